@@ -11,7 +11,11 @@
 
 #include "vectors.hpp"
 
+#if defined(CREEPKIT_SANITIZED)  // checks of every operation would make the inlined code too long to compile
+#define CREEPKIT_INLINE inline
+#else
 #define CREEPKIT_INLINE inline __attribute__((always_inline))
+#endif
 
 namespace creepkit {
 
