@@ -38,6 +38,7 @@ DATA = "measured data in ../shared/data"
 BENCHMARKS = {
     "import_time": Benchmark(0.1),
     "core_speed": Benchmark(2),
+    "core_random_cases": Benchmark(4),
     "kernel_speed": Benchmark(1, ((), ("1000",)), "numba, for the hand-written code beside ours"),
     "kernel_start": Benchmark(1),
     "uniaxial_speed": Benchmark(1),

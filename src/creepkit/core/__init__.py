@@ -83,7 +83,10 @@ def function(name: str, result: Any = ctypes.c_int64) -> Callable[..., Any]:
 
 
 class Address(ctypes.c_void_p):
-    """Address of an array, which lives as long as this does."""
+    """Address of an array, which lives as long as this does.
+
+    array : (...,).
+    """
 
     array: np.ndarray
 

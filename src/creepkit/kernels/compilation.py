@@ -148,9 +148,7 @@ def _checksums(folder: Path) -> str:
 
 _MODULE_HEADER = """# Kernel of a creep law; generated, do not edit.
 {terms}
-
-from creepkit.kernels.llvm_functions import {functions}
-
+{imports}
 VARIABLES, PARAMETERS, RATES = {sizes}
 COEFFICIENTS = {coefficients}
 
@@ -164,9 +162,10 @@ def module_source(lowered: SymbolicKernel) -> str:
     """The generated module of a law: its entries as functions of a point's variables and theta."""
     functions = "\n\n".join(getattr(lowered, entry).source for entry in ENTRIES)
     parameters = len(lowered.names.theta)
+    called = _called_functions(functions)
     header = _MODULE_HEADER.format(
         terms="\n".join(law_comments(lowered.law)),
-        functions=", ".join(_called_functions(functions)),
+        imports=f"\nfrom creepkit.kernels.llvm_functions import {', '.join(called)}\n" if called else "",
         sizes=f"{len(lowered.names.inputs) - parameters}, {parameters}, {1 + len(lowered.law.states)}",
         coefficients=repr(lowered.form.coefficients),
     )

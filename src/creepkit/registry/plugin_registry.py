@@ -8,9 +8,10 @@ only `load_file`, which was asked for that very plugin, raises.
 from __future__ import annotations
 
 import re
+import threading
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -89,6 +90,8 @@ class Registry:
         self._manager.add_hookspecs(hookspecs)
         self._plugins: dict[Provenance, Plugin] = {}
         self._loaded = False
+        self._loading_begun = False
+        self._loading = threading.RLock()
 
     # ---- what there is ---------------------------------------------------------------------------------------------
 
@@ -180,10 +183,12 @@ class Registry:
         """Load one plugin file; PluginError, and nothing registered, when it cannot be used."""
         path = Path(path)
         provenance = plugin_sources.provenance_of_file(path)
-        known = self._plugins.get(provenance)
-        if known is None or known.problem:
-            self._plugins[provenance] = self._register_plugin(provenance, plugin_sources.import_file(provenance, path))
-        return self._plugins[provenance]
+        with self._loading:
+            known = self._plugins.get(provenance)
+            if known is None or known.problem:
+                module = plugin_sources.import_file(provenance, path)
+                self._plugins[provenance] = self._register_plugin(provenance, module)
+            return self._plugins[provenance]
 
     def add_commands(self, app: typer.Typer) -> None:
         """Let every plugin add its commands to the command line; one that raises is broken from then on."""
@@ -196,10 +201,19 @@ class Registry:
                 self._plugins[plugin.provenance] = replace(plugin, problem=str(error))
 
     def _load_all(self) -> None:
-        """Load what is installed and what the environment names, once."""
+        """Load what is installed and what the environment names, once.
+
+        Other threads wait until all is there; a plugin that asks for laws while it is loaded gets those so far.
+        """
         if self._loaded:
             return
-        self._loaded = True
+        with self._loading:
+            if not self._loading_begun:
+                self._loading_begun = True
+                self._load_sources()
+                self._loaded = True
+
+    def _load_sources(self) -> None:
         for provenance, entry in plugin_sources.installed_entry_points():
             self._add_plugin(provenance, partial(plugin_sources.import_entry, provenance, entry))
         for path in plugin_sources.plugin_files_in_environment():
@@ -241,10 +255,12 @@ class Registry:
             raise PluginError(f"{provenance} does not fit the hooks of creepkit: {description}") from error
 
 
-@cache
+_DEFAULT_REGISTRY = Registry()
+
+
 def default_registry() -> Registry:
-    """The registry of the public functions, made at its first use from what is installed and the environment names."""
-    return Registry()
+    """The registry of the public functions; it loads what is installed and the environment names when first asked."""
+    return _DEFAULT_REGISTRY
 
 
 def _merged_contributions(

@@ -45,6 +45,13 @@ def test_norton_by_hand() -> None:
     np.testing.assert_allclose(sensitivity, [[1e-8, 4e-10, 0, 0, 0, 0, 0, 1e-8, 1e-8 * np.log(100)]], rtol=1e-13)
 
 
+def test_a_rate_that_is_a_number() -> None:
+    compiled = lower(NORTON.fix(n=0.0).fix(A=1e-6), "compiled")
+    rate, flags = call_entry(compiled, "rate", point(), np.zeros(0))
+    assert flags == 0
+    np.testing.assert_allclose(rate, [[1e-6]], rtol=1e-15)
+
+
 def test_damage_comes_after_the_rate_row_by_row() -> None:
     """Rate A s^n (1 + omega) and damage rate B s omega: values, then slopes to x of both, then to theta."""
     damaging = damage(A * stress**n * (1 + omega), B * stress * omega, {A: RATE, n: POWER, B: RATE})

@@ -2,15 +2,19 @@
 
 import os
 import sys
+import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from time import sleep
+from typing import Any
 
 import pytest
 import typer
 
 from creepkit.errors import ExportError, HistoryError, LawError, PluginError, SolveError
 from creepkit.language import CreepLaw, TemperatureFactor, arrhenius
-from creepkit.registry import Plugin, Registry
+from creepkit.registry import Plugin, Registry, plugin_sources
 
 LAW = """
 from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress
@@ -329,3 +333,23 @@ def test_a_plugin_whose_commands_fail_is_told_and_the_others_add_theirs(write: W
     problems = {p.provenance.name: p.problem for p in registry.plugins()}
     assert "creepkit_commands raised AttributeError" in problems["failing"]
     assert problems["working"] == ""
+
+
+def test_threads_that_ask_first_wait_until_all_plugins_are_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    waiting = threading.Barrier(4)
+    original = plugin_sources.import_entry
+
+    def slow_import(*arguments: Any) -> object:
+        sleep(0.02)
+        return original(*arguments)
+
+    def ask(registry: Registry) -> list[str]:
+        waiting.wait()
+        return sorted(registry.specimens())
+
+    monkeypatch.setattr(plugin_sources, "import_entry", slow_import)
+    registry = Registry()
+    with ThreadPoolExecutor(4) as threads:
+        answers = list(threads.map(ask, [registry] * 4))
+    assert answers[0]
+    assert answers == [answers[0]] * 4
