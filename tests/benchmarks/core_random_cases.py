@@ -2,13 +2,13 @@
 
     python tests/benchmarks/core_random_cases.py [--cases 100000] [--laws 100] [--seed 1] [--write]
 
-A law is a sum of one to three products of factors drawn from those of the literature and awkward ones (powers, sinh, exp,
-log, thresholds, damage, oscillation), with none to two internal states; parameters are drawn in and beyond their bounds.
-A load is a program of one to six segments of stress, temperature and, in a dimple, pressure and modulus, up to values no
-test has, with jumps. A tenth of the cases are dimples on a coarse mesh, the others bars under stress, constant load or
-relaxation; a third is differentiated. A process runs the cases of one law. "Lost" counts laws whose process ended before
-its cases; "untrue" counts results that contradict their status: a complete test with a value that is not finite, or a
-result that changes when it is calculated alone instead of among others.
+A law is a sum of one to three products of factors of the literature and awkward ones (powers, sinh, exp, log,
+thresholds, damage, oscillation), with none to two internal states; parameters are drawn in and beyond their bounds. A
+load is a program of one to six points of stress or, in a dimple, of pressure and modulus, and of temperature, with
+jumps and with values that no test has. A tenth of the cases are dimples on a coarse mesh, the others bars under
+stress, constant load or relaxation; a third is differentiated. A process runs the cases of one law. "Lost" counts
+laws whose process ended before its cases; "untrue" counts results that contradict their status: a complete test with
+a value that is not finite, or a result that changes when it is calculated alone instead of among others.
 """
 
 import collections
@@ -45,9 +45,10 @@ PARAMS = {
     s: Param("threshold", unit="MPa", bounds=(0, 300)),
 }
 FACTORS = (
-    stress**n, sympy.sinh(stress / B) ** n, clock**m, strain**m, sympy.exp(-30e3 / temperature), sympy.Max(stress - s, 0) ** n,
-    sympy.exp(k * strain), 1 + strain / (strain + sympy.Rational(1, 100)), sympy.log(1 + stress / B), sympy.Abs(k) * stress,
-    2 + sympy.cos(clock / 100), sympy.exp(stress / B), sympy.sqrt(stress + s), 1 / (1 + clock),
+    stress**n, sympy.sinh(stress / B) ** n, clock**m, strain**m, sympy.exp(-30e3 / temperature),
+    sympy.Max(stress - s, 0) ** n, sympy.exp(k * strain), 1 + strain / (strain + sympy.Rational(1, 100)),
+    sympy.log(1 + stress / B), sympy.Abs(k) * stress, 2 + sympy.cos(clock / 100), sympy.exp(stress / B),
+    sympy.sqrt(stress + s), 1 / (1 + clock),
 )  # fmt: skip
 STATE_FACTORS = ((1 - W[0]) ** (-n), sympy.exp(-W[1]), 1 + W[0], sympy.Max(1 - W[1], 0) ** m, 1 / (1 + W[1] ** 2))
 STATE_RATES = (A * stress**n / (1 - W[0]) ** n, A * stress * (1 - W[1]), -k * W[1] / 100, A * sympy.exp(W[0]), k / 1000)
