@@ -42,6 +42,10 @@ class FitWarning(UserWarning):
     """An identification answers beyond what its tests cover; `warnings.simplefilter` turns it off, or into an error."""
 
 
+class CacheWarning(UserWarning):
+    """Compiled laws are not kept on disk, for others could change what is executed."""
+
+
 class ExportError(CreepkitError):
     """A law cannot be written in the language that was asked for."""
 

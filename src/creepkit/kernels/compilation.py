@@ -2,20 +2,22 @@
 
 Each generated module has a folder of its own, named after the hash of all that it was made from, with the source, the
 machine code and the SHA-256 of both. A folder is built under a temporary name and renamed into place whole; one whose
-checksums do not match is built anew. Machine code from the cache is executed: keep the folder writable for yourself
-alone, as it is by default.
+checksums do not match is built anew. What is checked is what is executed. Machine code from the cache is executed, so
+a folder that another user owns or can write to is not used; without a folder, modules run from memory.
 """
 
 from __future__ import annotations
 
-import atexit
 import hashlib
 import os
 import re
 import shutil
+import stat
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache, lru_cache, partial
 from pathlib import Path
 from types import ModuleType
@@ -24,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats, frozen
+from creepkit.errors import CacheWarning
 from creepkit.kernels.interface import CompiledLaw, Entry
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, expression_source, law_comments
 from creepkit.kernels.llvm_code import Module, add_entry
@@ -46,10 +49,18 @@ _loaded_modules: dict[str, ModuleType] = {}
 def load_module(key: str, source: Callable[[], str]) -> ModuleType:
     """Return the module of `key`: from memory, from disk, or made from source() now."""
     if key not in _loaded_modules:
-        folder = _module_folder(f"law_{key}")
-        if not is_intact(folder):
-            _build_module(folder, source())
-        _loaded_modules[key] = _execute_module(key, folder)
+        folder = cache_folder() / f"law_{key}"
+        files, shared = None, False
+        try:
+            files = _stored_files(folder)
+        except _SharedError as error:
+            shared = True
+            _warn(str(error))
+        if files is None:
+            files = _made_files(source())
+            if not shared:
+                _store(folder, files)
+        _loaded_modules[key] = _execute_module(key, folder, files)
     return _loaded_modules[key]
 
 
@@ -61,63 +72,103 @@ def cache_folder() -> Path:
 
 
 def is_intact(folder: Path) -> bool:
-    """Whether a folder holds the files its seal names, unchanged, and no others."""
+    """Whether a folder holds source, code and their seal, unchanged, nothing else, and nobody else can write to it."""
     try:
-        return (folder / CHECKSUM_FILE).read_text(encoding="utf-8") == _checksums(folder)
-    except (OSError, UnicodeDecodeError):
+        return _stored_files(folder) is not None
+    except _SharedError:
         return False
 
 
-# ---- folders -------------------------------------------------------------------------------------------------------
+# ---- reading -------------------------------------------------------------------------------------------------------
 
 
-def _module_folder(name: str) -> Path:
-    """Where a module is or belongs: in the cache folder, or in a private one when that cannot be written."""
-    folder = cache_folder()
-    return (folder if is_intact(folder / name) or _writable(folder) else _private_folder()) / name
+class _SharedError(Exception):
+    """Others may have written what would be executed."""
 
 
-def _writable(folder: Path) -> bool:
+def _stored_files(folder: Path) -> dict[str, bytes] | None:
+    """Source and code of an intact folder, {name: content}, else None; _SharedError where others can write."""
+    names = (SOURCE_FILE, CODE_FILE, CHECKSUM_FILE)
     try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
+        _check_owner(folder.parent, os.stat(folder.parent))
+        status = os.lstat(folder)
+        if not stat.S_ISDIR(status.st_mode):
+            return None
+        _check_owner(folder, status)
+        if {*os.listdir(folder)} != {*names}:
+            return None
+        contents = {name: _content(folder / name) for name in names}
     except OSError:
-        return False
-    return True
+        return None
+    seal = contents.pop(CHECKSUM_FILE)
+    return contents if seal == _seal(contents) else None
+
+
+_NEITHER_LINK_NOR_WAIT = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+
+
+def _content(path: Path) -> bytes:
+    """The content of a regular file; OSError for links, pipes and devices, which are not waited for."""
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | _NEITHER_LINK_NOR_WAIT)) as stream:
+        status = os.fstat(stream.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(f"{path} is not a regular file")
+        _check_owner(path, status)
+        return stream.read()
+
+
+def _check_owner(path: Path, status: os.stat_result) -> None:
+    """Raise _SharedError unless a file or folder is this user's and nobody else can write to it."""
+    if not hasattr(os, "geteuid"):  # the mode says nothing of others there
+        return
+    if status.st_uid != os.geteuid():
+        problem = "belongs to another user"
+    elif status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        problem = "can be written by other users"
+    else:
+        return
+    raise _SharedError(
+        f"{path} {problem}, so that compiled laws are neither read from there nor kept there, and every process "
+        f"compiles them anew; delete it, or set CREEPKIT_CACHE to a folder of your own"
+    )
 
 
 @cache
-def _private_folder() -> Path:
-    """A folder of this process, removed when it ends."""
-    private = tempfile.mkdtemp(prefix="creepkit-")
-    atexit.register(shutil.rmtree, private, ignore_errors=True)
-    return Path(private)
+def _warn(sentence: str) -> None:
+    """Warn once."""
+    warnings.warn(sentence, CacheWarning, stacklevel=3)
 
 
 # ---- making and loading --------------------------------------------------------------------------------------------
 
 
-def _build_module(folder: Path, source: str) -> None:
-    """Write, compile and seal a module in a temporary folder, then put the folder into its place."""
-    temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f"new_{folder.name}_"))
-    try:
-        (temporary / SOURCE_FILE).write_text(source, encoding="utf-8", newline="\n")
-        (temporary / CODE_FILE).write_bytes(object_code(assembly(source)))
-        (temporary / CHECKSUM_FILE).write_text(_checksums(temporary), encoding="utf-8", newline="\n")
-        _install_folder(temporary, folder)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+def _made_files(source: str) -> dict[str, bytes]:
+    """Source and machine code of a module, {name: content}."""
+    return {SOURCE_FILE: source.encode(), CODE_FILE: object_code(assembly(source))}
+
+
+def _store(folder: Path, files: dict[str, bytes]) -> None:
+    """Write and seal a module in a temporary folder, then put the folder into its place.
+
+    Where that is impossible (no permission, a full disk) the module runs from memory, and the next process makes it.
+    """
+    with suppress(OSError):
+        folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f"new_{folder.name}_"))
+        try:
+            for name, content in {**files, CHECKSUM_FILE: _seal(files)}.items():
+                (temporary / name).touch(mode=0o600)
+                (temporary / name).write_bytes(content)
+            _install_folder(temporary, folder)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _install_folder(temporary: Path, folder: Path) -> None:
     """Rename the new folder into place; an intact one that is there already stays, a damaged one goes."""
-    if folder.exists() and not is_intact(folder):
+    if os.path.lexists(folder) and not is_intact(folder):
         _remove_folder(folder)
-    try:
-        os.rename(temporary, folder)
-    except OSError:
-        if not folder.exists():
-            raise
+    os.rename(temporary, folder)  # fails where another process has just done it
 
 
 def _remove_folder(folder: Path) -> None:
@@ -131,19 +182,18 @@ def _remove_folder(folder: Path) -> None:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _execute_module(key: str, folder: Path) -> ModuleType:
+def _execute_module(key: str, folder: Path, files: dict[str, bytes]) -> ModuleType:
     """Run the source of a module and load its machine code, the entries of which become COMPILED."""
-    source, code = (folder / SOURCE_FILE).read_text(encoding="utf-8"), LoadedCode((folder / CODE_FILE).read_bytes())
+    source, code = files[SOURCE_FILE].decode(), LoadedCode(files[CODE_FILE])
     module = ModuleType(f"creepkit_kernel_{key}")
     exec(compile(source, str(folder / SOURCE_FILE), "exec"), module.__dict__)
     module.__dict__.update(SOURCE=source, COMPILED={entry: Entry(code.address(entry), code) for entry in ENTRIES})
     return module
 
 
-def _checksums(folder: Path) -> str:
-    """One line a file: its SHA-256 and its path."""
-    files = sorted(p for p in folder.rglob("*") if p.is_file() and p != folder / CHECKSUM_FILE)
-    return "".join(f"{hashlib.sha256(p.read_bytes()).hexdigest()}  {p.relative_to(folder).as_posix()}\n" for p in files)
+def _seal(files: dict[str, bytes]) -> bytes:
+    """One line a file: its SHA-256 and its name."""
+    return "".join(f"{hashlib.sha256(files[name]).hexdigest()}  {name}\n" for name in sorted(files)).encode()
 
 
 _MODULE_HEADER = """# Kernel of a creep law; generated, do not edit.

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import qmc
 from sympy import exp
 
@@ -200,25 +202,36 @@ def _keep(basis: ReducedBasis, path: Path) -> None:
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         arrays = {"modes": basis.modes, "points": basis.points, "factors": basis.factors}
-        write_safetensors(path, arrays, {}, _FORMAT)
+        write_safetensors(path, arrays, {"sha256": _checksum(arrays)}, _FORMAT)
     except (OSError, CreepkitError):
         return
 
 
 def _read(path: Path, model: FiniteElementModel) -> ReducedBasis | None:
-    """The basis of a file; None where there is none for this mesh."""
-    if not path.is_file():
-        return None
+    """The basis of a file; None where there is none for this mesh, or not as it was written."""
     try:
-        arrays, _ = read_safetensors(path, _FORMAT)
+        arrays, header = read_safetensors(path, _FORMAT)
         modes, points, factors = (arrays[name] for name in ("modes", "points", "factors"))
     except (OSError, CreepkitError, KeyError):
         return None
-    fits = modes.ndim == 3 and modes.shape[1:] == model.nodes.shape and points.shape == factors.shape == (points.size,)
-    sound = fits and points.size > 0 and bool(_finite(modes) and _finite(factors))
-    if not (sound and 0 <= points.min() <= points.max() < model.weights.size):
+    if header.get("sha256") != _checksum(arrays):
+        return None
+    fits = modes.ndim == 3 and len(modes) > 0 and modes.shape[1:] == model.nodes.shape
+    paired = points.dtype == np.int64 and points.shape == factors.shape == (points.size,) and points.size > 0
+    if not (fits and paired and _finite(modes) and _finite(factors) and factors.min() > 0.0):
+        return None
+    if not (0 <= points.min() <= points.max() < model.weights.size and np.unique(points).size == points.size):
         return None
     return ReducedBasis(modes, points, factors)
+
+
+def _checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """SHA-256 of arrays (...,) by name: of names, types, shapes and bytes."""
+    digest = hashlib.sha256()
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype} {array.shape}\n".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
 
 
 def _finite(values: Floats) -> bool:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
+from functools import cache
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +21,7 @@ from creepkit.fem.solver import SolverSettings, StageConditions, assemble
 from creepkit.language import CreepLaw, mean_stress, parameters, stress
 from creepkit.laws.norton import NORTON
 from creepkit.records import Program, Status
+from creepkit.specimens import reduced_order_training
 from creepkit.specimens.reduced_order_training import power_law_runs, trained_basis
 from helpers.fem_cases import FREE, STILL, block, course, left_of, lowered, mesh_of
 from helpers.literature_laws import RATE, damage, number, omega
@@ -203,6 +207,62 @@ def test_a_trained_model_is_near_its_finite_elements(tmp_path, monkeypatch) -> N
     times = np.linspace(10.0, 9e3, 40)
     exact, found = (run.at(run.displacements, times) for run in runs)
     assert np.abs(found - exact).max() < 5e-3 * np.abs(exact).max()
+
+
+def test_a_kept_basis_that_is_not_sound_is_absent(tmp_path) -> None:
+    """What a file must hold, whoever wrote it: modes of the mesh, points of it, once each, and positive factors."""
+    path, sound = tmp_path / "basis.safetensors", few()
+    for change in (
+        {"modes": sound.modes[:0]},
+        {"modes": sound.modes[:, :-1]},
+        {"modes": np.where(sound.modes == sound.modes.max(), np.nan, sound.modes)},
+        {"points": np.where(sound.points == sound.points[0], sound.points[1], sound.points)},
+        {"points": sound.points + TUBE.weights.size},
+        {"points": sound.points - TUBE.weights.size},
+        {"points": sound.points.astype(float)},
+        {"factors": -sound.factors},
+        {"factors": 0.0 * sound.factors},
+        {"factors": np.inf * sound.factors},
+        {"factors": sound.factors[:-1]},
+    ):
+        changed = SimpleNamespace(modes=sound.modes, points=sound.points, factors=sound.factors)
+        vars(changed).update(change)
+        reduced_order_training._keep(changed, path)
+        assert path.is_file()
+        assert reduced_order_training._read(path, TUBE) is None, change
+    reduced_order_training._keep(sound, path)
+    np.testing.assert_array_equal(reduced_order_training._read(path, TUBE).modes, sound.modes)
+
+
+def test_a_kept_basis_that_was_changed_is_trained_and_written_anew(tmp_path, monkeypatch) -> None:
+    """A changed byte of a mode leaves a readable file of finite numbers; its checksum tells."""
+    monkeypatch.setenv("CREEPKIT_CACHE", str(tmp_path))
+    monkeypatch.setattr(reduced_order_training, "snapshots", lambda *_: None)
+    monkeypatch.setattr(reduced_order_training, "power_law_runs", lambda *_: [])
+    trained = []
+    monkeypatch.setattr(reduced_order_training, "train", lambda *_: trained.append(few()) or trained[-1])
+
+    def trainings() -> int:
+        reduced_order_training._in_memory().clear()
+        trained_basis([TUBE], SolverSettings(), modes=4, points=8)
+        return len(trained)
+
+    monkeypatch.setattr(reduced_order_training, "_in_memory", cache(dict))
+    assert [trainings(), trainings()] == [1, 1]
+    (path,) = tmp_path.glob("reduced_bases/*.safetensors")
+    content, modes = path.read_bytes(), trained[0].modes.tobytes()
+    assert modes in content
+    path.write_bytes(content.replace(modes, modes[:-8] + np.float64(0.5).tobytes()))
+    assert [trainings(), trainings()] == [2, 2]
+
+
+def test_no_permission_to_look_means_no_basis(tmp_path, monkeypatch) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(os, "open", refuse)
+    monkeypatch.setattr(os, "stat", refuse)
+    assert reduced_order_training._read(tmp_path / "basis.safetensors", TUBE) is None
 
 
 def test_what_it_cannot_do_is_refused() -> None:

@@ -1,12 +1,15 @@
 """Kernels on disk: found again, safe from each other, from damage and from folders that cannot be written."""
 
+import errno
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from creepkit.errors import CacheWarning
 from creepkit.kernels import compilation, lower
 from creepkit.kernels.compilation import CHECKSUM_FILE, CODE_FILE, SOURCE_FILE, is_intact
 from creepkit.language import CreepLaw, stress
@@ -104,14 +107,24 @@ def test_processes_may_build_the_same_law_at_once(cache: Path) -> None:
         (CODE_FILE, "changed", 11),
         (CODE_FILE, "removed", 13),
         (CHECKSUM_FILE, "removed", 17),
+        (CHECKSUM_FILE, "emptied", 41),
+        (CHECKSUM_FILE, "truncated", 43),
+        (CHECKSUM_FILE, "pipe", 47),
+        (CODE_FILE, "pipe", 53),
+        (CODE_FILE, "link", 59),
     ],
 )
 def test_what_is_damaged_is_made_anew(cache: Path, made: list[str], name: str, damage: str, factor: int) -> None:
+    """A pipe that nobody writes to is not waited for."""
     lower(some_law(factor), "compiled")
     victim = folder_of(cache) / name
     content = victim.read_bytes()
-    if damage == "removed":
+    if damage in ("removed", "pipe"):
         victim.unlink()
+        if damage == "pipe":
+            os.mkfifo(victim)
+    elif damage == "link":
+        victim.symlink_to(victim.rename(cache / name))
     else:
         changed = content[: len(content) // 2] + b"#" + content[len(content) // 2 + 1 :]
         victim.write_bytes({"truncated": content[:-20], "emptied": b"", "changed": changed}[damage])
@@ -154,7 +167,11 @@ def test_a_folder_that_is_read_only_still_serves_what_it_holds(
 ) -> None:
     lower(some_law(29), "compiled")
     before = folder_of(cache)
-    monkeypatch.setattr(compilation, "_writable", lambda folder: False)
+
+    def refuse(**options: object) -> str:
+        raise PermissionError
+
+    monkeypatch.setattr(compilation.tempfile, "mkdtemp", refuse)
     compilation._loaded_modules.clear()
 
     lower(some_law(29), "compiled")
@@ -165,18 +182,100 @@ def test_a_folder_that_is_read_only_still_serves_what_it_holds(
     assert folder_of(cache) == before
 
 
+@pytest.mark.parametrize("target", ["nowhere", "itself"])
+def test_a_link_to_nowhere_is_replaced(cache: Path, made: list[str], target: str) -> None:
+    lower(some_law(61), "compiled")
+    folder = folder_of(cache)
+    shutil.rmtree(folder)
+    folder.symlink_to(folder if target == "itself" else cache / target)
+    compilation._loaded_modules.clear()
+
+    lower(some_law(61), "compiled")
+
+    assert len(made) == 2
+    assert not folder.is_symlink()
+    assert is_intact(folder)
+
+
+@pytest.mark.parametrize("failing", ["write", "replace"])
+def test_what_cannot_be_kept_runs_from_memory(cache: Path, monkeypatch: pytest.MonkeyPatch, failing: str) -> None:
+    """A full disk, or a damaged folder that cannot be moved away."""
+
+    def refuse(*arguments: object) -> None:
+        raise OSError(errno.ENOSPC if failing == "write" else errno.EACCES, "refused")
+
+    lower(some_law(67), "compiled")
+    damaged = folder_of(cache) / CODE_FILE
+    damaged.write_bytes(b"")
+    compilation._loaded_modules.clear()
+    monkeypatch.setattr(*((Path, "write_bytes") if failing == "write" else (os, "replace")), refuse)
+
+    assert lower(some_law(67), "compiled").source
+    assert damaged.read_bytes() == b""
+    assert list((cache / "kernels").iterdir()) == [damaged.parent]
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes of files say nothing of others here")
+@pytest.mark.parametrize("shared", ["kernels", "folder", CODE_FILE, SOURCE_FILE, CHECKSUM_FILE])
+def test_what_others_can_write_is_not_run(cache: Path, made: list[str], shared: str) -> None:
+    """One warning; nothing is read, and nothing changed."""
+    lower(some_law(71), "compiled")
+    folder = folder_of(cache)
+    path = {"kernels": folder.parent, "folder": folder}.get(shared, folder / shared)
+    path.chmod(path.stat().st_mode | 0o020)
+    compilation._loaded_modules.clear()
+
+    with pytest.warns(CacheWarning, match="can be written by other users.*set CREEPKIT_CACHE") as warned:
+        lower(some_law(71), "compiled")
+
+    assert len(warned) == 1
+    assert str(warned[0].message).startswith(f"{path} ")
+    assert len(made) == 2
+    assert path.stat().st_mode & 0o020
+    compilation._loaded_modules.clear()
+    lower(some_law(71), "compiled")  # without a second warning, which would be an error here
+    path.chmod(path.stat().st_mode & ~0o020)
+    assert is_intact(folder)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no such owner here")
+def test_what_belongs_to_others_is_not_run(cache: Path, made: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    lower(some_law(73), "compiled")
+    compilation._loaded_modules.clear()
+    own = os.geteuid()
+    monkeypatch.setattr(os, "geteuid", lambda: own + 1)
+
+    with pytest.warns(CacheWarning, match="kernels belongs to another user"):
+        lower(some_law(73), "compiled")
+
+    assert len(made) == 2
+
+
+def test_the_folder_above_may_be_shared(cache: Path) -> None:
+    cache.mkdir()
+    cache.chmod(0o1777)
+
+    lower(some_law(79), "compiled")
+
+    assert is_intact(folder_of(cache))
+
+
 def test_a_failure_leaves_nothing_half_made(cache: Path) -> None:
     with pytest.raises(SyntaxError):
         compilation.load_module("broken", lambda: "def rate(:")
 
-    assert list((cache / "kernels").iterdir()) == []
+    assert list(cache.glob("kernels/*")) == []
 
 
 def test_the_folder_is_for_its_owner_alone(cache: Path) -> None:
-    lower(some_law(37), "compiled")
+    before = os.umask(0o002)
+    try:
+        lower(some_law(37), "compiled")
+    finally:
+        os.umask(before)
 
-    for folder in (cache / "kernels", folder_of(cache)):
-        assert folder.stat().st_mode & 0o022 == 0
+    for path in (cache / "kernels", folder_of(cache), *folder_of(cache).iterdir()):
+        assert path.stat().st_mode & 0o022 == 0
 
 
 def test_the_cache_has_a_home_without_the_variable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
