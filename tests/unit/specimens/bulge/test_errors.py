@@ -144,6 +144,12 @@ def test_a_modulus_that_falls_to_nothing_on_the_way_is_refused() -> None:
         ({"deflection_limit": 0.0}, "bulge specimen: deflection_limit is 0; allowed are 0.001 to 1000"),
         ({"threads": 0}, "bulge specimen: threads is 0; allowed are whole numbers above zero, or None for all cores"),
         (
+            {"threads": np.inf},
+            "bulge specimen: threads is inf; allowed are whole numbers above zero, or None for all cores",
+        ),
+        ({"max_steps": 100.5}, "bulge specimen: max_steps is 100.5; allowed are whole numbers, 10 to 100000"),
+        ({"tolerance": "a"}, "bulge specimen: tolerance is 'a'; allowed are finite numbers, 1e-06 to 0.1"),
+        (
             {"thickness": 0.5},
             "a bulge specimen has no field 'thickness'; did you mean 'apex_thickness'? (known: apex_thickness, "
             "cavity_radius, clamped, deflection_limit, geometry, max_steps, mesh, observation, outer_radius, "
