@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from numbers import Real
+from typing import Any
 
 from creepkit.errors import SolveError
 
 
-def is_finite_number(value: object) -> bool:
+def is_finite_number(value: Any) -> bool:
     """Whether a setting is one finite number, which True and False are not."""
-    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    return not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
 
 
-def is_whole_number(value: object) -> bool:
+def is_whole_number(value: Any) -> bool:
     """Whether a setting is a finite number without a fraction: 1000 is, and so is 1e3."""
-    return isinstance(value, Real) and is_finite_number(value) and value == int(value)
+    return is_finite_number(value) and bool(value == int(value))
 
 
 def check_number(specimen: str, name: str, value: object, allowed: str) -> None:
