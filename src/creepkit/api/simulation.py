@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.errors import DatasetError, SolveError, SurrogateError
 from creepkit.language import symbols
-from creepkit.records import History, Loading, Predictor, Program, Specimen, Status
+from creepkit.records import History, Loading, Predictor, Program, Specimen, Status, checked_prediction
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictor
 from creepkit.specimens.run import Run, Runnable, run_from_outputs
 
@@ -69,7 +69,8 @@ def simulate(
     values = law.values(values)
     if isinstance(using, Runnable):
         return using.run(law, values, planned_test)
-    prediction = using.predict(law, law.to_internal(values), [planned_test])
+    theta = law.to_internal(values)
+    prediction = checked_prediction(using.predict(law, theta, [planned_test]), using, [planned_test], *theta.shape)
     status, end = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
     return run_from_outputs(Run, planned_test, prediction.outputs, prediction.of(0), status, end, prediction.reason)
 

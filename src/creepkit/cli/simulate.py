@@ -30,6 +30,10 @@ DEFAULT_FRAMES, DEFAULT_INTERVAL = 200, 150.0
 """Frames of a bar; s between those of a dimple, as its cameras take them."""
 
 
+MOST_FRAMES = 1_000_000
+"""Of one simulated test, as its history and its file are to fit into memory."""
+
+
 def command(
     law: Annotated[str, typer.Argument(metavar="LAW", help="Name of a law.")],
     value: Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="A parameter's value.")],
@@ -150,10 +154,14 @@ def _frame_times(end: float, points: int | None, every: float | None, specimen: 
         raise SolveError("--points and --every both say when frames are taken; give one of them")
     if points is None and every is None and specimen == BULGE:
         every = DEFAULT_INTERVAL
+    if points is not None and points > MOST_FRAMES:
+        raise SolveError(f"--points {points} are too many frames; allowed are 2 to {MOST_FRAMES}")
     if every is None:
         return np.linspace(0.0, end, points or DEFAULT_FRAMES)
-    if not end / 1e6 <= every <= end:
-        raise SolveError(f"--every {every:g} s is not a step of a test of {end:g} s (allowed are 1 to 1000000 frames)")
+    if not end / MOST_FRAMES <= every <= end:
+        raise SolveError(
+            f"--every {every:g} s is not a step of a test of {end:g} s (allowed are 1 to {MOST_FRAMES} frames)"
+        )
     frame_times = np.arange(0.0, end * (1 - 1e-9), every)
     return np.append(frame_times, end)
 

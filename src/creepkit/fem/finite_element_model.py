@@ -12,7 +12,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.core import CoreStructure, address
 from creepkit.errors import SolveError
-from creepkit.fem.mesh import Mesh, discretize
+from creepkit.fem.mesh import SIDES, Mesh, discretize
 from creepkit.fem.solvable_model import SensitivityDirections
 
 TILE = 8
@@ -98,8 +98,11 @@ class FiniteElementModel:
 
 
 def finite_element_model(mesh: Mesh) -> FiniteElementModel:
-    """Prepare a mesh; refuse one that nothing holds or that is inverted."""
+    """Prepare a mesh; refuse one that is empty or inverted, that nothing holds or that is pressed from within."""
+    if not mesh.elements.size:
+        raise SolveError("the mesh has no elements; give the eight nodes of each")
     at = discretize(mesh)
+    _refuse_wrong_sides(mesh)
     free = ~mesh.held.ravel()
     if free.all() or not mesh.held[:, 1].any():
         raise SolveError("nothing holds the mesh along its axis; hold u_z somewhere")
@@ -118,6 +121,23 @@ def finite_element_model(mesh: Mesh) -> FiniteElementModel:
         pressed=mesh.pressed,
         top=mesh.top,
     )
+
+
+def _refuse_wrong_sides(mesh: Mesh) -> None:
+    """Refuse a pressed side that is no side of the outline, or runs the wrong way: its pressure would be suction."""
+    sides = {tuple(side) for side in mesh.elements[:, SIDES].reshape(-1, 3).tolist()}
+    for first, middle, last in mesh.pressed.tolist():
+        forward, backward = (first, middle, last) in sides, (last, middle, first) in sides
+        if forward and not backward:
+            continue
+        which = f"the pressed side of nodes {first}, {middle} and {last}"
+        if backward and not forward:
+            raise SolveError(
+                f"{which} runs against the order of its element, so that pressure would pull at it; give its nodes in "
+                f"the order {last}, {middle}, {first}"
+            )
+        where = "lies between two elements" if forward else "is no side of an element"
+        raise SolveError(f"{which} {where}; name the first, middle and last node of sides of the outline")
 
 
 class _ModelStructure(CoreStructure):

@@ -40,20 +40,29 @@ class Mesh:
     def __post_init__(self) -> None:
         freeze = object.__setattr__
         freeze(self, "nodes", frozen(self.nodes))
+        if self.nodes.ndim != 2 or self.nodes.shape[1] != 2 or not np.isfinite(self.nodes).all():
+            raise SolveError("a mesh needs nodes of two finite coordinates, r and z in mm")
         freeze(self, "elements", frozen(self.elements, dtype=np.int64))
         held = np.array(self.held, bool)
+        if held.shape != self.nodes.shape:
+            raise SolveError(
+                f"held of the mesh has the shape {held.shape}; give u_r and u_z of each of its {len(self.nodes)} nodes"
+            )
         held[self.nodes[:, 0] <= 0.0, 0] = True
         freeze(self, "held", frozen(held, dtype=np.bool_))
         freeze(self, "pressed", frozen(np.reshape(self.pressed, (-1, 3)), dtype=np.int64))
         freeze(self, "top", frozen(self.top, dtype=np.int64))
-        if self.nodes.ndim != 2 or self.nodes.shape[1] != 2 or not np.isfinite(self.nodes).all():
-            raise SolveError("a mesh needs nodes of two finite coordinates, r and z in mm")
         if (self.nodes[:, 0] < 0).any():
             k = int(np.argmin(self.nodes[:, 0]))
             raise SolveError(f"node {k} of the mesh has a radius of {self.nodes[k, 0]:g} mm; it must not be negative")
+        if self.elements.size and (self.elements.ndim != 2 or self.elements.shape[1] != 8):
+            raise SolveError(
+                f"the elements of the mesh have the shape {self.elements.shape}; give each a row of its eight nodes"
+            )
         for name, array in (("elements", self.elements), ("pressed", self.pressed), ("top", self.top)):
             if array.size and not 0 <= array.min() <= array.max() < len(self.nodes):
-                raise SolveError(f"the mesh has {len(self.nodes)} nodes, but its {name} name node {array.max()}")
+                missing = array.min() if array.min() < 0 else array.max()
+                raise SolveError(f"the mesh has {len(self.nodes)} nodes, but its {name} name node {missing}")
 
     def moved(self, nodes: Floats) -> Mesh:
         """The same mesh with its nodes elsewhere."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -93,11 +94,11 @@ def solve(
     segments = _contiguous(program.segments)
     rows, points = settings.max_steps + len(segments) + 2, model.point_count
     initial, limits, script = (_contiguous(a) for a in (law.initial, law.limits, program.script))
-    times, positions, counts = np.zeros(rows), np.zeros((rows, 2)), np.zeros(4, np.int64)
+    times, positions, counts = _empty_record(rows), _empty_record(rows, 2), np.zeros(4, np.int64)
     numbers = np.zeros(rows, np.int64)
-    displacements = np.zeros((rows, model.displacement_count))
-    values = np.zeros((rows, points, 4 + law.states)) if keep_points else None
-    mises = np.zeros((rows, points))
+    displacements = _empty_record(rows, model.displacement_count)
+    values = _empty_record(rows, points, 4 + law.states) if keep_points else None
+    mises = _empty_record(rows, points)
     pattern = _contiguous(program.pattern)
     record = _Record(
         rows, address(times), address(numbers), address(displacements), _optional(values), address(mises),
@@ -114,8 +115,8 @@ def solve(
     if directions is not None:
         kept = tuple(map(_contiguous, (directions.segments, *model.core_directions(directions))))
         columns = theta.size + len(directions.segments) + len(directions.velocities)
-        surface = np.zeros((rows, model.observed_count, columns))
-        moments = np.zeros((rows, len(directions.segments)))
+        surface = _empty_record(rows, model.observed_count, columns)
+        moments = _empty_record(rows, len(directions.segments))
         along = _Directions(len(directions.segments), len(directions.velocities), *map(address, kept))
         derivatives = _Derivatives(address(surface), address(moments))
     ended = _Termination()
@@ -198,6 +199,18 @@ def _entry_addresses(law: CompiledLaw) -> tuple[int, int]:
                 f"a compiled law has {entry!r} for an entry, which is no compiled function of this package"
             )
     return law.update.address, law.sensitivity.address
+
+
+def _empty_record(rows: int, *shape: int) -> Floats:
+    """Zeros (rows, ...) for the core to write; SolveError, with the memory needed, where there is not enough."""
+    try:
+        return np.zeros((rows, *shape))
+    except MemoryError:
+        size = 8 * rows * math.prod(shape) / 2**30
+        raise SolveError(
+            f"a record of up to {rows} steps needs {size:.3g} GiB in one piece, which is more memory than there is; "
+            "lower max_steps, or the refinement of the mesh"
+        ) from None
 
 
 def _contiguous(values: Floats) -> Floats:

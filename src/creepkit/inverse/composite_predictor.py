@@ -25,6 +25,7 @@ from creepkit.records import (
     SupportsRupturePrediction,
     SupportsSearchTolerance,
     TimesToStrain,
+    checked_prediction,
     kind_and_start,
 )
 
@@ -290,9 +291,9 @@ def predict_to_rupture(
     for predictor, tests in groups:
         group_histories = [histories[k] for k in tests]
         if isinstance(predictor, SupportsRupturePrediction):
-            group_predictions.append(
-                (tests, predictor.predict_to_rupture(law, theta, group_histories, sensitivities=sensitivities))
-            )
+            prediction = predictor.predict_to_rupture(law, theta, group_histories, sensitivities=sensitivities)
+            checked_prediction(prediction, predictor, group_histories, *theta.shape)
+            group_predictions.append((tests, prediction))
         else:
             prediction = predict(predictor, law, theta, group_histories, sensitivities=sensitivities)
             group_predictions.append(

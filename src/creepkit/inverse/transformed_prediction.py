@@ -20,6 +20,7 @@ from creepkit.records import (
     Prediction,
     Predictor,
     broadcast_candidates,
+    checked_prediction,
     kind_and_start,
     with_program_nuisances,
 )
@@ -116,7 +117,8 @@ def plain_prediction(
     nuisances: NuisanceValues,
     sensitivities: bool,
 ) -> Prediction:
-    """The predictor's own prediction; theta : (candidates, parameters) internal values."""
-    if nuisances:
-        return predictor.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
-    return predictor.predict(law, theta, histories, sensitivities=sensitivities)
+    """The predictor's own prediction, checked; theta : (candidates, parameters) internal values."""
+    given = {"nuisances": nuisances} if nuisances else {}
+    prediction = predictor.predict(law, theta, histories, sensitivities=sensitivities, **given)
+    candidates = max(len(theta), *(len(values) for values in nuisances.values())) if nuisances else len(theta)
+    return checked_prediction(prediction, predictor, histories, candidates, theta.shape[1])

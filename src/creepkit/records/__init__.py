@@ -46,6 +46,7 @@ from creepkit.records.prediction_assembly import (
     check_nuisances,
     unpredicted,
 )
+from creepkit.records.prediction_checks import checked_prediction
 
 __all__ = [
     "EVERY_FRAME",
@@ -85,6 +86,7 @@ __all__ = [
     "assemble_prediction",
     "broadcast_candidates",
     "check_nuisances",
+    "checked_prediction",
     "constant_strain",
     "constant_stress",
     "drift_duration",

@@ -24,6 +24,7 @@ from creepkit.records import (
     check_nuisances,
 )
 from creepkit.specimens.run import Run, run_from_outputs
+from creepkit.specimens.settings_checks import check_number, check_whole_number
 
 if TYPE_CHECKING:
     from creepkit.integration import Integration, PointTest
@@ -61,13 +62,16 @@ class Bar:
     """Kinds of explicit nuisances that predict() understands."""
 
     def __post_init__(self) -> None:
+        check_number(self.name, "tolerance", self.tolerance, "1e-13 to 1e-2")
+        check_number(self.name, "strain_limit", self.strain_limit, "above 0, up to 10")
+        check_whole_number(self.name, "max_steps", self.max_steps, "10 to 10 000 000")
         if not 1e-13 <= self.tolerance <= 1e-2:
             raise SolveError(f"{self.name} specimen: tolerance is {self.tolerance:g}; allowed are 1e-13 to 1e-2")
         if not 0 < self.strain_limit <= 10:
             raise SolveError(
                 f"{self.name} specimen: strain_limit is {self.strain_limit:g}; allowed is above 0, up to 10"
             )
-        if self.max_steps != int(self.max_steps) or not 10 <= self.max_steps <= 10_000_000:
+        if not 10 <= self.max_steps <= 10_000_000:
             raise SolveError(f"{self.name} specimen: max_steps is {self.max_steps}; allowed are 10 to 10 000 000")
 
     def replace(self, **changes: float) -> Self:

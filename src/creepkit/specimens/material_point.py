@@ -31,6 +31,7 @@ from creepkit.records import (
 )
 from creepkit.specimens.bar import NUISANCES, STEPS_PER_BREAKPOINT, isothermal_elasticity, predict_with_nuisances
 from creepkit.specimens.run import Run, run_from_outputs
+from creepkit.specimens.settings_checks import check_number, check_whole_number
 
 if TYPE_CHECKING:
     from creepkit.integration.tensor_integration import PointTrajectory
@@ -70,10 +71,14 @@ class MaterialPoint:
     """Kinds of explicit nuisances that predict() understands."""
 
     def __post_init__(self) -> None:
-        if not (1e-10 <= self.tolerance <= 1e-2 and 0 < self.strain_limit <= 10 and self.max_steps >= 10):
+        check_number(self.name, "tolerance", self.tolerance, "1e-10 to 1e-2")
+        check_number(self.name, "strain_limit", self.strain_limit, "above 0, up to 10")
+        check_whole_number(self.name, "max_steps", self.max_steps, "10 to 10 000 000")
+        in_range = 1e-10 <= self.tolerance <= 1e-2 and 0 < self.strain_limit <= 10
+        if not (in_range and 10 <= self.max_steps <= 10_000_000):
             raise SolveError(
                 f"point specimen: tolerance {self.tolerance:g}, strain_limit {self.strain_limit:g}, max_steps "
-                f"{self.max_steps}; allowed are 1e-10 to 1e-2, above 0 up to 10, and 10 or more"
+                f"{self.max_steps}; allowed are 1e-10 to 1e-2, above 0 up to 10, and 10 to 10 000 000"
             )
 
     def replace(self, **changes: float) -> MaterialPoint:

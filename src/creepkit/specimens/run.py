@@ -67,6 +67,8 @@ def run_from_outputs(
         labels["ended"] = reason
     # at rest, at time zero, there is nothing to leave out
     if not (reached & ((plan.times > 0.0) | (plan.times[-1] == 0.0))).any():
+        if status is Status.COMPLETE and not reason:
+            reason = f"its outputs ({', '.join(names)}) are not all finite numbers"
         raise SolveError(
             f"{plan.source or plan.name} ended at {end_time:g} s, before any of the times asked for: {reason}; "
             "check values, loading and times"

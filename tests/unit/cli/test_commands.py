@@ -350,6 +350,10 @@ def test_a_point_is_loaded_by_components() -> None:
             (*DIMPLE, "--pressure", "8", "--every", "9999"),
             "--every 9999 s is not a step of a test of 7200 s (allowed are 1 to 1000000 frames)",
         ),
+        (
+            (*DIMPLE, "--pressure", "8", "--points", "100000000000"),
+            "--points 100000000000 are too many frames; allowed are 2 to 1000000",
+        ),
         ((*DIMPLE, "--pressure", "8", "--picture", "none/section.png"), "none/section.png: the plot cannot be written"),
     ],
 )

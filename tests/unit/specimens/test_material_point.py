@@ -215,6 +215,7 @@ def test_a_history_of_a_point_survives_its_file(tmp_path):
         (lambda: PointLoading(stress={"21": 1.0}), "no component '21' to load; allowed are 11, 22, 33, 12, 23, 13"),
         (lambda: PointLoading(stress={"11": 1.0}, strain={"11": 0.0}), "component 11 has both a stress and a strain"),
         (lambda: MaterialPoint(tolerance=1.0), "allowed are 1e-10 to 1e-2"),
+        (lambda: MaterialPoint(max_steps=np.inf), "max_steps is inf; allowed are whole numbers, 10 to 10 000 000"),
         (lambda: shown(ck.constant_stress(100.0)), r'loaded by components, found stress; use PointLoading\(stress='),
         (lambda: shown(PointLoading(strain={"11": 1e-3}), elastic=None), "needs elastic data; set elastic="),
     ],

@@ -161,7 +161,10 @@ def test_tolerance_tightens_the_answer() -> None:
         ({"tolerance": 0.5}, "tolerance is 0.5; allowed are 1e-13 to 1e-2"),
         ({"strain_limit": -1.0}, "strain_limit is -1; allowed is above 0, up to 10"),
         ({"max_steps": 3}, "max_steps is 3; allowed are 10 to 10 000 000"),
-        ({"max_steps": 1e3 + 0.5}, "max_steps is 1000.5"),
+        ({"max_steps": 1e3 + 0.5}, "max_steps is 1000.5; allowed are whole numbers, 10 to 10 000 000"),
+        ({"max_steps": np.inf}, "max_steps is inf; allowed are whole numbers, 10 to 10 000 000"),
+        ({"max_steps": "9"}, "max_steps is '9'; allowed are whole numbers"),
+        ({"tolerance": np.nan}, "tolerance is nan; allowed are finite numbers, 1e-13 to 1e-2"),
     ],
 )
 def test_settings_out_of_range_are_refused(fields, said: str) -> None:

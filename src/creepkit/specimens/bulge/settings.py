@@ -14,6 +14,7 @@ from creepkit.errors import SolveError, nearest
 from creepkit.records import History
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import Observation
+from creepkit.specimens.settings_checks import check_number, check_whole_number, is_whole_number
 
 if TYPE_CHECKING:
     from creepkit.fem.mesh import Mesh
@@ -62,11 +63,13 @@ class BulgeSettings:
     def __post_init__(self) -> None:
         for name, (low, high) in _RANGES.items():
             value = getattr(self, name)
+            check = check_whole_number if name == "max_steps" else check_number
+            check("bulge", name, value, f"{low:g} to {high:g}")
             if not low <= value <= high:
                 raise SolveError(f"bulge specimen: {name} is {value:g}; allowed are {low:g} to {high:g}")
-        if self.threads is not None and (self.threads != int(self.threads) or self.threads < 1):
+        if self.threads is not None and not (is_whole_number(self.threads) and self.threads >= 1):
             allowed = "whole numbers above zero, or None for all cores"
-            raise SolveError(f"bulge specimen: threads is {self.threads}; allowed are {allowed}")
+            raise SolveError(f"bulge specimen: threads is {self.threads!r}; allowed are {allowed}")
 
     def replace(self, **changes: Any) -> Self:
         """The same specimen with some fields, or lengths of its geometry, changed: replace(apex_thickness=0.48)."""

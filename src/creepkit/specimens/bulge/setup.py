@@ -97,7 +97,12 @@ def _model_of_mesh(specimen: BulgeSettings) -> FiniteElementModel:
     assert specimen.mesh is not None
     if not specimen.mesh.top.size:
         raise SolveError("the mesh of a bulge specimen names no observed surface; give it the nodes of its top")
-    return finite_element_model(specimen.mesh)
+    model = finite_element_model(specimen.mesh)
+    if not model.pressed.size:
+        raise SolveError("the mesh of a bulge specimen has no pressed side; name those that the gas presses on")
+    if not model.size:
+        raise SolveError("the mesh of a bulge specimen is held at every node; hold it at its clamped rim alone")
+    return model
 
 
 def _geometry(specimen: BulgeSettings, history: History, nuisances: Mapping[str, float]) -> DimpleGeometry:

@@ -13,6 +13,7 @@ from creepkit.language import CreepLaw, stress, temperature, time
 from creepkit.records import Loading, Program, RecordedLoading, Status
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.specimens.run import Run, run_from_outputs
 from helpers.literature_laws import POWER, RATE, A, law, n, number, s_0
 
 N3 = {"A": 5e-13, "n": 3.0}
@@ -143,6 +144,12 @@ def test_a_modulus_that_falls_to_nothing_on_the_way_is_refused() -> None:
         ({"deflection_limit": 0.0}, "bulge specimen: deflection_limit is 0; allowed are 0.001 to 1000"),
         ({"threads": 0}, "bulge specimen: threads is 0; allowed are whole numbers above zero, or None for all cores"),
         (
+            {"threads": np.inf},
+            "bulge specimen: threads is inf; allowed are whole numbers above zero, or None for all cores",
+        ),
+        ({"max_steps": 100.5}, "bulge specimen: max_steps is 100.5; allowed are whole numbers, 10 to 100000"),
+        ({"tolerance": "a"}, "bulge specimen: tolerance is 'a'; allowed are finite numbers, 1e-06 to 0.1"),
+        (
             {"thickness": 0.5},
             "a bulge specimen has no field 'thickness'; did you mean 'apex_thickness'? (known: apex_thickness, "
             "cavity_radius, clamped, deflection_limit, geometry, max_steps, mesh, observation, outer_radius, "
@@ -174,6 +181,40 @@ def test_a_mesh_without_a_top_is_one_sentence() -> None:
     with pytest.raises(SolveError) as found:
         simulate(using=Bulge(mesh=replace(DimpleGeometry().mesh(), top=[])))
     assert str(found.value) == "the mesh of a bulge specimen names no observed surface; give it the nodes of its top"
+
+
+MESH = DimpleGeometry().mesh(0.5)
+SIDE = MESH.pressed[0].tolist()
+AROUND = MESH.elements[0, [1, 5, 2]]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"elements": []}, "the mesh has no elements; give the eight nodes of each"),
+        ({"elements": MESH.elements[:, :4]}, f"shape ({len(MESH.elements)}, 4); give each a row of its eight nodes"),
+        ({"elements": MESH.elements - 1}, "but its elements name node -1"),
+        ({"held": MESH.held[1:]}, f"give u_r and u_z of each of its {len(MESH.nodes)} nodes"),
+        ({"held": np.ones_like(MESH.held)}, "is held at every node; hold it at its clamped rim alone"),
+        ({"pressed": []}, "has no pressed side; name those that the gas presses on"),
+        ({"pressed": [[0, 2, 1]]}, "nodes 0, 2 and 1 is no side of an element; name the first"),
+        ({"pressed": [AROUND]}, "lies between two elements; name the first"),
+        (
+            {"pressed": MESH.pressed[:, ::-1]},
+            f"the pressed side of nodes {SIDE[2]}, {SIDE[1]} and {SIDE[0]} runs against the order of its element, so "
+            f"that pressure would pull at it; give its nodes in the order {SIDE[0]}, {SIDE[1]}, {SIDE[2]}",
+        ),
+    ],
+)
+def test_a_mesh_that_cannot_be_pressed_is_one_sentence(change: dict, said: str) -> None:
+    with pytest.raises(SolveError, match=re.escape(said)):
+        simulate(using=Bulge(mesh=replace(MESH, **change)))
+
+
+def test_a_test_without_any_number_says_so() -> None:
+    plan = ck.simulate("norton", "uniaxial", N3, loading=ck.constant_stress(100.0), times=[1.0, 2.0])
+    with pytest.raises(SolveError, match=r"its outputs \(strain\) are not all finite numbers; check values"):
+        run_from_outputs(Run, plan, ("strain",), np.full((2, 1), np.nan), Status.COMPLETE, 2.0)
 
 
 # ---- laws that others wrote ----------------------------------------------------------------------------------------
