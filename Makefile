@@ -46,7 +46,7 @@ sanitize: core
 	$(BIN)/python src/core/compile.py --sanitize
 	@CREEPKIT_CORE=$(CURDIR)/build/sanitize/libcreepkit_core.so ASAN_OPTIONS=detect_leaks=0 \
 	    LD_PRELOAD="$$($(CXX) -print-file-name=libasan.so) $$($(CXX) -print-file-name=libstdc++.so)" \
-	    $(BIN)/python -m pytest -q $(PYTEST_OPTIONS) $(SANITIZED_TESTS)
+	    $(BIN)/python -m pytest -q -n 2 $(PYTEST_OPTIONS) $(SANITIZED_TESTS)
 
 demo: core
 	$(BIN)/creepkit demo --to demo
