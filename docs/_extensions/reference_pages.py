@@ -59,13 +59,20 @@ def _package(name: str) -> str:
     root = importlib.import_module(f"creepkit.{name}")
     names = [root.__name__]
     if hasattr(root, "__path__"):
-        names += sorted(module.name for module in pkgutil.walk_packages(root.__path__, f"{root.__name__}."))
+        modules = pkgutil.walk_packages(root.__path__, f"{root.__name__}.")
+        names += sorted(module.name for module in modules if _is_python(module))
     parts = [_title(root.__name__, "=")]
     for module in names:
         if module != root.__name__:
             parts.append(_title(module, "-"))
         parts.append(f".. automodule:: {module}\n")
     return "\n".join(parts)
+
+
+def _is_python(module: pkgutil.ModuleInfo) -> bool:
+    """Whether a module has a text: the compiled core is a library that ends as extension modules do."""
+    spec = module.module_finder.find_spec(module.name, None)
+    return spec is not None and str(spec.origin).endswith(".py")
 
 
 def _title(text: str, line: str) -> str:
