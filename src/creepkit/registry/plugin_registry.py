@@ -11,7 +11,7 @@ import re
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -255,12 +255,13 @@ class Registry:
             raise PluginError(f"{provenance} does not fit the hooks of creepkit: {description}") from error
 
 
-_DEFAULT_REGISTRY = Registry()
-
-
+@cache
 def default_registry() -> Registry:
     """The registry of the public functions; it loads what is installed and the environment names when first asked."""
-    return _DEFAULT_REGISTRY
+    return Registry()
+
+
+default_registry()  # made with the module, while there is one thread
 
 
 def _merged_contributions(
