@@ -100,18 +100,14 @@ public:
     // Out-of-balance forces of a change of all creep strains by the sum of weights_i slopes_i, into `residual`.
     void error_forces(const double* u, const PointStates& points, const double weights[STAGES]) {
         clear(residual, shape.rows());
-        const int64_t stride = points.values * points.count;
         alignas(64) double P[5][EIGHT];
         for (int64_t pair = 0; pair < model.elements / 2; ++pair) {
             Kinematics at;
             deform(pair, u, at);
             if (!set_strains(at)) continue;  // never: the stage has just converged here
             const int64_t k = EIGHT * pair;
-            Eight change[3], stress[5];
-            for (int v = 0; v < CREEP_COMPONENTS; ++v)
-                change[v] = weights[0] * load(points.slopes + v * points.count + k) +
-                            weights[1] * load(points.slopes + stride + v * points.count + k);
-            stress_of_creep_change(points, k, at, change, stress);
+            Eight stress[5];
+            stress_of_creep_change(points, k, at, weights, stress);
             const Eight weight = load(model.weights + k);
             for (int i = 0; i < 5; ++i) store(P[i], stress[i] * weight);
             for (int half = 0; half < 2; ++half) add_forces(2 * pair + half, 4 * half, P);

@@ -346,11 +346,15 @@ CREEPKIT_INLINE PointFlag update_points(const PointLaw& law, const StageConditio
     return POINTS_SOLVED;
 }
 
-// Stress P of eight points for a change of their creep strains by `change`, through the tangent of the stage, which
-// damps what the stage would damp. at : with strains set. change : (3,) of the creep components.
+// Stress P of eight points for a change of their creep strains by the sum of weights_i slopes_i, through the tangent of
+// the stage, which damps what the stage would damp. at : with strains set.
 CREEPKIT_INLINE void stress_of_creep_change(const PointStates& points, int64_t k, const Kinematics& at,
-                                            const Eight change[3], Eight P[5]) {
-    Eight kept[6];
+                                            const double weights[STAGES], Eight P[5]) {
+    const int64_t stride = points.values * points.count;
+    Eight change[CREEP_COMPONENTS], kept[6];
+    for (int v = 0; v < CREEP_COMPONENTS; ++v)
+        change[v] = weights[0] * load(points.slopes + v * points.count + k) +
+                    weights[1] * load(points.slopes + stride + v * points.count + k);
     for (int i = 0; i < 6; ++i) kept[i] = load(points.deviator + i * points.count + k);
     const Eight first = kept[0] * change[0] + kept[3] * change[1] + kept[4] * change[2];
     const Eight stress[4] = {first * (1.0 / 3.0), -(kept[3] * change[0] + kept[1] * change[1] + kept[5] * change[2]),

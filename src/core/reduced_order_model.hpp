@@ -128,17 +128,13 @@ public:
     // Out-of-balance forces of a change of all creep strains by the sum of weights_i slopes_i, into `residual`.
     void error_forces(const double* q, const PointStates& points, const double weights[STAGES]) {
         clear();
-        const int64_t stride = points.values * points.count;
         for (int64_t block = 0; block < model.points / EIGHT; ++block) {
             Kinematics at;
             deform(block, q, at);
             if (!set_strains(at)) continue;  // never: the stage has just converged here
             const int64_t k = EIGHT * block;
-            Eight change[3], stress[5];
-            for (int v = 0; v < CREEP_COMPONENTS; ++v)
-                change[v] = weights[0] * load(points.slopes + v * points.count + k) +
-                            weights[1] * load(points.slopes + stride + v * points.count + k);
-            stress_of_creep_change(points, k, at, change, stress);
+            Eight stress[5];
+            stress_of_creep_change(points, k, at, weights, stress);
             add_forces(block, stress, load(model.weights + k));
         }
     }

@@ -13,6 +13,7 @@ from creepkit.core import CoreStructure, address, function
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.solvable_model import SensitivityDirections, SolvableModel
+from creepkit.integration.implicit_stage import MAX_STATES
 from creepkit.kernels.interface import CompiledLaw, Entry
 
 (
@@ -27,8 +28,8 @@ START, END, PRESSURE = range(3)
 MPa and motion of held nodes at both ends follow."""
 
 
-CREEP_COMPONENTS, EQUIVALENT_STRAIN, MAX_STATES = 3, 3, 16
-"""Creep components of a point, and the place of its equivalent creep strain; the most states of a law."""
+CREEP_COMPONENTS, EQUIVALENT_STRAIN = 3, 3
+"""Creep components of a point, and the place of its equivalent creep strain."""
 
 
 class SolverSettings(NamedTuple):
