@@ -13,7 +13,9 @@ import creepkit as ck
 from creepkit.cli.demo import PLANTED_BULGE
 from helpers.planted_datasets import bars
 
-PROGRAM = "from creepkit.cli import main; main()"
+PROGRAM = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from creepkit.cli import main; main()"
+)
 DEADLINE = 120.0
 """s in which a command must begin its work, and end when it is told to."""
 
