@@ -22,7 +22,7 @@ from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate
-from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution
+from creepkit.inverse.uncertainty.mixture_distribution import MixtureDistribution
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import LawWithValues

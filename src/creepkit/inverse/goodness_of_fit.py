@@ -20,6 +20,8 @@ from creepkit.inverse.observation_vector import (
     usable_frames,
 )
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, MixtureDistribution
+from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.records import History, Prediction, Predictor, constant_stress
 
 
@@ -289,17 +291,17 @@ own horizon comes on top."""
 def predict_rupture_times(
     coordinates: Coordinates,
     u: Floats,
-    covariance: Floats,
+    scatter: RateScatter,
     noise_model: NoiseModel | None,
-    quantile: float,
     histories: Sequence[History],
     predictor: Predictor,
 ) -> tuple[Floats, Floats, Floats]:
-    """Rupture times of histories, s, with intervals: (time, low, high), (tests,) each; infinite where none comes.
+    """Rupture times of histories, s, with 95 % intervals: (time, low, high), (tests,) each; infinite where none comes.
 
-    By the delta method on ln t; with `noise_model` the scatter of single tests is added.
+    By the delta method on ln t, over the posterior distribution of the scatter between tests; with `noise_model` the
+    scatter of single tests is added.
 
-    u : (parameters,) conditioned coordinates. covariance : (parameters, parameters) of u.
+    u : (parameters,) conditioned coordinates.
     """
     for history in histories:
         if not predicts_rupture(predictor, history):
@@ -314,16 +316,22 @@ def predict_rupture_times(
     assert prediction.times_to_strain.rupture_jacobian is not None
     median_times = prediction.times_to_strain.rupture_times[0]
     sensitivities = np.nan_to_num(prediction.times_to_strain.rupture_jacobian[0]) @ coordinates.jacobian(u)
-    variance = np.einsum("ti,ij,tj->t", sensitivities, covariance, sensitivities)
+    posterior, size = scatter.posterior, u.size
+    covariances = np.stack([scatter.covariance(sd)[:size, :size] for sd in posterior.sd])
+    variance = np.einsum("ti,nij,tj->nt", sensitivities, covariances, sensitivities)
     if noise_model is not None:
         rupture_sd = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
-        variance = variance + noise_model.rate**2 + rupture_sd**2
-    interval_factor = np.exp(quantile * np.sqrt(variance))
+        variance = variance + posterior.total_variance[:, None] + rupture_sd**2
     ruptured = np.isfinite(median_times)
-    return tuple(
-        np.where(ruptured, each, np.inf)
-        for each in (median_times, median_times / interval_factor, median_times * interval_factor)
-    )  # type: ignore[return-value]
+    log_times = np.log(np.where(ruptured, median_times, 1.0))
+    mixture = MixtureDistribution(
+        posterior.weight,
+        np.full(posterior.weight.size, NORMAL_FREEDOM),
+        np.broadcast_to(log_times, variance.shape),
+        np.sqrt(np.maximum(variance, 1e-20)),
+    )
+    low, high = (np.exp(mixture.quantile(probability)) for probability in (0.025, 0.975))
+    return tuple(np.where(ruptured, each, np.inf) for each in (median_times, low, high))  # type: ignore[return-value]
 
 
 def _extended_to_rupture(history: History) -> History:
@@ -354,22 +362,21 @@ def constant_stress_tests(
 def compare_rupture_times(
     coordinates: Coordinates,
     u: Floats,
-    covariance: Floats,
+    scatter: RateScatter,
     noise_model: NoiseModel,
-    quantile: float,
     histories: Sequence[History],
     predictor: Predictor,
 ) -> list[RuptureComparison | None]:
     """Measured against predicted, for every history; None where its end is not known or not predicted.
 
-    u : (parameters,) conditioned coordinates. covariance : (parameters, parameters) of u.
+    u : (parameters,) conditioned coordinates.
     """
     followed = [k for k, h in enumerate(histories) if h.end_known and predicts_rupture(predictor, h)]
     comparisons: list[RuptureComparison | None] = [None] * len(histories)
     if not followed:
         return comparisons
     tests = [histories[k] for k in followed]
-    times = predict_rupture_times(coordinates, u, covariance, noise_model, quantile, tests, predictor)
+    times = predict_rupture_times(coordinates, u, scatter, noise_model, tests, predictor)
     for k, history, time, low, high in zip(followed, tests, *times, strict=True):
         measured = history.rupture_time or float(history.times[-1])
         comparisons[k] = RuptureComparison(measured, history.unruptured, float(time), float(low), float(high))

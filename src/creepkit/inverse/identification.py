@@ -26,6 +26,7 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, delta_method, interval_quantile
+from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.inverse.unmodelled_effects import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
@@ -58,6 +59,8 @@ class Identification(Presentable):
     nuisances : estimates of explicit nuisances.
     adequacy : whether the law explains the tests to their noise. numerical_error : of the predictor at the optimum,
         which was corrected; None where there is no more exact one. unmodelled : effects that intervals do not include.
+    rate_scatter : what the tests say of the scatter of rates between tests, heats and laboratories, and how it enters
+        the covariance: what forecasts need.
     samples : (samples, parameters) conditioned coordinates drawn from the posterior, where some value lies at its bound
         or is not determined (see uncertainty.importance_sampling); None elsewhere.
     ranges : {"stress", "temperature", "strain", "time": (low, high)} of the fitted frames; MPa, K, -, s.
@@ -90,6 +93,7 @@ class Identification(Presentable):
     adequacy: Adequacy | None = None
     numerical_error: NumericalError | None = None
     unmodelled: tuple[UnmodelledEffect, ...] = ()
+    rate_scatter: RateScatter | None = None
     samples: Floats | None = None
     converged: bool = True
     notes: tuple[str, ...] = ()
@@ -133,6 +137,16 @@ class Identification(Presentable):
         if self.numerical_error is not None:
             problem, _ = correct_defect(problem, self.x)
         return problem.with_covariance(CovarianceFactor.of_residuals(self.residuals_of(problem), self.noise_model))
+
+    @property
+    def scatter_of_rates(self) -> RateScatter:
+        """The scatter of rates between tests; FitError for an identification that does not have it."""
+        if self.rate_scatter is None:
+            raise FitError(
+                f"this identification of law '{self.law.name}' says nothing of the scatter between tests, without "
+                "which a prediction has no interval; identify again"
+            )
+        return self.rate_scatter
 
     def residuals_of(self, problem: LeastSquaresProblem) -> Residuals:
         """Residuals of a problem of these tests at the optimum, with the weights of tests."""
@@ -229,9 +243,7 @@ class Identification(Presentable):
 
         predictor = self._predictor_or(using)
         tests, noise_model = list(histories or self.histories), self.noise_model if test_scatter else None
-        return predict_rupture_times(
-            self.coordinates, self.u, self.covariance, noise_model, self._quantile, tests, predictor
-        )
+        return predict_rupture_times(self.coordinates, self.u, self.scatter_of_rates, noise_model, tests, predictor)
 
     def predict(
         self, histories: Sequence[History] | None = None, using: Predictor | None = None, *, own_nuisances: bool = True

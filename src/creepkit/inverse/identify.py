@@ -57,7 +57,8 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     positive_semidefinite,
     restricted_covariance,
 )
-from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note
+from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
+from creepkit.inverse.unmodelled_effects import CHECKED_DIMENSIONS, unmodelled_effects, unmodelled_note
 from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
 from creepkit.language import CreepLaw
@@ -292,6 +293,16 @@ def _result(
     u = x[:count]
     working_estimator = _working_estimator(problem, numerical_error)
     noise_model, covariance, freedom = _uncertainty(best, working_estimator, len(histories))
+    linear = best.linearised or linearised(problem, x, residuals)
+    unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories)
+    scatter = rate_scatter(
+        problem,
+        x,
+        residuals,
+        _fitting_noise(best),
+        noise_model,
+        [effect.residual_change for effect in unmodelled if effect.kind in CHECKED_DIMENSIONS],
+    )
     prediction = predict(
         problem.predictor,
         law,
@@ -303,17 +314,13 @@ def _result(
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
     law_covariance = positive_semidefinite(covariance[:count, :count])
-    ruptures = compare_rupture_times(
-        coordinates, u, law_covariance, noise_model, interval_quantile(freedom), histories, problem.predictor
-    )
+    ruptures = compare_rupture_times(coordinates, u, scatter, noise_model, histories, problem.predictor)
     tests = test_fits(
         problem, residuals, predicted_random_effects(residuals, noise_model), histories, prediction, ruptures
     )
     nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]
     )
-    linear = best.linearised or linearised(problem, x, residuals)
-    unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories)
     adequacy = adequacy_with_remedies(
         problem, linear, noise_model, working_estimator.predictor_errors, histories, unmodelled
     )
@@ -338,6 +345,7 @@ def _result(
         adequacy=adequacy,
         numerical_error=numerical_error,
         unmodelled=unmodelled,
+        rate_scatter=scatter,
         notes=(
             *suspect_frames_note(histories),
             *identification_notes(best, tests, nuisance_estimates),
@@ -374,15 +382,21 @@ def _uncertainty(
         nuisances,
     )
     rate_is_given = any(n.kind == "rate" and n.sd is not None for n in nuisances)
-    fitting_noise = with_rupture_weight(best.working_noise, problem.observations)
     return noise_model, *laplace_covariance(
         best.residuals,
-        fitting_noise,
+        _fitting_noise(best),
         noise_model,
         problem.bounds,
         problem.nuisance_parameters,
         rate_known=rate_is_given,
     )
+
+
+def _fitting_noise(best: EstimationResult) -> NoiseModel:
+    """The noise model under which the values were found."""
+    if best.linearised is not None:
+        return best.working_noise
+    return with_rupture_weight(best.working_noise, best.problem.observations)
 
 
 def _with_assumed_rate(nuisances: Sequence[Nuisance], tests: int) -> tuple[Nuisance, ...]:

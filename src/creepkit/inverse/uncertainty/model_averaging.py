@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 from scipy.stats import norm
-from scipy.stats import t as student
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_quantile
+from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, MixtureDistribution
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, local_exponent, log_rate
 from creepkit.language import temperature as TEMPERATURE
 from creepkit.presentation import Presentable, present
@@ -32,54 +32,6 @@ from creepkit.records import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-BISECTIONS = 80
-"""Of the interval between the lowest and the highest quantile of the parts: to the last digit."""
-
-
-NORMAL_FREEDOM = 1e9
-"""Degrees of freedom at which Student's distribution is the normal one."""
-
-
-INTERVAL_PROBABILITIES = (0.5, 0.025, 0.975)
-
-
-@dataclass(frozen=True, eq=False)
-class MixtureDistribution:
-    """The parts of a mixture: location, spread and degrees of freedom of each, with its weight.
-
-    weight, degrees_of_freedom : (parts,) -; location, scale : (parts, ...) in the unit of the quantity.
-    """
-
-    weight: Floats
-    degrees_of_freedom: Floats
-    location: Floats
-    scale: Floats
-
-    def cumulative(self, x: Floats) -> Floats:
-        """(...,) the probability of less than x (...,)."""
-        probabilities = student.cdf((x - self.location) / self.scale, self._freedom)
-        return np.asarray(np.einsum("p,p...->...", self.weight, probabilities), float)
-
-    def quantile(self, probability: float) -> Floats:
-        """(...,) by halving, between the lowest and the highest quantile of the parts."""
-        quantiles = self.location + self.scale * student.ppf(probability, self._freedom)
-        lower, upper = quantiles.min(axis=0), quantiles.max(axis=0)
-        for _ in range(BISECTIONS):
-            midpoint = 0.5 * (lower + upper)
-            is_below = self.cumulative(midpoint) < probability
-            lower, upper = np.where(is_below, midpoint, lower), np.where(is_below, upper, midpoint)
-        return np.asarray(0.5 * (lower + upper), float)
-
-    def interval(self) -> tuple[Floats, Floats, Floats]:
-        """Median and 95 % interval, (...,) each."""
-        median, low, high = (self.quantile(p) for p in INTERVAL_PROBABILITIES)
-        return median, low, high
-
-    @property
-    def _freedom(self) -> Floats:
-        return self.degrees_of_freedom.reshape(-1, *(1 for _ in self.location.shape[1:]))
 
 
 class WeightedFit(Protocol):

@@ -33,7 +33,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import MINIMUM_TESTS, NoiseModel
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
-from creepkit.inverse.uncertainty.model_averaging import INTERVAL_PROBABILITIES
+from creepkit.inverse.uncertainty.mixture_distribution import INTERVAL_PROBABILITIES
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity, local_exponent, log_rate, quantity_of
 from creepkit.presentation import Presentable, present
 from creepkit.records import Predictor
