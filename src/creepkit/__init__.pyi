@@ -26,6 +26,8 @@ from .discovery.discover import discover as discover
 from .discovery.discover import group_by_temperature as group_by_temperature
 from .discovery.discover import temperature_study as temperature_study
 from .fem.mesh_files import read_mesh as read_mesh
+from .forecasts.forecast import Forecast as Forecast
+from .forecasts.forecast import forecast as forecast
 from .hookspecs import hookimpl as hookimpl
 from .inverse.cross_validation import cross_validate as cross_validate
 from .inverse.goodness_of_fit import relative_squared_error as relative_squared_error

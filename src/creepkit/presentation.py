@@ -40,6 +40,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "sample": "creepkit.inverse.uncertainty.posterior:sample_posterior",
         "correlation": "creepkit.inverse.uncertainty.correlation:correlation",
         "undetermined": "creepkit.inverse.uncertainty.correlation:undetermined",
+        "forecast": "creepkit.forecasts.forecast:forecast",
     },
     "CrossValidation": {"text": "creepkit.report.identification_text:cross_validation_text"},
     "Confirmation": {"text": "creepkit.report.identification_text:confirmation_text"},
@@ -47,6 +48,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
     "Ranking": {
         "text": "creepkit.report.ranking:ranking_text",
         "plot": "creepkit.report.ranking_plot:ranking_figure",
+        "forecast": "creepkit.forecasts.forecast:forecast",
         "further_tests": "creepkit.experiments.discriminating_experiments:further_tests",
     },
     "Sparsity": {"text": "creepkit.report.search:sparsity_text"},
@@ -67,12 +69,19 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "text": "creepkit.report.uncertainty:correlation_text",
         "plot": "creepkit.report.uncertainty:correlation_figure",
     },
-    "ModelAverage": {"text": "creepkit.report.uncertainty:model_average_text"},
+    "ModelAverage": {
+        "text": "creepkit.report.uncertainty:model_average_text",
+        "forecast": "creepkit.forecasts.forecast:forecast",
+    },
     "RateBand": {
         "text": "creepkit.report.uncertainty:rate_band_text",
         "plot": "creepkit.report.uncertainty:rate_band_figure",
     },
-    # screening, discovery, experiments
+    # forecasts, screening, discovery, experiments
+    "Forecast": {
+        "text": "creepkit.report.forecast:forecast_text",
+        "plot": "creepkit.report.forecast_plot:forecast_figure",
+    },
     "ScreeningResult": {
         "text": "creepkit.report.screening:screening_text",
         "plot": "creepkit.report.screening:plot_screening",

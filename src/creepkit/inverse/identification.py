@@ -165,7 +165,8 @@ class Identification(Presentable):
 
         stress, temperature, strain, time : numbers or arrays that broadcast, in MPa, K, - and s; by default those of
         the reference point: without a temperature the rate is that at `reference.temperature`, the median of the tests.
-        warn : whether a point outside `ranges` gives a FitWarning.
+        warn : whether a point outside `ranges` gives a FitWarning, and a temperature that seems to be in Celsius a
+            FitError.
         """
         from creepkit.inverse.uncertainty.quantities import log_rate
 
@@ -218,6 +219,7 @@ class Identification(Presentable):
         control: Literal["load", "stress"] = "load",
         test_scatter: bool = True,
         using: Predictor | None = None,
+        warn: bool = True,
     ) -> tuple[Floats, Floats, Floats]:
         """When a bar will break, s, with its 95 % interval: (time, low, high), each of the broadcast shape.
 
@@ -225,13 +227,14 @@ class Identification(Presentable):
         that of the reference point.
         test_scatter : whether the interval is that of a single test, which has its own rate, or that of the law alone.
         Infinite where nothing breaks within some thousand times the longest test. A stress or temperature outside
-        `ranges` gives a FitWarning.
+        `ranges` gives a FitWarning, a temperature that seems to be in Celsius a FitError, but for warn=False.
         """
         from creepkit.inverse.goodness_of_fit import constant_stress_tests
 
         T = self.reference.temperature if temperature is None else temperature
         tests, shape = constant_stress_tests(stress, T, self.ranges["time"][1], control)
-        warn_of_extrapolation(self.ranges, {"stress": stress, "temperature": temperature})
+        if warn:
+            warn_of_extrapolation(self.ranges, {"stress": stress, "temperature": temperature})
         time, low, high = self.rupture_times(tests, test_scatter=test_scatter, using=using)
         return time.reshape(shape), low.reshape(shape), high.reshape(shape)
 
@@ -321,6 +324,13 @@ class Identification(Presentable):
         """All but the problem, which holds compiled code and is set up again when it is needed."""
         state = {name: value for name, value in self.__dict__.items() if name != "least_squares_problem"}
         return {**state, "problem": None}
+
+    def forecast(self, tests: History | Sequence[History], *, level: float = 0.95, **options: Any) -> Any:
+        """What tests will show, measured or planned: a Forecast of curves with bands, times and scores.
+
+        options : targets, tolerances, using, draws, seed, progress, as creepkit.forecast() takes them.
+        """
+        return present(self, "forecast", tests, level=level, **options)
 
     def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> Any:
         """The ProfileLikelihood of a parameter, by name, or of another quantity (see uncertainty.quantities)."""

@@ -25,13 +25,14 @@ def law_with_rate_factors(law: CreepLaw, keys: tuple[str, ...]) -> CreepLaw:
     """The law with every rate, those of internal variables included, multiplied by exp[b g(t)].
 
     keys : of rate nuisances. Each adds a parameter b after those of the law: the nuisance itself for a step, with g
-        from 0 at its start to 1 STEP_DURATION later; ln of the factor a second for a drift, with g = t.
+        from 0 at its start to 1 STEP_DURATION later, and for "rate", with g = 1; ln of the factor a second for a drift,
+        with g = t.
     """
     exponent, params = sympy.S.Zero, dict(law.params)
     for k, key in enumerate(keys):
         kind, start = kind_and_start(key)
         symbol = sympy.Symbol(_unused_name(law, f"{kind.replace(' ', '_')}_{k}"), real=True)
-        shape = sympy.Min(sympy.Max((time - start) / STEP_DURATION, 0), 1) if kind in STEP_NUISANCES else time
+        shape = _shape_in_time(kind, start)
         exponent += symbol * shape
         params[symbol] = Param(f"ln of a factor on all rates, {kind}", UNBOUNDED)
     factor = sympy.exp(exponent)
@@ -42,6 +43,12 @@ def law_with_rate_factors(law: CreepLaw, keys: tuple[str, ...]) -> CreepLaw:
         states={symbol: replace(state, rate=state.rate * factor) for symbol, state in law.states.items()},
         params=params,
     )
+
+
+def _shape_in_time(kind: str, start: float) -> sympy.Expr:
+    if kind == "rate":
+        return sympy.S.One
+    return sympy.Min(sympy.Max((time - start) / STEP_DURATION, 0), 1) if kind in STEP_NUISANCES else time
 
 
 def rate_parameters(keys: Sequence[str], values: Floats, histories: Sequence[History]) -> tuple[Floats, Floats]:

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from creepkit.inverse.selection.challenges import Challenge
     from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+    from creepkit.records import History
 
 
 CRITERIA = ("bic", "aicc", "hold-out")
@@ -125,6 +126,10 @@ class Ranking(Presentable):
         from creepkit.inverse.selection.discrimination import equivalent_laws
 
         return equivalent_laws(self)
+
+    def forecast(self, tests: History | Sequence[History], *, level: float = 0.95, **options: Any) -> Any:
+        """What tests will show, over all laws by their weights; as creepkit.forecast()."""
+        return present(self, "forecast", tests, level=level, **options)
 
     def further_tests(self) -> tuple[Any, ...]:
         """A DiscriminationDesign for each remaining law: tests that would tell it from the best (some seconds)."""

@@ -15,20 +15,21 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from scipy.stats import norm
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
+from creepkit.inverse.extrapolation import check_kelvin, warn_of_extrapolation
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_quantile
 from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, MixtureDistribution
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, local_exponent, log_rate
 from creepkit.language import temperature as TEMPERATURE
 from creepkit.presentation import Presentable, present
-from creepkit.records import ZERO_CELSIUS
+from creepkit.records import ZERO_CELSIUS, History
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,12 +88,15 @@ class ModelAverage(Presentable):
         *,
         strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
+        warn: bool = True,
     ) -> tuple[Floats, Floats, Floats]:
         """Median creep rate over the laws, 1/s, with its 95 % interval: (rate, low, high).
 
         stress, temperature, strain, time : numbers or arrays that broadcast, in MPa, K, - and s; what is not given is
         that of the best law's reference point.
+        warn : as of Identification.rate.
         """
+        self._check_point(warn, stress=stress, temperature=temperature, strain=strain, time=time)
         distribution = self.distribution(log_rate, stress, temperature, strain, time)
         median, low, high = (np.exp(v) for v in distribution.interval())
         return median, low, high
@@ -104,12 +108,23 @@ class ModelAverage(Presentable):
         *,
         strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
+        warn: bool = True,
     ) -> tuple[Floats, Floats, Floats]:
         """Median local stress exponent over the laws, with its 95 % interval: (exponent, low, high).
 
         stress, temperature, strain, time : as in `rate`, numbers or arrays that broadcast; the results have that shape.
+        warn : as of Identification.rate.
         """
+        self._check_point(warn, stress=stress, temperature=temperature, strain=strain, time=time)
         return self.distribution(local_exponent, stress, temperature, strain, time).interval()
+
+    def forecast(self, tests: History | Sequence[History], *, level: float = 0.95, **options: Any) -> Any:
+        """What tests will show, over the laws, so that bands hold the doubt about the law; as creepkit.forecast()."""
+        return present(self, "forecast", tests, level=level, **options)
+
+    def _check_point(self, warn: bool, **point: ArrayLike | None) -> None:
+        if warn:
+            warn_of_extrapolation(self.fits[0].ranges, point, stacklevel=4)
 
     def distribution(
         self,
@@ -193,14 +208,17 @@ def rate_band(
     temperature_distribution: Literal["uniform", "normal"] = "uniform",
     strain: float | None = None,
     time: float | None = None,
+    warn: bool = True,
 ) -> RateBand:
     """Creep rates at stresses (points,) MPa and temperature +- uncertainty (K), over one law or the laws of a ranking.
 
     A law without temperature cannot know how the temperature moves its rate: its part of the band is not widened, and
-    a note says so.
+    a note says so. warn : whether a temperature that seems to be in Celsius is a FitError.
     """
     mixture = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
     levels = np.atleast_1d(np.asarray(stresses, float))
+    if warn:
+        check_kelvin(mixture.fits[0].ranges, temperature)
     if not (
         temperature_uncertainty >= 0
         and np.isfinite(temperature_uncertainty)

@@ -56,6 +56,7 @@ class RateScatter:
     """What tests say of the scatter of rates between them, and how it enters the unknowns x = (u, e).
 
     tests : their names. members : {level: (tests,) names} of the levels that these tests tell apart, without "test".
+    common : {level: name} of the levels whose one member they all belong to.
     log_factor, variance : (tests,) z and var e. design : (tests, unknowns) X. precision : (unknowns, unknowns) of the
         unknowns by all that is independent of the tests' factors.
     within : (unknowns, unknowns) covariance of the unknowns without scatter; gain : (unknowns, tests) derivatives of
@@ -72,6 +73,7 @@ class RateScatter:
     precision: Floats
     within: Floats
     gain: Floats
+    common: Mapping[str, str] = field(default_factory=dict)
     known: float | None = None
     output_scales: Mapping[str, float] = field(default_factory=dict)
 
@@ -205,6 +207,7 @@ def rate_scatter(
     return RateScatter(
         tests=tuple(h.name for h in problem.histories),
         members=_members(problem.histories),
+        common=_common_members(problem.histories),
         within=0.5 * (within + within.T),
         gain=inverse @ np.einsum("tep,te->pt", fitting, residuals.log_rate_sensitivity),
         known=_known_sd(problem.settings.nuisances),
@@ -259,6 +262,12 @@ def _members(histories: Sequence[History]) -> dict[str, tuple[str, ...]]:
         if 1 < len(set(names)) < len(names):
             members[level] = names
     return members
+
+
+def _common_members(histories: Sequence[History]) -> dict[str, str]:
+    """{level: its one member} of the levels that all these tests state alike."""
+    names = {level: {level_of(h, level) for h in histories} for level in LEVELS[:-1]}
+    return {level: next(iter(found)) for level, found in names.items() if len(found) == 1 and "" not in found}
 
 
 def _known_sd(nuisances: Sequence[Nuisance]) -> float | None:
