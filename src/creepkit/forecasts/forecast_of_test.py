@@ -24,6 +24,7 @@ from creepkit.forecasts.measured_test import TestScore, mean_law_covariance, sco
 from creepkit.forecasts.simulation import (
     TestCurves,
     TestSensitivities,
+    at_times,
     central_curves,
     corrected,
     crossing_times,
@@ -134,17 +135,15 @@ class TestForecast:
 class DrawnLaw:
     """What one law says of one test.
 
-    drawn, followed : draws of its curves, at its times and up to rupture; central, central_followed : at the identified
-    values. factor_variances : {level: variance of ln of the test's own factor on the rate}. numerical : {output:
-    standard deviation}, in its unit.
+    drawn : draws of its curves, at its times and up to rupture; central : at the identified values.
+    factor_variances : {level: variance of ln of the test's own factor on the rate}.
+    numerical : {output: standard deviation}, in its unit.
     """
 
     draws: LawDraws
     weight: float
     drawn: TestCurves
-    followed: TestCurves
     central: TestCurves
-    central_followed: TestCurves
     dimensions: Sequence[Dimension]
     factor_variances: Mapping[str, float]
     sensitivities: TestSensitivities
@@ -168,7 +167,7 @@ def forecast_test(
     outputs = {
         name: _output_forecast(drawn, best, history, name, level, rng)
         for name in best.central.outputs
-        if np.isfinite(best.central.of(name)).any()
+        if np.isfinite(at_times(best.central, history.times).of(name)).any()
     }
     times = _times(drawn, best, history, targets, level, rng)
     notes = _notes(fit, history, outputs)
@@ -193,35 +192,20 @@ def _drawn_law(
     fit = draws.fit
     dimensions = dimensions_of(fit, history, predictor, tolerances)
     centre = {d.kind: d.mean for d in dimensions}
-    central, numerical = central_curves(fit, predictor, history, centre)
-    followed = followed_history(history, predictor)
-    own = predictor_for(predictor, history)
-    central_followed = curves(
-        fit,
-        own,
-        followed,
-        fit.coordinates.theta(fit.u)[None],
-        np.zeros(1),
-        {k: np.array([[v]]) for k, v in centre.items()},
-    )
+    followed, own = followed_history(history, predictor), predictor_for(predictor, history)
+    central, numerical = central_curves(fit, predictor, followed, centre)
     cheaper = drawing_predictor(fit, predictor, history, [*centre])
-    theta = drawn_theta(fit, draws.u)
     factors = log_factor_draws(draws, history, rng)
-    total = np.sum([*factors.values()], axis=0)
     nuisances = dimension_draws(dimensions, draws, rng)
-    sampled = curves(fit, cheaper, history, theta, total, nuisances)
-    far = curves(fit, cheaper, followed, theta, total, nuisances)
-    if cheaper is not own:
-        at_values = fit.coordinates.theta(fit.u)[None], np.zeros(1), {k: np.array([[v]]) for k, v in centre.items()}
-        sampled = corrected(sampled, curves(fit, cheaper, history, *at_values), central)
-        far = corrected(far, curves(fit, cheaper, followed, *at_values), central_followed)
+    drawn = curves(fit, cheaper, followed, drawn_theta(fit, draws.u), np.sum([*factors.values()], axis=0), nuisances)
+    if cheaper is not own or numerical:
+        values, fixed = fit.coordinates.theta(fit.u)[None], {kind: np.array([[v]]) for kind, v in centre.items()}
+        drawn = corrected(drawn, curves(fit, cheaper, followed, values, np.zeros(1), fixed), central)
     return DrawnLaw(
         draws,
         weight,
-        sampled,
-        far,
+        drawn,
         central,
-        central_followed,
         dimensions,
         factor_variances(draws, history),
         sensitivities_at_values(fit, own, history, centre),
@@ -235,13 +219,13 @@ def _drawn_law(
 def _output_forecast(
     drawn: Sequence[DrawnLaw], best: DrawnLaw, history: History, name: str, level: float, rng: np.random.Generator
 ) -> OutputForecast:
-    fit, central = best.draws.fit, best.central.of(name)[0]
+    fit, central = best.draws.fit, at_times(best.central, history.times).of(name)[0]
     transform = _transform_of(fit, name, central)
     leading = best.central.outputs[0] == name
     smooth, white = _noise_in_output(fit, history, name, central, transform)
     parts = []
     for one in drawn:
-        values = one.drawn.of(name)
+        values = at_times(one.drawn, history.times).of(name)
         if name in fit.noise_model.outputs:
             values = values + fit.noise_model[name].offset * rng.standard_normal((len(values), 1))
         parts.append(values + one.numerical.get(name, 0.0) * rng.standard_normal((len(values), 1)))
@@ -323,14 +307,16 @@ def _shares(
     total_weight = sum(one.weight for one in drawn)
     variances: dict[str, Floats] = {}
     for one in drawn:
-        for part, value in _law_variances(one, name, transform).items():
+        for part, value in _law_variances(one, history, name, transform).items():
             variances[part] = variances.get(part, 0.0) + one.weight / total_weight * value
     fit = best.draws.fit
     known = fit.noise_model.outputs.get(name)
-    central = best.central.of(name)[0]
+    central = at_times(best.central, history.times).of(name)[0]
     slope = transform.derivative(np.where(np.isfinite(central), central, 0.0))
     if len(drawn) > 1:
-        g = np.stack([transform.forward(np.nan_to_num(one.central.of(name)[0])) for one in drawn])
+        g = np.stack(
+            [transform.forward(np.nan_to_num(at_times(one.central, history.times).of(name)[0])) for one in drawn]
+        )
         weight = np.array([one.weight for one in drawn]) / total_weight
         variances[CHOICE_OF_LAW] = weight @ (g - weight @ g) ** 2
     variances[OFFSET] = (slope * (0.0 if known is None else known.offset)) ** 2
@@ -359,9 +345,9 @@ def _discrepancy_variance(fit: Identification, name: str, transform: OutputTrans
     return float((fit.noise_model.discrepancy * unit) ** 2)
 
 
-def _law_variances(one: DrawnLaw, name: str, transform: OutputTransform) -> dict[str, Floats]:
+def _law_variances(one: DrawnLaw, history: History, name: str, transform: OutputTransform) -> dict[str, Floats]:
     """{part: (times,) variance of the transformed output} by parameters, scatter of rates and dimensions of one law."""
-    central, column = one.central.of(name)[0], one.sensitivities.outputs.index(name)
+    central, column = at_times(one.central, history.times).of(name)[0], one.sensitivities.outputs.index(name)
     slope = transform.derivative(np.where(np.isfinite(central), central, 0.0))[:, None]
     by_law = slope * one.sensitivities.coordinates[:, column]
     variances = {LAW: np.einsum("ti,ij,tj->t", by_law, mean_law_covariance(one.draws.fit), by_law)}
@@ -389,19 +375,19 @@ def _times(
     forecasts = []
     for output, values in targets.items():
         for target in values if output in best.central.outputs else ():
-            crossings = np.concatenate([crossing_times(one.followed, output, target) for one in drawn])
-            value = float(crossing_times(best.central_followed, output, target)[0])
+            crossings = np.concatenate([crossing_times(one.drawn, output, target) for one in drawn])
+            value = float(crossing_times(best.central, output, target)[0])
             event = f"{output.replace('_', ' ')} {target:g} {output_unit(output)}".strip()
             measured = _measured_crossing(history, output, target)
             forecasts.append(_time_forecast(event, value, crossings, history, level, measured, censored=False))
-    ends = np.concatenate([one.followed.end_times for one in drawn])
+    ends = np.concatenate([one.drawn.end_times for one in drawn])
     fit = best.draws.fit
     if RUPTURE_OUTPUT in fit.noise_model.outputs:
         ends = ends * np.exp(fit.noise_model[RUPTURE_OUTPUT].misfit * rng.standard_normal(ends.size))
     asked = history.end_known or RUPTURE_OUTPUT in fit.noise_model.outputs or RUPTURE_OUTPUT in targets
     if np.isfinite(ends).any() and (asked or (ends <= history.times[-1]).any()):
         measured = history.rupture_time or (float(history.times[-1]) if history.unruptured else float("nan"))
-        value = float(best.central_followed.end_times[0])
+        value = float(best.central.end_times[0])
         forecasts.append(_time_forecast("rupture", value, ends, history, level, measured, censored=history.unruptured))
     return tuple(forecasts)
 
@@ -497,7 +483,7 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw) -> st
     stresses = reference_stresses(history, predictor)
     point = {"stress": stresses[stresses > 0], "temperature": temperatures, "time": history.times[-1:]}
     if "strain" in best.central.outputs:
-        strain = best.central.of("strain")[0]
+        strain = at_times(best.central, history.times).of("strain")[0]
         point["strain"] = np.array([np.nanmax(strain, initial=0.0)])
     return extrapolation_text(fit.ranges, point, NEARBY)
 

@@ -23,11 +23,11 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.rate_nuisances import law_with_rate_factors
 from creepkit.records import History, Prediction, Predictor, Status
 
-FRAMES_TO_RUPTURE = 240
-"""Geometrically spaced times at which a test is followed beyond its last one."""
+FOLLOWED_TIMES, ADDED_TIMES = 200, 20
+"""Geometrically spaced times at which a test is followed to its rupture, or to its last time, beside its own."""
 
 
-FIRST_OF_RUPTURE = 1e-5
+FIRST_OF_FOLLOWED = 1e-4
 """The first of them, over the last time of the test."""
 
 
@@ -185,16 +185,17 @@ def corrected(drawn: TestCurves, at_values: TestCurves, exact: TestCurves) -> Te
 
 
 def followed_history(history: History, predictor: Predictor) -> History:
-    """The history at times up to its rupture: far beyond its last one where the specimen is followed to rupture."""
+    """The history at its own times and at times up to its rupture, far beyond where the specimen is followed to it."""
     last = max(float(history.times[-1]), history.rupture_time or 0.0)
-    horizon = EXTRAPOLATION_FACTOR * last if predicts_rupture(predictor, history) else last
-    first = min(
-        FIRST_OF_RUPTURE * last, float(history.times[history.times > 0][0]) if (history.times > 0).any() else last
-    )
-    times = np.geomspace(first, horizon, FRAMES_TO_RUPTURE)
-    kept = history.times[(history.times > 0) & (history.times < horizon)]
-    times = np.unique(np.concatenate([times, kept[:: max(1, kept.size // FRAMES_TO_RUPTURE)]]))
-    return history.replace(times=times, outputs={}, standard_deviation={}, includes_elastic=False)
+    far = predicts_rupture(predictor, history)
+    horizon, count = (EXTRAPOLATION_FACTOR * last, FOLLOWED_TIMES) if far else (last, ADDED_TIMES)
+    times = np.geomspace(FIRST_OF_FOLLOWED * last, horizon, count)
+    return history.replace(times=np.union1d(times, history.times), outputs={}, standard_deviation={})
+
+
+def at_times(followed: TestCurves, times: Floats) -> TestCurves:
+    """The curves at some of their times, (times,)."""
+    return replace(followed, times=times, values=followed.values[:, np.searchsorted(followed.times, times)])
 
 
 def crossing_times(drawn: TestCurves, output: str, target: float) -> Floats:

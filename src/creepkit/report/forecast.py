@@ -1,0 +1,1 @@
+"""Text of forecasts, as a whole, as rows of tables, and as JSON."""
