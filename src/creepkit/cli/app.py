@@ -24,6 +24,7 @@ from creepkit.cli import (
     laws,
     new_law,
     plugins,
+    predict,
     reduced_model,
     screen,
     simulate,
@@ -91,6 +92,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "discover": discover.command,
     "screen": screen.command,
     "confirm": confirm.command,
+    "predict": predict.command,
     "export": export.command,
     "demo": demo.command,
 }

@@ -38,16 +38,18 @@ if TYPE_CHECKING:
 def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
     """Write JSON and plot of every law, the ranking's plot, and the best law as LaTeX and Python; returns the paths."""
     import creepkit as ck
+    from creepkit.inverse.ranking_document import write_ranking_document
 
     folder.mkdir(parents=True, exist_ok=True)
-    written = []
+    written, weights = [], {}
     for entry in ranking.laws:
         name = file_stem(entry.fit.law.name)
         written.append(entry.fit.save(folder / f"{name}.json"))
+        weights[f"{name}.json"] = entry.weight
         entry.fit.plot(folder / f"{name}.png")
         written.append(folder / f"{name}.png")
     ranking.plot(folder / "ranking.png")
-    written.append(folder / "ranking.png")
+    written += [folder / "ranking.png", write_ranking_document(weights, folder / "ranking.json")]
     best = ranking.best
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
         path = folder / f"{file_stem(best.law.name)}{suffix}"

@@ -8,22 +8,25 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.cli.options import (
-    BULGE,
-    MATERIAL_POINT,
-    RELAXATION,
-    UNIAXIAL,
-    check_file,
-    check_options,
-    parse_loading,
-    parse_numbers,
-    parse_steps,
+from creepkit.cli.options import BULGE, UNIAXIAL, check_file, check_options, parse_loading, parse_numbers
+from creepkit.cli.planned_test import (
+    ControlOption,
+    GeometryOption,
+    ModulusOption,
+    PressureOption,
+    RampOption,
+    StrainOption,
+    StressOption,
+    check_duration,
+    check_modulus,
+    parse_temperature,
+    with_geometry,
 )
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
     from creepkit.language import CreepLaw
-    from creepkit.records import History, Program, Specimen
+    from creepkit.records import History, Program
 
 
 DEFAULT_FRAMES, DEFAULT_INTERVAL = 200, 150.0
@@ -41,28 +44,16 @@ def command(
     specimen: Annotated[
         str, typer.Option(help="uniaxial, relaxation, point, bulge or a plugin's; see 'creepkit specimens'.")
     ] = UNIAXIAL,
-    stress: Annotated[
-        list[str] | None,
-        typer.Option(metavar="[NN=][S:]MPA", help="Of a bar, from S seconds on; of a point, of component NN (11=80)."),
-    ] = None,
-    strain: Annotated[
-        list[str] | None,
-        typer.Option(metavar="[NN=][S:]STRAIN", help="Total strain of a bar in relaxation, or of a point's component."),
-    ] = None,
-    pressure: Annotated[
-        list[str] | None, typer.Option(metavar="[S:]MPA", help="On a dimple, from S seconds on, after a ramp of 5 s.")
-    ] = None,
+    stress: StressOption = None,
+    strain: StrainOption = None,
+    pressure: PressureOption = None,
     temperature_c: Annotated[
         list[str] | None, typer.Option(metavar="[S:]C", help="Temperature, C; 20 unless the law depends on it.")
     ] = None,
-    modulus_gpa: Annotated[
-        float | None, typer.Option(help="Young's modulus, GPa; a dimple and a prescribed strain need it.")
-    ] = None,
-    geometry: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=MM", help="A length of the dimple, such as apex_thickness=0.48.")
-    ] = None,
-    control: Annotated[str | None, typer.Option(help="Of a bar: load (held in each step) or stress (true).")] = None,
-    ramp: Annotated[float | None, typer.Option(min=0, help="Of a strain: s in which each is reached.")] = None,
+    modulus_gpa: ModulusOption = None,
+    geometry: GeometryOption = None,
+    control: ControlOption = None,
+    ramp: RampOption = None,
     points: Annotated[int | None, typer.Option(min=2, help="Number of frames; 200 of a bar.")] = None,
     every: Annotated[float | None, typer.Option(help="Or s from frame to frame; 150 of a dimple.")] = None,
     to: Annotated[Path | None, typer.Option(help="CSV file to write; by default it is printed.")] = None,
@@ -85,8 +76,7 @@ def command(
     }
     check_options(specimen, {**load_options, "--geometry": geometry, "--picture": picture})
     chosen = ck.law(law)
-    if not 0 < end_h < 1e9:
-        raise SolveError(f"--end-h {end_h:g} is not a time above zero (and below 1e9 h)")
+    check_duration(end_h)
     times = _frame_times(3600.0 * end_h, points, every, specimen)
     loading = parse_loading(specimen, stress, strain, pressure, control, ramp, float(times[-1]))
     if picture is not None:
@@ -95,16 +85,14 @@ def command(
         check_figure_target(picture, SolveError)
     if to is not None:
         check_file("--to", to)
-    if modulus_gpa is None and (specimen in (BULGE, RELAXATION) or (specimen == MATERIAL_POINT and strain)):
-        requirement = "a dimple" if specimen == BULGE else "a prescribed strain"
-        raise SolveError(f"{requirement} needs a modulus: give --modulus-gpa, such as 150")
+    check_modulus(specimen, modulus_gpa, strain)
     run = ck.simulate(
         chosen,
-        _with_geometry(specimen_record, geometry),
+        with_geometry(specimen_record, geometry),
         parse_numbers(value, "--set", "n=5.2"),
         loading=loading,
         times=times,
-        temperature=_parse_temperature(chosen, temperature_c),
+        temperature=_temperature_of(chosen, temperature_c),
         elastic=None if modulus_gpa is None else Elastic(1e3 * modulus_gpa),
         name=chosen.name if to is None else to.stem,
     )
@@ -116,22 +104,16 @@ def command(
     _write_history(run, to)
 
 
-def _parse_temperature(law: CreepLaw, texts: Sequence[str] | None) -> float | Program | None:
+def _temperature_of(law: CreepLaw, texts: Sequence[str] | None) -> float | Program | None:
     """K; None where nothing was said and the law does not ask."""
     from creepkit.errors import SolveError
     from creepkit.language.symbols import temperature
-    from creepkit.records import ZERO_CELSIUS, Program
 
-    if not texts:
-        if law.uses(temperature):
-            raise SolveError(f"law '{law.name}' depends on temperature: give --temperature-c")
-        return None
-    levels = [(start, celsius + ZERO_CELSIUS) for start, celsius in parse_steps(texts, "--temperature-c")]
-    if levels[0][0] != 0.0:
-        raise SolveError(
-            f"--temperature-c {texts[0]}: nothing is said of the time before; give the first one from 0 s on"
-        )
-    return levels[0][1] if len(levels) == 1 else Program.steps(levels)
+    if texts:
+        return parse_temperature(texts)
+    if law.uses(temperature):
+        raise SolveError(f"law '{law.name}' depends on temperature: give --temperature-c")
+    return None
 
 
 def _write_history(run: History, to: Path | None) -> None:
@@ -164,17 +146,3 @@ def _frame_times(end: float, points: int | None, every: float | None, specimen: 
         )
     frame_times = np.arange(0.0, end * (1 - 1e-9), every)
     return np.append(frame_times, end)
-
-
-def _with_geometry(specimen: Specimen, texts: Sequence[str] | None) -> Specimen:
-    """The specimen with its lengths changed."""
-    from creepkit.errors import SolveError, nearest
-
-    lengths = parse_numbers(texts or (), "--geometry", "apex_thickness=0.48")
-    if not lengths:
-        return specimen
-    known_lengths = getattr(getattr(specimen, "geometry", None), "lengths", ())
-    for name in lengths:
-        if name not in known_lengths:
-            raise SolveError(f"--geometry: no length is called '{name}'; {nearest(name, known_lengths)}")
-    return specimen.replace(**lengths)  # type: ignore[attr-defined, no-any-return]

@@ -1,1 +1,189 @@
-"""Text of forecasts, as a whole, as rows of tables, and as JSON."""
+"""Text of forecasts, as a whole, as rows of a table, and as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.records import output_unit
+
+if TYPE_CHECKING:
+    from creepkit.forecasts.forecast import Forecast
+    from creepkit.forecasts.forecast_of_test import OutputForecast, TestForecast, TimeForecast
+    from creepkit.forecasts.measured_test import ExplainedNuisance, TestScore
+
+SECONDS_PER_HOUR = 3600.0
+
+
+SHOWN_SHARE = 0.02
+"""Of the variance: smaller parts of a band are not named."""
+
+
+def forecast_text(forecast: Forecast) -> str:
+    """What is forecast by which laws, then a paragraph for each test."""
+    names = ", ".join(name if len(forecast.laws) == 1 else f"{name} ({w:.2g})" for name, w in forecast.laws.items())
+    lines = [f"by {names}: {100 * forecast.level:g} % bands and intervals of single tests"]
+    for test in forecast.tests:
+        lines += ["", *_test_lines(test)]
+    return "\n".join(lines)
+
+
+def _test_lines(test: TestForecast) -> list[str]:
+    lines = [f"{test.name}: {test.history.condition}"]
+    lines += [f"  {_end_text(one)}" for one in test.outputs.values()]
+    lines += [f"  {_time_text(one, float(test.history.times[-1]))}" for one in test.times]
+    if test.score is not None:
+        lines += [f"  {line}" for line in score_lines(test.score)]
+    leading = next(iter(test.outputs.values()), None)
+    if leading is not None:
+        parts = ", ".join(f"{part} {100 * share:.0f} %" for part, share in end_shares(leading).items())
+        lines.append(f"  its band at the end is made of: {parts}")
+    lines += [f"  {test.extrapolation}"] if test.extrapolation else []
+    return [*lines, *(f"  note: {note}" for note in test.notes)]
+
+
+def _end_text(one: OutputForecast) -> str:
+    alive = np.flatnonzero(np.isfinite(one.value) & np.isfinite(one.band.low))
+    unit = f" {output_unit(one.output)}" if output_unit(one.output) else ""
+    if not alive.size:
+        return f"{one.output}: nothing is predicted"
+    k = int(alive[-1])
+    hours = one.times[k] / SECONDS_PER_HOUR
+    return (
+        f"{one.output.replace('_', ' ')} at {hours:.4g} h: {one.value[k]:.4g}{unit} "
+        f"[{one.band.low[k]:.4g}, {_number(one.band.high[k])}]"
+    )
+
+
+def _time_text(one: TimeForecast, end: float) -> str:
+    value, low, high = (_hours(v) for v in (one.value, one.low, one.high))
+    text = f"{one.event}: {value} [{low}, {high}] h"
+    if math.isfinite(one.measured):
+        where = {True: "inside", False: "outside", None: ""}[one.inside]
+        return f"{text}, measured {'> ' if one.censored else ''}{_hours(one.measured)} h, {where}"
+    return f"{text}; before the end of the test at {_hours(end)} h with probability {one.chance:.2g}"
+
+
+def _hours(seconds: float) -> str:
+    if math.isnan(seconds):
+        return "?"
+    return f"{seconds / SECONDS_PER_HOUR:.4g}" if math.isfinite(seconds) else "beyond the test"
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else "ruptured"
+
+
+def score_lines(score: TestScore) -> list[str]:
+    """How a measured test compares, in two lines."""
+    inside = ", ".join(
+        f"{name} {100 * share:.0f} %{' (whole curve inside)' if score.whole_inside[name] else ''}"
+        for name, share in score.inside.items()
+    )
+    rms = ", ".join(f"{name} {before:.3g} to {score.rms_explained[name]:.3g}" for name, before in score.rms.items())
+    moved = [nuisance_text(one) for one in score.nuisances if abs(one.deviation) > 0.1]
+    return [
+        f"measured: frames in the pointwise band: {inside}; probability of residuals as large by chance "
+        f"{score.p_value:.2g}; log score {score.log_score:.3g} a frame",
+        f"with the law frozen its own nuisances explain {100 * score.explained:.0f} % of the squared residuals (rms in "
+        f"noises: {rms}){': ' if moved else ''}{', '.join(moved)}",
+    ]
+
+
+def nuisance_text(one: ExplainedNuisance) -> str:
+    """A nuisance and how far it lies from its prior mean."""
+    if one.kind == "rate":
+        return f"rate x {math.exp(one.value):.3g} ({one.deviation:+.1f} sd)"
+    return f"{one.kind} {one.value:.4g} ({one.deviation:+.1f} sd)"
+
+
+def end_shares(one: OutputForecast) -> dict[str, float]:
+    """{part: share of the variance} at the last time that is predicted, the largest first."""
+    alive = np.flatnonzero(np.isfinite(one.value))
+    if not alive.size:
+        return {}
+    shares = {part: float(values[alive[-1]]) for part, values in one.shares.items()}
+    return {part: share for part, share in sorted(shares.items(), key=lambda pair: -pair[1]) if share >= SHOWN_SHARE}
+
+
+FORECAST_COLUMNS = ("test", "condition", "at the end", "times, h", "measured", "own nuisances explain", "extrapolated")
+
+
+def forecast_rows(forecast: Forecast) -> list[tuple[str, ...]]:
+    """One row a test: its leading output at the end, times, and how a measurement compares."""
+    rows: list[tuple[str, ...]] = []
+    for test in forecast.tests:
+        leading = next(iter(test.outputs.values()), None)
+        times = "\n".join(f"{t.event}: {_hours(t.value)} [{_hours(t.low)}, {_hours(t.high)}]" for t in test.times)
+        measured = explained = ""
+        if test.score is not None:
+            inside = [f"{name} {100 * share:.0f} % inside" for name, share in test.score.inside.items()]
+            inside += [f"{t.event}: {_hours(t.measured)}" for t in test.times if math.isfinite(t.measured)]
+            measured, explained = "\n".join(inside), f"{100 * test.score.explained:.0f} %"
+        end = "" if leading is None else _end_text(leading).replace(" at ", "\nat ", 1)
+        rows.append((test.name, test.history.condition, end, times, measured, explained, test.extrapolation or "no"))
+    return rows
+
+
+def forecast_to_json(forecast: Forecast) -> dict[str, Any]:
+    """The forecast as JSON-able data: s and the units of the outputs; null for what is infinite or not known."""
+    return {
+        "laws": dict(forecast.laws),
+        "level": forecast.level,
+        "tests": [_test_to_json(test) for test in forecast.tests],
+    }
+
+
+def _test_to_json(test: TestForecast) -> dict[str, Any]:
+    return {
+        "name": test.name,
+        "condition": test.history.condition,
+        "outputs": {name: _output_to_json(one) for name, one in test.outputs.items()},
+        "times": [
+            {
+                "event": one.event,
+                **{key: _finite(getattr(one, key)) for key in ("value", "median", "low", "high", "chance", "measured")},
+                "censored": one.censored,
+            }
+            for one in test.times
+        ],
+        "includes": dict(test.includes),
+        "extrapolation": test.extrapolation,
+        "notes": list(test.notes),
+        "score": None if test.score is None else _score_to_json(test.score),
+    }
+
+
+def _output_to_json(one: OutputForecast) -> dict[str, Any]:
+    curves: Mapping[str, Any] = {
+        "time": one.times,
+        "value": one.value,
+        **{key: getattr(one.band, key) for key in ("median", "low", "high", "lowest", "highest")},
+    }
+    return {
+        **{key: [_finite(float(v)) for v in values] for key, values in curves.items()},
+        "unit": output_unit(one.output),
+        "shares": {part: [_finite(float(v)) for v in values] for part, values in one.shares.items()},
+    }
+
+
+def _score_to_json(score: TestScore) -> dict[str, Any]:
+    numbers = ("chi_square", "freedom", "p_value", "log_score", "explained")
+    return {
+        "inside": dict(score.inside),
+        "whole_inside": dict(score.whole_inside),
+        **{key: _finite(float(getattr(score, key))) for key in numbers},
+        "rms": {k: _finite(v) for k, v in score.rms.items()},
+        "rms_explained": {k: _finite(v) for k, v in score.rms_explained.items()},
+        "nuisances": [
+            {"kind": n.kind, "value": n.value, "sd": n.sd, "prior_mean": n.prior_mean, "prior_sd": n.prior_sd}
+            for n in score.nuisances
+        ],
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

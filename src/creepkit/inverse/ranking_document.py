@@ -1,0 +1,54 @@
+"""A ranking as a file: its laws' identifications, each in a file beside it, with their weights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from creepkit.errors import FitError
+from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, read_json, write_json
+from creepkit.files.reading import FileKind
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json, read_identification
+from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+
+RANKING = DocumentFormat(
+    "creepkit-ranking",
+    1,
+    FileKind("a ranking", FitError, "give a ranking.json that 'creepkit identify' wrote"),
+    remedy="identify again",
+)
+
+
+MOST_LAWS = 100
+"""In a ranking's file."""
+
+
+def write_ranking_document(weights: Mapping[str, float], path: Path) -> Path:
+    """Write the ranking; weights : {file of an identification, beside it: weight}."""
+    laws = [{"file": name, "weight": weight} for name, weight in weights.items()]
+    return write_json({**RANKING.heading, "laws": laws}, path, RANKING.kind)
+
+
+def read_fit_or_ranking(path: str | Path) -> Identification | ModelAverage:
+    """What a file of either holds: an identification, or the laws of a ranking with their weights."""
+    data = read_json(Path(path), IDENTIFICATION.kind)
+    if not (isinstance(data, dict) and data.get("format") == RANKING.name):
+        return identification_from_json(data, str(path))
+    content = check_heading(data, str(path), RANKING)
+    laws = content.get("laws")
+    problem = check_keys(content, ("laws",), "ranking")
+    if problem or not isinstance(laws, list) or not 0 < len(laws) <= MOST_LAWS:
+        raise FitError(f"{path}: {problem or 'laws is no list of laws'}; {RANKING.kind.advice}")
+    fits, weights = [], []
+    for entry in laws:
+        if not isinstance(entry, dict) or check_keys(entry, ("file", "weight"), "laws"):
+            raise FitError(f"{path}: each of its laws is a file and a weight, found {entry!r:.60}")
+        name, weight = entry["file"], entry["weight"]
+        if not isinstance(name, str) or Path(name).name != name:
+            raise FitError(f"{path}: a law's file is {name!r:.60}; it is a name in the same folder")
+        if isinstance(weight, bool) or not isinstance(weight, int | float) or not 0 <= weight <= 1:
+            raise FitError(f"{path}: the weight of {name} is {weight!r:.20}; it is a number from 0 to 1")
+        fits.append(read_identification(Path(path).parent / name))
+        weights.append(float(weight))
+    return ModelAverage(tuple(fits), tuple(weights))
