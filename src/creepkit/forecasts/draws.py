@@ -67,7 +67,9 @@ def law_draws(fit: Identification, count: int, rng: np.random.Generator) -> LawD
         for k, level in enumerate(scatter.levels)
     }
     factors = sum(effects[level] @ scatter.indicators[level].T for level in scatter.levels)
-    errors = factors @ scatter.gain.T + rng.standard_normal((count, len(scatter.within))) @ _root(scatter.within).T
+    errors = (
+        factors @ scatter.gain.T + rng.standard_normal((count, len(scatter.within))) @ covariance_root(scatter.within).T
+    )
     unknowns = fit.x - errors
     members = {}
     if scatter.members:
@@ -86,7 +88,7 @@ def _systematic(weight: Floats, count: int, rng: np.random.Generator) -> Ints:
     return np.minimum(np.searchsorted(np.cumsum(weight), points), weight.size - 1)
 
 
-def _root(covariance: Floats) -> Floats:
+def covariance_root(covariance: Floats) -> Floats:
     """A square root of a covariance, (unknowns, unknowns)."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))

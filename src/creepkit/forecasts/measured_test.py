@@ -19,7 +19,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from creepkit.arrays import Floats
-from creepkit.forecasts.draws import Dimension
+from creepkit.forecasts.draws import Dimension, covariance_root
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
@@ -66,6 +66,7 @@ class TestScore:
     chi_square: float
     freedom: int
     p_value: float
+    departure_p_value: float
     log_score: float
     rms: dict[str, float]
     rms_explained: dict[str, float]
@@ -98,12 +99,12 @@ def score_test(
     jacobian = residuals.jacobian[0][present]
     count = fit.u.size
     noise = covariance(residuals, noise_model)[0][np.ix_(present, present)]
-    law_covariance = mean_law_covariance(fit)
     rate = residuals.log_rate_sensitivity[0][present][:, None] * np.sqrt(scatter_variance)
     tolerance = jacobian[:, count:] * np.array([d.sd for d in own])
-    total = (
-        noise + jacobian[:, :count] @ law_covariance @ jacobian[:, :count].T + rate @ rate.T + tolerance @ tolerance.T
+    uncertain = np.concatenate(
+        [jacobian[:, :count] @ covariance_root(mean_law_covariance(fit)), rate, tolerance], axis=1
     )
+    total = noise + uncertain @ uncertain.T
     factor = np.linalg.cholesky(total)
     whitened = np.linalg.solve(factor, values)
     chi_square, freedom = float(whitened @ whitened), values.size
@@ -125,12 +126,27 @@ def score_test(
         chi_square,
         freedom,
         float(chi2.sf(chi_square, freedom)),
+        _departure_p_value(values, noise, uncertain),
         float(-0.5 * (chi_square + log_determinant + freedom * np.log(2 * np.pi)) / max(freedom, 1)),
         rms_of(values),
         rms_of(remaining),
         1.0 - float(((remaining / white) ** 2).sum()) / squares if squares > 0 else 0.0,
         estimates,
     )
+
+
+def _departure_p_value(values: Floats, noise: Floats, uncertain: Floats) -> float:
+    """Probability of a departure as large in the directions that are more uncertain than noise; 1 without any.
+
+    values : (data,). noise : (data, data) covariance. uncertain : (data, sources) effect of one standard deviation.
+    """
+    factor = np.linalg.cholesky(noise)
+    directions, sizes, _ = np.linalg.svd(np.linalg.solve(factor, uncertain), full_matrices=False)
+    counted = sizes > 1.0
+    if not counted.any():
+        return 1.0
+    components = directions[:, counted].T @ np.linalg.solve(factor, values)
+    return float(chi2.sf((components**2 / (1.0 + sizes[counted] ** 2)).sum(), int(counted.sum())))
 
 
 def mean_law_covariance(fit: Identification) -> Floats:

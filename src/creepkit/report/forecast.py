@@ -86,8 +86,8 @@ def score_lines(score: TestScore) -> list[str]:
     rms = ", ".join(f"{name} {before:.3g} to {score.rms_explained[name]:.3g}" for name, before in score.rms.items())
     moved = [nuisance_text(one) for one in score.nuisances if abs(one.deviation) > 0.1]
     return [
-        f"measured: frames in the pointwise band: {inside}; probability of residuals as large by chance "
-        f"{score.p_value:.2g}; log score {score.log_score:.3g} a frame",
+        f"measured: frames in the pointwise band: {inside}; probability of so large a departure by chance "
+        f"{score.departure_p_value:.2g}, of all residuals {score.p_value:.2g}; log score {score.log_score:.3g} a frame",
         f"with the law frozen its own nuisances explain {100 * score.explained:.0f} % of the squared residuals (rms in "
         f"noises: {rms}){': ' if moved else ''}{', '.join(moved)}",
     ]
@@ -171,7 +171,7 @@ def _output_to_json(one: OutputForecast) -> dict[str, Any]:
 
 
 def _score_to_json(score: TestScore) -> dict[str, Any]:
-    numbers = ("chi_square", "freedom", "p_value", "log_score", "explained")
+    numbers = ("chi_square", "freedom", "p_value", "departure_p_value", "log_score", "explained")
     return {
         "inside": dict(score.inside),
         "whole_inside": dict(score.whole_inside),

@@ -1,0 +1,236 @@
+"""Forecasts of Norton bars, whose curves, times and their distributions are closed forms; and what is refused."""
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+import creepkit as ck
+from creepkit.errors import FitError
+from creepkit.forecasts.forecast import forecast
+from creepkit.inverse.ranking_document import read_fit_or_ranking, write_ranking_document
+from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.report.forecast import forecast_to_json
+from helpers.rupture_tests import BAR
+
+TIMES = np.geomspace(3.6e3, 3.6e5, 40)
+RATE, EXPONENT, SCATTER = 1e-8, 5.0, 0.1  # 1/s at 100 MPa, -, of ln rate
+
+
+def bar(name, stress, factor=1.0, noise=2e-6, seed=0, **changes):
+    rng = np.random.default_rng(seed)
+    strain = RATE * (stress / 100.0) ** EXPONENT * factor * TIMES
+    outputs = {"strain": strain + rng.normal(0.0, noise, TIMES.size)} if noise else {}
+    return ck.History(name, TIMES, outputs, ck.constant_stress(stress, "stress"), 1073.15, **changes)
+
+
+@pytest.fixture(scope="module")
+def tests():
+    rng = np.random.default_rng(11)
+    stresses = [80, 80, 90, 100, 100, 110, 120, 120]
+    return [bar(f"bar {k}", s, np.exp(rng.normal(0.0, SCATTER)), seed=k) for k, s in enumerate(stresses)]
+
+
+@pytest.fixture(scope="module")
+def fit(tests):
+    nuisances = [ck.Nuisance("rate", sd=SCATTER)]
+    return ck.identify("norton", tests, using=BAR, starts=2, nuisances=nuisances)
+
+
+def test_the_band_of_a_planned_bar_is_that_of_a_linear_regression(fit, tests):
+    """ln rate is linear in ln stress: its variance is s^2 (1 + x' (X'X)^-1 x), noise being negligible."""
+    plan = bar("plan", 105.0, noise=0.0)
+    one = fit.forecast(plan, draws=20000).tests[0]
+    x = np.log([h.loading.program().values.max() / 100.0 for h in tests])
+    design = np.stack([np.ones_like(x), x], axis=1)
+    point = np.array([1.0, np.log(1.05)])
+    sd = SCATTER * np.sqrt(1.0 + point @ np.linalg.inv(design.T @ design) @ point)
+    strain = one.outputs["strain"]
+    half = np.log(strain.band.high[-1] / strain.band.low[-1]) / 2
+    assert half == pytest.approx(norm.ppf(0.975) * sd, rel=0.03)
+    (time,) = one.times
+    assert np.log(time.high / time.low) / 2 == pytest.approx(norm.ppf(0.975) * sd, rel=0.03)
+    assert time.value == pytest.approx(0.01 / (RATE * 1.05**EXPONENT), rel=0.25)
+    share = strain.shares["scatter between tests"][-1]
+    assert share == pytest.approx(SCATTER**2 / sd**2, abs=0.02)
+    assert sum(float(v[-1]) for v in strain.shares.values()) == pytest.approx(1.0)
+
+
+def test_a_factor_on_all_rates_is_followed_by_laws_without_a_coefficient_of_their_own():
+    """(A s^n)^q has no coefficient: the factor comes as a parameter of its own; the bands are those of Norton."""
+    A, q = ck.parameters("A q")
+    law = ck.CreepLaw(
+        name="root",
+        title="A power law without a coefficient",
+        terms={"root": (A + ck.stress / 100) ** (5 * q) * 1e-8},
+        params={A: ck.Param("shift", bounds=(-0.5, 0.5)), q: ck.Param("power", bounds=(0.2, 2.0))},
+        references=["none"],
+    )
+    made = [bar(f"bar {k}", s, seed=k) for k, s in enumerate([70, 85, 100, 120])]
+    fit = ck.identify(law, made, using=BAR, starts=2, nuisances=[ck.Nuisance("rate", sd=SCATTER)])
+    strain = fit.forecast(bar("plan", 90.0, noise=0.0), draws=5000).tests[0].outputs["strain"]
+    variance = (np.log(strain.band.high[-1] / strain.band.low[-1]) / 2 / norm.ppf(0.975)) ** 2
+    assert variance * strain.shares["scatter between tests"][-1] == pytest.approx(SCATTER**2, rel=0.15)
+
+
+def test_a_measured_test_is_scored_and_its_own_factor_is_found(fit):
+    measured = bar("another", 95.0, factor=1.3, seed=5)
+    one = fit.forecast(measured, targets={"strain": [0.002]}).tests[0]
+    assert one.score is not None
+    assert one.score.inside["strain"] < 0.5
+    assert one.score.departure_p_value < 0.07  # ln 1.3 is 2.4 standard deviations of two, the law's own being small
+    assert one.score.p_value > 0.2  # and each frame is as near to its neighbours as noise is
+    (rate,) = [n for n in one.score.nuisances if n.kind == "rate"]
+    law_error = np.log(float(fit.rate(95.0)[0]) / (RATE * 0.95**EXPONENT))
+    assert rate.value + law_error == pytest.approx(np.log(1.3), abs=0.01)
+    assert one.score.explained > 0.99
+    (time,) = one.times
+    assert time.measured == pytest.approx(0.002 / (RATE * 0.95**EXPONENT * 1.3), rel=0.02)
+    assert time.inside is False
+
+
+def test_a_likely_test_is_inside(fit):
+    one = fit.forecast(bar("another", 95.0, factor=1.02, seed=6)).tests[0]
+    assert one.score.whole_inside == {"strain": True}
+    assert min(one.score.p_value, one.score.departure_p_value) > 0.05
+
+
+def test_a_known_heat_narrows_the_band():
+    rng = np.random.default_rng(3)
+    heats = {"a": 0.4, "b": -0.4, "c": 0.1, "d": -0.1}
+    made = [
+        bar(f"{heat} {k}", 80 + 10 * k, np.exp(effect + rng.normal(0.0, 0.03)), seed=k, labels={"heat": heat})
+        for heat, effect in heats.items()
+        for k in range(4)
+    ]
+    fit = ck.identify("norton", made, using=BAR, starts=2)
+    plans = [bar(h, 95.0, noise=0.0, labels={"heat": h}) for h in ("a", "b", "new")]
+    a, b, new = (t.times[0] for t in fit.forecast(plans).tests)
+    assert b.median / a.median == pytest.approx(np.exp(0.8), rel=0.1)
+    assert np.log(a.high / a.low) < 0.25
+    assert np.log(new.high / new.low) > 0.8
+
+
+def test_a_test_of_another_heat_than_all_that_were_fitted_has_the_usual_scatter(tests):
+    fit = ck.identify("norton", [h.replace(labels={"heat": "a"}) for h in tests], using=BAR, starts=1)
+    same, other = (bar(h, 95.0, noise=0.0, labels={"heat": h}) for h in "ab")
+    result = fit.forecast([same, other])
+    assert not any("another" in note for note in result["a"].notes)
+    assert any("all fitted tests are of one heat" in note for note in result["b"].notes)
+    assert np.log(result["b"].times[0].high / result["b"].times[0].low) > 1.0
+
+
+def test_a_saved_identification_forecasts_the_same(fit, tmp_path):
+    plan = bar("plan", 105.0, noise=0.0)
+    loaded = ck.load(fit.save(tmp_path / "fit.json"))
+    assert forecast_to_json(loaded.forecast(plan, using=BAR)) == forecast_to_json(fit.forecast(plan, using=BAR))
+
+
+def test_extrapolation_is_said_by_how_much(fit):
+    one = fit.forecast(bar("plan", 60.0, noise=0.0)).tests[0]
+    assert "stress 60 MPa (the tests cover 80 to 120 MPa; 1.33 times beyond)" in one.extrapolation
+
+
+def test_over_laws_the_doubt_about_the_law_is_part_of_the_band(tests):
+    laws = ("norton", "hyperbolic-sine")
+    fits = tuple(
+        ck.identify(law, tests, using=BAR, starts=2, nuisances=[ck.Nuisance("rate", sd=SCATTER)]) for law in laws
+    )
+    average = ModelAverage(fits, (0.6, 0.4))
+    far = bar("plan", 220.0, noise=0.0)
+    single, both = fits[0].forecast(far).tests[0], average.forecast(far).tests[0]
+    assert both.outputs["strain"].shares["choice of the law"][-1] > 0.05
+    width = [np.log(t.times[0].high / t.times[0].low) for t in (single, both)]
+    assert width[1] > width[0]
+
+
+def test_a_dimple_is_forecast_from_bars_with_the_tolerance_of_its_thickness(fit):
+    jump = ck.PressureJump(P1=4.0, P2=5.0, Tj=1800.0)
+    times = np.linspace(0.0, 3600.0, 13)
+    plan = ck.History("dimple", times, {}, jump, 1073.15, "bulge", elastic=ck.Elastic(150e3))
+    result = forecast(fit, plan, targets={"amplitude": [0.02]}, draws=60)
+    one = result.tests[0]
+    assert set(one.outputs) == {"amplitude", "width", "shape"}
+    assert one.includes["thickness"] == "0.5 ± 0.01 mm"
+    assert any("no fitted test shows the noise" in note for note in one.notes)
+    exact = forecast(fit, plan, tolerances={"thickness": 0.0}, draws=60).tests[0]
+    assert "thickness" in one.outputs["amplitude"].shares
+    assert "thickness" not in exact.outputs["amplitude"].shares
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"level": 0.2}, "level is 0.2; give a probability"),
+        ({"draws": 3}, "draws is 3"),
+        ({"tolerances": {"thicknes": 0.1}}, "a tolerance of 'thicknes' is not known; did you mean 'thickness'"),
+        ({"tolerances": {"thickness": 0.1}}, "means nothing to the specimens of these tests"),
+        ({"tolerances": {"temperature": -1.0}}, "the tolerance of 'temperature' is -1.0"),
+        ({"targets": {"amplitude": [0.1]}}, "no test has an output 'amplitude'"),
+        ({"targets": {"strain": [-1.0]}}, "targets of strain"),
+    ],
+)
+def test_nonsense_is_refused(fit, options, sentence):
+    with pytest.raises(FitError, match=sentence):
+        fit.forecast(bar("plan", 100.0, noise=0.0), **options)
+
+
+def test_celsius_is_refused_and_may_be_insisted_on(fit):
+    plan = bar("plan", 100.0, noise=0.0).replace(temperature=800.0)
+    with pytest.raises(FitError, match=r"temperature 800 K lies 273 K below .* if 800 C is meant, give 1073.15"):
+        fit.forecast(plan)
+    with pytest.raises(FitError, match="temperatures are in K"):
+        fit.rate(100.0, 800.0)
+    with pytest.raises(FitError, match="temperatures are in K"):
+        fit.rupture_time(100.0, 800.0)
+    assert fit.forecast(plan, warn=False).tests[0].extrapolation
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit.rate(100.0, 800.0, warn=False)
+
+
+def test_an_identification_without_scatter_says_so(fit):
+    from dataclasses import replace
+
+    with pytest.raises(FitError, match=r"says nothing of the scatter between tests, .*identify again"):
+        replace(fit, rate_scatter=None).forecast(bar("plan", 100.0, noise=0.0))
+
+
+def test_text_json_and_picture(fit, tmp_path):
+    result = fit.forecast([bar("another", 95.0, seed=5), bar("plan", 130.0, noise=0.0)])
+    text = str(result)
+    assert "strain 0.01:" in text
+    assert "measured: frames in the pointwise band: strain 100 %" in text
+    assert "extrapolated" not in text.split("plan: ")[0]
+    json.dumps(forecast_to_json(result), allow_nan=False)
+    result.plot(tmp_path / "forecast.png")
+    assert (tmp_path / "forecast.png").stat().st_size > 10_000
+    with pytest.raises(FitError, match="there is no forecast of a test 'x'"):
+        result["x"]
+
+
+def test_a_ranking_has_a_file(fit, tmp_path):
+    fit.save(tmp_path / "norton.json")
+    write_ranking_document({"norton.json": 1.0}, tmp_path / "ranking.json")
+    source = read_fit_or_ranking(tmp_path / "ranking.json")
+    assert isinstance(source, ModelAverage)
+    assert source.fits[0].values == fit.values
+
+
+@pytest.mark.parametrize(
+    ("laws", "sentence"),
+    [
+        ([], "laws is no list of laws"),
+        ([{"file": "../norton.json", "weight": 1.0}], "it is a name in the same folder"),
+        ([{"file": "norton.json", "weight": 2.0}], "it is a number from 0 to 1"),
+        ([{"file": "norton.json"}], "each of its laws is a file and a weight"),
+        ([{"file": "absent.json", "weight": 1.0}], "absent.json"),
+    ],
+)
+def test_other_files_of_rankings_are_refused(laws, sentence, tmp_path):
+    path = tmp_path / "ranking.json"
+    path.write_text(json.dumps({"format": "creepkit-ranking", "version": 1, "laws": laws}))
+    with pytest.raises(FitError, match=sentence):
+        read_fit_or_ranking(path)

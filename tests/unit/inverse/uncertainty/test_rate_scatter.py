@@ -1,0 +1,109 @@
+"""Scatter of rates: balanced designs, where REML is the analysis of variance (Searle et al. (1992), chapter 4)."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import creepkit as ck
+from creepkit.inverse.uncertainty.rate_scatter import USUAL_SD, RateScatter
+from helpers.rupture_tests import BAR
+
+
+def scatter_of(log_factor, variance=0.0, heats=(), known=None):
+    """Tests that say as much of one unknown, the mean, each."""
+    count = len(log_factor)
+    names = tuple(f"test {k}" for k in range(count))
+    members = {"heat": tuple(heats)} if heats else {}
+    return RateScatter(
+        tests=names,
+        members=members,
+        log_factor=np.array(log_factor, float),
+        variance=np.full(count, variance),
+        design=np.ones((count, 1)),
+        precision=np.full((1, 1), 1e-9),
+        within=np.full((1, 1), variance / count),
+        gain=np.full((1, count), 1.0 / count),
+        known=known,
+    )
+
+
+def test_without_heats_the_restricted_likelihood_is_largest_at_the_sample_variance():
+    z = np.random.default_rng(1).normal(0.0, 0.2, 9)
+    scatter = scatter_of(z, variance=0.01**2)
+    best = minimize(lambda s: -scatter.restricted_log_likelihood(np.exp(s)), [np.log(0.1)]).x
+    assert np.exp(2 * best[0]) == pytest.approx(z.var(ddof=1) - 0.01**2, rel=1e-3)
+
+
+def test_with_heats_it_is_the_analysis_of_variance():
+    rng = np.random.default_rng(5)
+    heats, tests = 6, 4
+    z = rng.normal(0.0, 0.3, heats)[:, None] + rng.normal(0.0, 0.1, (heats, tests))
+    scatter = scatter_of(z.ravel(), 1e-8, [f"heat {k}" for k in range(heats) for _ in range(tests)])
+    best = minimize(lambda s: -scatter.restricted_log_likelihood(np.exp(s)), np.log([0.3, 0.1]), tol=1e-10).x
+    within = ((z - z.mean(axis=1, keepdims=True)) ** 2).sum() / (heats * (tests - 1))
+    between = tests * z.mean(axis=1).var(ddof=1)
+    assert np.exp(2 * best) == pytest.approx([(between - within) / tests, within], rel=1e-3)
+
+
+def test_the_effect_of_a_heat_is_shrunk_as_its_reliability_says():
+    z = np.array([0.3, 0.2, -0.2, -0.3])
+    scatter = scatter_of(z, 1e-12, ["a", "a", "b", "b"])
+    effects = scatter.member_predictor("heat", np.array([0.2, 0.1])) @ z
+    # Means of two tests differ by 0.5; the share of a heat's variance in that of its mean is .04 / (.04 + .01 / 2).
+    assert effects == pytest.approx([0.25 * 0.04 / 0.045, -0.25 * 0.04 / 0.045], rel=1e-6)
+
+
+def test_the_posterior_distribution_integrates_to_that_of_the_prior_without_information():
+    scatter = scatter_of([0.0], 1e-12)
+    posterior = scatter.posterior
+    # One test says nothing of a scatter: the mean square of a half-normal is that of its normal.
+    assert posterior.mean_square("test") == pytest.approx(USUAL_SD["test"] ** 2, rel=0.02)
+    assert posterior.median("test") == pytest.approx(0.6745 * USUAL_SD["test"], rel=0.1)
+
+
+def test_many_tests_overrule_the_prior():
+    z = np.random.default_rng(2).normal(0.0, 0.05, 200)
+    posterior = scatter_of(z).posterior
+    assert np.sqrt(posterior.mean_square("test")) == pytest.approx(0.05, rel=0.15)
+
+
+def test_a_given_standard_deviation_is_taken():
+    posterior = scatter_of([0.1, -0.3, 0.2], known=0.07).posterior
+    assert posterior.sd.tolist() == [[0.07]]
+    assert posterior.weight.tolist() == [1.0]
+
+
+def bars(count, scatter, seed, noise=2e-6):
+    """Norton bars at one stress, their strains in closed form, e = A s^n t."""
+    rng = np.random.default_rng(seed)
+    times = np.geomspace(3.6e3, 3.6e5, 40)
+    factors = np.exp(rng.normal(0.0, scatter, count))
+    return [
+        ck.History(
+            f"bar {k}",
+            times,
+            {"strain": 1e-8 * f * times + rng.normal(0.0, noise, times.size)},
+            ck.constant_stress(100.0, "stress"),
+            1073.15,
+        )
+        for k, f in enumerate(factors)
+    ], np.log(factors)
+
+
+def test_each_test_says_its_own_factor():
+    tests, log_factors = bars(6, 0.1, 3)
+    fit = ck.identify(ck.law("norton").fix(n=5.0), tests, using=BAR, starts=1)
+    told = fit.rate_scatter.log_factor
+    np.testing.assert_allclose(told - told.mean(), log_factors - log_factors.mean(), atol=4e-3)
+    # Known scatter: the law's rate is known to s / sqrt(N).
+    sd = np.sqrt(fit.rate_scatter.covariance(np.array([0.1]))[0, 0])
+    assert sd == pytest.approx(0.1 / np.sqrt(6), rel=0.02)
+
+
+def test_heats_and_laboratories_are_read_from_labels():
+    tests, _ = bars(6, 0.1, 3)
+    labelled = [h.replace(labels={"heat": "ab"[k % 2], "lab": "one"}) for k, h in enumerate(tests)]
+    scatter = ck.identify(ck.law("norton").fix(n=5.0), labelled, using=BAR, starts=1).rate_scatter
+    assert scatter.levels == ("heat", "test")
+    assert scatter.members["heat"] == ("a", "b", "a", "b", "a", "b")
+    assert scatter.common == {"laboratory": "one"}
