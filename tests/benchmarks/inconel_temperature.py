@@ -37,7 +37,8 @@ from creepkit.errors import CreepkitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.cross_validation import CrossValidation, prediction_errors
 from creepkit.inverse.identification import Identification, IdentificationSettings
-from creepkit.inverse.identify import StartingEstimate, identify
+from creepkit.inverse.identify import identify
+from creepkit.inverse.starting_estimate import StartingEstimate
 
 LAW = ck.law("drifting-exponent").fix(m=0)
 THICKNESS = ck.Nuisance("thickness", mean=0.4935, sd=0.027)

@@ -24,11 +24,12 @@ from proportions import share_with_interval
 
 import creepkit as ck
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.identify import StartingEstimate, identify
+from creepkit.inverse.identify import identify
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.search.multistart import MultiStart, distinct
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.starting_estimate import StartingEstimate
 
 REFERENCE = ReferencePoint(stress=120.0, strain=0.01, time=1e4, temperature=1000.0)
 RATE = (-7.3, -5.7)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -111,19 +112,25 @@ def parse_lengths(specimen: Specimen, texts: Sequence[str] | None) -> dict[str, 
     return lengths
 
 
-def planned_test(
-    *,
-    specimen: str | None,
-    end_h: float,
-    temperature: float | Program,
-    stress: Sequence[str] | None = None,
-    strain: Sequence[str] | None = None,
-    pressure: Sequence[str] | None = None,
-    modulus_gpa: float | None = None,
-    geometry: Sequence[str] | None = None,
-    control: str | None = None,
-    ramp: float | None = None,
-) -> History:
+@dataclass(frozen=True)
+class TestOptions:
+    """The options that describe a test, as they were given; end_h : h, temperature : K."""
+
+    __test__ = False  # not a test case, whatever its name says to pytest
+
+    end_h: float
+    temperature: float | Program
+    specimen: str | None = None
+    stress: Sequence[str] | None = None
+    strain: Sequence[str] | None = None
+    pressure: Sequence[str] | None = None
+    modulus_gpa: float | None = None
+    geometry: Sequence[str] | None = None
+    control: str | None = None
+    ramp: float | None = None
+
+
+def planned_test(options: TestOptions) -> History:
     """The history of a test that is described by options, without outputs."""
     import numpy as np
 
@@ -131,23 +138,22 @@ def planned_test(
     from creepkit.language import Elastic
     from creepkit.records import History
 
-    kind = specimen or (BULGE if pressure else RELAXATION if strain and not stress else UNIAXIAL)
+    stress, strain, pressure = options.stress, options.strain, options.pressure
+    kind = options.specimen or (BULGE if pressure else RELAXATION if strain and not stress else UNIAXIAL)
     record = ck.specimen(kind)
-    given = {"--stress": stress, "--strain": strain, "--pressure": pressure, "--control": control, "--ramp": ramp}
-    check_options(kind, {**given, "--geometry": geometry})
-    check_duration(end_h)
-    check_modulus(kind, modulus_gpa, strain)
-    end = 3600.0 * end_h
-    half = PLANNED_FRAMES // 2
+    given = {"--stress": stress, "--strain": strain, "--pressure": pressure, "--control": options.control}
+    check_options(kind, {**given, "--ramp": options.ramp, "--geometry": options.geometry})
+    check_duration(options.end_h)
+    check_modulus(kind, options.modulus_gpa, strain)
+    end, half = 3600.0 * options.end_h, PLANNED_FRAMES // 2
     times = np.union1d(np.geomspace(1e-3 * end, end, half), np.linspace(end / half, end, half))
-    loading = parse_loading(kind, stress, strain, pressure, control, ramp, end)
     return History(
         name="planned test",
         times=times,
         outputs={},
-        loading=loading,
-        temperature=temperature,
+        loading=parse_loading(kind, stress, strain, pressure, options.control, options.ramp, end),
+        temperature=options.temperature,
         specimen=kind,
-        elastic=None if modulus_gpa is None else Elastic(1e3 * modulus_gpa),
-        geometry=parse_lengths(record, geometry),
+        elastic=None if options.modulus_gpa is None else Elastic(1e3 * options.modulus_gpa),
+        geometry=parse_lengths(record, options.geometry),
     )

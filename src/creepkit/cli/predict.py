@@ -16,6 +16,7 @@ from creepkit.cli.planned_test import (
     RampOption,
     StrainOption,
     StressOption,
+    TestOptions,
     parse_temperature,
     planned_test,
 )
@@ -84,7 +85,7 @@ def command(
     given = [name for name, value in {**described, "specimen": specimen}.items() if value]
     if end_h is not None:
         temperature = _temperature(source, temperature_c)
-        histories.append(planned_test(specimen=specimen, end_h=end_h, temperature=temperature, **described))  # type: ignore[arg-type]
+        histories.append(planned_test(TestOptions(end_h, temperature, specimen, **described)))  # type: ignore[arg-type]
     elif given:
         option = f"--{given[0].replace('_', '-')}"
         raise FitError(f"{option} describes a planned test, which needs an end: give --end-h, such as 100")

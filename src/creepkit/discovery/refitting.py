@@ -29,10 +29,11 @@ from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw, ave
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import StartingEstimate, identify
+from creepkit.inverse.identify import identify
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 

@@ -21,9 +21,9 @@ MOST_ALIVE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """A band about a curve, (times,) each, in the output's unit: infinite above where draws have ruptured.
+    """A band about a curve, in the output's unit: infinite above where draws have ruptured.
 
-    median, low, high : pointwise, of measured values. lowest, highest : simultaneous.
+    median, low, high : (times,) pointwise, of measured values. lowest, highest : (times,) simultaneous.
     """
 
     median: Floats
@@ -36,9 +36,10 @@ class Band:
 def band_of_draws(
     values: Floats, noise: Floats, transform: OutputTransform, level: float, rng: np.random.Generator, *, grows: bool
 ) -> Band:
-    """The band of draws (draws, times) of a curve, to which white noise of standard deviation (times,) is added.
+    """The band of draws of a curve, to which white noise is added.
 
-    noise : in the transformed output. grows : whether a curve that has ended counts as infinitely large.
+    values : (draws, times) in the output's unit. noise : (times,) standard deviation in the transformed output.
+    grows : whether a curve that has ended counts as infinitely large.
     """
     alive = np.isfinite(values)
     transformed = transform.forward(np.where(alive, values, 0.0))

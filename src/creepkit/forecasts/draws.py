@@ -89,7 +89,7 @@ def _systematic(weight: Floats, count: int, rng: np.random.Generator) -> Ints:
 
 
 def covariance_root(covariance: Floats) -> Floats:
-    """A square root of a covariance, (unknowns, unknowns)."""
+    """A square root (unknowns, unknowns) of covariance (unknowns, unknowns)."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))

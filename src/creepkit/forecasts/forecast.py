@@ -12,9 +12,9 @@ import numpy as np
 from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.forecasts.draws import check_tolerances, law_draws
-from creepkit.forecasts.forecast_of_test import TestForecast, forecast_test
+from creepkit.forecasts.forecast_of_test import forecast_test
+from creepkit.forecasts.results import TestForecast
 from creepkit.inverse.composite_predictor import CompositePredictor, underlying_specimen
-from creepkit.inverse.extrapolation import check_kelvin
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
@@ -72,8 +72,6 @@ def forecast(
     tolerances: Mapping[str, float] | None = None,
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     draws: int = DRAWS,
-    seed: int = 0,
-    warn: bool = True,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Forecast:
     """What tests will show, by an identified law or over all laws of a ranking, with bands and intervals.
@@ -85,8 +83,8 @@ def forecast(
     tolerances : {kind: standard deviation} of what is not exactly known of a test, in the unit of the nuisance
         parameter of that kind, {"thickness": 0.01}; by default as the fit estimated it, else as the specimen states it.
     using : what predicts them, by default their specimens with the settings of the identification.
-    draws : of the law and of all else that a band is made of. warn : whether a test at a temperature that seems to be
-        in Celsius is a FitError.
+    draws : of the law and of all else that a band is made of. The seed of random numbers is that of
+        the identification's settings.
     """
     if not 0.5 <= level < 1.0:
         raise FitError(f"level is {level:g}; give a probability from 0.5 to below 1, such as 0.95")
@@ -96,9 +94,6 @@ def forecast(
     average = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
     weighted = [(f, w) for f, w in zip(average.fits, average.weights, strict=True) if w >= LEAST_WEIGHT]
     asked = dict(DEFAULT_TARGETS if targets is None else targets)
-    if warn:
-        for history in histories:
-            check_kelvin(weighted[0][0].ranges, history.temperature_program().values)
     predictors = [_predictor(weighted[0][0], history, using) for history in histories]
     if tolerances:
         check_tolerances(
@@ -112,7 +107,7 @@ def forecast(
         for k, (history, predictor) in enumerate(zip(histories, predictors, strict=True)):
             if progress is not None:
                 progress("tests", k, len(histories))
-            rng = np.random.default_rng([seed, k])
+            rng = np.random.default_rng([average.fits[0].settings.seed, k])
             laws = [(law_draws(f, max(round(draws * w / total), 2), rng), w) for f, w in weighted]
             made.append(
                 forecast_test(

@@ -194,7 +194,7 @@ def followed_history(history: History, predictor: Predictor) -> History:
 
 
 def at_times(followed: TestCurves, times: Floats) -> TestCurves:
-    """The curves at some of their times, (times,)."""
+    """The curves at some of their times; times : (times,) s."""
     return replace(followed, times=times, values=followed.values[:, np.searchsorted(followed.times, times)])
 
 

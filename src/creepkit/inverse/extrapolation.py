@@ -58,7 +58,10 @@ WRONG_UNIT_MARGIN = 100.0
 
 
 def check_kelvin(ranges: Mapping[str, tuple[float, float]], temperature: ArrayLike | None) -> None:
-    """FitError for a temperature far below the fitted ones that would be near them if it were meant in C."""
+    """FitError for a temperature far below the fitted ones that would be near them if it were meant in C.
+
+    temperature : number or (...,) K.
+    """
     if temperature is None or "temperature" not in ranges:
         return
     low, high = ranges["temperature"]

@@ -328,7 +328,7 @@ class Identification(Presentable):
     def forecast(self, tests: History | Sequence[History], *, level: float = 0.95, **options: Any) -> Any:
         """What tests will show, measured or planned: a Forecast of curves with bands, times and scores.
 
-        options : targets, tolerances, using, draws, seed, progress, as creepkit.forecast() takes them.
+        options : targets, tolerances, using, draws, progress, as creepkit.forecast() takes them.
         """
         return present(self, "forecast", tests, level=level, **options)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,13 +42,13 @@ from creepkit.inverse.iterative_estimation import (
 )
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS, NoiseModel, initial_noise_model
-from creepkit.inverse.nuisance_parameters import NuisanceEstimate, nuisance_estimates_of
+from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.multistart import EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
 from creepkit.inverse.uncertainty.laplace_approximation import (
     interval_quantile,
@@ -70,24 +70,6 @@ MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 
 REFIT_ROUNDS = 2
 """Rounds of an estimate that begins near its end."""
-
-
-@dataclass(frozen=True, eq=False)
-class StartingEstimate:
-    """Where an identification begins instead of with a global search; it takes two rounds at most.
-
-    u : (parameters,) conditioned coordinates about `reference`, None for a global search in these coordinates.
-    nuisances : explicit nuisances as they were estimated before.
-    """
-
-    u: Floats | None
-    nuisances: Sequence[NuisanceEstimate] = ()
-    reference: ReferencePoint | None = None
-
-    @classmethod
-    def from_identification(cls, fit: Identification) -> StartingEstimate:
-        """The estimates of another identification of the same law."""
-        return cls(fit.u, fit.nuisances, fit.reference)
 
 
 def identify(

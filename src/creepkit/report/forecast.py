@@ -12,8 +12,8 @@ from creepkit.records import output_unit
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
-    from creepkit.forecasts.forecast_of_test import OutputForecast, TestForecast, TimeForecast
     from creepkit.forecasts.measured_test import ExplainedNuisance, TestScore
+    from creepkit.forecasts.results import OutputForecast, TestForecast, TimeForecast
 
 SECONDS_PER_HOUR = 3600.0
 

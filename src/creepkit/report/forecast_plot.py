@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.forecasts.forecast import Forecast
-    from creepkit.forecasts.forecast_of_test import OutputForecast, TestForecast
+    from creepkit.forecasts.results import OutputForecast, TestForecast
 
 MOST_DRAWN = 12
 """Tests in one figure."""

@@ -19,10 +19,13 @@ RANGES = {"stress": (50.0, 100.0), "temperature": (1000.0, 1050.0), "strain": (0
     [
         ({"stress": 80.0, "temperature": None}, ""),
         ({"stress": [50.0, 100.0], "temperature": 1050.4}, ""),
-        ({"stress": 120.0}, "extrapolated: stress 120 MPa (the tests cover 50 to 100 MPa)"),
-        ({"stress": [20, 80.0], "time": 1e7}, "extrapolated: stress 20 to 80 MPa (the tests cover 50 to 100 MPa), "),
-        ({"temperature": 950.0}, "extrapolated: temperature 950 K (the tests cover 1000 to 1050 K)"),
-        ({"strain": 0.05}, "extrapolated: strain 0.05 (the tests cover 0 to 0.02)"),
+        ({"stress": 120.0}, "extrapolated: stress 120 MPa (the tests cover 50 to 100 MPa; 1.2 times beyond)"),
+        (
+            {"stress": [20, 80.0], "time": 1e7},
+            "extrapolated: stress 20 to 80 MPa (the tests cover 50 to 100 MPa; 2.5 times beyond), ",
+        ),
+        ({"temperature": 950.0}, "extrapolated: temperature 950 K (the tests cover 1000 to 1050 K; 50 K beyond)"),
+        ({"strain": 0.05}, "extrapolated: strain 0.05 (the tests cover 0 to 0.02; 2.5 times beyond)"),
         ({"stress": []}, ""),
     ],
 )

@@ -16,7 +16,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import StartingEstimate, identify
+from creepkit.inverse.identify import identify
 from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 from creepkit.inverse.search.multistart import distinct
@@ -24,6 +24,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, PenalisedTerms, Subsets, check_penalty
 from creepkit.inverse.sparsity.reduced_laws import ReducedLaw, ReducedLaws, TermProblem, terms_above
 from creepkit.inverse.sparsity.result import FitStatistics, PenaltyPath, Sparsity, TermNames
+from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 

@@ -1,0 +1,148 @@
+"""What a band is made of: variances of its parts, to first order, in the transformed output; the noise of a test."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.forecasts.drawn_law import DrawnLaw
+from creepkit.forecasts.draws import SOURCES
+from creepkit.forecasts.measured_test import mean_law_covariance
+from creepkit.forecasts.results import CHOICE_OF_LAW, LAW, MISFIT, NOISE, NUMERICAL, OFFSET
+from creepkit.forecasts.simulation import at_times
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.noise_model import OutputNoise
+from creepkit.inverse.observation_vector import (
+    LINEAR_COORDINATE_LENGTH,
+    LOGARITHMIC_OUTPUTS,
+    RELATIVE_DISCREPANCY_UNIT,
+    noise_standard_deviation,
+    usable_frames,
+)
+from creepkit.inverse.output_transforms import LinearTransform, LogTransform, OutputTransform
+from creepkit.records import History
+
+SMALLEST_STRAIN_RATIO = 1e-3
+"""Floor of the logarithmic scale of a strain in a band, over its largest value."""
+
+
+def band_transform(fit: Identification, name: str, central: Floats) -> OutputTransform:
+    """The scale on which an output is banded: logarithmic for a strain; central : (times,) in the output's unit."""
+    largest = float(np.nanmax(np.abs(central), initial=0.0))
+    if name in LOGARITHMIC_OUTPUTS:
+        known = fit.noise_model.outputs.get(name)
+        noise = 0.0 if known is None else max(known.noise, known.offset)
+        return LogTransform(max(SMALLEST_STRAIN_RATIO * largest, noise, 1e-14))
+    scale = fit.scatter_of_rates.output_scales.get(name, 0.0) or max(float(np.nanstd(central)), 1e-12 + 1e-3 * largest)
+    return LinearTransform(scale, largest)
+
+
+def noise_in_output(
+    fit: Identification, history: History, name: str, central: Floats, transform: OutputTransform
+) -> tuple[Floats, Floats]:
+    """Root of the covariance of correlated noise (times, times), and white noise (times,), in the transformed output.
+
+    Of an output that was not fitted only what the history states is known. central : (times,) in the output's unit.
+    """
+    times = history.times
+    slope = transform.derivative(np.where(np.isfinite(central), central, 0.0))
+    known: OutputNoise | None = fit.noise_model.outputs.get(name)
+    if name in history.outputs and usable_frames(history, name).any():
+        frame = noise_standard_deviation(history, name)
+    else:
+        stated = history.standard_deviation.get(name)
+        frame = stated if stated is not None else np.full(times.size, 0.0 if known is None else known.noise)
+    frame = np.where(np.isfinite(frame), frame, 0.0)
+    if known is None:
+        return np.zeros((times.size, 0)), np.abs(slope * frame)
+    logarithmic = name in LOGARITHMIC_OUTPUTS
+    coordinate = (
+        np.log(np.maximum(times, 1e-9 * times[-1]))
+        if logarithmic
+        else LINEAR_COORDINATE_LENGTH * times / max(float(times[-1]), 1e-300)
+    )
+    unit = RELATIVE_DISCREPANCY_UNIT if logarithmic else known.noise / float(getattr(transform, "scale", 1.0))
+    lags = np.abs(coordinate[:, None] - coordinate[None, :])
+    total = known.drift**2 * np.exp(-lags / known.correlation_length)
+    total = total + (fit.noise_model.discrepancy * unit) ** 2 * np.exp(-lags / fit.noise_model.discrepancy_length)
+    size = float(total[0, 0])
+    # Where a strain is small beside its floor, so is what is relative to it.
+    visible = np.abs(slope * central) if logarithmic else np.ones(times.size)
+    visible = np.where(np.isfinite(visible), np.minimum(visible, 1.0), 0.0)
+    root = (
+        np.linalg.cholesky(total + 1e-9 * size * np.eye(times.size)) * visible[:, None]
+        if size > 0
+        else np.zeros((times.size, 0))
+    )
+    return root, np.hypot(slope * frame, known.misfit * visible)
+
+
+def variance_shares(
+    drawn: Sequence[DrawnLaw],
+    best: DrawnLaw,
+    history: History,
+    name: str,
+    transform: OutputTransform,
+    smooth: Floats,
+    white: Floats,
+) -> dict[str, Floats]:
+    """{part: (times,) share of the variance}, to first order, in the transformed output.
+
+    smooth : (times, sources) root of the covariance of correlated noise; white : (times,) the other noise.
+    """
+    total_weight = sum(one.weight for one in drawn)
+    variances: dict[str, Floats] = {}
+    for one in drawn:
+        for part, value in _law_variances(one, history, name, transform).items():
+            variances[part] = variances.get(part, 0.0) + one.weight / total_weight * value
+    fit = best.draws.fit
+    known = fit.noise_model.outputs.get(name)
+    central = at_times(best.central, history.times).of(name)[0]
+    slope = transform.derivative(np.where(np.isfinite(central), central, 0.0))
+    if len(drawn) > 1:
+        g = np.stack(
+            [transform.forward(np.nan_to_num(at_times(one.central, history.times).of(name)[0])) for one in drawn]
+        )
+        weight = np.array([one.weight for one in drawn]) / total_weight
+        variances[CHOICE_OF_LAW] = weight @ (g - weight @ g) ** 2
+    variances[OFFSET] = (slope * (0.0 if known is None else known.offset)) ** 2
+    variances[NUMERICAL] = (slope * best.numerical.get(name, 0.0)) ** 2
+    misfit = 0.0 if known is None else known.misfit
+    discrepancy = (smooth**2).sum(axis=1) if smooth.size else np.zeros(history.times.size)
+    drift = known.drift**2 if known is not None else 0.0
+    both = drift + _discrepancy_variance(fit, name, transform)
+    share_of_drift = drift / both if both > 0 else 0.0
+    variances[NOISE] = np.maximum(white**2 - misfit**2, 0.0) + discrepancy * share_of_drift
+    variances[MISFIT] = np.minimum(misfit**2, white**2) + discrepancy * (1.0 - share_of_drift)
+    total = np.sum([*variances.values()], axis=0)
+    return {
+        part: np.where(total > 0, value / np.maximum(total, 1e-300), 0.0)
+        for part, value in variances.items()
+        if np.nanmax(value, initial=0.0) > 0
+    }
+
+
+def _discrepancy_variance(fit: Identification, name: str, transform: OutputTransform) -> float:
+    known = fit.noise_model.outputs.get(name)
+    if known is None:
+        return 0.0
+    logarithmic = name in LOGARITHMIC_OUTPUTS
+    unit = RELATIVE_DISCREPANCY_UNIT if logarithmic else known.noise / float(getattr(transform, "scale", 1.0))
+    return float((fit.noise_model.discrepancy * unit) ** 2)
+
+
+def _law_variances(one: DrawnLaw, history: History, name: str, transform: OutputTransform) -> dict[str, Floats]:
+    """{part: (times,) variance of the transformed output} by parameters, scatter of rates and dimensions of one law."""
+    central, column = at_times(one.central, history.times).of(name)[0], one.sensitivities.outputs.index(name)
+    slope = transform.derivative(np.where(np.isfinite(central), central, 0.0))[:, None]
+    by_law = slope * one.sensitivities.coordinates[:, column]
+    variances = {LAW: np.einsum("ti,ij,tj->t", by_law, mean_law_covariance(one.draws.fit), by_law)}
+    rate = slope[:, 0] * one.sensitivities.rate[:, column]
+    for level, variance in one.factor_variances.items():
+        variances[SOURCES[level]] = rate**2 * variance
+    for dimension in one.dimensions:
+        change = slope[:, 0] * one.sensitivities.dimensions[dimension.kind][:, column] * dimension.sd
+        variances[dimension.kind] = change**2
+    return variances
