@@ -91,6 +91,9 @@ def forecast(
     if not 50 <= draws <= 100_000:
         raise FitError(f"draws is {draws}; allowed are 50 to 100000")
     histories = check_histories([tests] if isinstance(tests, History) else list(tests))
+    for history in histories:
+        if not history.times[-1] > 0:
+            raise FitError(f"history '{history.name}' has no time above zero; give those at which it is to be forecast")
     average = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
     weighted = [(f, w) for f, w in zip(average.fits, average.weights, strict=True) if w >= LEAST_WEIGHT]
     asked = dict(DEFAULT_TARGETS if targets is None else targets)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,24 +44,48 @@ def forecast_test(
     tolerances: Mapping[str, float],
     rng: np.random.Generator,
 ) -> TestForecast:
-    """The forecast of one test by weighted laws."""
-    drawn = [drawn_law(draws, weight, history, predictor, tolerances, rng) for draws, weight in laws]
+    """The forecast of one test by weighted laws.
+
+    targets : {output: values}, in its unit. tolerances : {kind: standard deviation}.
+    """
+    banded = _banded_history(history)
+    drawn = [drawn_law(draws, weight, banded, predictor, tolerances, rng) for draws, weight in laws]
     best = max(drawn, key=lambda one: one.weight)
     fit = best.draws.fit
     outputs = {
-        name: _output_forecast(drawn, best, history, name, level, rng)
+        name: _output_forecast(drawn, best, banded, name, level, rng)
         for name in best.central.outputs
-        if np.isfinite(at_times(best.central, history.times).of(name)).any()
+        if np.isfinite(at_times(best.central, banded.times).of(name)).any()
     }
     times = _times(drawn, best, history, targets, level, rng)
     notes = _notes(fit, history, outputs)
     score = None
     if any(usable_frames(history, name).any() for name in history.outputs if name in outputs):
-        score, problem = _score(best, history, predictor, outputs)
+        score, problem = _score(best, (history, banded), predictor, outputs)
         notes += [problem] if problem else []
     includes = _includes(drawn, best, outputs)
-    return TestForecast(
-        history, outputs, times, includes, _extrapolation(history, predictor, best), score, tuple(notes)
+    return TestForecast(history, outputs, times, includes, _extrapolation(banded, predictor, best), score, tuple(notes))
+
+
+MOST_TIMES = 300
+"""Of a test at which bands are made; of more frames so many are taken, half in time and half in its logarithm."""
+
+
+def _banded_history(history: History) -> History:
+    """The history at the times of its bands."""
+    times = history.times
+    if times.size <= MOST_TIMES:
+        return history
+    half = MOST_TIMES // 2
+    first = float(times[times > 0][0])
+    targets = np.concatenate([np.geomspace(first, times[-1], half), np.linspace(first, times[-1], half)])
+    kept = np.unique(np.searchsorted(times, targets).clip(max=times.size - 1))
+    return replace(
+        history,
+        times=times[kept],
+        outputs={name: values[kept] for name, values in history.outputs.items()},
+        standard_deviation={name: values[kept] for name, values in history.standard_deviation.items()},
+        used=history.used[kept],
     )
 
 
@@ -157,9 +182,10 @@ def _measured_crossing(history: History, output: str, target: float) -> float:
 
 
 def _score(
-    best: DrawnLaw, history: History, predictor: Predictor, outputs: Mapping[str, OutputForecast]
+    best: DrawnLaw, tests: tuple[History, History], predictor: Predictor, outputs: Mapping[str, OutputForecast]
 ) -> tuple[TestScore | None, str]:
-    """The score of a measured test, or why it has none."""
+    """The score of a measured test, or why it has none; tests : the history, and the same at the times of bands."""
+    full, history = tests
     inside, whole = {}, {}
     for name, forecast in outputs.items():
         if name not in history.outputs or not usable_frames(history, name).any():
@@ -171,7 +197,7 @@ def _score(
         whole[name] = bool(((values >= band.lowest[used]) & (values <= band.highest[used])).all())
     try:
         score = score_test(
-            best.draws.fit, predictor, history, best.dimensions, sum(best.factor_variances.values()), (inside, whole)
+            best.draws.fit, predictor, full, best.dimensions, sum(best.factor_variances.values()), (inside, whole)
         )
     except CreepkitError as error:
         return None, f"no score: {error}"
