@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Bools, Floats
 from creepkit.inverse.output_transforms import OutputTransform
 
 MOST_ALIVE = 0.5
@@ -34,7 +34,14 @@ class Band:
 
 
 def band_of_draws(
-    values: Floats, noise: Floats, transform: OutputTransform, level: float, rng: np.random.Generator, *, grows: bool
+    values: Floats,
+    times: Floats,
+    noise: Floats,
+    transform: OutputTransform,
+    level: float,
+    rng: np.random.Generator,
+    *,
+    grows: bool,
 ) -> Band:
     """The band of draws of a curve, to which white noise is added.
 
@@ -42,47 +49,63 @@ def band_of_draws(
     grows : whether a curve that has ended counts as infinitely large.
     """
     alive = np.isfinite(values)
-    transformed = transform.forward(np.where(alive, values, 0.0))
-    transformed = np.where(alive, transformed, np.inf if grows else np.nan)
-    enough = alive.mean(axis=0) >= MOST_ALIVE
+    transformed = np.where(alive, transform.forward(np.where(alive, values, 0.0)), np.nan)
+    if grows:
+        transformed = _continued(transformed, times)
+    counted = np.isfinite(transformed).any(axis=0)
     probabilities = (0.5 - 0.5 * level, 0.5, 0.5 + 0.5 * level)
-    low, median, high = _quantiles(transformed, probabilities, grows=grows)
+    low, median, high = (
+        np.where(counted, q, np.nan) for q in np.nanquantile(np.where(counted, transformed, 0.0), probabilities, axis=0)
+    )
     quantile = float(norm.ppf(0.5 + 0.5 * level))
-    with np.errstate(invalid="ignore"):
-        below = np.hypot(median - low, quantile * noise)
-        above = np.hypot(high - median, quantile * noise)
+    below = np.hypot(median - low, quantile * noise)
+    above = np.hypot(high - median, quantile * noise)
     noisy = transformed + noise * rng.standard_normal(transformed.shape)
     factor = _simultaneous_factor(noisy, median, below, above, level)
-    usable = np.isfinite(median) if grows else enough & np.isfinite(median)
+    enough = alive.mean(axis=0) >= MOST_ALIVE
+    largest = np.max(transformed, initial=-np.inf, where=alive)
+    first_ended = np.min(transformed, axis=0, initial=np.inf, where=~alive) if grows else np.full(times.size, np.inf)
 
-    def outputs(g: Floats) -> Floats:
-        finite = np.isfinite(g)
-        return np.where(
-            usable,
-            np.where(finite, transform.inverse(np.where(finite, g, 0.0)), np.where(g > 0, np.inf, np.nan)),
-            np.nan,
-        )
+    def outputs(g: Floats, infinite: Bools) -> Floats:
+        usable = np.isfinite(g) & ~infinite & (enough | grows)
+        outside = np.where(infinite & grows, np.inf, np.nan)
+        return np.where(usable, transform.inverse(np.where(usable, g, 0.0)), outside)
 
-    ends = (median, median - below, median + above, median - factor * below, median + factor * above)
-    return Band(*(outputs(g) for g in ends))
+    def lower(g: Floats) -> Floats:
+        return outputs(g, (g > largest) & grows)
+
+    def upper(g: Floats) -> Floats:
+        return outputs(g, g >= first_ended)
+
+    return Band(
+        outputs(median, ~enough & grows),
+        lower(median - below),
+        upper(median + above),
+        lower(median - factor * below),
+        upper(median + factor * above),
+    )
 
 
-def _quantiles(values: Floats, probabilities: tuple[float, ...], *, grows: bool) -> list[Floats]:
-    """(times,) each; of values (draws, times) that may be infinite, or, where curves that ended do not count, NaN."""
-    if grows:
-        ordered = np.sort(values, axis=0)
-        positions = [p * (len(values) - 1) for p in probabilities]
-        result = []
-        for position in positions:
-            lower, upper = ordered[int(np.floor(position))], ordered[int(np.ceil(position))]
-            share = position - np.floor(position)
-            finite = np.isfinite(lower) & np.isfinite(upper)
-            blend = np.where(finite, lower, 0.0) * (1 - share) + np.where(finite, upper, 0.0) * share
-            result.append(np.where(finite, blend, upper))
-        return result
-    counted = np.isfinite(values).any(axis=0)
-    filled = np.where(counted, values, 0.0)
-    return [np.where(counted, q, np.nan) for q in np.nanquantile(filled, probabilities, axis=0)]
+def _continued(values: Floats, times: Floats) -> Floats:
+    """Curves (draws, times), NaN after their ends, continued in ln t with the slope at which such curves end.
+
+    So a curve that ends early is far above one that ends late, and the band of a curve that is still there where most
+    have ended has a lower end.
+    """
+    log_times = np.log(np.maximum(times, 1e-9 * times[-1]))
+    alive = np.isfinite(values)
+    lasting, frames = alive.any(axis=1), np.arange(times.size)
+    last = times.size - 1 - alive[:, ::-1].argmax(axis=1)
+    at_end = np.take_along_axis(values, last[:, None], axis=1)
+    before = np.take_along_axis(values, np.maximum(last - 1, 0)[:, None], axis=1)
+    slopes = (at_end - before)[:, 0] / np.maximum(log_times[last] - log_times[last - 1], 1e-12)
+    slopes = slopes[lasting & (last > 0) & (last < times.size - 1)]
+    slope = max(float(np.median(slopes)), 0.0) if slopes.size else 0.0
+    beyond = at_end + slope * (log_times - log_times[last][:, None])
+    continued = np.where(frames > last[:, None], beyond, values)
+    if lasting.any() and not lasting.all():
+        continued[~lasting] = np.nanmax(continued[lasting], axis=0)
+    return continued
 
 
 def _simultaneous_factor(values: Floats, median: Floats, below: Floats, above: Floats, level: float) -> float:
@@ -90,9 +113,7 @@ def _simultaneous_factor(values: Floats, median: Floats, below: Floats, above: F
     counted = np.isfinite(median) & (below > 0) & (above > 0)
     if not counted.any():
         return 1.0
-    with np.errstate(invalid="ignore"):
-        deviation = values[:, counted] - median[counted]
-        excess = np.where(deviation > 0, deviation / above[counted], -deviation / below[counted])
-    excess = np.where(np.isfinite(above[counted]) | (deviation <= 0), excess, 0.0)
+    deviation = values[:, counted] - median[counted]
+    excess = np.where(deviation > 0, deviation / above[counted], -deviation / below[counted])
     largest = np.nan_to_num(excess, nan=0.0).max(axis=1)
     return max(1.0, float(np.quantile(largest, level, method="higher")))

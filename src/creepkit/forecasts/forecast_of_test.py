@@ -110,7 +110,7 @@ def _output_forecast(
     g = transform.forward(np.where(alive, values, 0.0)) + rng.standard_normal((len(values), smooth.shape[1])) @ smooth.T
     values = np.where(alive, transform.inverse(g), np.nan)
     grows = leading and _increases(central)
-    band = band_of_draws(values, white, transform, level, rng, grows=grows)
+    band = band_of_draws(values, history.times, white, transform, level, rng, grows=grows)
     shares = variance_shares(drawn, best, history, name, transform, smooth, white)
     return OutputForecast(name, history.times, central, band, shares)
 

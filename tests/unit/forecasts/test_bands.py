@@ -13,7 +13,8 @@ RNG = np.random.default_rng(0)
 
 def band(values, noise=0.0, grows=True, level=0.95):
     noise = np.broadcast_to(noise, values.shape[1:]).astype(float)
-    return band_of_draws(values, noise, IDENTITY, level, np.random.default_rng(1), grows=grows)
+    times = 1.0 + np.arange(values.shape[1])
+    return band_of_draws(values, times, noise, IDENTITY, level, np.random.default_rng(1), grows=grows)
 
 
 def test_parallel_curves_have_one_band():
@@ -50,6 +51,20 @@ def test_where_many_have_ruptured_there_is_no_upper_end():
     assert np.isfinite(result.high[:3]).all()
     assert np.isinf(result.high[3:]).all()
     assert np.isfinite(result.low).all()
+
+
+def test_new_curves_lie_inside_while_they_last():
+    times = np.linspace(0.1, 1.6, 25)
+
+    def ruptured(count):
+        clock = times / np.exp(0.2 * RNG.standard_normal((count, 1)))
+        return np.where(clock < 1.0, -np.log(np.maximum(1.0 - clock, 1e-12)), np.nan)
+
+    result = band_of_draws(ruptured(2000), times, np.zeros(25), IDENTITY, 0.9, np.random.default_rng(1), grows=True)
+    new = ruptured(2000)
+    assert np.isinf(result.median[-1])
+    inside = (np.isnan(new) | ((new >= result.lowest) & (new <= result.highest))).all(axis=1).mean()
+    assert inside == pytest.approx(0.92, abs=0.05)
 
 
 def test_an_output_that_ends_says_nothing_after_most_have_ended():
