@@ -25,10 +25,10 @@ from creepkit.forecasts.results import (
     TimeForecast,
 )
 from creepkit.forecasts.simulation import at_times, crossing_times
-from creepkit.forecasts.variance_shares import band_transform, noise_in_output, variance_shares
+from creepkit.forecasts.variance_shares import band_transform, discrepancy_variance, noise_in_output, variance_shares
 from creepkit.inverse.extrapolation import extrapolation_text
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, usable_frames
+from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT, usable_frames
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.uncertainty.rate_scatter import USUAL_SD
 from creepkit.records import ZERO_CELSIUS, History, Predictor, output_unit
@@ -135,8 +135,13 @@ def _times(
     forecasts = []
     for output, values in targets.items():
         for target in values if output in best.central.outputs else ():
-            crossings = np.concatenate([crossing_times(one.drawn, output, target) for one in drawn])
-            value = float(crossing_times(best.central, output, target)[0])
+            crossings = np.concatenate(
+                [
+                    crossing_times(one.drawn, output, _targets_of_curves(best, history, output, target, one, rng))
+                    for one in drawn
+                ]
+            )
+            value = float(crossing_times(best.central, output, np.array([target]))[0])
             event = f"{output.replace('_', ' ')} {target:g} {output_unit(output)}".strip()
             measured = _measured_crossing(history, output, target)
             forecasts.append(_time_forecast(event, value, crossings, history, level, measured, censored=False))
@@ -150,6 +155,25 @@ def _times(
         value = float(best.central.end_times[0])
         forecasts.append(_time_forecast("rupture", value, ends, history, level, measured, censored=history.unruptured))
     return tuple(forecasts)
+
+
+def _targets_of_curves(
+    best: DrawnLaw, history: History, name: str, target: float, one: DrawnLaw, rng: np.random.Generator
+) -> Floats:
+    """(draws,) what predicted curves must reach, so that measured ones reach the target: without what lies beside them.
+
+    These are the offset of the test and what lasts over many frames; the noise of a single frame is left out.
+    """
+    fit, count = best.draws.fit, one.draws.count
+    known = fit.noise_model.outputs.get(name)
+    if known is None:
+        return np.full(count, target)
+    shifted = target - known.offset * rng.standard_normal(count)
+    transform = band_transform(fit, name, at_times(best.central, history.times).of(name)[0])
+    slow = np.sqrt(known.drift**2 + discrepancy_variance(fit, name, transform)) * rng.standard_normal(count)
+    if name in LOGARITHMIC_OUTPUTS:
+        return np.asarray(shifted * np.exp(-slow))
+    return np.asarray(shifted - float(getattr(transform, "scale", 1.0)) * slow)
 
 
 def _time_forecast(

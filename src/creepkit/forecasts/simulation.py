@@ -198,14 +198,14 @@ def at_times(followed: TestCurves, times: Floats) -> TestCurves:
     return replace(followed, times=times, values=followed.values[:, np.searchsorted(followed.times, times)])
 
 
-def crossing_times(drawn: TestCurves, output: str, target: float) -> Floats:
-    """(draws,) s, when an output first reaches a target; the rupture where that comes first, else infinite."""
+def crossing_times(drawn: TestCurves, output: str, targets: Floats) -> Floats:
+    """(draws,) s, when an output first reaches targets (draws,); rupture where that comes first, else infinite."""
     values, times = drawn.of(output), drawn.times
-    reached = np.nan_to_num(values, nan=-np.inf) >= target
+    reached = np.nan_to_num(values, nan=-np.inf) >= targets[:, None]
     first = np.where(reached.any(axis=1), reached.argmax(axis=1), -1)
     result = np.where(np.isnan(drawn.end_times), np.nan, drawn.end_times)
     for k in np.flatnonzero(first >= 0):
-        j = int(first[k])
+        j, target = int(first[k]), float(targets[k])
         if j == 0:
             result[k] = times[0]
             continue

@@ -112,7 +112,7 @@ def variance_shares(
     misfit = 0.0 if known is None else known.misfit
     discrepancy = (smooth**2).sum(axis=1) if smooth.size else np.zeros(history.times.size)
     drift = known.drift**2 if known is not None else 0.0
-    both = drift + _discrepancy_variance(fit, name, transform)
+    both = drift + discrepancy_variance(fit, name, transform)
     share_of_drift = drift / both if both > 0 else 0.0
     variances[NOISE] = np.maximum(white**2 - misfit**2, 0.0) + discrepancy * share_of_drift
     variances[MISFIT] = np.minimum(misfit**2, white**2) + discrepancy * (1.0 - share_of_drift)
@@ -124,7 +124,8 @@ def variance_shares(
     }
 
 
-def _discrepancy_variance(fit: Identification, name: str, transform: OutputTransform) -> float:
+def discrepancy_variance(fit: Identification, name: str, transform: OutputTransform) -> float:
+    """Variance of the model discrepancy of one output, in the transformed output."""
     known = fit.noise_model.outputs.get(name)
     if known is None:
         return 0.0
