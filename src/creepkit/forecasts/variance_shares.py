@@ -28,6 +28,10 @@ SMALLEST_STRAIN_RATIO = 1e-3
 """Floor of the logarithmic scale of a strain in a band, over its largest value."""
 
 
+COMPARED_STRAIN_RATIO = 1e-2
+"""The same of the scale on which tests are compared (see inverse.observation_vector.log_transform_for)."""
+
+
 def band_transform(fit: Identification, name: str, central: Floats) -> OutputTransform:
     """The scale on which an output is banded: logarithmic for a strain; central : (times,) in the output's unit."""
     largest = float(np.nanmax(np.abs(central), initial=0.0))
@@ -68,9 +72,10 @@ def noise_in_output(
     total = known.drift**2 * np.exp(-lags / known.correlation_length)
     total = total + (fit.noise_model.discrepancy * unit) ** 2 * np.exp(-lags / fit.noise_model.discrepancy_length)
     size = float(total[0, 0])
-    # Where a strain is small beside its floor, so is what is relative to it.
-    visible = np.abs(slope * central) if logarithmic else np.ones(times.size)
-    visible = np.where(np.isfinite(visible), np.minimum(visible, 1.0), 0.0)
+    # What lies beside the law has one size on the scale on which tests are compared, whose floor is higher.
+    finite = np.where(np.isfinite(central), central, 0.0)
+    fitted = LogTransform(max(COMPARED_STRAIN_RATIO * float(np.abs(finite).max()), 1e-14)) if logarithmic else transform
+    visible = slope / fitted.derivative(finite)
     root = (
         np.linalg.cholesky(total + 1e-9 * size * np.eye(times.size)) * visible[:, None]
         if size > 0
