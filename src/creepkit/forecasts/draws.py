@@ -32,6 +32,14 @@ SOURCES = {
 """What the scatter of each level is called among the parts of a band."""
 
 
+MOST_BATCHES = 50
+"""Of draws, until enough of them lie within the bounds of the law; then some are taken more than once."""
+
+
+BOUND_TOLERANCE = 1e-6
+"""Of the width of the bounds: draws as near as this outside one count as inside."""
+
+
 @dataclass(frozen=True, eq=False)
 class LawDraws:
     """Draws of the unknowns of one identification, with the scatter that each of them belongs to.
@@ -57,7 +65,27 @@ class LawDraws:
 
 
 def law_draws(fit: Identification, count: int, rng: np.random.Generator) -> LawDraws:
-    """`count` draws of the unknowns of an identification and of the factors of its heats and laboratories."""
+    """`count` draws of the unknowns of an identification and of the factors of its heats and laboratories.
+
+    Draws outside the bounds of the law are drawn again: moved to a bound one by one, parameters that compensate each
+    other would no longer do so.
+    """
+    drawn = [_joint_draws(fit, count, rng)]
+    while sum(one.count for one in drawn) < count and len(drawn) < MOST_BATCHES:
+        drawn.append(_joint_draws(fit, count, rng))
+    if not any(one.count for one in drawn):
+        drawn = [_joint_draws(fit, count, rng, within_bounds=False)]
+    chosen = np.arange(count) % sum(one.count for one in drawn)
+    return LawDraws(
+        fit,
+        np.concatenate([one.unknowns for one in drawn])[chosen],
+        np.concatenate([one.scatter_sd for one in drawn])[chosen],
+        {level: np.concatenate([one.members[level] for one in drawn])[chosen] for level in drawn[0].members},
+    )
+
+
+def _joint_draws(fit: Identification, count: int, rng: np.random.Generator, *, within_bounds: bool = True) -> LawDraws:
+    """Draws of all that is uncertain together, at most `count`: those within the bounds of the law."""
     scatter = fit.scatter_of_rates
     posterior = scatter.posterior
     nodes = rng.permutation(_systematic(posterior.weight, count, rng))
@@ -76,10 +104,13 @@ def law_draws(fit: Identification, count: int, rng: np.random.Generator) -> LawD
         shown = factors - errors @ scatter.design.T
         shown = shown + np.sqrt(scatter.variance) * rng.standard_normal(shown.shape)
         members = _conditioned(scatter, sd, nodes, effects, shown)
-    if fit.samples is not None:
-        chosen = rng.permutation(_systematic(np.full(len(fit.samples), 1.0 / len(fit.samples)), count, rng))
-        unknowns[:, : fit.u.size] = fit.samples[chosen]
-    return LawDraws(fit, unknowns, sd, members)
+    kept = np.ones(count, bool)
+    if within_bounds:
+        theta = fit.coordinates.theta(unknowns[:, : fit.u.size])
+        low, high = fit.law.internal_bounds
+        margin = BOUND_TOLERANCE * (high - low)
+        kept = ((theta >= low - margin) & (theta <= high + margin)).all(axis=1)
+    return LawDraws(fit, unknowns[kept], sd[kept], {level: values[kept] for level, values in members.items()})
 
 
 def _systematic(weight: Floats, count: int, rng: np.random.Generator) -> Ints:

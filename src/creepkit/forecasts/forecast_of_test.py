@@ -231,7 +231,7 @@ def _score(
 def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, OutputForecast]) -> dict[str, str]:
     """{part of the band: its size in words}."""
     fit = best.draws.fit
-    parts = {LAW: "posterior covariance of its parameters" if fit.samples is None else "samples of their posterior"}
+    parts = {LAW: "posterior covariance of its parameters, within their bounds"}
     if len(drawn) > 1:
         parts[CHOICE_OF_LAW] = ", ".join(f"{one.draws.fit.law.name} ({one.weight:.2g})" for one in drawn)
     for level, variance in best.factor_variances.items():

@@ -150,9 +150,7 @@ def _departure_p_value(values: Floats, noise: Floats, uncertain: Floats) -> floa
 
 
 def mean_law_covariance(fit: Identification) -> Floats:
-    """(parameters, parameters) covariance of u over the posterior distribution of the scatter; of samples their own."""
-    if fit.samples is not None:
-        return np.atleast_2d(np.cov(fit.samples, rowvar=False))
+    """(parameters, parameters) covariance of u over the posterior distribution of the scatter."""
     scatter, size = fit.scatter_of_rates, fit.u.size
     posterior = scatter.posterior
     mean_effect = sum(w * scatter.effect_covariance(sd) for w, sd in zip(posterior.weight, posterior.sd, strict=True))
