@@ -82,7 +82,8 @@ def command(
         "control": control,
         "ramp": ramp,
     }
-    given = [name for name, value in {**described, "specimen": specimen}.items() if value]
+    others = {"specimen": specimen, "temperature_c": temperature_c}
+    given = [name for name, value in {**described, **others}.items() if value not in (None, [])]
     if end_h is not None:
         temperature = _temperature(source, temperature_c)
         histories.append(planned_test(TestOptions(end_h, temperature, specimen, **described)))  # type: ignore[arg-type]
@@ -112,12 +113,12 @@ def command(
 def _temperature(source: Identification | ModelAverage, texts: list[str] | None) -> float | Program:
     """K, as given; else that of the fitted tests, which must have had one alone."""
     from creepkit.errors import FitError
+    from creepkit.inverse.identification import Identification
     from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 
     if texts:
         return parse_temperature(texts)
-    ranges = getattr(source, "ranges", None) or source.fits[0].ranges  # type: ignore[union-attr]
-    low, high = ranges["temperature"]
+    low, high = (source if isinstance(source, Identification) else source.fits[0]).ranges["temperature"]
     if high - low > ISOTHERMAL_RANGE:
         raise FitError(f"the fitted tests were made at {low:.4g} to {high:.4g} K: give --temperature-c")
     return float(0.5 * (low + high))

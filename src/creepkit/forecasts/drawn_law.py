@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from creepkit.errors import FitError
 from creepkit.forecasts.draws import (
     Dimension,
     LawDraws,
     dimension_draws,
     dimensions_of,
-    factor_variances,
     log_factor_draws,
+    own_variances,
 )
 from creepkit.forecasts.simulation import (
     TestCurves,
@@ -29,14 +30,17 @@ from creepkit.forecasts.simulation import (
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.records import History, Predictor
 
+LEAST_SOLVED = 0.8
+"""Share of the draws that the solver must finish."""
+
 
 @dataclass(frozen=True, eq=False)
 class DrawnLaw:
     """What one law says of one test.
 
     drawn : draws of its curves, at its times and up to rupture; central : at the identified values.
-    factor_variances : {level: variance of ln of the test's own factor on the rate}.
-    numerical : {output: standard deviation}, in its unit.
+    own_variances : {level: variance of ln of what is new in the factor of the test on the rate}.
+    numerical : {output: standard deviation}, in its unit. failed : draws that the solver did not finish, left out.
     """
 
     draws: LawDraws
@@ -44,9 +48,10 @@ class DrawnLaw:
     drawn: TestCurves
     central: TestCurves
     dimensions: Sequence[Dimension]
-    factor_variances: Mapping[str, float]
+    own_variances: Mapping[str, float]
     sensitivities: TestSensitivities
     numerical: Mapping[str, float]
+    failed: int
 
 
 def drawn_law(
@@ -62,21 +67,32 @@ def drawn_law(
     dimensions = dimensions_of(fit, history, predictor, tolerances)
     centre = {d.kind: d.mean for d in dimensions}
     followed, own = followed_history(history, predictor), predictor_for(predictor, history)
-    central, numerical = central_curves(fit, predictor, followed, centre)
+    mean, _ = fit.scatter_of_rates.mean_joint
+    known = float(mean[[*fit.scatter_of_rates.new_test(history).known.values()]].sum())
+    central, numerical = central_curves(fit, predictor, followed, centre, known)
     cheaper = drawing_predictor(fit, predictor, history, [*centre])
     factors = log_factor_draws(draws, history, rng)
     nuisances = dimension_draws(dimensions, draws, rng)
-    drawn = curves(fit, cheaper, followed, drawn_theta(fit, draws.u), np.sum([*factors.values()], axis=0), nuisances)
+    drawn = curves(fit, cheaper, followed, drawn_theta(fit, draws.u), factors, nuisances)
     if cheaper is not own or numerical:
         values, fixed = fit.coordinates.theta(fit.u)[None], {kind: np.array([[v]]) for kind, v in centre.items()}
-        drawn = corrected(drawn, curves(fit, cheaper, followed, values, np.zeros(1), fixed), central)
+        drawn = corrected(drawn, curves(fit, cheaper, followed, values, np.array([known]), fixed), central)
+    solved = ~np.isnan(drawn.end_times)
+    if solved.mean() < LEAST_SOLVED:
+        raise FitError(
+            f"test '{history.name}': the solver finishes {100 * solved.mean():.0f} % of the draws of law "
+            f"'{fit.law.name}' alone, too few for a band; shorten the test, or narrow the bounds of the law"
+        )
+    failed = int((~solved).sum())
+    drawn = replace(drawn, values=drawn.values[solved], end_times=drawn.end_times[solved])
     return DrawnLaw(
         draws,
         weight,
         drawn,
         central,
         dimensions,
-        factor_variances(draws, history),
+        own_variances(fit, history),
         sensitivities_at_values(fit, own, history, centre),
         numerical,
+        failed,
     )

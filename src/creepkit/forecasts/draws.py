@@ -1,8 +1,7 @@
 """Draws from what an identification leaves uncertain of a new test: the law, the test's own rate, its dimensions.
 
-The law's unknowns and the tests' ln factors are drawn together, from the posterior distribution of the scatter between
-tests (see inverse.uncertainty.rate_scatter). A heat or laboratory among those that were fitted keeps its own factor: a
-draw from the prior is conditioned on what the tests showed by kriging its difference to them (Matheron's rule).
+The law's unknowns and the effects of heats and laboratories are drawn together, from their posterior distribution over
+that of the scatter between tests (see inverse.uncertainty.rate_scatter).
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from creepkit.errors import FitError, nearest
 from creepkit.inverse.composite_predictor import predictor_for, supports_nuisance
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import owner_of, prior_mean
-from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD, RateScatter, level_of
+from creepkit.inverse.uncertainty.rate_scatter import USUAL_SD
 from creepkit.records import SIMULATED_NUISANCES, STEP_NUISANCES, History, Nuisance, Predictor
 
 TOLERANCE_KINDS = tuple(kind for kind in SIMULATED_NUISANCES if kind not in STEP_NUISANCES)
@@ -42,30 +41,29 @@ BOUND_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class LawDraws:
-    """Draws of the unknowns of one identification, with the scatter that each of them belongs to.
+    """Draws of the unknowns of one identification and of the effects of its heats and laboratories.
 
-    unknowns : (draws, unknowns) x = (u, e). scatter_sd : (draws, levels) of ln rate. members : {level: (draws,
-    members)} ln factors of the members of the levels that were fitted.
+    joint : (draws, unknowns + effects) x = (u, e), then ln factors (see RateScatter.groups). scatter_sd : (draws,
+    levels) of ln rate, the scatter that each draw belongs to.
     """
 
     fit: Identification
-    unknowns: Floats
+    joint: Floats
     scatter_sd: Floats
-    members: Mapping[str, Floats]
 
     @property
     def count(self) -> int:
         """Number of draws."""
-        return len(self.unknowns)
+        return len(self.joint)
 
     @property
     def u(self) -> Floats:
         """(draws, parameters) conditioned coordinates of the law."""
-        return self.unknowns[:, : self.fit.u.size]
+        return self.joint[:, : self.fit.u.size]
 
 
 def law_draws(fit: Identification, count: int, rng: np.random.Generator) -> LawDraws:
-    """`count` draws of the unknowns of an identification and of the factors of its heats and laboratories.
+    """`count` draws of the unknowns of an identification and of the effects of its heats and laboratories.
 
     Draws outside the bounds of the law are drawn again: moved to a bound one by one, parameters that compensate each
     other would no longer do so.
@@ -76,45 +74,32 @@ def law_draws(fit: Identification, count: int, rng: np.random.Generator) -> LawD
     if not any(one.count for one in drawn):
         drawn = [_joint_draws(fit, count, rng, within_bounds=False)]
     chosen = np.arange(count) % sum(one.count for one in drawn)
-    return LawDraws(
-        fit,
-        np.concatenate([one.unknowns for one in drawn])[chosen],
-        np.concatenate([one.scatter_sd for one in drawn])[chosen],
-        {level: np.concatenate([one.members[level] for one in drawn])[chosen] for level in drawn[0].members},
-    )
+    joint = np.concatenate([one.joint for one in drawn])[chosen]
+    return LawDraws(fit, joint, np.concatenate([one.scatter_sd for one in drawn])[chosen])
 
 
 def _joint_draws(fit: Identification, count: int, rng: np.random.Generator, *, within_bounds: bool = True) -> LawDraws:
     """Draws of all that is uncertain together, at most `count`: those within the bounds of the law."""
     scatter = fit.scatter_of_rates
-    posterior = scatter.posterior
-    nodes = rng.permutation(_systematic(posterior.weight, count, rng))
-    sd = posterior.sd[nodes]
-    effects = {
-        level: sd[:, [k]] * rng.standard_normal((count, scatter.indicators[level].shape[1]))
-        for k, level in enumerate(scatter.levels)
-    }
-    factors = sum(effects[level] @ scatter.indicators[level].T for level in scatter.levels)
-    errors = (
-        factors @ scatter.gain.T + rng.standard_normal((count, len(scatter.within))) @ covariance_root(scatter.within).T
-    )
-    unknowns = fit.x - errors
-    members = {}
-    if scatter.members:
-        shown = factors - errors @ scatter.design.T
-        shown = shown + np.sqrt(scatter.variance) * rng.standard_normal(shown.shape)
-        members = _conditioned(scatter, sd, nodes, effects, shown)
+    nodes = rng.permutation(systematic(scatter.posterior.weight, count, rng))
+    sd = scatter.posterior.sd[nodes]
+    normal = rng.standard_normal((count, scatter.joint_design.shape[1]))
+    joint = np.empty_like(normal)
+    for node in np.unique(nodes):
+        mean, covariance = scatter.joint(scatter.posterior.sd[node])
+        joint[nodes == node] = mean + normal[nodes == node] @ covariance_root(covariance).T
+    joint[:, : fit.x.size] += fit.x
     kept = np.ones(count, bool)
     if within_bounds:
-        theta = fit.coordinates.theta(unknowns[:, : fit.u.size])
+        theta = fit.coordinates.theta(joint[:, : fit.u.size])
         low, high = fit.law.internal_bounds
         margin = BOUND_TOLERANCE * (high - low)
         kept = ((theta >= low - margin) & (theta <= high + margin)).all(axis=1)
-    return LawDraws(fit, unknowns[kept], sd[kept], {level: values[kept] for level, values in members.items()})
+    return LawDraws(fit, joint[kept], sd[kept])
 
 
-def _systematic(weight: Floats, count: int, rng: np.random.Generator) -> Ints:
-    """(count,) positions drawn with probabilities `weight`, as evenly as these allow."""
+def systematic(weight: Floats, count: int, rng: np.random.Generator) -> Ints:
+    """(count,) positions drawn with probabilities weight (positions,), as evenly as these allow."""
     points = (np.arange(count) + rng.random()) / count
     return np.minimum(np.searchsorted(np.cumsum(weight), points), weight.size - 1)
 
@@ -126,60 +111,24 @@ def covariance_root(covariance: Floats) -> Floats:
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def _conditioned(
-    scatter: RateScatter, sd: Floats, nodes: Ints, effects: Mapping[str, Floats], shown: Floats
-) -> dict[str, Floats]:
-    """{level: (draws, members)} effects given what the tests showed.
-
-    shown : (draws, tests) what tests would have shown of their factors under the drawn effects.
-    """
-    conditioned = {level: effects[level].copy() for level in scatter.members}
-    for node in np.unique(nodes):
-        mask = nodes == node
-        difference = scatter.log_factor - shown[mask]
-        for level in scatter.members:
-            conditioned[level][mask] += difference @ scatter.member_predictor(level, sd[mask][0]).T
-    return conditioned
+def log_factor_draws(draws: LawDraws, history: History, rng: np.random.Generator) -> Floats:
+    """(draws,) ln of the factor of one new test on the rate: effects that were fitted, and those drawn anew."""
+    scatter = draws.fit.scatter_of_rates
+    test = scatter.new_test(history)
+    factor = draws.joint[:, [*test.known.values()]].sum(axis=1)
+    for level in test.unknown:
+        factor += draws.scatter_sd[:, scatter.levels.index(level)] * rng.standard_normal(draws.count)
+    for level in test.unseen:
+        factor += np.abs(USUAL_SD[level] * rng.standard_normal(draws.count)) * rng.standard_normal(draws.count)
+    return np.asarray(factor)
 
 
-def log_factor_draws(draws: LawDraws, history: History, rng: np.random.Generator) -> dict[str, Floats]:
-    """{level: (draws,) ln of its factor on the rate of one new test}."""
-    scatter, factors = draws.fit.scatter_of_rates, {}
-    for k, level in enumerate(scatter.levels):
-        name = level_of(history, level)
-        if level != "test" and name in scatter.members[level]:
-            position = list(dict.fromkeys(scatter.members[level])).index(name)
-            factors[level] = draws.members[level][:, position]
-        else:
-            factors[level] = draws.scatter_sd[:, k] * rng.standard_normal(draws.count)
-    for level in unseen_levels(draws.fit, history):
-        assumed = np.abs(USUAL_SD[level] * rng.standard_normal(draws.count))
-        factors[level] = assumed * rng.standard_normal(draws.count)
-    return factors
-
-
-def factor_variances(draws: LawDraws, history: History) -> dict[str, float]:
-    """{level: variance of ln of a new test's factor}: of a known heat or laboratory, what is not known of it."""
-    scatter, variances = draws.fit.scatter_of_rates, {}
-    for level in scatter.levels:
-        name = level_of(history, level)
-        if level != "test" and name in scatter.members[level]:
-            position = list(dict.fromkeys(scatter.members[level])).index(name)
-            variances[level] = float(draws.members[level][:, position].var())
-        else:
-            variances[level] = scatter.posterior.mean_square(level)
-    return {**variances, **{level: USUAL_SD[level] ** 2 for level in unseen_levels(draws.fit, history)}}
-
-
-def unseen_levels(fit: Identification, history: History) -> list[str]:
-    """Levels of which a history states a member, while all fitted tests were of one other: their scatter is assumed."""
+def own_variances(fit: Identification, history: History) -> dict[str, float]:
+    """{level: variance of ln of what is new in the factor of a test on the rate}."""
     scatter = fit.scatter_of_rates
-    named = {level: level_of(history, level) for level in LEVELS[:-1]}
-    return [
-        level
-        for level, name in named.items()
-        if scatter.known is None and name and scatter.common.get(level, name) != name
-    ]
+    test = scatter.new_test(history)
+    drawn = {level: scatter.posterior.mean_square(level) for level in test.unknown}
+    return {**drawn, **{level: USUAL_SD[level] ** 2 for level in test.unseen}}
 
 
 @dataclass(frozen=True)
@@ -217,9 +166,7 @@ def dimensions_of(
             estimate = fit.nuisances[position]
             dimensions[kind] = Dimension(kind, estimate.value, estimate.sd, low, high, fit.u.size + position)
         else:
-            spread = [n.prior_sd for n in fit.nuisances if n.key == nuisance.key] or [nuisance.sd or 0.0]
-            finite = [sd for sd in spread if np.isfinite(sd)]
-            dimensions[kind] = Dimension(kind, mean, finite[0] if finite else 0.0, low, high)
+            dimensions[kind] = Dimension(kind, mean, _spread_between_tests(fit, nuisance), low, high)
     for given, relative in (*_stated_tolerances(own_predictor), *((kind, None) for kind in tolerances)):
         if not supports_nuisance(own_predictor, given) or (relative is not None and given in dimensions):
             continue
@@ -228,6 +175,15 @@ def dimensions_of(
         sd = tolerances[given] if relative is None else relative * mean
         dimensions[given] = Dimension(given, mean, sd, 0.0 if mean > 0 else -np.inf, np.inf)
     return list(dimensions.values())
+
+
+def _spread_between_tests(fit: Identification, nuisance: Nuisance) -> float:
+    """Standard deviation of a nuisance between tests: of its prior, or of its estimates where that is flat."""
+    estimates = [n for n in fit.nuisances if n.key == nuisance.key]
+    prior_sd = estimates[0].prior_sd if estimates else nuisance.sd or 0.0
+    if np.isfinite(prior_sd):
+        return float(prior_sd)
+    return float(np.sqrt(np.mean([(n.value - n.prior_mean) ** 2 for n in estimates]))) if estimates else 0.0
 
 
 def _stated_tolerances(predictor: Predictor) -> list[tuple[str, float]]:
@@ -252,7 +208,7 @@ def dimension_draws(dimensions: Sequence[Dimension], draws: LawDraws, rng: np.ra
     for one in dimensions:
         drawn = one.mean + one.sd * rng.standard_normal(draws.count)
         if one.shared is not None:
-            drawn = draws.unknowns[:, one.shared]
+            drawn = draws.joint[:, one.shared]
         margin = 1e-3 * abs(one.mean)
         values[one.kind] = np.clip(drawn, one.low + margin, one.high - margin)[:, None]
     return values

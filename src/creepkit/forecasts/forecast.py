@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import single_threaded_blas
-from creepkit.errors import FitError
+from creepkit.errors import FitError, nearest
 from creepkit.forecasts.draws import check_tolerances, law_draws
 from creepkit.forecasts.forecast_of_test import forecast_test
 from creepkit.forecasts.results import TestForecast
@@ -18,6 +19,7 @@ from creepkit.inverse.composite_predictor import CompositePredictor, underlying_
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
+from creepkit.language import temperature
 from creepkit.presentation import Presentable, present
 from creepkit.records import History, Predictor
 from creepkit.registry.arguments import check_histories, resolve_predictors
@@ -29,8 +31,8 @@ DRAWS = 500
 """Of the law, of each test's own rate, and of its dimensions."""
 
 
-LEAST_WEIGHT = 1e-2
-"""Of a law of a ranking, below which it is left out."""
+LEAST_WEIGHT, LEAST_DRAWS = 1e-2, 5
+"""Of the laws that are left out of a ranking, together; and draws of each of the others at least."""
 
 
 DEFAULT_TARGETS: Mapping[str, Sequence[float]] = {"strain": (0.01,)}
@@ -86,17 +88,24 @@ def forecast(
     draws : of the law and of all else that a band is made of. The seed of random numbers is that of
         the identification's settings.
     """
-    if not 0.5 <= level < 1.0:
-        raise FitError(f"level is {level:g}; give a probability from 0.5 to below 1, such as 0.95")
+    if not isinstance(level, int | float) or not 0.5 <= level < 1.0:
+        raise FitError(f"level is {level!r}; give a probability from 0.5 to below 1, such as 0.95")
     if not 50 <= draws <= 100_000:
         raise FitError(f"draws is {draws}; allowed are 50 to 100000")
-    histories = check_histories([tests] if isinstance(tests, History) else list(tests))
+    if not isinstance(tests, History) and not hasattr(tests, "__iter__"):
+        raise FitError(f"tests are histories, found {tests!r:.60}; read_histories(path) returns them")
+    histories = check_histories([tests] if isinstance(tests, History) else tests)
+    if not histories:
+        raise FitError("there is no test to forecast; give histories, measured or planned")
     for history in histories:
         if not history.times[-1] > 0:
             raise FitError(f"history '{history.name}' has no time above zero; give those at which it is to be forecast")
-    average = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
-    weighted = [(f, w) for f, w in zip(average.fits, average.weights, strict=True) if w >= LEAST_WEIGHT]
-    asked = dict(DEFAULT_TARGETS if targets is None else targets)
+    weighted = _weighted_laws(source)
+    tolerances, targets_given = _numbers(tolerances, "tolerances"), targets is not None
+    for kind in tolerances:
+        if kind.startswith("temperature") and not any(f.law.uses(temperature) for f, _ in weighted):
+            raise FitError(f"the tolerance of '{kind}' changes nothing: no law has a temperature; leave it out")
+    asked = _checked_targets(DEFAULT_TARGETS if targets is None else targets)
     predictors = [_predictor(weighted[0][0], history, using) for history in histories]
     if tolerances:
         check_tolerances(
@@ -104,22 +113,20 @@ def forecast(
             histories,
             CompositePredictor({h.specimen: p for h, p in zip(histories, predictors, strict=True)}),
         )
-    _check_targets(asked, targets is not None, predictors)
-    made, total = [], sum(w for _, w in weighted)
+    _check_targets(asked, targets_given, predictors)
+    made = []
     with single_threaded_blas():
         for k, (history, predictor) in enumerate(zip(histories, predictors, strict=True)):
             if progress is not None:
                 progress("tests", k, len(histories))
-            rng = np.random.default_rng([average.fits[0].settings.seed, k])
-            laws = [(law_draws(f, max(round(draws * w / total), 2), rng), w) for f, w in weighted]
+            rng = np.random.default_rng([weighted[0][0].settings.seed, zlib.crc32(history.name.encode())])
+            laws = [(law_draws(f, max(round(draws * w), LEAST_DRAWS), rng), w) for f, w in weighted]
             made.append(
-                forecast_test(
-                    laws, history, predictor, level=level, targets=asked, tolerances=tolerances or {}, rng=rng
-                )
+                forecast_test(laws, history, predictor, level=level, targets=asked, tolerances=tolerances, rng=rng)
             )
     if progress is not None:
         progress("tests", len(histories), len(histories))
-    return Forecast({f.law.name: float(w) for f, w in weighted}, level, tuple(made))
+    return Forecast(_named_weights(weighted), level, tuple(made))
 
 
 def _predictor(
@@ -136,10 +143,52 @@ def _predictor(
     return resolved[history.specimen] if isinstance(resolved, Mapping) else resolved
 
 
+def _weighted_laws(source: Identification | WeightedLaws | ModelAverage) -> list[tuple[Identification, float]]:
+    """The laws that count, with weights that add up to one: those of least weight are left out."""
+    if not isinstance(source, Identification | ModelAverage) and not hasattr(source, "laws"):
+        raise FitError(f"a forecast is made by an identification or a ranking, found {source!r:.60}")
+    average = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
+    ordered = sorted(zip(average.fits, average.weights, strict=True), key=lambda pair: -pair[1])
+    kept, total = [], 0.0
+    for fit, weight in ordered:
+        if total >= 1.0 - LEAST_WEIGHT:
+            break
+        kept.append((fit, weight))
+        total += weight
+    return [(fit, weight / total) for fit, weight in kept]
+
+
+def _named_weights(weighted: Sequence[tuple[Identification, float]]) -> dict[str, float]:
+    """{law: weight}; identifications of one law add their weights."""
+    weights: dict[str, float] = {}
+    for fit, weight in weighted:
+        weights[fit.law.name] = weights.get(fit.law.name, 0.0) + float(weight)
+    return weights
+
+
+def _numbers(values: Mapping[str, float] | None, what: str) -> dict[str, float]:
+    """{name: number}; FitError for anything else."""
+    try:
+        return {str(name): float(value) for name, value in (values or {}).items()}
+    except (AttributeError, TypeError, ValueError):
+        raise FitError(f"{what} must be numbers by name, such as {{'thickness': 0.01}}; found {values!r:.60}") from None
+
+
+def _checked_targets(targets: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
+    """{output: values}, a single value as a list; FitError for anything else."""
+    try:
+        return {str(name): [float(v) for v in np.atleast_1d(values)] for name, values in targets.items()}
+    except (AttributeError, TypeError, ValueError):
+        raise FitError(
+            f"targets must be numbers by output, such as {{'strain': [0.01]}}; found {targets!r:.60}"
+        ) from None
+
+
 def _check_targets(targets: Mapping[str, Sequence[float]], asked: bool, predictors: Sequence[Predictor]) -> None:
-    known = dict.fromkeys(name for p in predictors for name in getattr(p, "outputs", ()))
+    """FitError for a target of what no test has, or that is not above zero."""
+    known = list(dict.fromkeys(name for p in predictors for name in getattr(p, "outputs", ())))
     for output, values in targets.items():
         if asked and known and output not in known:
-            raise FitError(f"no test has an output '{output}' to reach; there are {', '.join(known)}")
+            raise FitError(f"no test has an output '{output}' to reach; {nearest(output, known)}")
         if not all(np.isfinite(v) and v > 0 for v in values):
             raise FitError(f"targets of {output} are {list(values)}; give numbers above zero, in its unit")

@@ -11,7 +11,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
 from creepkit.forecasts.bands import band_of_draws
 from creepkit.forecasts.drawn_law import DrawnLaw, drawn_law
-from creepkit.forecasts.draws import SOURCES, LawDraws, unseen_levels
+from creepkit.forecasts.draws import SOURCES, LawDraws
 from creepkit.forecasts.measured_test import TestScore, score_test
 from creepkit.forecasts.results import (
     CHOICE_OF_LAW,
@@ -24,7 +24,7 @@ from creepkit.forecasts.results import (
     TestForecast,
     TimeForecast,
 )
-from creepkit.forecasts.simulation import at_times, crossing_times
+from creepkit.forecasts.simulation import at_times, crossing_times, first_crossing
 from creepkit.forecasts.variance_shares import band_transform, discrepancy_variance, noise_in_output, variance_shares
 from creepkit.inverse.extrapolation import extrapolation_text
 from creepkit.inverse.identification import Identification
@@ -59,9 +59,11 @@ def forecast_test(
     }
     times = _times(drawn, best, history, targets, level, rng)
     notes = _notes(fit, history, outputs)
+    failed = sum(one.failed for one in drawn)
+    notes += [f"the solver did not finish {failed} of the draws; they are left out"] if failed else []
     score = None
     if any(usable_frames(history, name).any() for name in history.outputs if name in outputs):
-        score, problem = _score(best, (history, banded), predictor, outputs)
+        score, problem = _score(drawn, (history, banded), predictor, outputs)
         notes += [problem] if problem else []
     includes = _includes(drawn, best, outputs)
     return TestForecast(history, outputs, times, includes, _extrapolation(banded, predictor, best), score, tuple(notes))
@@ -96,7 +98,7 @@ def _output_forecast(
     drawn: Sequence[DrawnLaw], best: DrawnLaw, history: History, name: str, level: float, rng: np.random.Generator
 ) -> OutputForecast:
     fit, central = best.draws.fit, at_times(best.central, history.times).of(name)[0]
-    transform = band_transform(fit, name, central)
+    transform = band_transform(fit, history, name, central)
     leading = best.central.outputs[0] == name
     smooth, white = noise_in_output(fit, history, name, central, transform)
     parts = []
@@ -144,7 +146,8 @@ def _times(
             value = float(crossing_times(best.central, output, np.array([target]))[0])
             event = f"{output.replace('_', ' ')} {target:g} {output_unit(output)}".strip()
             measured = _measured_crossing(history, output, target)
-            forecasts.append(_time_forecast(event, value, crossings, history, level, measured, censored=False))
+            made = _time_forecast(event, value, crossings, history, level, measured, censored=False)
+            forecasts.append(replace(made, output=output, target=float(target)))
     ends = np.concatenate([one.drawn.end_times for one in drawn])
     fit = best.draws.fit
     if RUPTURE_OUTPUT in fit.noise_model.outputs:
@@ -164,12 +167,12 @@ def _targets_of_curves(
 
     These are the offset of the test and what lasts over many frames; the noise of a single frame is left out.
     """
-    fit, count = best.draws.fit, one.draws.count
+    fit, count = best.draws.fit, len(one.drawn.values)
     known = fit.noise_model.outputs.get(name)
     if known is None:
         return np.full(count, target)
     shifted = target - known.offset * rng.standard_normal(count)
-    transform = band_transform(fit, name, at_times(best.central, history.times).of(name)[0])
+    transform = band_transform(fit, history, name, at_times(best.central, history.times).of(name)[0])
     slow = np.sqrt(known.drift**2 + discrepancy_variance(fit, name, transform)) * rng.standard_normal(count)
     if name in LOGARITHMIC_OUTPUTS:
         return np.asarray(shifted * np.exp(-slow))
@@ -193,20 +196,20 @@ def _measured_crossing(history: History, output: str, target: float) -> float:
     """s, when the measured output first reaches a target; NaN where it does not, or is not measured."""
     if output not in history.outputs:
         return float("nan")
-    used = usable_frames(history, output)
-    times, values = history.times[used], history.outputs[output][used]
-    reached = np.flatnonzero(values >= target)
-    if not reached.size or reached[0] == 0:
-        return float("nan")
-    k = int(reached[0])
-    return float(np.interp(target, values[k - 1 : k + 1], times[k - 1 : k + 1]))
+    used = usable_frames(history, output) & (history.times > 0)
+    times = history.times[used]
+    crossing = first_crossing(times, history.outputs[output][used], target)
+    return crossing if times.size and times[0] < crossing < np.inf else float("nan")
 
 
 # ---- what is said beside it ----------------------------------------------------------------------------------
 
 
 def _score(
-    best: DrawnLaw, tests: tuple[History, History], predictor: Predictor, outputs: Mapping[str, OutputForecast]
+    drawn: Sequence[DrawnLaw],
+    tests: tuple[History, History],
+    predictor: Predictor,
+    outputs: Mapping[str, OutputForecast],
 ) -> tuple[TestScore | None, str]:
     """The score of a measured test, or why it has none; tests : the history, and the same at the times of bands."""
     full, history = tests
@@ -220,9 +223,8 @@ def _score(
         inside[name] = float(within.mean())
         whole[name] = bool(((values >= band.lowest[used]) & (values <= band.highest[used])).all())
     try:
-        score = score_test(
-            best.draws.fit, predictor, full, best.dimensions, sum(best.factor_variances.values()), (inside, whole)
-        )
+        laws = [(one.draws.fit, one.weight, one.dimensions) for one in drawn]
+        score = score_test(laws, predictor, full, inside, whole)
     except CreepkitError as error:
         return None, f"no score: {error}"
     return score, ""
@@ -234,7 +236,7 @@ def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, O
     parts = {LAW: "posterior covariance of its parameters, within their bounds"}
     if len(drawn) > 1:
         parts[CHOICE_OF_LAW] = ", ".join(f"{one.draws.fit.law.name} ({one.weight:.2g})" for one in drawn)
-    for level, variance in best.factor_variances.items():
+    for level, variance in best.own_variances.items():
         if variance > 0:
             parts[SOURCES[level]] = f"{100 * np.sqrt(variance):.2g} % of the rate"
     for dimension in best.dimensions:
@@ -288,15 +290,23 @@ def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputFo
     unknown = [name for name in outputs if name not in fit.noise_model.outputs]
     if unknown:
         notes.append(f"no fitted test shows the noise of {' and '.join(unknown)}; it is not in the band")
-    if fit.scatter_of_rates.known is None and len(fit.tests) < FEW_TESTS:
+    scatter = fit.scatter_of_rates
+    test = scatter.new_test(history)
+    if scatter.known is None and len(fit.tests) < FEW_TESTS:
         notes.append(
             f"{len(fit.tests)} test{'s say' if len(fit.tests) > 1 else ' says'} little of the scatter between tests: "
-            f"what is usual, some {100 * USUAL_SD['test']:.0f} % of the rate at most, stands for it"
+            f"what is usual holds it, {100 * USUAL_SD['test']:.0f} % of the rate (rms)"
         )
-    for level in unseen_levels(fit, history):
+    for level in test.unseen:
         notes.append(
             f"all fitted tests are of one {level}, and this is of another: the scatter between them is what is usual, "
-            f"up to {100 * USUAL_SD[level]:.0f} % of the rate"
+            f"{100 * USUAL_SD[level]:.0f} % of the rate (rms)"
+        )
+    mean, covariance = scatter.mean_joint
+    for level, position in test.known.items():
+        factor, sd = float(np.exp(mean[position])), float(np.sqrt(covariance[position, position]))
+        notes.append(
+            f"its {level} was fitted and creeps {factor:.3g} times as fast as the law says (± {100 * sd:.2g} %)"
         )
     return notes
 

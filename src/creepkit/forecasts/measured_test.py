@@ -1,30 +1,43 @@
 """A measured test beside its forecast: how likely it was, and how much of what is left its own nuisances explain.
 
-With r the residuals of the test at the identified values and prior means, the covariance of the forecast is
+With r the residuals of the test at the identified values, A and m derivatives to, and posterior mean of, what the
+fitted tests say (the law, and the effects of a heat or laboratory that was fitted), C its covariance, s^2 the variance
+of what is new in the factor of the test on the rate and d the derivative to it, E the effects of its dimensions within
+their tolerances, and N noise, offsets and misfit, the forecast is
 
-    V = J C J' + E S E' + s^2 d d' + N:
+    r + A m is normal with covariance V = A C A' + s^2 d d' + E E' + N,
 
-J, E and d derivatives to the law's coordinates, to the test's own nuisance parameters and to ln of a factor on its
-rate, C, S and s^2 their covariances, N noise, offsets and misfit. r'V^-1 r is a chi-square if the forecast holds. With
-the law frozen, the nuisances are estimated from r under their priors: what whitened residuals are then smaller by, they
-explain.
+a mixture over the posterior distribution of the scatter, and over the laws of a ranking. p-values are prior predictive
+ones (Box (1980), J. R. Stat. Soc. A 143, 383). With the law frozen, the nuisances of the test are estimated from r
+under their priors: what whitened residuals are then smaller by, they explain.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import logsumexp
 from scipy.stats import chi2
 
-from creepkit.arrays import Floats
-from creepkit.forecasts.draws import Dimension, covariance_root
+from creepkit.arrays import Floats, Ints
+from creepkit.forecasts.draws import Dimension, covariance_root, systematic
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
+from creepkit.inverse.output_transforms import LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.uncertainty.rate_scatter import NewTest
 from creepkit.records import History, Nuisance, Predictor
+
+SCORED_NODES = 16
+"""Standard deviations of the scatter, drawn from their posterior distribution, over which a test is scored."""
+
+
+EXACTLY_KNOWN = 1e-9
+"""Prior standard deviation that stands for none."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +46,7 @@ class ExplainedNuisance:
 
     kind : "rate" (value is ln of a factor), "offset of amplitude", or the kind of a Nuisance, in its unit.
     value, sd : estimate and its standard deviation. prior_mean, prior_sd : before the test.
+    spread : standard deviation that the forecast gives to such an estimate, that of the law included.
     """
 
     kind: str
@@ -40,11 +54,12 @@ class ExplainedNuisance:
     sd: float
     prior_mean: float
     prior_sd: float
+    spread: float
 
     @property
     def deviation(self) -> float:
-        """Distance from the prior mean in its standard deviations."""
-        return (self.value - self.prior_mean) / self.prior_sd if self.prior_sd > 0 else 0.0
+        """Distance from the prior mean, in what the forecast allows it."""
+        return (self.value - self.prior_mean) / self.spread if self.spread > 0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -52,8 +67,10 @@ class TestScore:
     """How a measured test compares with its forecast.
 
     inside : {output: share of frames inside the pointwise band}. whole_inside : {output: whether all of its frames are
-    inside the simultaneous band}. chi_square, freedom, p_value : of the residuals under the covariance of the forecast.
-    log_score : ln of the predictive density of the transformed outputs, per frame; larger is better.
+    inside the simultaneous band}. p_value : of the residuals under the forecast, noise and all; freedom : their number.
+    departure_p_value : of the residuals in those directions alone in which the forecast is more uncertain than its
+        noise: of a whole curve that lies so far off.
+    log_score : ln of the predictive density of the outputs in their units, per frame; larger is better.
     rms, rms_explained : {output: root mean square residual over its noise} at prior means, and with the test's own
         nuisances estimated. explained : share of the squared whitened residuals that these explain.
     nuisances : their estimates.
@@ -61,105 +78,236 @@ class TestScore:
 
     __test__ = False  # not a test case, whatever its name says to pytest
 
-    inside: dict[str, float]
-    whole_inside: dict[str, bool]
-    chi_square: float
+    inside: Mapping[str, float]
+    whole_inside: Mapping[str, bool]
     freedom: int
     p_value: float
     departure_p_value: float
     log_score: float
-    rms: dict[str, float]
-    rms_explained: dict[str, float]
+    rms: Mapping[str, float]
+    rms_explained: Mapping[str, float]
     explained: float
     nuisances: tuple[ExplainedNuisance, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class LinearForecast:
+    """What one law forecasts of a test's residuals, linear in what is uncertain.
+
+    fit : the identification. problem, residuals : of the test. values : (data,) r at the prior means. by_joint : (data,
+    unknowns + effects) A. rate : (data,) d. tolerance : (data, dimensions) E. noise : (data, data) N. white : (data,)
+    standard deviation of what is independent from frame to frame. outputs : (data,) positions; names : of outputs.
+    """
+
+    fit: Identification
+    problem: LeastSquaresProblem
+    residuals: Residuals
+    noise_model: NoiseModel
+    values: Floats
+    by_joint: Floats
+    rate: Floats
+    tolerance: Floats
+    noise: Floats
+    white: Floats
+    outputs: Ints
+    names: tuple[str, ...]
+    own: tuple[Dimension, ...]
+    dimensions: tuple[Dimension, ...]
+    log_scale: float
+
+    @classmethod
+    def of_test(
+        cls, fit: Identification, predictor: Predictor, history: History, dimensions: Sequence[Dimension]
+    ) -> LinearForecast:
+        """The linear forecast of a measured test by one law."""
+        kinds = tuple(
+            Nuisance(d.kind, mean=d.mean, sd=d.sd if d.sd > 0 else EXACTLY_KNOWN)  # type: ignore[arg-type]
+            for d in dimensions
+        )
+        if RUPTURE_OUTPUT not in fit.noise_model.outputs:  # nothing is known of how lives scatter beside rates
+            history = replace(history, rupture_time=None, unruptured=False)
+        settings = replace(fit.settings, nuisances=kinds)
+        problem = LeastSquaresProblem.from_histories(fit.law, [history], predictor, settings, fit.reference)
+        problem = replace(problem, observations=_on_fitted_scale(fit, problem.observations))
+        residuals = problem.residuals(np.concatenate([fit.u, [d.mean for d in dimensions]]))
+        noise_model = noise_model_of(fit, problem.observations)
+        present = residuals.present[0]
+        assert residuals.jacobian is not None
+        jacobian, rate = residuals.jacobian[0][present], residuals.log_rate_sensitivity[0][present]
+        scatter, count = fit.scatter_of_rates, fit.u.size
+        by_joint = np.zeros((present.sum(), scatter.joint_design.shape[1]))
+        by_joint[:, :count] = jacobian[:, :count]
+        by_joint[:, [*scatter.new_test(history).known.values()]] = rate[:, None]
+        own = [k for k, d in enumerate(dimensions) if d.shared is None and d.sd > 0]
+        for k, dimension in enumerate(dimensions):
+            if dimension.shared is not None:
+                by_joint[:, dimension.shared] = jacobian[:, count + k]
+        slopes = problem.observations.derivative(problem.observations.values)[0][present]
+        return cls(
+            fit,
+            problem,
+            residuals,
+            noise_model,
+            residuals.values[0][present],
+            by_joint,
+            rate,
+            jacobian[:, [count + k for k in own]] * np.array([dimensions[k].sd for k in own]),
+            covariance(residuals, noise_model)[0][np.ix_(present, present)],
+            _white_noise(residuals, noise_model)[present],
+            residuals.output_index[0][present],
+            problem.observations.outputs,
+            tuple(dimensions[k] for k in own),
+            tuple(dimensions),
+            float(np.log(np.maximum(np.abs(slopes), 1e-300)).sum()),
+        )
+
+    def evaluated(self, history: History) -> tuple[float, float, Floats]:
+        """p-value, departure p-value, and ln of the predictive density at each node of the scatter, (nodes,)."""
+        scatter = self.fit.scatter_of_rates
+        posterior = scatter.posterior
+        nodes = systematic(posterior.weight, SCORED_NODES, np.random.default_rng(0))
+        test = scatter.new_test(history)
+        variances = scatter.own_variance(test, posterior.sd[nodes])
+        noise_root, noise_freedom = np.linalg.cholesky(self.noise), self.noise_freedom
+        p_values, departures, densities = [], [], []
+        for node, variance in zip(nodes, variances, strict=True):
+            mean, joint = scatter.joint(posterior.sd[node])
+            uncertain = np.concatenate(
+                [self.by_joint @ covariance_root(joint), np.sqrt(variance) * self.rate[:, None], self.tolerance], axis=1
+            )
+            residuals = np.linalg.solve(noise_root, self.values + self.by_joint @ mean)
+            directions, sizes, sources = np.linalg.svd(np.linalg.solve(noise_root, uncertain), full_matrices=False)
+            components = directions.T @ residuals
+            relative = components**2 / (1.0 + sizes**2)
+            most_likely = -sources.T @ (sizes * components / (1.0 + sizes**2))
+            remaining = np.linalg.solve(noise_root, self.residuals_at(test, mean, (joint, variance), most_likely))
+            total = float(remaining @ remaining + most_likely @ most_likely)
+            counted = sizes > 1.0
+            p_values.append(chance_of_larger(total / residuals.size, float(residuals.size), noise_freedom))
+            departures.append(chi2.sf(relative[counted].sum(), counted.sum()) if counted.any() else 1.0)
+            log_determinant = 2.0 * np.log(np.diag(noise_root)).sum() + np.log1p(sizes**2).sum()
+            densities.append(-0.5 * (total + log_determinant + residuals.size * np.log(2 * np.pi)) + self.log_scale)
+        return float(np.mean(p_values)), float(np.mean(departures)), np.array(densities)
+
+    @property
+    def noise_freedom(self) -> float:
+        """Degrees of freedom of the noise: of an estimate from the frames of the fitted tests, infinite of stated noise."""
+        frames = [o.errors.frames for m in self.fit.tests for o in m.outputs if o.output in self.names]
+        stated = all(self.fit.noise_model[n].stated > 0 for n in self.names if n in self.fit.noise_model.outputs)
+        return float("inf") if stated else FREEDOM_PER_FRAME * max(sum(frames), 1)
+
+    def residuals_at(self, test: NewTest, mean: Floats, scatter: tuple[Floats, float], sources: Floats) -> Floats:
+        """(data,) residuals where what is uncertain is moved by `sources`, in standard deviations of its sources.
+
+        test : which effects are known. mean : (unknowns + effects,) at sources of zero. scatter : covariance of these,
+        and variance of what is new in the factor of the test. Simulated, so that a large factor on the rate is no error
+        of linearisation; linear for laws whose rates have no coefficient.
+        """
+        covariance_of_joint, variance = scatter
+        size, count = mean.size, self.fit.u.size
+        joint = mean + covariance_root(covariance_of_joint) @ sources[:size]
+        own_factor, dimensions = float(np.sqrt(variance) * sources[size]), sources[size + 1 :]
+        coefficients = list(self.fit.coordinates.coefficients)
+        if len(coefficients) < len(self.fit.law.terms) + len(self.fit.law.states):
+            return self.values + self.by_joint @ joint + own_factor * self.rate + self.tolerance @ dimensions
+        x = np.concatenate([self.fit.u + joint[:count], [d.mean for d in self.dimensions]])
+        x[coefficients] += own_factor + joint[[*test.known.values()]].sum()
+        for k, dimension in enumerate(self.dimensions):
+            if dimension.shared is not None:
+                x[count + k] += joint[dimension.shared]
+        for dimension, moved in zip(self.own, dimensions, strict=True):
+            x[count + self.dimensions.index(dimension)] += dimension.sd * moved
+        return np.asarray(self.problem.residuals(self.problem.bounds.clip(x)).values[0][self.residuals.present[0]])
+
+    def rms(self, values: Floats) -> dict[str, float]:
+        """{output: root mean square of residuals (data,) over their noise}."""
+        return {
+            name: float(np.sqrt(np.mean((values / self.white)[self.outputs == k] ** 2)))
+            for k, name in enumerate(self.names)
+            if name != RUPTURE_OUTPUT and (self.outputs == k).any()
+        }
+
+    def explained(self, history: History) -> tuple[tuple[ExplainedNuisance, ...], Floats, Floats]:
+        """Estimates of the test's own nuisances with the law frozen; residuals (data,) before and after."""
+        scatter = self.fit.scatter_of_rates
+        mean, joint = scatter.mean_joint
+        test = scatter.new_test(history)
+        variance = float(scatter.posterior.weight @ scatter.own_variance(test, scatter.posterior.sd))
+        known = np.zeros(mean.size)
+        known[[*test.known.values()]] = mean[[*test.known.values()]]
+        values = self.values + self.by_joint @ known
+        sd = float(np.sqrt(variance))
+        columns = [sd * self.rate[:, None], self.tolerance]
+        kinds = [("rate", 0.0, sd), *((d.kind, d.mean, d.sd) for d in self.own)]
+        present = self.residuals.present[0]
+        for k, (name, components) in enumerate(self.noise_model.outputs.items()):
+            if components.offset > 0 and (self.outputs == k).any():
+                effect = np.where(self.outputs == k, self.residuals.offset_sensitivity[0][present], 0.0)
+                columns.append(components.offset * effect[:, None])
+                kinds.append((f"offset of {name}", 0.0, components.offset))
+        design = np.concatenate(columns, axis=1)
+        without_offset = {n: replace(o, offset=0.0) for n, o in self.noise_model.outputs.items()}
+        noise = covariance(self.residuals, replace(self.noise_model, outputs=without_offset))[0]
+        weighted = np.linalg.solve(noise[np.ix_(present, present)], design)
+        posterior = np.linalg.inv(design.T @ weighted + np.eye(design.shape[1]))
+        to_estimate = -posterior @ weighted.T
+        estimate = to_estimate @ values
+        forecast = design @ design.T + noise[np.ix_(present, present)] + self.by_joint @ joint @ self.by_joint.T
+        spread = np.sqrt(np.einsum("kd,de,ke->k", to_estimate, forecast, to_estimate))
+        estimates = tuple(
+            ExplainedNuisance(kind, centre + one * float(e), one * float(np.sqrt(v)), centre, one, one * float(w))
+            for (kind, centre, one), e, v, w in zip(kinds, estimate, np.diag(posterior), spread, strict=True)
+            if one > 0
+        )
+        return estimates, values, values + design @ estimate
+
+
 def score_test(
-    fit: Identification,
+    laws: Sequence[tuple[Identification, float, Sequence[Dimension]]],
     predictor: Predictor,
     history: History,
-    dimensions: Sequence[Dimension],
-    scatter_variance: float,
-    bands: tuple[dict[str, float], dict[str, bool]],
+    inside: Mapping[str, float],
+    whole_inside: Mapping[str, bool],
 ) -> TestScore:
     """The score of a measured test.
 
-    scatter_variance : of ln of the test's own factor on the rate. bands : `inside` and `whole_inside`.
+    laws : each with its weight and the dimensions of the test. inside, whole_inside : as TestScore has them.
     """
-    own = [d for d in dimensions if d.sd > 0 and d.shared is None]
-    nuisances = tuple(Nuisance(d.kind, mean=d.mean, sd=d.sd) for d in own)  # type: ignore[arg-type]
-    settings = replace(fit.settings, nuisances=nuisances)
-    problem = LeastSquaresProblem.from_histories(fit.law, [history], predictor, settings, fit.reference)
-    x = np.concatenate([fit.u, [d.mean for d in own]])
-    residuals = problem.residuals(x)
-    noise_model = noise_model_of(fit, problem.observations)
-    present = residuals.present[0]
-    values = residuals.values[0][present]
-    assert residuals.jacobian is not None
-    jacobian = residuals.jacobian[0][present]
-    count = fit.u.size
-    noise = covariance(residuals, noise_model)[0][np.ix_(present, present)]
-    rate = residuals.log_rate_sensitivity[0][present][:, None] * np.sqrt(scatter_variance)
-    tolerance = jacobian[:, count:] * np.array([d.sd for d in own])
-    uncertain = np.concatenate(
-        [jacobian[:, :count] @ covariance_root(mean_law_covariance(fit)), rate, tolerance], axis=1
-    )
-    total = noise + uncertain @ uncertain.T
-    factor = np.linalg.cholesky(total)
-    whitened = np.linalg.solve(factor, values)
-    chi_square, freedom = float(whitened @ whitened), values.size
-    log_determinant = 2.0 * float(np.log(np.diag(factor)).sum())
-    estimates, remaining = _explained(residuals, noise_model, own, tolerance, rate, scatter_variance)
-    white = _white_noise(residuals, noise_model)[present]
-    names, outputs = problem.observations.outputs, residuals.output_index[0][present]
-
-    def rms_of(r: Floats) -> dict[str, float]:
-        return {
-            name: float(np.sqrt(np.mean((r / white)[outputs == k] ** 2)))
-            for k, name in enumerate(names)
-            if name != RUPTURE_OUTPUT and (outputs == k).any()
-        }
-
-    squares = float(((values / white) ** 2).sum())
+    forecasts = [LinearForecast.of_test(fit, predictor, history, dimensions) for fit, _, dimensions in laws]
+    weight = np.array([w for _, w, _ in laws]) / sum(w for _, w, _ in laws)
+    evaluated = [one.evaluated(history) for one in forecasts]
+    log_density = logsumexp([logsumexp(e[2]) - np.log(SCORED_NODES) for e in evaluated], b=weight)
+    best = forecasts[int(weight.argmax())]
+    estimates, before, after = best.explained(history)
+    squares = float(((before / best.white) ** 2).sum())
     return TestScore(
-        *bands,
-        chi_square,
-        freedom,
-        float(chi2.sf(chi_square, freedom)),
-        _departure_p_value(values, noise, uncertain),
-        float(-0.5 * (chi_square + log_determinant + freedom * np.log(2 * np.pi)) / max(freedom, 1)),
-        rms_of(values),
-        rms_of(remaining),
-        1.0 - float(((remaining / white) ** 2).sum()) / squares if squares > 0 else 0.0,
+        inside,
+        whole_inside,
+        before.size,
+        float(weight @ [e[0] for e in evaluated]),
+        float(weight @ [e[1] for e in evaluated]),
+        float(log_density) / max(before.size, 1),
+        best.rms(before),
+        best.rms(after),
+        1.0 - float(((after / best.white) ** 2).sum()) / squares if squares > 0 else 0.0,
         estimates,
     )
 
 
-def _departure_p_value(values: Floats, noise: Floats, uncertain: Floats) -> float:
-    """Probability of a departure as large in the directions that are more uncertain than noise; 1 without any.
-
-    values : (data,). noise : (data, data) covariance. uncertain : (data, sources) effect of one standard deviation.
-    """
-    factor = np.linalg.cholesky(noise)
-    directions, sizes, _ = np.linalg.svd(np.linalg.solve(factor, uncertain), full_matrices=False)
-    counted = sizes > 1.0
-    if not counted.any():
-        return 1.0
-    components = directions[:, counted].T @ np.linalg.solve(factor, values)
-    return float(chi2.sf((components**2 / (1.0 + sizes[counted] ** 2)).sum(), int(counted.sum())))
-
-
-def mean_law_covariance(fit: Identification) -> Floats:
-    """(parameters, parameters) covariance of u over the posterior distribution of the scatter."""
-    scatter, size = fit.scatter_of_rates, fit.u.size
-    posterior = scatter.posterior
-    mean_effect = sum(w * scatter.effect_covariance(sd) for w, sd in zip(posterior.weight, posterior.sd, strict=True))
-    return np.asarray((scatter.within + scatter.gain @ mean_effect @ scatter.gain.T)[:size, :size])
+def _on_fitted_scale(fit: Identification, observations: ObservationVector) -> ObservationVector:
+    """The observations by the transforms of the fit, in which its misfit and drift are stated."""
+    floors = fit.scatter_of_rates.output_floors
+    transforms = tuple(
+        LogTransform(floors[name]) if isinstance(transform, LogTransform) and name in floors else transform
+        for name, transform in zip(observations.outputs, observations.transforms, strict=True)
+    )
+    return replace(observations, transforms=transforms)
 
 
 def noise_model_of(fit: Identification, observations: ObservationVector) -> NoiseModel:
     """The noise model of a test: that of the fit, its misfit and drift in the units of these observations.
 
+    The noise of a frame is that which the test states, else that of the fitted tests: a few frames say little of it.
     An output that was not fitted has the noise of its frames alone.
     """
     outputs = {}
@@ -170,7 +318,8 @@ def noise_model_of(fit: Identification, observations: ObservationVector) -> Nois
             outputs[name] = OutputNoise(noise=max(float(observations.noise[position]), 1e-12))
             continue
         ratio = scales.get(name, 1.0) / float(getattr(observations.transforms[position], "scale", 1.0))
-        noise = float(observations.noise[position]) or known.noise
+        stated = bool(observations.stated[position]) and float(observations.noise[position]) > 0
+        noise = float(observations.noise[position]) if stated else known.noise
         outputs[name] = replace(known, noise=max(noise, 1e-12), misfit=known.misfit * ratio, drift=known.drift * ratio)
     return replace(fit.noise_model, outputs=outputs, rate=0.0)
 
@@ -181,40 +330,3 @@ def _white_noise(residuals: Residuals, noise_model: NoiseModel) -> Floats:
     noise = noise_model.per_observation(index, "noise") * residuals.relative_noise * residuals.offset_sensitivity
     misfit = noise_model.per_observation(index, "misfit")
     return np.asarray(np.maximum(np.hypot(noise, misfit)[0], 1e-12))
-
-
-def _explained(
-    residuals: Residuals,
-    noise_model: NoiseModel,
-    own: Sequence[Dimension],
-    tolerance: Floats,
-    rate: Floats,
-    scatter_variance: float,
-) -> tuple[tuple[ExplainedNuisance, ...], Floats]:
-    """Estimates of the test's own nuisances with the law frozen, and the residuals that remain, (data,).
-
-    tolerance : (data, dimensions) effect of one standard deviation of each; rate : (data, 1) the same of the rate.
-    """
-    present = residuals.present[0]
-    values, outputs = residuals.values[0][present], residuals.output_index[0][present]
-    columns, kinds = (
-        [rate, tolerance],
-        [("rate", 0.0, float(np.sqrt(scatter_variance))), *[(d.kind, d.mean, d.sd) for d in own]],
-    )
-    for k, (name, components) in enumerate(noise_model.outputs.items()):
-        if components.offset > 0 and (outputs == k).any():
-            effect = np.where(outputs == k, residuals.offset_sensitivity[0][present], 0.0) * components.offset
-            columns.append(effect[:, None])
-            kinds.append((f"offset of {name}", 0.0, components.offset))
-    design = np.concatenate(columns, axis=1)
-    without_offset = replace(noise_model, outputs={n: replace(o, offset=0.0) for n, o in noise_model.outputs.items()})
-    noise = covariance(residuals, without_offset)[0][np.ix_(present, present)]
-    weighted = np.linalg.solve(noise, design)
-    posterior = np.linalg.inv(design.T @ weighted + np.eye(design.shape[1]))
-    estimate = -posterior @ (weighted.T @ values)
-    estimates = tuple(
-        ExplainedNuisance(kind, mean + sd * float(e), sd * float(np.sqrt(v)), mean, sd)
-        for (kind, mean, sd), e, v in zip(kinds, estimate, np.diag(posterior), strict=True)
-        if sd > 0
-    )
-    return estimates, values + design @ estimate

@@ -42,7 +42,8 @@ class OutputForecast:
 class TimeForecast:
     """When an output reaches a value, or the specimen breaks.
 
-    event : in words. value : s, at the identified values; median, low, high : of a single test. All may be infinite.
+    event : in words. output, target : what is reached; "" for rupture. value : s, at the identified values.
+    median, low, high : s, of a single test. All may be infinite.
     measured : s, NaN where it is not known; censored : whether the test was stopped then, unbroken.
     chance : probability that it comes before the last time of the test.
     """
@@ -55,6 +56,8 @@ class TimeForecast:
     chance: float
     measured: float = float("nan")
     censored: bool = False
+    output: str = ""
+    target: float = float("nan")
 
     @property
     def inside(self) -> bool | None:

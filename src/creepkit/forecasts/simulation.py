@@ -23,11 +23,11 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.rate_nuisances import law_with_rate_factors
 from creepkit.records import History, Prediction, Predictor, Status
 
-FOLLOWED_TIMES, ADDED_TIMES = 200, 20
+FOLLOWED_TIMES, ADDED_TIMES = 300, 20
 """Geometrically spaced times at which a test is followed to its rupture, or to its last time, beside its own."""
 
 
-FIRST_OF_FOLLOWED = 1e-4
+FIRST_OF_FOLLOWED, FIRST_OF_ADDED = 1e-8, 1e-4
 """The first of them, over the last time of the test."""
 
 
@@ -52,21 +52,22 @@ class TestCurves:
 
 
 def central_curves(
-    fit: Identification, predictor: Predictor, history: History, dimensions: Mapping[str, float]
+    fit: Identification, predictor: Predictor, history: History, dimensions: Mapping[str, float], log_factor: float
 ) -> tuple[TestCurves, dict[str, float]]:
     """The curve at the identified values, by the most exact predictor there is, and what is left of its error.
 
-    dimensions : {kind: value}. Returns one draw, and {output: standard deviation} of the numerical error, in the
-    output's unit: a tenth of what the refined predictor changes, and what predictors state of themselves.
+    dimensions : {kind: value}. log_factor : ln of a factor on its rate. Returns one draw, and {output: standard
+    deviation} of the numerical error, in the output's unit: a tenth of what the refined predictor changes, and what
+    predictors state of themselves.
     """
     theta = fit.coordinates.theta(fit.u)[None]
     nuisances = {kind: np.array([[value]]) for kind, value in dimensions.items()}
-    coarse = curves(fit, predictor, history, theta, np.zeros(1), nuisances)
+    coarse = curves(fit, predictor, history, theta, np.array([log_factor]), nuisances)
     refined = refined_of(predictor_for(predictor, history))
     stated = dict(getattr(predictor_for(predictor, history), "error", {}))
     if refined is None:
         return coarse, stated
-    exact = curves(fit, refined, history, theta, np.zeros(1), nuisances)
+    exact = curves(fit, refined, history, theta, np.array([log_factor]), nuisances)
     change = exact.values[0] - coarse.values[0]
     remaining = {
         name: REMAINING_DEFECT * float(np.sqrt(np.nanmean(change[:, k] ** 2)))
@@ -189,7 +190,7 @@ def followed_history(history: History, predictor: Predictor) -> History:
     last = max(float(history.times[-1]), history.rupture_time or 0.0)
     far = predicts_rupture(predictor, history)
     horizon, count = (EXTRAPOLATION_FACTOR * last, FOLLOWED_TIMES) if far else (last, ADDED_TIMES)
-    times = np.geomspace(FIRST_OF_FOLLOWED * last, horizon, count)
+    times = np.geomspace((FIRST_OF_FOLLOWED if far else FIRST_OF_ADDED) * last, horizon, count)
     return history.replace(times=np.union1d(times, history.times), outputs={}, standard_deviation={})
 
 
@@ -199,19 +200,31 @@ def at_times(followed: TestCurves, times: Floats) -> TestCurves:
 
 
 def crossing_times(drawn: TestCurves, output: str, targets: Floats) -> Floats:
-    """(draws,) s, when an output first reaches targets (draws,); rupture where that comes first, else infinite."""
+    """(draws,) s, when an output first reaches targets (draws,), from below or from above.
+
+    The rupture where that comes first; infinite where neither comes, NaN where the prediction failed.
+    """
     values, times = drawn.of(output), drawn.times
-    reached = np.nan_to_num(values, nan=-np.inf) >= targets[:, None]
-    first = np.where(reached.any(axis=1), reached.argmax(axis=1), -1)
     result = np.where(np.isnan(drawn.end_times), np.nan, drawn.end_times)
-    for k in np.flatnonzero(first >= 0):
-        j, target = int(first[k]), float(targets[k])
-        if j == 0:
-            result[k] = times[0]
-            continue
-        below, above = values[k, j - 1], values[k, j]
-        fraction = np.log(target / below) / np.log(above / below) if below > 0 else (target - below) / (above - below)
-        result[k] = float(
-            np.exp(np.log(max(times[j - 1], 1e-12)) + fraction * np.log(times[j] / max(times[j - 1], 1e-12)))
-        )
+    for k in range(len(values)):
+        result[k] = min(first_crossing(times, values[k], float(targets[k])), result[k])
     return np.asarray(result)
+
+
+def first_crossing(times: Floats, values: Floats, target: float) -> float:
+    """s, when values (times,) first reach a target from the side on which they begin; infinite where they do not."""
+    counted = np.isfinite(values) & (times > 0)
+    times, values = times[counted], values[counted]
+    if not values.size:
+        return float("inf")
+    sign = 1.0 if values[0] <= target else -1.0
+    reached = np.flatnonzero(sign * (values - target) >= 0.0)
+    if not reached.size:
+        return float("inf")
+    j = int(reached[0])
+    if j == 0:  # before the first time an output is taken to be in proportion to time
+        return float(times[0] * target / values[0]) if sign > 0 and values[0] > 0 else float(times[0])
+    below, above = values[j - 1], values[j]
+    positive = min(below, above, target) > 0
+    share = np.log(target / below) / np.log(above / below) if positive else (target - below) / (above - below)
+    return float(times[j - 1] * (times[j] / times[j - 1]) ** share)

@@ -9,18 +9,11 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.forecasts.drawn_law import DrawnLaw
 from creepkit.forecasts.draws import SOURCES
-from creepkit.forecasts.measured_test import mean_law_covariance
 from creepkit.forecasts.results import CHOICE_OF_LAW, LAW, MISFIT, NOISE, NUMERICAL, OFFSET
 from creepkit.forecasts.simulation import at_times
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import OutputNoise
-from creepkit.inverse.observation_vector import (
-    LINEAR_COORDINATE_LENGTH,
-    LOGARITHMIC_OUTPUTS,
-    RELATIVE_DISCREPANCY_UNIT,
-    noise_standard_deviation,
-    usable_frames,
-)
+from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH, LOGARITHMIC_OUTPUTS, RELATIVE_DISCREPANCY_UNIT
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform, OutputTransform
 from creepkit.records import History
 
@@ -28,19 +21,30 @@ SMALLEST_STRAIN_RATIO = 1e-3
 """Floor of the logarithmic scale of a strain in a band, over its largest value."""
 
 
+NOISES_IN_FLOOR = 3.0
+"""Noises of a frame, or offsets, below which that scale is linear, so that they are symmetrical about the curve."""
+
+
 COMPARED_STRAIN_RATIO = 1e-2
 """The same of the scale on which tests are compared (see inverse.observation_vector.log_transform_for)."""
 
 
-def band_transform(fit: Identification, name: str, central: Floats) -> OutputTransform:
+def band_transform(fit: Identification, history: History, name: str, central: Floats) -> OutputTransform:
     """The scale on which an output is banded: logarithmic for a strain; central : (times,) in the output's unit."""
     largest = float(np.nanmax(np.abs(central), initial=0.0))
     if name in LOGARITHMIC_OUTPUTS:
         known = fit.noise_model.outputs.get(name)
-        noise = 0.0 if known is None else max(known.noise, known.offset)
-        return LogTransform(max(SMALLEST_STRAIN_RATIO * largest, noise, 1e-14))
+        noise = max(float(np.median(frame_noise_of(fit, history, name))), 0.0 if known is None else known.offset)
+        return LogTransform(max(SMALLEST_STRAIN_RATIO * largest, NOISES_IN_FLOOR * noise, 1e-14))
     scale = fit.scatter_of_rates.output_scales.get(name, 0.0) or max(float(np.nanstd(central)), 1e-12 + 1e-3 * largest)
     return LinearTransform(scale, largest)
+
+
+def frame_noise_of(fit: Identification, history: History, name: str) -> Floats:
+    """(times,) standard deviation of a frame: as the history states it, else that of the fitted tests."""
+    known, stated = fit.noise_model.outputs.get(name), history.standard_deviation.get(name)
+    usual = np.full(history.times.size, 0.0 if known is None else known.noise)
+    return usual if stated is None else np.where(np.isfinite(stated) & (stated > 0), stated, usual)
 
 
 def noise_in_output(
@@ -53,12 +57,7 @@ def noise_in_output(
     times = history.times
     slope = transform.derivative(np.where(np.isfinite(central), central, 0.0))
     known: OutputNoise | None = fit.noise_model.outputs.get(name)
-    if name in history.outputs and usable_frames(history, name).any():
-        frame = noise_standard_deviation(history, name)
-    else:
-        stated = history.standard_deviation.get(name)
-        frame = stated if stated is not None else np.full(times.size, 0.0 if known is None else known.noise)
-    frame = np.where(np.isfinite(frame), frame, 0.0)
+    frame = frame_noise_of(fit, history, name)
     if known is None:
         return np.zeros((times.size, 0)), np.abs(slope * frame)
     logarithmic = name in LOGARITHMIC_OUTPUTS
@@ -74,7 +73,8 @@ def noise_in_output(
     size = float(total[0, 0])
     # What lies beside the law has one size on the scale on which tests are compared, whose floor is higher.
     finite = np.where(np.isfinite(central), central, 0.0)
-    fitted = LogTransform(max(COMPARED_STRAIN_RATIO * float(np.abs(finite).max()), 1e-14)) if logarithmic else transform
+    floor = fit.scatter_of_rates.output_floors.get(name, COMPARED_STRAIN_RATIO * float(np.abs(finite).max()))
+    fitted = LogTransform(max(floor, 1e-14)) if logarithmic else transform
     visible = slope / fitted.derivative(finite)
     root = (
         np.linalg.cholesky(total + 1e-9 * size * np.eye(times.size)) * visible[:, None]
@@ -140,15 +140,24 @@ def discrepancy_variance(fit: Identification, name: str, transform: OutputTransf
 
 
 def _law_variances(one: DrawnLaw, history: History, name: str, transform: OutputTransform) -> dict[str, Floats]:
-    """{part: (times,) variance of the transformed output} by parameters, scatter of rates and dimensions of one law."""
+    """{part: (times,) variance of the transformed output} by parameters, scatter of rates and dimensions of one law.
+
+    What was estimated together with the law, a known heat or what all tests share, is one part with it.
+    """
     central, column = at_times(one.central, history.times).of(name)[0], one.sensitivities.outputs.index(name)
     slope = transform.derivative(np.where(np.isfinite(central), central, 0.0))[:, None]
-    by_law = slope * one.sensitivities.coordinates[:, column]
-    variances = {LAW: np.einsum("ti,ij,tj->t", by_law, mean_law_covariance(one.draws.fit), by_law)}
     rate = slope[:, 0] * one.sensitivities.rate[:, column]
-    for level, variance in one.factor_variances.items():
-        variances[SOURCES[level]] = rate**2 * variance
+    scatter, size = one.draws.fit.scatter_of_rates, one.draws.fit.u.size
+    by_joint = np.zeros((history.times.size, scatter.joint_design.shape[1]))
+    by_joint[:, :size] = slope * one.sensitivities.coordinates[:, column]
+    by_joint[:, [*scatter.new_test(history).known.values()]] = rate[:, None]
     for dimension in one.dimensions:
+        if dimension.shared is not None:
+            by_joint[:, dimension.shared] = slope[:, 0] * one.sensitivities.dimensions[dimension.kind][:, column]
+    variances = {LAW: np.einsum("ti,ij,tj->t", by_joint, scatter.mean_joint[1], by_joint)}
+    for level, variance in one.own_variances.items():
+        variances[SOURCES[level]] = rate**2 * variance
+    for dimension in (d for d in one.dimensions if d.shared is None):
         change = slope[:, 0] * one.sensitivities.dimensions[dimension.kind][:, column] * dimension.sd
         variances[dimension.kind] = change**2
     return variances

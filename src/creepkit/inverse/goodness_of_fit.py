@@ -314,24 +314,48 @@ def predict_rupture_times(
     prediction = predict_to_rupture(predictor, coordinates.law, theta, extended, sensitivities=True)
     assert prediction.times_to_strain is not None
     assert prediction.times_to_strain.rupture_jacobian is not None
-    median_times = prediction.times_to_strain.rupture_times[0]
-    sensitivities = np.nan_to_num(prediction.times_to_strain.rupture_jacobian[0]) @ coordinates.jacobian(u)
-    posterior, size = scatter.posterior, u.size
-    covariances = np.stack([scatter.covariance(sd)[:size, :size] for sd in posterior.sd])
-    variance = np.einsum("ti,nij,tj->nt", sensitivities, covariances, sensitivities)
-    if noise_model is not None:
-        rupture_sd = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
-        variance = variance + posterior.total_variance[:, None] + rupture_sd**2
-    ruptured = np.isfinite(median_times)
-    log_times = np.log(np.where(ruptured, median_times, 1.0))
+    at_values = prediction.times_to_strain.rupture_times[0]
+    by_parameter = np.nan_to_num(prediction.times_to_strain.rupture_jacobian[0])
+    locations, variances = [], []
+    for k, history in enumerate(histories):
+        test = scatter.new_test(history)
+        row = np.zeros(scatter.joint_design.shape[1])
+        row[: u.size] = by_parameter[k] @ coordinates.jacobian(u)
+        rate_effect = _log_time_by_log_rate(coordinates, by_parameter[k])
+        row[[*test.known.values()]] = rate_effect if noise_model is not None else 0.0
+        parts = [scatter.joint(sd) for sd in scatter.posterior.sd]
+        own = scatter.own_variance(test, scatter.posterior.sd) * rate_effect**2 + _rupture_variance(noise_model)
+        locations.append([row @ mean for mean, _ in parts])
+        by_law = np.array([row @ covariance @ row for _, covariance in parts])
+        variances.append(by_law + own if noise_model is not None else by_law)
+    posterior, variance = scatter.posterior, np.array(variances).T
+    ruptured = np.isfinite(at_values)
+    log_times = np.log(np.where(ruptured, at_values, 1.0))
     mixture = MixtureDistribution(
         posterior.weight,
         np.full(posterior.weight.size, NORMAL_FREEDOM),
-        np.broadcast_to(log_times, variance.shape),
+        log_times + np.array(locations).T,
         np.sqrt(np.maximum(variance, 1e-20)),
     )
     low, high = (np.exp(mixture.quantile(probability)) for probability in (0.025, 0.975))
-    return tuple(np.where(ruptured, each, np.inf) for each in (median_times, low, high))  # type: ignore[return-value]
+    return tuple(np.where(ruptured, each, np.inf) for each in (at_values, low, high))  # type: ignore[return-value]
+
+
+def _log_time_by_log_rate(coordinates: Coordinates, by_parameter: Floats) -> float:
+    """Derivative of ln of a rupture time to ln of a factor on all rates: -1 where the law has no explicit time.
+
+    by_parameter : (parameters,) derivatives of ln of the time.
+    """
+    coefficients = list(coordinates.coefficients)
+    if len(coefficients) < len(coordinates.law.terms) + len(coordinates.law.states):
+        return -1.0
+    return float(by_parameter[coefficients].sum())
+
+
+def _rupture_variance(noise_model: NoiseModel | None) -> float:
+    """Variance of ln of the rupture time of a single test beside its rate."""
+    known = noise_model is not None and RUPTURE_OUTPUT in noise_model.outputs
+    return float(noise_model[RUPTURE_OUTPUT].misfit ** 2) if known else 0.0  # type: ignore[index]
 
 
 def _extended_to_rupture(history: History) -> History:

@@ -22,6 +22,7 @@ from creepkit.inverse.predictor_documents import predictor_documents, predictor_
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity
+from creepkit.inverse.uncertainty.rate_scatter import RateScatter, problem_with
 from creepkit.inverse.unmodelled_effects import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
@@ -39,6 +40,10 @@ NOT_NEGATIVE = NumberRange(low=0.0)
 
 
 POSITIVE = NumberRange(low=0.0, open_low=True)
+
+
+SIZE = NumberRange(low=0.0, high=1e12)
+"""Of a standard deviation, in any unit."""
 
 
 POSITIVE_OR_INFINITE = NumberRange(low=0.0, open_low=True, infinite=True)
@@ -65,9 +70,9 @@ CODEC = RecordCodec(
     ranges={
         Identification: {"rms": NOT_NEGATIVE_OR_NAN, "effective_frames": POSITIVE, "freedom": POSITIVE},
         ReferencePoint: dict.fromkeys(("stress", "strain", "time", "temperature"), POSITIVE),
-        NoiseModel: {"rate": NOT_NEGATIVE, "discrepancy": NOT_NEGATIVE, "discrepancy_length": POSITIVE},
+        NoiseModel: {"rate": SIZE, "discrepancy": SIZE, "discrepancy_length": POSITIVE},
         OutputNoise: {
-            **dict.fromkeys(("noise", "misfit", "offset", "drift", "stated"), NOT_NEGATIVE),
+            **dict.fromkeys(("noise", "misfit", "offset", "drift", "stated"), SIZE),
             "correlation_length": POSITIVE,
         },
         Adequacy: dict.fromkeys(
@@ -147,8 +152,26 @@ def identification_from_json(data: Any, source: str = "identification") -> Ident
     correlation = covariance / np.maximum(np.outer(scale, scale), 1e-300)
     if size and (not np.allclose(covariance, covariance.T, rtol=1e-8) or np.linalg.eigvalsh(correlation)[0] < -1e-8):
         raise FitError(f"{source}: covariance is not symmetric and positive semi-definite; the file is damaged")
+    if fit.rate_scatter is not None:
+        unknowns, tests = size + len(fit.nuisances), [m.name for m in fit.tests]
+        fit = replace(fit, rate_scatter=_with_shapes(fit.rate_scatter, len(tests), unknowns))
+        problem = problem_with(fit.rate_scatter, tests, unknowns)  # type: ignore[arg-type]
+        if problem:
+            raise FitError(f"{source}: rate_scatter: {problem}; the file is damaged")
+    if not {"stress", "temperature", "strain", "time"} <= {*fit.ranges} or any(a > b for a, b in fit.ranges.values()):
+        raise FitError(f"{source}: ranges must be of stress, temperature, strain and time, each from low to high")
     try:
         predictor = predictor_from_documents(fit.predictor_documents)
     except FitError as error:
         raise FitError(f"{source}: {error}") from None
     return replace(fit, covariance=covariance, predictor=predictor)  # of a law without parameters it is a list
+
+
+def _with_shapes(scatter: RateScatter, tests: int, unknowns: int) -> RateScatter:
+    """The record with two-dimensional arrays where they are empty: JSON holds no shape of those."""
+    shapes = {"design": (tests, unknowns), "precision": (unknowns, unknowns)}
+    design, precision = (
+        np.zeros(shape) if 0 in shape and not getattr(scatter, name).size else getattr(scatter, name)
+        for name, shape in shapes.items()
+    )
+    return replace(scatter, design=design, precision=precision)

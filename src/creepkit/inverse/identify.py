@@ -281,7 +281,6 @@ def _result(
         problem,
         x,
         residuals,
-        _fitting_noise(best),
         noise_model,
         [effect.residual_change for effect in unmodelled if effect.kind in CHECKED_DIMENSIONS],
     )
@@ -364,21 +363,15 @@ def _uncertainty(
         nuisances,
     )
     rate_is_given = any(n.kind == "rate" and n.sd is not None for n in nuisances)
+    fitting_noise = with_rupture_weight(best.working_noise, problem.observations)
     return noise_model, *laplace_covariance(
         best.residuals,
-        _fitting_noise(best),
+        fitting_noise,
         noise_model,
         problem.bounds,
         problem.nuisance_parameters,
         rate_known=rate_is_given,
     )
-
-
-def _fitting_noise(best: EstimationResult) -> NoiseModel:
-    """The noise model under which the values were found."""
-    if best.linearised is not None:
-        return best.working_noise
-    return with_rupture_weight(best.working_noise, best.problem.observations)
 
 
 def _with_assumed_rate(nuisances: Sequence[Nuisance], tests: int) -> tuple[Nuisance, ...]:

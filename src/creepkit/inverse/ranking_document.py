@@ -26,6 +26,8 @@ MOST_LAWS = 100
 
 def write_ranking_document(weights: Mapping[str, float], path: Path) -> Path:
     """Write the ranking; weights : {file of an identification, beside it: weight}."""
+    if len(weights) > MOST_LAWS:  # those of least weight say nothing
+        weights = dict(sorted(weights.items(), key=lambda pair: -pair[1])[:MOST_LAWS])
     laws = [{"file": name, "weight": weight} for name, weight in weights.items()]
     return write_json({**RANKING.heading, "laws": laws}, path, RANKING.kind)
 
@@ -39,16 +41,24 @@ def read_fit_or_ranking(path: str | Path) -> Identification | ModelAverage:
     laws = content.get("laws")
     problem = check_keys(content, ("laws",), "ranking")
     if problem or not isinstance(laws, list) or not 0 < len(laws) <= MOST_LAWS:
-        raise FitError(f"{path}: {problem or 'laws is no list of laws'}; {RANKING.kind.advice}")
-    fits, weights = [], []
+        raise FitError(f"{path}: {problem or f'laws is no list of 1 to {MOST_LAWS} laws'}; {RANKING.kind.advice}")
+    fits: list[Identification] = []
+    weights: list[float] = []
     for entry in laws:
         if not isinstance(entry, dict) or check_keys(entry, ("file", "weight"), "laws"):
             raise FitError(f"{path}: each of its laws is a file and a weight, found {entry!r:.60}")
         name, weight = entry["file"], entry["weight"]
-        if not isinstance(name, str) or Path(name).name != name:
+        if not isinstance(name, str) or Path(name).name != name or name in ("", ".", "..", Path(path).name):
             raise FitError(f"{path}: a law's file is {name!r:.60}; it is a name in the same folder")
         if isinstance(weight, bool) or not isinstance(weight, int | float) or not 0 <= weight <= 1:
             raise FitError(f"{path}: the weight of {name} is {weight!r:.20}; it is a number from 0 to 1")
-        fits.append(read_identification(Path(path).parent / name))
+        if name in (known["file"] for known in laws[: len(fits)]):
+            raise FitError(f"{path}: {name} is among its laws twice; keep one of them")
+        try:
+            fits.append(read_identification(Path(path).parent / name))
+        except FitError as error:
+            raise FitError(f"{path} names {name}: {error}") from None
         weights.append(float(weight))
+    if not sum(weights) > 0:
+        raise FitError(f"{path}: no law has a weight above zero; {RANKING.kind.advice}")
     return ModelAverage(tuple(fits), tuple(weights))

@@ -70,7 +70,7 @@ def _time_text(one: TimeForecast, end: float) -> str:
 def _hours(seconds: float) -> str:
     if math.isnan(seconds):
         return "?"
-    return f"{seconds / SECONDS_PER_HOUR:.4g}" if math.isfinite(seconds) else "beyond the test"
+    return f"{seconds / SECONDS_PER_HOUR:.4g}" if math.isfinite(seconds) else "never"
 
 
 def _number(value: float) -> str:
@@ -171,7 +171,7 @@ def _output_to_json(one: OutputForecast) -> dict[str, Any]:
 
 
 def _score_to_json(score: TestScore) -> dict[str, Any]:
-    numbers = ("chi_square", "freedom", "p_value", "departure_p_value", "log_score", "explained")
+    numbers = ("freedom", "p_value", "departure_p_value", "log_score", "explained")
     return {
         "inside": dict(score.inside),
         "whole_inside": dict(score.whole_inside),
@@ -179,7 +179,7 @@ def _score_to_json(score: TestScore) -> dict[str, Any]:
         "rms": {k: _finite(v) for k, v in score.rms.items()},
         "rms_explained": {k: _finite(v) for k, v in score.rms_explained.items()},
         "nuisances": [
-            {"kind": n.kind, "value": n.value, "sd": n.sd, "prior_mean": n.prior_mean, "prior_sd": n.prior_sd}
+            {**{key: getattr(n, key) for key in ("kind", "value", "sd", "prior_mean", "prior_sd", "deviation")}}
             for n in score.nuisances
         ],
     }

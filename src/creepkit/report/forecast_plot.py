@@ -77,10 +77,10 @@ def forecast_figure(forecast: Forecast, path: str | Path | None = None) -> Figur
         cell = grid[k // columns, k % columns].subgridspec(
             len(outputs) + 1, 1, height_ratios=[*[2.0] * len(outputs), 1.0], hspace=0.08
         )
-        for j, one in enumerate(outputs):
-            axes = figure.add_subplot(cell[j])
-            _draw_curve(axes, test, one, forecast.level, first=j == 0)
-        _draw_shares(figure.add_subplot(cell[len(outputs)]), outputs[0], parts)
+        panels_of_test = [figure.add_subplot(cell[j]) for j in range(len(outputs))]
+        for j, (axes, one) in enumerate(zip(panels_of_test, outputs, strict=True)):
+            _draw_curve(axes, test, one, first=j == 0)
+        _draw_shares(figure.add_subplot(cell[len(outputs)]), panels_of_test[0], outputs[0], parts)
     events = {t.event == "rupture" for test in tests for t in test.times if np.isfinite(t.low)}
     _legend(figure, parts, forecast.level, events)
     title = " or ".join(forecast.laws)
@@ -94,7 +94,7 @@ def _scaled(one: OutputForecast) -> float:
     return 100.0 if one.output in LOGARITHMIC_OUTPUTS else 1.0
 
 
-def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, level: float, *, first: bool) -> None:
+def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, *, first: bool) -> None:
     """The curve, pointwise and simultaneous bands, the measured points, and intervals of times."""
     factor, logarithmic = _scaled(one), one.output in LOGARITHMIC_OUTPUTS
     history, positive = test.history, one.times > 0
@@ -105,6 +105,7 @@ def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, level: floa
     )
     measured_hours, measured = _measured(test, one.output, factor)
     finite = np.concatenate([v[np.isfinite(v)] for v in (curve, low, high, measured)])
+    finite = finite if finite.size else np.zeros(1)
     top = float(finite.max(initial=1e-12))
     bottom = (
         max(SHOWN_RATIO * top, 1e-12) if logarithmic else float(min(finite.min(initial=0.0), 0.0 if top > 0 else top))
@@ -157,11 +158,10 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, bottom: flo
     """Intervals of times as bars: at the value that is reached, and of rupture at the upper edge."""
     right = axes.get_xlim()[1]
     for time in test.times:
-        word, _, rest = time.event.partition(" ")
-        is_rupture = time.event == "rupture"
-        if not is_rupture and word.replace(" ", "_") != one.output.split("_")[0]:
+        is_rupture = not time.output
+        if not is_rupture and time.output != one.output:
             continue
-        level = top * 0.97 if is_rupture else _scaled(one) * float(rest.split(" ")[0])
+        level = top * 0.97 if is_rupture else _scaled(one) * time.target
         if not bottom <= level <= top or not np.isfinite(time.low):
             continue
         low, high = time.low / SECONDS_PER_HOUR, min(time.high / SECONDS_PER_HOUR, right)
@@ -173,8 +173,8 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, bottom: flo
             axes.plot([time.measured / SECONDS_PER_HOUR], [level], "x", color="black", ms=5, zorder=6)
 
 
-def _draw_shares(axes: Axes, one: OutputForecast, parts: dict[str, str]) -> None:
-    """Stacked shares of the variance over time."""
+def _draw_shares(axes: Axes, above: Axes, one: OutputForecast, parts: dict[str, str]) -> None:
+    """Stacked shares of the variance over time, on the axis of the panel above."""
     positive = (one.times > 0) & np.isfinite(one.value)
     hours = one.times[positive] / SECONDS_PER_HOUR
     for part, share in one.shares.items():
@@ -185,7 +185,7 @@ def _draw_shares(axes: Axes, one: OutputForecast, parts: dict[str, str]) -> None
         stacked = np.stack([100 * values[positive] for values in one.shares.values()])
         axes.stackplot(hours, stacked, colors=[parts.get(part, UNNAMED) for part in one.shares], lw=0)
         logarithmic = one.output in LOGARITHMIC_OUTPUTS
-        upper = axes.figure.axes[-2].get_xlim()
+        upper = above.get_xlim()
         axes.set_xscale("log" if logarithmic else "linear")
         set_range(axes, "x", *upper, logarithmic=logarithmic, most=6)
         axes.set_xlim(*upper)

@@ -12,6 +12,7 @@ from creepkit.errors import FitError
 from creepkit.forecasts.forecast import forecast
 from creepkit.inverse.ranking_document import read_fit_or_ranking, write_ranking_document
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.records import Status
 from creepkit.report.forecast import forecast_to_json
 from helpers.rupture_tests import BAR
 
@@ -113,6 +114,111 @@ def test_a_known_heat_narrows_the_band():
     assert np.log(new.high / new.low) > 0.8
 
 
+def test_a_known_heat_is_where_its_tests_were_and_departures_are_judged_by_its_own_scatter():
+    """Heat a creeps exp(0.5) times as fast as the law; a test of it 3 standard deviations off is an unlikely one."""
+    rng = np.random.default_rng(8)
+    made = [
+        bar(f"{heat} {k}", 80 + 10 * k, np.exp(effect + rng.normal(0.0, 0.05)), seed=k, labels={"heat": heat})
+        for heat, effect in {"a": 0.5, "b": -0.5, "c": 0.2}.items()
+        for k in range(5)
+    ]
+    fit = ck.identify("norton", made, using=BAR, starts=2)
+    usual, far = (
+        fit.forecast(bar("x", 95.0, np.exp(0.5 + b), seed=9, labels={"heat": "a"})).tests[0] for b in (0.0, 0.25)
+    )
+    strain = usual.outputs["strain"]
+    assert strain.band.low[-1] < strain.value[-1] < strain.band.high[-1]
+    assert strain.shares["scatter between tests"][-1] > 0.5
+    assert usual.score.departure_p_value > 0.1
+    assert far.score.departure_p_value < 0.01
+    (rate,) = [n for n in far.score.nuisances if n.kind == "rate"]
+    assert rate.value == pytest.approx(0.25, abs=0.08)
+
+
+def test_what_tests_share_is_at_its_estimate_in_forecast_and_score():
+    """All tests are 15 K hotter than stated: a new one like them is scored as they were fitted."""
+    law = ck.law("norton").times(ck.arrhenius(T_ref=1073.15)).fix(n=5.0, Q=3e5)
+    shift = 3e5 / 8.314462618 * (1 / 1073.15 - 1 / 1088.15)
+    rng = np.random.default_rng(4)
+    made = [
+        bar(f"bar {k}", s, np.exp(shift + rng.normal(0, 0.02)), seed=k) for k, s in enumerate([80, 90, 100, 110, 120])
+    ]
+    nuisances = [ck.Nuisance("rate"), ck.Nuisance("temperature", scope="all", sd=10.0)]
+    fit = ck.identify(law, made, using=BAR, starts=1, nuisances=nuisances)
+    one = fit.forecast(bar("new", 95.0, np.exp(shift), seed=9)).tests[0]
+    assert one.score.inside["strain"] > 0.9
+    assert one.score.p_value > 0.01
+    (rate,) = [n for n in one.score.nuisances if n.kind == "rate"]
+    assert abs(rate.deviation) < 2
+    assert np.log(one.outputs["strain"].band.high[-1] / one.outputs["strain"].band.low[-1]) < 0.4
+
+
+def test_p_values_of_tests_like_the_fitted_ones_are_uniform(fit):
+    """Over 60 tests from the true law: P(p < 0.2) is 0.2 give or take 0.05, and none is below 1e-4."""
+    rng = np.random.default_rng(21)
+    made = [bar(f"new {k}", rng.uniform(80, 120), np.exp(rng.normal(0.0, SCATTER)), seed=100 + k) for k in range(60)]
+    scores = [t.score for t in fit.forecast(made, draws=100).tests]
+    for values in (np.array([s.p_value for s in scores]), np.array([s.departure_p_value for s in scores])):
+        assert 0.05 <= (values < 0.2).mean() <= 0.4
+        assert values.min() > 1e-4
+
+
+def test_the_stress_of_a_relaxing_bar_is_reached_from_above(fit):
+    """ds/dt = -E A s^n has the closed form s^(1-n) = s0^(1-n) + (n - 1) E A t."""
+    E, s0, target = 150e3, 150.0, 70.0
+    plan = ck.History(
+        "relaxation",
+        np.geomspace(36.0, 3.6e5, 60),
+        {},
+        ck.constant_strain(s0 / E),
+        1073.15,
+        "relaxation",
+        elastic=ck.Elastic(E),
+    )
+    one = forecast(fit, plan, targets={"stress": [target]}).tests[0]
+    (time,) = one.times
+    A, n = float(fit.rate(100.0)[0]) / 100.0 ** fit.values["n"], fit.values["n"]
+    exact = (target ** (1 - n) - s0 ** (1 - n)) / ((n - 1) * E * A)
+    assert time.value == pytest.approx(exact, rel=0.02)
+    assert time.low < time.value < time.high
+
+
+def test_early_times_are_those_of_the_curve_not_of_its_first_frame(fit):
+    plan = bar("plan", 100.0, noise=0.0).replace(times=np.array([1.8e8, 3.6e8]))
+    time = fit.forecast(plan, targets={"strain": [1e-5]}).tests[0].times[0]
+    assert time.value == pytest.approx(1e-5 / float(fit.rate(100.0)[0]), rel=1e-3)
+    assert np.log(time.high / time.low) > 0.2
+
+
+def test_a_broken_test_is_not_scored_by_its_life_where_no_life_was_fitted(fit):
+    broken = bar("broken", 100.0, seed=5).replace(rupture_time=3.65e5)
+    assert fit.forecast(broken).tests[0].score.p_value > 1e-3
+
+
+def test_curves_with_noise_of_their_own_lie_inside(fit):
+    """Stated noise ten times that of the fitted tests: 40 whole curves inside at 0.95, give or take 0.035."""
+    made = []
+    for k in range(40):
+        rng = np.random.default_rng(300 + k)
+        history = bar(f"new {k}", 100.0, np.exp(rng.normal(0.0, SCATTER)), noise=2e-5, seed=200 + k)
+        made.append(history.replace(standard_deviation={"strain": np.full(TIMES.size, 2e-5)}))
+    inside = [t.score.whole_inside["strain"] for t in fit.forecast(made).tests]
+    assert np.mean(inside) >= 0.85
+
+
+def test_draws_that_the_solver_does_not_finish_are_left_out_and_said(fit):
+    class Weak(type(BAR)):
+        def predict(self, law, theta, histories, **options):
+            made = super().predict(law, theta, histories, **options)
+            if len(theta) > 20:
+                made.status[:10] = Status.NOT_CONVERGED
+            return made
+
+    one = forecast(fit, bar("plan", 100.0, noise=0.0), using=Weak()).tests[0]
+    assert np.isfinite(one.outputs["strain"].band.high).all()
+    assert any("the solver did not finish 10 of the draws" in note for note in one.notes)
+
+
 def test_a_test_of_another_heat_than_all_that_were_fitted_has_the_usual_scatter(tests):
     fit = ck.identify("norton", [h.replace(labels={"heat": "a"}) for h in tests], using=BAR, starts=1)
     same, other = (bar(h, 95.0, noise=0.0, labels={"heat": h}) for h in "ab")
@@ -167,7 +273,11 @@ def test_a_dimple_is_forecast_from_bars_with_the_tolerance_of_its_thickness(fit)
         ({"draws": 3}, "draws is 3"),
         ({"tolerances": {"thicknes": 0.1}}, "a tolerance of 'thicknes' is not known; did you mean 'thickness'"),
         ({"tolerances": {"thickness": 0.1}}, "means nothing to the specimens of these tests"),
-        ({"tolerances": {"temperature": -1.0}}, "the tolerance of 'temperature' is -1.0"),
+        ({"tolerances": {"temperature": 5.0}}, "no law has a temperature; leave it out"),
+        ({"tolerances": {"modulus": -1.0}}, "the tolerance of 'modulus' is -1.0"),
+        ({"tolerances": {"modulus": "x"}}, "tolerances must be numbers by name"),
+        ({"targets": {"strain": ["x"]}}, "targets must be numbers by output"),
+        ({"level": "x"}, "level is 'x'"),
         ({"targets": {"amplitude": [0.1]}}, "no test has an output 'amplitude'"),
         ({"targets": {"strain": [-1.0]}}, "targets of strain"),
     ],
@@ -220,7 +330,8 @@ def test_a_ranking_has_a_file(fit, tmp_path):
 @pytest.mark.parametrize(
     ("laws", "sentence"),
     [
-        ([], "laws is no list of laws"),
+        ([], "laws is no list of 1 to 100 laws"),
+        ([{"file": "ranking.json", "weight": 1.0}], "it is a name in the same folder"),
         ([{"file": "../norton.json", "weight": 1.0}], "it is a name in the same folder"),
         ([{"file": "norton.json", "weight": 2.0}], "it is a number from 0 to 1"),
         ([{"file": "norton.json"}], "each of its laws is a file and a weight"),

@@ -1,14 +1,21 @@
-"""The scatter of creep rates between tests, as levels of one random effect: laboratories, heats, and single tests.
+"""The scatter of creep rates between tests: random effects of laboratories, heats and single tests.
 
-With b_j the ln of the factor by which test j creeps faster than the law, r_j its residuals, J_j and d_j their
-derivatives to the unknowns and to b_j, and N_j their covariance without scatter of rates,
+With b_j the ln of the factor by which test j creeps faster than the law, r_j its residuals at the estimate, J_j and d_j
+their derivatives to the unknowns x and to b_j, and N_j their covariance without scatter of rates,
 
     z_j = -d'N^-1 r / d'N^-1 d = b_j + X_j dx + e_j,    X_j = d'N^-1 J / d'N^-1 d,    var e_j = 1 / d'N^-1 d,
 
-is what a test says of its own factor, dx being the error of the unknowns. So each curve becomes one number, and the
-standard deviations of the levels have the restricted likelihood of a small linear mixed model. Few tests say little of
-them: a half-normal prior, of the size that is usual between creep tests, holds them. Intervals of predictions are
-integrals over that posterior distribution, in the place of a factor of Student's t that knows nothing beforehand.
+is what a test says of its own factor, dx being the true unknowns less the estimate. What else the curves say of dx is
+independent of it, a quadratic form with matrix K and gradient g. So each curve becomes one number, and unknowns and
+effects of heats and laboratories, c, are those of a linear mixed model: given the standard deviations s of the effects,
+
+    (dx, c) is normal with precision [K 0; 0 S^-1] + [X Z]' D^-1 [X Z],    D = s_test^2 + var e,
+
+Z saying which heat and laboratory a test is of, and S being diagonal with s_heat^2 and s_laboratory^2. Integrating it
+out leaves the restricted likelihood of s. Few tests say little of s: a half-normal prior, of the size that is usual
+between creep tests, holds it. Intervals of predictions are integrals over the posterior distribution of s.
+
+Source: S. Searle, G. Casella and C. McCulloch, Variance Components (1992), chapters 6 and 7.
 """
 
 from __future__ import annotations
@@ -21,7 +28,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import ASSUMED_RATE_SD, NoiseModel, Residuals, covariance
+from creepkit.inverse.noise_model import ASSUMED_RATE_SD, NoiseModel, Residuals
+from creepkit.inverse.output_transforms import LinearTransform, LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import scaled_inverse
 from creepkit.records import History, Nuisance
@@ -42,6 +50,14 @@ NODES = {1: 60, 2: 24, 3: 12}
 """Standard deviations of a level at which its posterior distribution is taken, by the number of levels."""
 
 
+REFINEMENTS, GRID_HALF_WIDTH = 2, 4.0
+"""How often the grid is refined, and its half width then, in standard deviations of the posterior on the one before."""
+
+
+SMALLEST_EFFECT = 1e-6
+"""Of ln rate: an effect without scatter has this standard deviation."""
+
+
 SMALLEST_SD, LARGEST_IN_PRIORS = 1e-3, 4.0
 """Ends of these standard deviations: of ln rate, and over the standard deviation of the prior."""
 
@@ -53,29 +69,29 @@ def level_of(history: History, level: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class RateScatter:
-    """What tests say of the scatter of rates between them, and how it enters the unknowns x = (u, e).
+    """What tests say of the scatter of rates between them, and with it of the unknowns x = (u, e).
 
     tests : their names. members : {level: (tests,) names} of the levels that these tests tell apart, without "test".
     common : {level: name} of the levels whose one member they all belong to.
-    log_factor, variance : (tests,) z and var e. design : (tests, unknowns) X. precision : (unknowns, unknowns) of the
-        unknowns by all that is independent of the tests' factors.
-    within : (unknowns, unknowns) covariance of the unknowns without scatter; gain : (unknowns, tests) derivatives of
-        the estimate to the tests' factors.
+    log_factor, variance, weight : (tests,) z, var e, and the weight of the test. design : (tests, unknowns) X.
+    precision, gradient : (unknowns, unknowns) K and (unknowns,) g.
     known : the standard deviation between tests where it was given, None where it is estimated; 0 for none.
-    output_scales : {output: unit of its transformed output}, in which misfit and drift are stated: 1 for logarithms.
+    output_scales, output_floors : {output: scale of a linear, floor of a logarithmic transform}, in its unit, in which
+        misfit and drift of the noise model are stated.
     """
 
     tests: tuple[str, ...]
     members: Mapping[str, tuple[str, ...]]
     log_factor: Floats
     variance: Floats
+    weight: Floats
     design: Floats
     precision: Floats
-    within: Floats
-    gain: Floats
+    gradient: Floats
     common: Mapping[str, str] = field(default_factory=dict)
     known: float | None = None
     output_scales: Mapping[str, float] = field(default_factory=dict)
+    output_floors: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def levels(self) -> tuple[str, ...]:
@@ -83,13 +99,20 @@ class RateScatter:
         return (*(level for level in LEVELS if level in self.members), "test")
 
     @cached_property
-    def indicators(self) -> dict[str, Floats]:
-        """{level: (tests, members)} which member a test belongs to; each test is a member of the level "test"."""
-        tables = {
-            level: np.array([[float(name == member) for member in dict.fromkeys(names)] for name in names])
-            for level, names in self.members.items()
-        }
-        return {**tables, "test": np.eye(len(self.tests))}
+    def groups(self) -> tuple[tuple[str, str], ...]:
+        """(level, member) of each effect c, in the order in which they follow the unknowns."""
+        return tuple((level, name) for level in self.levels[:-1] for name in dict.fromkeys(self.members[level]))
+
+    def position(self, level: str, member: str) -> int | None:
+        """The position of a member's effect among unknowns and effects; None where it was not fitted."""
+        key = (level, member)
+        return self.design.shape[1] + self.groups.index(key) if key in self.groups else None
+
+    @cached_property
+    def joint_design(self) -> Floats:
+        """(tests, unknowns + effects) [X Z]."""
+        table = [[float(self.members[level][k] == name) for level, name in self.groups] for k in range(len(self.tests))]
+        return np.concatenate([self.design, np.array(table, float).reshape(len(self.tests), -1)], axis=1)
 
     @cached_property
     def posterior(self) -> ScatterPosterior:
@@ -97,50 +120,100 @@ class RateScatter:
         if self.known is not None:
             sd = np.array([[0.0] * (len(self.levels) - 1) + [self.known]])
             return ScatterPosterior(self.levels, sd, np.ones(1))
-        count = len(self.levels)
-        axes = [np.geomspace(SMALLEST_SD, LARGEST_IN_PRIORS * USUAL_SD[level], NODES[count]) for level in self.levels]
-        sd = np.stack([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")], axis=-1)
-        usual = np.array([USUAL_SD[level] for level in self.levels])
-        log_weight = np.log(sd).sum(axis=1) - 0.5 * ((sd / usual) ** 2).sum(axis=1)  # d sd = sd d ln sd
+        scale = np.array([USUAL_SD[level] for level in self.levels])
+        low, high = np.full(scale.size, np.log(SMALLEST_SD)), np.log(LARGEST_IN_PRIORS * scale)
+        result = self._on_grid(low, high)
+        for _ in range(REFINEMENTS):
+            centre = result.weight @ np.log(result.sd)
+            spread = np.sqrt(result.weight @ (np.log(result.sd) - centre) ** 2)
+            half_width = GRID_HALF_WIDTH * np.maximum(spread, (high - low) / NODES[scale.size])
+            low, high = np.maximum(low, centre - half_width), np.minimum(high, centre + half_width)
+            result = self._on_grid(low, high)
+        return result
+
+    def _on_grid(self, low: Floats, high: Floats) -> ScatterPosterior:
+        """The posterior on a grid, even in ln of standard deviations between low and high, (levels,) each."""
+        count, scale = NODES[low.size], np.array([USUAL_SD[level] for level in self.levels])
+        axes = [np.linspace(first, last, count) for first, last in zip(low, high, strict=True)]
+        sd = np.exp(np.stack([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")], axis=-1))
+        log_weight = np.log(sd).sum(axis=1) - 0.5 * ((sd / scale) ** 2).sum(axis=1)  # d sd = sd d ln sd
         log_weight += np.array([self.restricted_log_likelihood(one) for one in sd])
         weight = np.exp(log_weight - log_weight.max())
         return ScatterPosterior(self.levels, sd, weight / weight.sum())
 
-    def effect_covariance(self, sd: Floats) -> Floats:
-        """(tests, tests) covariance of the tests' ln factors; sd : (levels,)."""
-        return np.asarray(
-            sum(
-                s**2 * self.indicators[level] @ self.indicators[level].T
-                for s, level in zip(sd, self.levels, strict=True)
-            )
-        )
-
     def restricted_log_likelihood(self, sd: Floats) -> float:
         """ln of the restricted likelihood of standard deviations sd (levels,), but for a constant."""
-        total = self.effect_covariance(sd) + np.diag(self.variance)
-        joined = np.concatenate([self.log_factor[:, None], self.design], axis=1)
-        weighted = np.linalg.solve(total, joined)
-        normal_matrix = self.precision + self.design.T @ weighted[:, 1:]
-        right = self.design.T @ weighted[:, 0]
-        chi_square = self.log_factor @ weighted[:, 0] - right @ _scaled_solve(normal_matrix, right)
-        log_determinant = np.linalg.slogdet(total)[1] + np.linalg.slogdet(normal_matrix)[1]
-        return float(-0.5 * (chi_square + log_determinant))
+        precision, right, own, log_prior = self._normal_equations(sd)
+        chi_square = float(self.log_factor**2 @ (1.0 / own) - right @ _scaled_solve(precision, right))
+        log_determinant = float(np.log(own).sum()) + log_prior + float(np.linalg.slogdet(precision)[1])
+        return -0.5 * (chi_square + log_determinant)
 
-    def covariance(self, sd: Floats) -> Floats:
-        """(unknowns, unknowns) covariance of the unknowns where tests scatter with standard deviations sd (levels,)."""
-        return np.asarray(self.within + self.gain @ self.effect_covariance(sd) @ self.gain.T)
+    def joint(self, sd: Floats) -> tuple[Floats, Floats]:
+        """Mean (unknowns + effects,) and covariance of (dx, c) given standard deviations sd (levels,)."""
+        precision, right, _, _ = self._normal_equations(sd)
+        return _scaled_solve(precision, right), scaled_inverse(precision)
 
-    def member_predictor(self, level: str, sd: Floats) -> Floats:
-        """(members, tests) best linear predictor of the effects of a level's members from the tests' z; sd : (levels,).
+    def _normal_equations(self, sd: Floats) -> tuple[Floats, Floats, Floats, float]:
+        """Precision and right-hand side of (dx, c), D (tests,), and ln|S|."""
+        own = (np.maximum(sd[-1], SMALLEST_EFFECT) ** 2 + self.variance) / self.weight
+        Q, size = self.joint_design, self.design.shape[1]
+        precision = Q.T @ (Q / own[:, None])
+        precision[:size, :size] += self.precision
+        of_group = np.array([sd[self.levels.index(level)] for level, _ in self.groups])
+        effect_variance = np.maximum(of_group, SMALLEST_EFFECT) ** 2
+        precision[size:, size:] += np.diag(1.0 / effect_variance)
+        right = Q.T @ (self.log_factor / own)
+        right[:size] -= self.gradient
+        return precision, right, own, float(np.log(effect_variance).sum())
 
-        Universal kriging: it gives nothing for a change of the unknowns, which every test shares.
-        """
-        total = self.effect_covariance(sd) + np.diag(self.variance)
-        weighted = np.linalg.solve(total, np.concatenate([np.eye(len(self.tests)), self.design], axis=1))
-        inverse, by_design = weighted[:, : len(self.tests)], weighted[:, len(self.tests) :]
-        normal_matrix = self.precision + self.design.T @ by_design
-        projected = inverse - by_design @ _scaled_solve(normal_matrix, by_design.T)
-        return np.asarray(sd[self.levels.index(level)] ** 2 * self.indicators[level].T @ projected)
+    @cached_property
+    def mean_joint(self) -> tuple[Floats, Floats]:
+        """Mean and covariance of (dx, c) over the posterior distribution of the standard deviations."""
+        posterior = self.posterior
+        parts = [self.joint(sd) for sd in posterior.sd]
+        means, covariances = np.stack([m for m, _ in parts]), np.stack([c for _, c in parts])
+        mean = posterior.weight @ means
+        deviation = means - mean
+        between = np.einsum("n,ni,nj->ij", posterior.weight, deviation, deviation)
+        return mean, np.einsum("n,nij->ij", posterior.weight, covariances) + between
+
+    def new_test(self, history: History) -> NewTest:
+        """Which effects a new test shares with those that were fitted, and which levels it draws anew."""
+        known, unknown = {}, ["test"]
+        for level in LEVELS[:-1]:
+            name = level_of(history, level)
+            position = self.position(level, name)
+            if position is not None:
+                known[level] = position
+            elif level in self.members:
+                unknown.append(level)
+        unseen = [
+            level
+            for level in LEVELS[:-1]
+            if self.known is None
+            and level_of(history, level)
+            and self.common.get(level, "") not in ("", level_of(history, level))
+        ]
+        return NewTest(known, tuple(unknown), tuple(unseen))
+
+    def own_variance(self, test: NewTest, sd: Floats) -> Floats:
+        """(nodes,) variance of ln of what is new in the factor of a test; sd : (nodes, levels)."""
+        drawn = sum(sd[:, self.levels.index(level)] ** 2 for level in test.unknown)
+        return np.asarray(drawn + sum(USUAL_SD[level] ** 2 for level in test.unseen))
+
+
+@dataclass(frozen=True)
+class NewTest:
+    """Where the factor of a new test on the rate comes from.
+
+    known : {level: position of its effect among unknowns and effects} of a heat or laboratory that was fitted.
+    unknown : levels that are drawn anew; unseen : levels of which all fitted tests had one other member, so that the
+    scatter is what is usual.
+    """
+
+    known: Mapping[str, int]
+    unknown: tuple[str, ...]
+    unseen: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,48 +247,40 @@ def rate_scatter(
     problem: LeastSquaresProblem,
     x: Floats,
     residuals: Residuals,
-    fitting_noise: NoiseModel,
     noise_model: NoiseModel,
-    shared_effects: Sequence[Floats] = (),
+    test_effects: Sequence[Floats] = (),
 ) -> RateScatter:
-    """The scatter of rates between tests at an optimum x (unknowns,).
+    """The scatter of rates between tests at an estimate x (unknowns,).
 
-    residuals : there, with derivatives to all unknowns. fitting_noise : under which the values were found; noise_model
-        : of the data. shared_effects : (tests, observations) each, one standard deviation of what differs between tests
-        beside their rates, such as a thickness within its tolerance.
+    residuals : there, with derivatives to all unknowns. noise_model : of the data. test_effects : (tests, observations)
+        each, one standard deviation of what differs between tests beside their rates, such as a thickness within its
+        tolerance.
     """
     count, nuisances = problem.parameter_count, problem.nuisance_parameters
     prior_precision = np.concatenate([12.0 / problem.bounds.width[:count] ** 2, nuisances.precision])
-    without_rate = replace(noise_model, rate=0.0)
-    at_prior_means = nuisances.integrate_out(residuals, x[count:])
+    prior_gradient = np.concatenate(
+        [np.zeros(count), nuisances.precision * (x[count:] - nuisances.mean[: nuisances.size])]
+    )
     integrated = [
         count + k
         for k, n in enumerate(nuisances.nuisances[: nuisances.size])
         if n.scope == "test" and np.isfinite(nuisances.sd[k])
     ]
-    evidence = _evidence(at_prior_means, without_rate, integrated, prior_precision, shared_effects)
-    assert residuals.jacobian is not None
-    fitting = CovarianceFactor.of_residuals(residuals, fitting_noise).inverse_times(residuals.jacobian)
-    inverse = scaled_inverse(np.einsum("tep,teq->pq", fitting, residuals.jacobian) + np.diag(prior_precision))
-    unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
-    noise = covariance(unweighted, without_rate)
-    meat = np.einsum("tep,tef,tfq->pq", fitting, noise, fitting, optimize=True) + np.diag(prior_precision)
-    for effect in shared_effects:
-        by_test = np.einsum("tep,te->pt", fitting, effect)
-        meat += by_test @ by_test.T
-    within = inverse @ meat @ inverse
+    prior_gradient[integrated] = 0.0
+    at_prior_means = nuisances.integrate_out(residuals, x[count:])
+    observations = problem.observations
+    transforms = dict(zip(observations.outputs, observations.transforms, strict=True))
     return RateScatter(
         tests=tuple(h.name for h in problem.histories),
         members=_members(problem.histories),
+        weight=np.array(residuals.test_weights, float),
         common=_common_members(problem.histories),
-        within=0.5 * (within + within.T),
-        gain=inverse @ np.einsum("tep,te->pt", fitting, residuals.log_rate_sensitivity),
         known=_known_sd(problem.settings.nuisances),
-        output_scales={
-            name: float(getattr(transform, "scale", 1.0))
-            for name, transform in zip(problem.observations.outputs, problem.observations.transforms, strict=True)
-        },
-        **evidence,
+        output_scales={n: t.scale for n, t in transforms.items() if isinstance(t, LinearTransform)},
+        output_floors={n: t.floor for n, t in transforms.items() if isinstance(t, LogTransform)},
+        **_evidence(
+            at_prior_means, replace(noise_model, rate=0.0), integrated, (prior_precision, prior_gradient), test_effects
+        ),
     )
 
 
@@ -223,31 +288,37 @@ def _evidence(
     residuals: Residuals,
     noise_model: NoiseModel,
     integrated: Sequence[int],
-    prior_precision: Floats,
-    shared_effects: Sequence[Floats],
+    prior: tuple[Floats, Floats],
+    test_effects: Sequence[Floats],
 ) -> dict[str, Floats]:
-    """What tests say of their factors: `log_factor`, `variance`, `design` and `precision` of a RateScatter.
+    """What tests say: `log_factor`, `variance`, `design`, `precision` and `gradient` of a RateScatter.
 
     residuals : at prior means of nuisance parameters of tests; integrated : positions of these among the unknowns.
+    prior : precision and gradient, (unknowns,) each.
     """
     assert residuals.jacobian is not None
+    weight = residuals.test_weights
     unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
     jacobian = residuals.jacobian.copy()
     jacobian[..., list(integrated)] = 0.0
     factor = CovarianceFactor.of_residuals(unweighted, noise_model)
-    effects = np.stack([unweighted.values, *shared_effects], axis=-1)
+    effects = np.stack([unweighted.values, *test_effects], axis=-1)
     weighted_rate = factor.inverse_times(unweighted.log_rate_sensitivity)
     information = np.maximum(np.einsum("te,te->t", weighted_rate, unweighted.log_rate_sensitivity), 1e-12)
     joined = np.concatenate([effects, jacobian], axis=-1)
     projected = np.einsum("te,tep->tp", weighted_rate, joined) / information[:, None]
-    design = projected[:, effects.shape[-1] :]
-    own = np.einsum("tep,teq->pq", factor.inverse_times(jacobian), jacobian)
-    precision = own - np.einsum("tp,t,tq->pq", design, information, design) + np.diag(prior_precision)
+    design, log_factor = projected[:, effects.shape[-1] :], -projected[:, 0]
+    weighted = factor.inverse_times(jacobian) * weight[:, None, None]
+    precision = np.einsum("tep,teq->pq", weighted, jacobian) + np.diag(prior[0])
+    precision -= np.einsum("tp,t,tq->pq", design, weight * information, design)
+    gradient = np.einsum("tep,te->p", weighted, unweighted.values) + prior[1]
+    gradient += design.T @ (weight * information * log_factor)
     return {
-        "log_factor": -projected[:, 0],
+        "log_factor": log_factor,
         "variance": 1.0 / information + (projected[:, 1 : effects.shape[-1]] ** 2).sum(axis=1),
         "design": design,
         "precision": 0.5 * (precision + precision.T),
+        "gradient": gradient,
     }
 
 
@@ -283,3 +354,48 @@ def _scaled_solve(matrix: Floats, right: Floats) -> Floats:
     scaled = right / (scale if right.ndim == 1 else scale[:, None])
     solution = np.linalg.solve(matrix / np.outer(scale, scale), scaled)
     return np.asarray(solution / (scale if right.ndim == 1 else scale[:, None]))
+
+
+LARGEST_NUMBER = 1e12
+"""Of a stored record: larger ones are damage."""
+
+
+def problem_with(scatter: RateScatter, tests: Sequence[str], unknowns: int) -> str:
+    """What is wrong with a record that was read from a file, in one clause; "" for one that fits an identification.
+
+    tests : names of the fitted tests. unknowns : how many the identification has.
+    """
+    count = len(tests)
+    shapes = {
+        "log_factor": (count,),
+        "variance": (count,),
+        "weight": (count,),
+        "design": (count, unknowns),
+        "precision": (unknowns, unknowns),
+        "gradient": (unknowns,),
+    }
+    if scatter.tests != tuple(tests):
+        return "its tests are not those of the identification"
+    for name, shape in shapes.items():
+        array = np.asarray(getattr(scatter, name))
+        if array.shape != shape and not array.size == 0 == np.prod(shape):
+            return f"{name} has the shape {array.shape}, not {shape}"
+        if not (np.abs(array) < LARGEST_NUMBER**2).all():
+            return f"{name} holds numbers that are too large"
+    if not ((scatter.variance >= 0).all() and (scatter.weight > 0).all()):
+        return "a variance is negative, or a weight not above zero"
+    for level, names in scatter.members.items():
+        if level not in LEVELS[:-1] or len(names) != count:
+            return f"members of '{level:.20}' are not one for each test, of a heat or laboratory"
+    if not {*scatter.common} <= {*LEVELS[:-1]}:
+        return "common names levels that are no heat or laboratory"
+    if scatter.known is not None and not 0 <= scatter.known < LARGEST_NUMBER:
+        return f"known is {scatter.known:g}, which is no standard deviation"
+    for name in ("output_scales", "output_floors"):
+        if not all(0 < value < LARGEST_NUMBER for value in getattr(scatter, name).values()):
+            return f"{name} must be above zero"
+    scale = np.sqrt(np.maximum(np.diag(scatter.precision), 1e-300))
+    scaled = scatter.precision / np.outer(scale, scale)
+    if unknowns and (not np.allclose(scaled, scaled.T, atol=1e-8) or np.linalg.eigvalsh(scaled)[0] < -1e-6):
+        return "precision is not symmetric and positive semi-definite"
+    return ""

@@ -20,9 +20,9 @@ def scatter_of(log_factor, variance=0.0, heats=(), known=None):
         log_factor=np.array(log_factor, float),
         variance=np.full(count, variance),
         design=np.ones((count, 1)),
+        weight=np.ones(count),
         precision=np.full((1, 1), 1e-9),
-        within=np.full((1, 1), variance / count),
-        gain=np.full((1, count), 1.0 / count),
+        gradient=np.zeros(1),
         known=known,
     )
 
@@ -48,9 +48,25 @@ def test_with_heats_it_is_the_analysis_of_variance():
 def test_the_effect_of_a_heat_is_shrunk_as_its_reliability_says():
     z = np.array([0.3, 0.2, -0.2, -0.3])
     scatter = scatter_of(z, 1e-12, ["a", "a", "b", "b"])
-    effects = scatter.member_predictor("heat", np.array([0.2, 0.1])) @ z
+    mean, covariance = scatter.joint(np.array([0.2, 0.1]))
     # Means of two tests differ by 0.5; the share of a heat's variance in that of its mean is .04 / (.04 + .01 / 2).
-    assert effects == pytest.approx([0.25 * 0.04 / 0.045, -0.25 * 0.04 / 0.045], rel=1e-6)
+    assert scatter.groups == (("heat", "a"), ("heat", "b"))
+    assert mean[1:] == pytest.approx([0.25 * 0.04 / 0.045, -0.25 * 0.04 / 0.045], rel=1e-6)
+    # Mean and effect of heat a together are what its two tests show, shrunk a little towards those of b: by hand, from
+    # the covariance of (mean of a, mean of b), each .045, and a flat mean, var = .04 - .04^2 / .045 / 2 + ... below.
+    row = np.array([1.0, 1.0, 0.0])
+    within, between = 0.01 / 2, 0.04
+    share = between / (between + within)
+    expected = share * within + (1.0 - share) ** 2 * (between + within) / 2
+    assert row @ covariance @ row == pytest.approx(expected, rel=1e-5)
+
+
+def test_the_mean_of_the_unknowns_is_that_of_generalised_least_squares():
+    z, variance = np.array([0.3, -0.1, 0.05]), 0.02
+    scatter = scatter_of(z, variance)
+    mean, covariance = scatter.joint(np.array([0.1]))
+    assert mean[0] == pytest.approx(z.mean(), rel=1e-6)
+    assert covariance[0, 0] == pytest.approx((0.1**2 + variance) / 3, rel=1e-6)
 
 
 def test_the_posterior_distribution_integrates_to_that_of_the_prior_without_information():
@@ -58,13 +74,14 @@ def test_the_posterior_distribution_integrates_to_that_of_the_prior_without_info
     posterior = scatter.posterior
     # One test says nothing of a scatter: the mean square of a half-normal is that of its normal.
     assert posterior.mean_square("test") == pytest.approx(USUAL_SD["test"] ** 2, rel=0.02)
-    assert posterior.median("test") == pytest.approx(0.6745 * USUAL_SD["test"], rel=0.1)
+    assert posterior.median("test") == pytest.approx(0.6745 * USUAL_SD["test"], rel=0.05)
 
 
 def test_many_tests_overrule_the_prior():
     z = np.random.default_rng(2).normal(0.0, 0.05, 200)
     posterior = scatter_of(z).posterior
-    assert np.sqrt(posterior.mean_square("test")) == pytest.approx(0.05, rel=0.15)
+    assert np.sqrt(posterior.mean_square("test")) == pytest.approx(z.std(ddof=1), rel=0.01)
+    assert (1.0 / (posterior.weight**2).sum()) > 10  # nodes within the posterior distribution, not one of them
 
 
 def test_a_given_standard_deviation_is_taken():
@@ -96,7 +113,7 @@ def test_each_test_says_its_own_factor():
     told = fit.rate_scatter.log_factor
     np.testing.assert_allclose(told - told.mean(), log_factors - log_factors.mean(), atol=4e-3)
     # Known scatter: the law's rate is known to s / sqrt(N).
-    sd = np.sqrt(fit.rate_scatter.covariance(np.array([0.1]))[0, 0])
+    sd = np.sqrt(fit.rate_scatter.joint(np.array([0.1]))[1][0, 0])
     assert sd == pytest.approx(0.1 / np.sqrt(6), rel=0.02)
 
 
