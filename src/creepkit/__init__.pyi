@@ -13,6 +13,7 @@ from .api.objects import example_data as example_data
 from .api.objects import law as law
 from .api.objects import load as load
 from .api.objects import load_plugin as load_plugin
+from .api.objects import load_ranking as load_ranking
 from .api.objects import specimen as specimen
 from .api.objects import surrogate as surrogate
 from .api.simulation import check_data_quality as check_data_quality

@@ -11,6 +11,7 @@ from creepkit.registry.arguments import resolve_law
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
+    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.language import CreepLaw
     from creepkit.records import Predictor, Specimen
     from creepkit.registry import Plugin
@@ -62,6 +63,13 @@ def load(path: str | Path) -> Identification:
     It knows its specimen by name and predicts new histories; attach its own with `.with_histories(histories)`.
     """
     from creepkit.inverse.identification_document import read_identification as run
+
+    return run(path)
+
+
+def load_ranking(path: str | Path) -> ModelAverage:
+    """Return the laws of a ranking.json with their weights, as forecasts take them; the files of laws lie beside it."""
+    from creepkit.inverse.ranking_document import read_ranking as run
 
     return run(path)
 

@@ -55,6 +55,10 @@ def command(
     geometry: GeometryOption = None,
     control: ControlOption = None,
     ramp: RampOption = None,
+    label: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Label of a planned test, such as heat=X7.")
+    ] = None,
+    draws: Annotated[int | None, typer.Option(help="Of the law and of all else; more make bands smoother.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Picture of the curves with their bands.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the forecast as JSON.")] = False,
 ) -> None:
@@ -82,11 +86,12 @@ def command(
         "control": control,
         "ramp": ramp,
     }
-    others = {"specimen": specimen, "temperature_c": temperature_c}
+    others = {"specimen": specimen, "temperature_c": temperature_c, "label": label}
     given = [name for name, value in {**described, **others}.items() if value not in (None, [])]
     if end_h is not None:
         temperature = _temperature(source, temperature_c)
-        histories.append(planned_test(TestOptions(end_h, temperature, specimen, **described)))  # type: ignore[arg-type]
+        planned = planned_test(TestOptions(end_h, temperature, specimen, **described))  # type: ignore[arg-type]
+        histories.append(planned.replace(labels=dict(_label(text) for text in label or ())))
     elif given:
         option = f"--{given[0].replace('_', '-')}"
         raise FitError(f"{option} describes a planned test, which needs an end: give --end-h, such as 100")
@@ -99,6 +104,7 @@ def command(
             level=level,
             targets=_targets(target),
             tolerances=parse_numbers(tolerance or (), "--tolerance", "thickness=0.01"),
+            draws=draws,
             progress=progress.tick,
         )
     if plot is not None:
@@ -138,3 +144,12 @@ def _targets(texts: list[str] | None) -> dict[str, list[float]] | None:
         except ValueError:
             raise FitError(f"--target {text}: write OUTPUT=NUMBER, such as strain=0.01,0.05") from None
     return targets
+
+
+def _label(text: str) -> tuple[str, str]:
+    from creepkit.errors import FitError
+
+    name, separator, value = (part.strip() for part in text.partition("="))
+    if not (name and separator and value):
+        raise FitError(f"--label {text}: write NAME=VALUE, such as heat=X7")
+    return name, value

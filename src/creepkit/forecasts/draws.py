@@ -17,10 +17,14 @@ from creepkit.inverse.composite_predictor import predictor_for, supports_nuisanc
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import owner_of, prior_mean
 from creepkit.inverse.uncertainty.rate_scatter import USUAL_SD
-from creepkit.records import SIMULATED_NUISANCES, STEP_NUISANCES, History, Nuisance, Predictor
+from creepkit.records import LENGTH_NUISANCES, SIMULATED_NUISANCES, STEP_NUISANCES, History, Nuisance, Predictor
 
 TOLERANCE_KINDS = tuple(kind for kind in SIMULATED_NUISANCES if kind not in STEP_NUISANCES)
 """Kinds of nuisance parameters that a tolerance can be given of."""
+
+
+LARGEST_TOLERANCES = {"modulus": 0.3, "temperature": 100.0, "temperature drift": 100.0, "thickness": 0.5, "window": 1.5}
+"""Standard deviations, in the unit of the kind: relative, K, K, mm, mm."""
 
 
 SOURCES = {
@@ -198,6 +202,11 @@ def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[Histor
             raise FitError(f"a tolerance of '{kind}' is not known; {nearest(kind, TOLERANCE_KINDS)}")
         if not (np.isfinite(sd) and sd >= 0):
             raise FitError(f"the tolerance of '{kind}' is {sd}; give a standard deviation of zero or more, in its unit")
+        if sd > LARGEST_TOLERANCES.get(kind, np.inf):
+            raise FitError(
+                f"the tolerance of '{kind}' is {sd:g}; allowed are 0 to {LARGEST_TOLERANCES[kind]:g} "
+                f"({'K' if 'temperature' in kind else 'mm' if kind in LENGTH_NUISANCES else 'relative, 0.05 for 5 %'})"
+            )
         if not any(supports_nuisance(predictor_for(predictor, h), kind) for h in histories):
             raise FitError(f"the tolerance of '{kind}' means nothing to the specimens of these tests; leave it out")
 

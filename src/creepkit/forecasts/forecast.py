@@ -15,7 +15,7 @@ from creepkit.errors import FitError, nearest
 from creepkit.forecasts.draws import check_tolerances, law_draws
 from creepkit.forecasts.forecast_of_test import forecast_test
 from creepkit.forecasts.results import TestForecast
-from creepkit.inverse.composite_predictor import CompositePredictor, underlying_specimen
+from creepkit.inverse.composite_predictor import CompositePredictor, reduced_order_model_of, underlying_specimen
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
@@ -27,8 +27,8 @@ from creepkit.registry.arguments import check_histories, resolve_predictors
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DRAWS = 500
-"""Of the law, of each test's own rate, and of its dimensions."""
+DRAWS, COSTLY_DRAWS = 4000, 800
+"""Of the law, of each test's own rate, and of its dimensions; and where each is a simulation by finite elements."""
 
 
 LEAST_WEIGHT, LEAST_DRAWS = 1e-2, 5
@@ -43,13 +43,15 @@ DEFAULT_TARGETS: Mapping[str, Sequence[float]] = {"strain": (0.01,)}
 class Forecast(Presentable):
     """What tests will show: the result of forecast().
 
-    laws : {law: weight}. level : probability that a pointwise band holds a measured value, a simultaneous band a whole
-    curve, and an interval a time, of a single test. tests : one forecast each.
+    laws : {law: weight}; left_out : how many laws of a ranking have too little weight to count.
+    level : probability that a pointwise band holds a measured value, a simultaneous band a whole curve, and an interval
+    a time, of a single test. tests : one forecast each.
     """
 
     laws: Mapping[str, float]
     level: float
     tests: tuple[TestForecast, ...]
+    left_out: int = 0
 
     def __getitem__(self, test: str) -> TestForecast:
         """The forecast of one test, by name."""
@@ -73,7 +75,7 @@ def forecast(
     targets: Mapping[str, Sequence[float]] | None = None,
     tolerances: Mapping[str, float] | None = None,
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
-    draws: int = DRAWS,
+    draws: int | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Forecast:
     """What tests will show, by an identified law or over all laws of a ranking, with bands and intervals.
@@ -85,12 +87,12 @@ def forecast(
     tolerances : {kind: standard deviation} of what is not exactly known of a test, in the unit of the nuisance
         parameter of that kind, {"thickness": 0.01}; by default as the fit estimated it, else as the specimen states it.
     using : what predicts them, by default their specimens with the settings of the identification.
-    draws : of the law and of all else that a band is made of. The seed of random numbers is that of
-        the identification's settings.
+    draws : of the law and of all else that a band is made of; by default 4000 of a bar, and 800 where each is a
+        simulation by finite elements. The seed of random numbers is that of the identification's settings.
     """
     if not isinstance(level, int | float) or not 0.5 <= level < 1.0:
         raise FitError(f"level is {level!r}; give a probability from 0.5 to below 1, such as 0.95")
-    if not 50 <= draws <= 100_000:
+    if draws is not None and not 50 <= draws <= 100_000:
         raise FitError(f"draws is {draws}; allowed are 50 to 100000")
     if not isinstance(tests, History) and not hasattr(tests, "__iter__"):
         raise FitError(f"tests are histories, found {tests!r:.60}; read_histories(path) returns them")
@@ -120,13 +122,15 @@ def forecast(
             if progress is not None:
                 progress("tests", k, len(histories))
             rng = np.random.default_rng([weighted[0][0].settings.seed, zlib.crc32(history.name.encode())])
-            laws = [(law_draws(f, max(round(draws * w), LEAST_DRAWS), rng), w) for f, w in weighted]
+            count = draws or (DRAWS if reduced_order_model_of(predictor) is None else COSTLY_DRAWS)
+            laws = [(law_draws(f, max(round(count * w), LEAST_DRAWS), rng), w) for f, w in weighted]
             made.append(
                 forecast_test(laws, history, predictor, level=level, targets=asked, tolerances=tolerances, rng=rng)
             )
     if progress is not None:
         progress("tests", len(histories), len(histories))
-    return Forecast(_named_weights(weighted), level, tuple(made))
+    given = len(source.fits) if isinstance(source, ModelAverage) else len(getattr(source, "laws", weighted))
+    return Forecast(_named_weights(weighted), level, tuple(made), given - len(weighted))
 
 
 def _predictor(

@@ -60,6 +60,8 @@ def forecast_test(
     times = _times(drawn, best, history, targets, level, rng)
     notes = _notes(fit, history, outputs)
     failed = sum(one.failed for one in drawn)
+    if RUPTURE_OUTPUT not in fit.noise_model.outputs and any(not t.output for t in times):
+        notes.append("no fitted test broke: when one does is what the law alone says, by its growth of strain")
     notes += [f"the solver did not finish {failed} of the draws; they are left out"] if failed else []
     score = None
     if any(usable_frames(history, name).any() for name in history.outputs if name in outputs):
@@ -144,7 +146,8 @@ def _times(
                 ]
             )
             value = float(crossing_times(best.central, output, np.array([target]))[0])
-            event = f"{output.replace('_', ' ')} {target:g} {output_unit(output)}".strip()
+            measure = f"{history.strain_measure} " if output == "strain" else ""
+            event = f"{measure}{output.replace('_', ' ')} {target:g} {output_unit(output)}".strip()
             measured = _measured_crossing(history, output, target)
             made = _time_forecast(event, value, crossings, history, level, measured, censored=False)
             forecasts.append(replace(made, output=output, target=float(target)))
@@ -153,7 +156,7 @@ def _times(
     if RUPTURE_OUTPUT in fit.noise_model.outputs:
         ends = ends * np.exp(fit.noise_model[RUPTURE_OUTPUT].misfit * rng.standard_normal(ends.size))
     asked = history.end_known or RUPTURE_OUTPUT in fit.noise_model.outputs or RUPTURE_OUTPUT in targets
-    if np.isfinite(ends).any() and (asked or (ends <= history.times[-1]).any()):
+    if np.isfinite(ends).any() and (asked or (ends <= history.times[-1]).mean() > NOTEWORTHY_CHANCE):
         measured = history.rupture_time or (float(history.times[-1]) if history.unruptured else float("nan"))
         value = float(best.central.end_times[0])
         forecasts.append(_time_forecast("rupture", value, ends, history, level, measured, censored=history.unruptured))
@@ -273,6 +276,8 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw) -> st
     fit, temperatures = best.draws.fit, history.temperature_program().at(history.times)
     stresses = reference_stresses(history, predictor)
     point = {"stress": stresses[stresses > 0], "temperature": temperatures, "time": history.times[-1:]}
+    if "stress" in best.central.outputs:
+        point["stress"] = at_times(best.central, history.times).of("stress")[0]
     if "strain" in best.central.outputs:
         strain = at_times(best.central, history.times).of("strain")[0]
         point["strain"] = np.array([np.nanmax(strain, initial=0.0)])
@@ -297,6 +302,13 @@ def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputFo
             f"{len(fit.tests)} test{'s say' if len(fit.tests) > 1 else ' says'} little of the scatter between tests: "
             f"what is usual holds it, {100 * USUAL_SD['test']:.0f} % of the rate (rms)"
         )
+    for level, names in scatter.members.items():
+        if len(set(names)) < FEW_TESTS:
+            plural = {"heat": "heats", "laboratory": "laboratories"}[level]
+            notes.append(
+                f"{len(set(names))} {plural} say little of the scatter between them: what is usual holds it, "
+                f"{100 * USUAL_SD[level]:.0f} % of the rate (rms)"
+            )
     for level in test.unseen:
         notes.append(
             f"all fitted tests are of one {level}, and this is of another: the scatter between them is what is usual, "
@@ -312,4 +324,8 @@ def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputFo
 
 
 FEW_TESTS = 5
-"""Below so many tests their number is mentioned."""
+"""Below so many tests, or members of a level, their number is mentioned."""
+
+
+NOTEWORTHY_CHANCE = 0.01
+"""Of a rupture before the end of a test, from which on it is forecast where no fitted test broke."""

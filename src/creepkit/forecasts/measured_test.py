@@ -191,7 +191,7 @@ class LinearForecast:
 
     @property
     def noise_freedom(self) -> float:
-        """Degrees of freedom of the noise: of an estimate from the frames of the fitted tests, infinite of stated noise."""
+        """Degrees of freedom of the noise: of an estimate from the fitted tests, infinite of stated noise."""
         frames = [o.errors.frames for m in self.fit.tests for o in m.outputs if o.output in self.names]
         stated = all(self.fit.noise_model[n].stated > 0 for n in self.names if n in self.fit.noise_model.outputs)
         return float("inf") if stated else FREEDOM_PER_FRAME * max(sum(frames), 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from creepkit.errors import FitError
 from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, read_json, write_json
@@ -37,6 +38,15 @@ def read_fit_or_ranking(path: str | Path) -> Identification | ModelAverage:
     data = read_json(Path(path), IDENTIFICATION.kind)
     if not (isinstance(data, dict) and data.get("format") == RANKING.name):
         return identification_from_json(data, str(path))
+    return _ranking_from_json(data, path)
+
+
+def read_ranking(path: str | Path) -> ModelAverage:
+    """The laws of a ranking's file with their weights."""
+    return _ranking_from_json(read_json(Path(path), RANKING.kind), path)
+
+
+def _ranking_from_json(data: Any, path: str | Path) -> ModelAverage:
     content = check_heading(data, str(path), RANKING)
     laws = content.get("laws")
     problem = check_keys(content, ("laws",), "ranking")

@@ -25,6 +25,7 @@ SHOWN_SHARE = 0.02
 def forecast_text(forecast: Forecast) -> str:
     """What is forecast by which laws, then a paragraph for each test."""
     names = ", ".join(name if len(forecast.laws) == 1 else f"{name} ({w:.2g})" for name, w in forecast.laws.items())
+    names += f" ({forecast.left_out} more of too little weight)" if forecast.left_out else ""
     lines = [f"by {names}: {100 * forecast.level:g} % bands and intervals of single tests"]
     for test in forecast.tests:
         lines += ["", *_test_lines(test)]
@@ -53,12 +54,14 @@ def _end_text(one: OutputForecast) -> str:
     k = int(alive[-1])
     hours = one.times[k] / SECONDS_PER_HOUR
     return (
-        f"{one.output.replace('_', ' ')} at {hours:.4g} h: {one.value[k]:.4g}{unit} "
-        f"[{one.band.low[k]:.4g}, {_number(one.band.high[k])}]"
+        f"{one.output.replace('_', ' ')} at {hours:.4g} h: {one.value[k]:.3g}{unit} "
+        f"[{one.band.low[k]:.3g}, {_number(one.band.high[k])}]"
     )
 
 
 def _time_text(one: TimeForecast, end: float) -> str:
+    if not math.isfinite(one.low) and not math.isfinite(one.measured):
+        return f"{one.event}: not within the test of {_hours(end)} h (probability of it {one.chance:.2g})"
     value, low, high = (_hours(v) for v in (one.value, one.low, one.high))
     text = f"{one.event}: {value} [{low}, {high}] h"
     if math.isfinite(one.measured):
@@ -70,26 +73,27 @@ def _time_text(one: TimeForecast, end: float) -> str:
 def _hours(seconds: float) -> str:
     if math.isnan(seconds):
         return "?"
-    return f"{seconds / SECONDS_PER_HOUR:.4g}" if math.isfinite(seconds) else "never"
+    return f"{seconds / SECONDS_PER_HOUR:.3g}" if math.isfinite(seconds) else "never"
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}" if math.isfinite(value) else "ruptured"
+    return f"{value:.3g}" if math.isfinite(value) else "ruptured"
 
 
 def score_lines(score: TestScore) -> list[str]:
     """How a measured test compares, in two lines."""
     inside = ", ".join(
-        f"{name} {100 * share:.0f} %{' (whole curve inside)' if score.whole_inside[name] else ''}"
+        f"{name} {100 * share:.0f} % of the frames in the band"
+        + (" and the whole curve in the wider one" if score.whole_inside[name] else "")
         for name, share in score.inside.items()
     )
     rms = ", ".join(f"{name} {before:.3g} to {score.rms_explained[name]:.3g}" for name, before in score.rms.items())
     moved = [nuisance_text(one) for one in score.nuisances if abs(one.deviation) > 0.1]
     return [
-        f"measured: frames in the pointwise band: {inside}; probability of so large a departure by chance "
-        f"{score.departure_p_value:.2g}, of all residuals {score.p_value:.2g}; log score {score.log_score:.3g} a frame",
-        f"with the law frozen its own nuisances explain {100 * score.explained:.0f} % of the squared residuals (rms in "
-        f"noises: {rms}){': ' if moved else ''}{', '.join(moved)}",
+        f"measured: {inside}; a test lies as far off, or farther, with probability {score.departure_p_value:.2g} "
+        f"(noise of its frames included: {score.p_value:.2g})",
+        f"with the law fixed, a rate, offsets and dimensions of its own describe {100 * score.explained:.0f} % of what "
+        f"differs (rms over noise: {rms}){': ' if moved else ''}{', '.join(moved)}",
     ]
 
 

@@ -81,8 +81,8 @@ def forecast_figure(forecast: Forecast, path: str | Path | None = None) -> Figur
         for j, (axes, one) in enumerate(zip(panels_of_test, outputs, strict=True)):
             _draw_curve(axes, test, one, first=j == 0)
         _draw_shares(figure.add_subplot(cell[len(outputs)]), panels_of_test[0], outputs[0], parts)
-    events = {t.event == "rupture" for test in tests for t in test.times if np.isfinite(t.low)}
-    _legend(figure, parts, forecast.level, events)
+    events = {not t.output for test in tests for t in test.times if t.low <= 1.03 * SECONDS_PER_HOUR * _last(test)}
+    _legend(figure, parts, forecast.level, events, measured=any(t.score is not None for t in tests))
     title = " or ".join(forecast.laws)
     left_out = len(forecast.tests) - len(tests)
     title += f" ({left_out} more tests are not drawn)" if left_out > 0 else ""
@@ -127,13 +127,20 @@ def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, *, first: b
         axes.plot(measured_hours, measured, ".", ms=3, color="black", alpha=0.6)
     last = float(history.times[-1]) / SECONDS_PER_HOUR
     start = float(hours[0]) if logarithmic else 0.0
-    set_range(axes, "x", start, _time_end(test, last), logarithmic=logarithmic, most=6)
+    end = _time_end(test, last)
+    set_range(axes, "x", start, end, logarithmic=logarithmic, most=6)
+    axes.set_xlim(0.95 * start if logarithmic else 0.0, 1.03 * end)
     _draw_times(axes, test, one, bottom, ceiling)
     axes.set_ylabel(axis_label(one.output), fontsize=8)
     axes.tick_params(labelsize=7, labelbottom=False)
     axes.grid(alpha=0.25)
     if first:
         axes.set_title(wrapped(f"{test.name}: {history.condition}", 4.4, 11.0), fontsize=8)
+
+
+def _last(test: TestForecast) -> float:
+    """h, the end of the time axis."""
+    return _time_end(test, float(test.history.times[-1]) / SECONDS_PER_HOUR)
 
 
 def _time_end(test: TestForecast, last: float) -> float:
@@ -194,7 +201,7 @@ def _draw_shares(axes: Axes, above: Axes, one: OutputForecast, parts: dict[str, 
     axes.tick_params(labelsize=7)
 
 
-def _legend(figure: Figure, parts: dict[str, str], level: float, ruptures: set[bool]) -> None:
+def _legend(figure: Figure, parts: dict[str, str], level: float, ruptures: set[bool], *, measured: bool) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -203,7 +210,7 @@ def _legend(figure: Figure, parts: dict[str, str], level: float, ruptures: set[b
         Line2D([], [], color="#1f3f73", lw=1.3, label="identified law"),
         Patch(color="#3b6fb6", alpha=0.45, label=f"{per_cent} of measured values"),
         Patch(color="#3b6fb6", alpha=0.15, label=f"{per_cent} of whole curves"),
-        Line2D([], [], color="black", marker=".", ls="", label="measured"),
+        *([Line2D([], [], color="black", marker=".", ls="", label="measured")] if measured else []),
         *(
             Line2D([], [], color=RUPTURE_COLOUR if r else TIME_COLOUR, lw=2.2, label=f"{per_cent} of times to {word}")
             for r, word in ((False, "a value"), (True, "rupture"))
