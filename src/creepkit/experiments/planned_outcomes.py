@@ -1,0 +1,401 @@
+"""What identified laws expect of planned tests: whitened predictions with their derivatives to all that tests share.
+
+The unknowns q = (u, s) of a law are its conditioned coordinates u and the nuisance parameters s that tests share, such
+as the modulus of an alloy. The tests that were made know them with the information
+
+    A = J'C^-1 J + P,
+
+their own nuisance parameters integrated out. Of a planned test the outcome is y = m + K (q - q_0) + e, all over the
+Cholesky factor of its covariance: white noise, drift and discrepancy of the noise model, and as random effects its own
+offset, its own rate and its own nuisance parameters, with their priors. Afterwards the information is A + K'K.
+
+All laws are whitened by the covariance of the first, as a ranking compares them under one covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.stats import norm, qmc
+
+from creepkit.arrays import Bools, Floats
+from creepkit.inverse.composite_predictor import (
+    predict,
+    predict_with_sensitivities,
+    predictor_for,
+    reduced_order_model_of,
+)
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel, Residuals
+from creepkit.inverse.nuisance_parameters import NuisanceParameters
+from creepkit.inverse.observation_vector import ObservationVector
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.residuals import candidate_residuals, candidate_residuals_and_jacobian, residuals_of_prediction
+from creepkit.inverse.variance_components import scaled_inverse
+from creepkit.records import History, Predictor, Status
+
+CHUNK = 8
+"""Planned tests that are predicted at once: between two chunks progress is told, and a stop is heard."""
+
+
+STATED_THICKNESS = "apex_thickness"
+"""The length that the nuisance parameter "thickness" is of."""
+
+
+def predictor_of(fit: Identification) -> Predictor:
+    """What planned tests are predicted with: the reduced-order model where the predictor of the fit has one."""
+    assert fit.predictor is not None
+    return reduced_order_model_of(fit.predictor) or fit.predictor
+
+
+@dataclass(frozen=True, eq=False)
+class KnownLaw:
+    """An identified law and what the tests that were made know of its unknowns q = (u, s).
+
+    measured : the problem of these tests, through the predictor of planned tests. x : (unknowns,) its values.
+    shared : positions among x of the nuisance parameters that tests share. information : (q, q) A.
+    chi_square : of the tests that were made, under the covariance of the noise model. sandwich : standard deviation of
+    the fit over that of A, (parameters,), other than 1 where values were not found by likelihood.
+    """
+
+    fit: Identification
+    measured: LeastSquaresProblem
+    noise_model: NoiseModel
+    x: Floats
+    shared: tuple[int, ...]
+    information: Floats
+    chi_square: float
+    sandwich: Floats
+
+    @classmethod
+    def from_identification(cls, fit: Identification, noise_model: NoiseModel) -> KnownLaw:
+        """The information of the tests that were made, under a noise model."""
+        predictor, count = predictor_of(fit), fit.u.size
+        problem = LeastSquaresProblem.from_histories(
+            fit.law, fit.histories, predictor, fit.settings, fit.reference
+        )
+        nuisances = problem.nuisance_parameters
+        if fit.nuisances:
+            sd = np.array([n.prior_sd for n in fit.nuisances], float)
+            problem = problem.with_nuisances(replace(nuisances, sd=sd))
+        residuals = fit.residuals_of(problem)
+        factor = CovarianceFactor.of_residuals(residuals, noise_model)
+        information = _information(problem, residuals, factor, count)
+        shared = tuple(count + k for k, n in enumerate(nuisances.nuisances) if n.scope != "test")
+        kept = [*range(count), *shared]
+        marginal = scaled_inverse(scaled_inverse(information)[np.ix_(kept, kept)])
+        sd_of_information = np.sqrt(np.diag(scaled_inverse(marginal)))[:count]
+        by_likelihood = fit.settings.weights == "likelihood"
+        sandwich = np.ones(count) if by_likelihood else np.sqrt(np.diag(fit.covariance)) / sd_of_information
+        chi_square = float((factor.whiten(residuals.values) ** 2).sum())
+        return cls(fit, problem, noise_model, fit.x, shared, marginal, chi_square, sandwich)
+
+    @property
+    def size(self) -> int:
+        """Number of parameters of the law, the first of q."""
+        return self.fit.u.size
+
+    def draws(self, count: int, seed: int) -> Floats:
+        """(draws, q) deviations from the estimates, of the posterior: its samples where there are some, else normal."""
+        size = self.information.shape[0]
+        unit = norm.ppf(np.clip(qmc.Sobol(size, seed=seed).random(count), 1e-6, 1 - 1e-6))
+        deviations = unit @ np.linalg.cholesky(scaled_inverse(self.information)).T
+        if self.fit.samples is not None:
+            positions = np.linspace(0, len(self.fit.samples) - 1, count).round().astype(int)
+            deviations[:, : self.size] = self.fit.samples[positions] - self.fit.u
+        bounds = self.measured.bounds
+        lower, upper = bounds.lower[: self.size], bounds.upper[: self.size]
+        deviations[:, : self.size] = np.clip(self.fit.u + deviations[:, : self.size], lower, upper) - self.fit.u
+        return np.asarray(deviations)
+
+    def information_at(self, deviations: Floats) -> Floats:
+        """(draws, q, q) the information of the tests that were made if the values were others.
+
+        deviations : (draws, q). Its share of u alone is evaluated there; what couples u and s is that of the estimates.
+        """
+        problem = self.measured.with_fixed_nuisances(self.x[self.size :])
+        residuals = self.fit.residuals_of(self.measured)
+        factor = CovarianceFactor.of_residuals(residuals, self.noise_model)
+        _, jacobian = problem.candidate_jacobian(self.fit.u + deviations[:, : self.size])
+        change = []
+        for one in (residuals.jacobian[..., : self.size], *jacobian):  # type: ignore[index]
+            change.append(np.einsum("tep,teq->pq", one, factor.inverse_times(one)))
+        information = np.tile(self.information, (len(deviations), 1, 1))
+        for k, own in enumerate(change[1:]):
+            moved = information[k].copy()
+            moved[: self.size, : self.size] += own - change[0]
+            information[k] = moved if np.linalg.eigvalsh(moved)[0] > 0 else information[k]
+        return information
+
+
+def _information(
+    problem: LeastSquaresProblem, residuals: Residuals, factor: CovarianceFactor, count: int
+) -> Floats:
+    assert residuals.jacobian is not None
+    precision = np.concatenate([12.0 / problem.bounds.width[:count] ** 2, problem.nuisance_parameters.precision])
+    weighted = factor.inverse_times(residuals.jacobian)
+    return np.asarray(np.einsum("tep,teq->pq", residuals.jacobian, weighted) + np.diag(precision))
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedOutcome:
+    """What one law expects of one planned test, whitened.
+
+    mean : (data,) m; jacobian : (data, q) K. ruptures : whether it would rupture before its end. growth : of the leading
+    output over the test, in noises of a frame; largest : of that output, in its unit.
+    """
+
+    mean: Floats
+    jacobian: Floats
+    ruptures: bool
+    growth: float
+    largest: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Chunk:
+    """What one law predicts of some planned tests.
+
+    residuals : with zero in the place of what is measured. leading : (tests,) arrays of the leading output, in its
+    unit. ruptures : (tests,). own_effects : (tests, observations, effects) -, of one standard deviation of the nuisance
+    parameters that each test has for itself, or None. kept : columns of the derivatives that are of q.
+    """
+
+    residuals: Residuals
+    leading: list[Floats]
+    ruptures: Bools
+    own_effects: Floats | None
+    kept: tuple[int, ...]
+
+
+@dataclass(eq=False)
+class PlannedOutcomes:
+    """What some laws expect of planned tests; outcomes are worked out once for each test that differs.
+
+    laws : the first sets the covariance. seed : of draws.
+    """
+
+    laws: Sequence[KnownLaw]
+    seed: int = 0
+    progress: Callable[[str, int, int], None] | None = None
+    _known: dict[object, list[PlannedOutcome]] = field(default_factory=dict)
+    _drawn: dict[object, tuple[Floats, Floats, Bools]] = field(default_factory=dict)
+
+    def add(self, histories: Sequence[History]) -> None:
+        """Predict the planned tests that are not known yet."""
+        fresh = list({test_key(h): h for h in histories if test_key(h) not in self._known}.values())
+        for start in range(0, len(fresh), CHUNK):
+            chunk = [replace(h, name=f"plan {k}") for k, h in enumerate(fresh[start : start + CHUNK])]
+            by_law = self._outcomes(chunk)
+            for k, history in enumerate(fresh[start : start + CHUNK]):
+                self._known[test_key(history)] = [outcomes[k] for outcomes in by_law]
+            if self.progress is not None:
+                self.progress("planned tests", min(start + CHUNK, len(fresh)), len(fresh))
+
+    def of(self, histories: Sequence[History], law: int) -> tuple[Floats, Floats]:
+        """Whitened means (data,) and derivatives (data, q) of some tests that were added, end to end."""
+        outcomes = [self._known[test_key(h)][law] for h in histories]
+        return np.concatenate([o.mean for o in outcomes]), np.concatenate([o.jacobian for o in outcomes])
+
+    def outcome(self, history: History, law: int) -> PlannedOutcome:
+        """That of one test that was added."""
+        return self._known[test_key(history)][law]
+
+    def is_known(self, history: History) -> bool:
+        """Whether a test was added."""
+        return test_key(history) in self._known
+
+    def drawn(self, history: History, law: int, deviations: Floats) -> tuple[Floats, Floats, Bools]:
+        """Whitened predictions at draws of a law's posterior, their derivatives, and which draws rupture.
+
+        deviations : (draws, q) from the estimates; s is taken as linear. Returns (draws, data), (draws, data, q) and
+        (draws,).
+        """
+        key = test_key(history), law, deviations.tobytes()
+        if key not in self._drawn:
+            self._drawn[key] = self._evaluated_at(replace(history, name="plan 0"), law, deviations)
+        return self._drawn[key]
+
+    # ---- predictions -------------------------------------------------------------------------------------------------
+
+    def _outcomes(self, chunk: Sequence[History]) -> list[list[PlannedOutcome]]:
+        """For each law the outcomes of each test of a chunk."""
+        observations = self._observations(chunk)
+        predicted = [_predicted(law, chunk, observations) for law in self.laws]
+        factor = self._covariance(predicted[0], observations)
+        return [self._whitened(one, factor, observations) for one in predicted]
+
+    def _whitened(
+        self, predicted: _Chunk, factor: CovarianceFactor, observations: ObservationVector
+    ) -> list[PlannedOutcome]:
+        """The outcomes of one law for each test of a chunk."""
+        residuals = predicted.residuals
+        assert residuals.jacobian is not None
+        transformed = np.where(observations.present, residuals.values + observations.transformed_values, 0.0)
+        mean, jacobian = factor.whiten(transformed), factor.whiten(residuals.jacobian[..., predicted.kept])
+        outcomes = []
+        for k, leading in enumerate(predicted.leading):
+            mask = observations.present[k]
+            noise = float(observations.noise[observations.output_index[k, observations.leading_output[k]][0]])
+            growth, largest = (float(np.ptp(leading)), float(leading.max())) if leading.size else (0.0, 0.0)
+            outcomes.append(
+                PlannedOutcome(
+                    mean[k][mask], jacobian[k][mask], bool(predicted.ruptures[k]), growth / max(noise, 1e-300), largest
+                )
+            )
+        return outcomes
+
+    def _observations(self, chunk: Sequence[History]) -> ObservationVector:
+        """The observations of planned tests, with the transforms and the noise of those that were made."""
+        base, predictor = self.laws[0].measured.observations, self.laws[0].measured.predictor
+        planned = []
+        for history in chunk:
+            names = getattr(predictor_for(predictor, history), "outputs", base.outputs)
+            noise = {n: float(base.noise[base.outputs.index(n)]) for n in names if n in base.outputs}
+            sd = {n: np.full(history.times.size, max(v, 1e-300)) for n, v in noise.items()}
+            zero = {n: np.zeros(history.times.size) for n in noise}
+            planned.append(replace(history, outputs=zero, standard_deviation=sd, rupture_time=None, unruptured=False))
+        observations = ObservationVector.from_histories(planned, predictor)
+        position = [base.outputs.index(name) for name in observations.outputs]
+        return replace(
+            observations,
+            transforms=tuple(base.transforms[k] for k in position),
+            noise=base.noise[position],
+            relative_noise=np.ones_like(observations.relative_noise),
+        )
+
+    def _covariance(self, predicted: _Chunk, observations: ObservationVector) -> CovarianceFactor:
+        """Noise, offset and rate of each planned test, and its own nuisance parameters, as the first law has them."""
+        known = self.laws[0].noise_model
+        outputs = {name: known[name] for name in observations.outputs}
+        noise_model = NoiseModel(outputs, known.rate, known.discrepancy, known.discrepancy_length)
+        residuals = replace(
+            predicted.residuals,
+            present=observations.present,
+            discrepancy_unit=np.where(observations.present, observations.discrepancy_unit, 0.0),
+            random_effect_sensitivities=predicted.own_effects,
+        )
+        return CovarianceFactor.of_residuals(residuals, noise_model)
+
+    def _evaluated_at(self, history: History, law: int, deviations: Floats) -> tuple[Floats, Floats, Bools]:
+        known, observations = self.laws[law], self._observations([history])
+        factor = self._covariance(_predicted(self.laws[0], [history], observations), observations)
+        own = self._whitened(_predicted(known, [history], observations), factor, observations)[0]
+        mask, nuisances = observations.present[0], _nuisances_of(known, [history])
+        u = known.fit.u + deviations[:, : known.size]
+        prediction = predict(
+            known.measured.predictor,
+            known.fit.law,
+            known.fit.coordinates.theta(u),
+            [history],
+            nuisances=nuisances.predictor_values(_values_of(nuisances, known)),
+            sensitivities=True,
+        )
+        jacobian = np.tile(own.jacobian, (len(u), 1, 1))
+        if prediction.jacobian is None:
+            values = candidate_residuals(observations, prediction)
+        else:
+            values, internal = candidate_residuals_and_jacobian(observations, prediction)
+            derivatives = np.einsum("cep,cpq->ceq", internal[:, 0], known.fit.coordinates.jacobian(u))
+            columns = np.moveaxis(derivatives, 0, 1).reshape(1, mask.size, -1)
+            whitened = factor.whiten(columns)[0][mask].reshape(-1, len(u), known.size)
+            jacobian[:, :, : known.size] = np.moveaxis(whitened, 1, 0)
+        transformed = np.where(observations.present, values + observations.transformed_values, 0.0)
+        mean = factor.whiten(np.moveaxis(transformed, 0, -1))[0][mask].T
+        mean = mean + deviations[:, known.size :] @ own.jacobian[:, known.size :].T
+        return np.asarray(mean), jacobian, np.isin(prediction.status[:, 0], ENDED)
+
+
+ENDED = (int(Status.RUPTURED), int(Status.NOT_CONVERGED))
+"""Status of tests that a prediction does not follow to their end."""
+
+
+def test_key(history: History) -> tuple[object, ...]:
+    """What a planned test is, whatever it is called."""
+    temperature = history.temperature
+    return (
+        history.specimen,
+        history.loading,
+        temperature if isinstance(temperature, float) else (temperature.times.tobytes(), temperature.values.tobytes()),
+        tuple(sorted(history.geometry.items())),
+        history.times.tobytes(),
+    )
+
+
+def _nuisances_of(law: KnownLaw, planned: Sequence[History]) -> NuisanceParameters:
+    """The nuisance parameters of planned tests beside those of the tests that were made, for the planned ones alone.
+
+    A planned test is of the length that it states, whatever was measured of others.
+    """
+    measured, made = law.measured, law.measured.histories
+    nuisances = NuisanceParameters.from_histories(law.fit.settings.nuisances, [*made, *planned], measured.predictor)
+    spread = {n.kind: n.prior_sd for n in law.fit.nuisances}
+    mean, sd = nuisances.mean.copy(), nuisances.sd.copy()
+    stated = {h.name: h.geometry[STATED_THICKNESS] for h in planned if STATED_THICKNESS in h.geometry}
+    for k, (n, owner) in enumerate(zip(nuisances.nuisances, nuisances.owners, strict=True)):
+        sd[k] = spread.get(n.kind, sd[k])
+        mean[k] = stated.get(owner, mean[k]) if n.kind == "thickness" and n.scope == "test" else mean[k]
+    index = {key: positions[len(made) :] for key, positions in nuisances.test_index.items()}
+    return replace(nuisances, mean=mean, sd=sd, test_index=index)
+
+
+def _values_of(nuisances: NuisanceParameters, law: KnownLaw) -> Floats:
+    """(nuisances,) as estimated, of planned tests their prior means."""
+    known = {(n.key, n.owner): n.value for n in law.fit.nuisances}
+    parameters = zip(nuisances.nuisances, nuisances.owners, nuisances.mean, strict=True)
+    return np.array([known.get((n.key, owner), float(mean)) for n, owner, mean in parameters])
+
+
+def _predicted(law: KnownLaw, planned: Sequence[History], observations: ObservationVector) -> _Chunk:
+    """What a law predicts of planned tests at its estimates, with derivatives."""
+    nuisances, problem, coordinates = _nuisances_of(law, planned), law.measured, law.fit.coordinates
+    e, u, size = _values_of(nuisances, law), law.fit.u, law.size
+    prediction = predict_with_sensitivities(
+        problem.predictor, law.fit.law, coordinates.theta(u), planned, nuisances.predictor_values(e)
+    )
+    coefficients = coordinates.coefficients
+    every_rate_has_one = len(coefficients) == len(law.fit.law.terms) + len(law.fit.law.states)
+    residuals = residuals_of_prediction(
+        observations, prediction, nuisances, coefficients if every_rate_has_one else None
+    )
+    assert residuals.jacobian is not None
+    internal, of_nuisances = np.split(residuals.jacobian, [size], axis=-1)
+    jacobian = np.concatenate([internal @ coordinates.jacobian(u), of_nuisances], axis=-1)
+    owners = [(n.key, owner) for n, owner in zip(nuisances.nuisances, nuisances.owners, strict=True)]
+    made = problem.nuisance_parameters
+    made_owners = [(n.key, owner) for n, owner in zip(made.nuisances, made.owners, strict=True)]
+    kept = (*range(size), *(size + owners.index(made_owners[k - size]) for k in law.shared))
+    names = {h.name for h in planned}
+    own = [k for k, n in enumerate(nuisances.nuisances) if n.scope == "test" and nuisances.owners[k] in names]
+    sd = np.minimum(nuisances.sd, (nuisances.high - nuisances.low) / np.sqrt(12.0))
+    effects = _compact(jacobian[..., [size + k for k in own]] * sd[own]) if own else None
+    leading_outputs = [
+        prediction.of(k)[:, prediction.outputs.index(_leading(problem.predictor, h, prediction.outputs))]
+        for k, h in enumerate(planned)
+    ]
+    return _Chunk(
+        residuals=replace(residuals, jacobian=jacobian),
+        leading=[values[np.isfinite(values)] for values in leading_outputs],
+        ruptures=np.isin(prediction.status[0], ENDED),
+        own_effects=effects,
+        kept=kept,
+    )
+
+
+def _leading(predictor: Predictor, history: History, predicted: Sequence[str]) -> str:
+    """The output of a test that grows with creep, the first of its predictor."""
+    own: Sequence[str] = getattr(predictor_for(predictor, history), "outputs", predicted)
+    return own[0]
+
+
+def _compact(effects: Floats) -> Floats:
+    """(tests, observations, effects) of each test alone: its own columns first, and no others."""
+    counts = (np.abs(effects).sum(axis=1) > 0).sum(axis=1)
+    compact = np.zeros((*effects.shape[:2], max(int(counts.max(initial=0)), 1)))
+    for k, test in enumerate(effects):
+        columns = np.flatnonzero(np.abs(test).sum(axis=0) > 0)
+        compact[k, :, : columns.size] = test[:, columns]
+    return compact
