@@ -17,6 +17,7 @@ from creepkit.cli import (
     confirm,
     data,
     demo,
+    design,
     discover,
     export,
     generate,
@@ -91,6 +92,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "discover": discover.command,
     "screen": screen.command,
     "confirm": confirm.command,
+    "design": design.command,
     "export": export.command,
     "demo": demo.command,
 }

@@ -11,16 +11,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.experiments.rig import HIGHER_LEVEL, LOWER_LEVEL, VARIED_DIMENSION, Rig
-from creepkit.records import (
-    History,
-    Loading,
-    PressureJump,
-    StrainSteps,
-    StressSteps,
-    constant_strain,
-    constant_stress,
-)
+from creepkit.experiments.rig import HIGHER_LEVEL, LOWER_LEVEL, Rig
+from creepkit.records import History, Loading, PressureJump, StrainSteps, StressSteps, constant_strain, constant_stress
 from creepkit.records.loading import Quantity
 
 ControlledQuantity = Literal["load", "stress"]
@@ -107,7 +99,7 @@ def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperatu
 def frame_times(duration: float, interval: float) -> Floats:
     """(frames,) s, of a planned test: frames at their interval, at least FEWEST_FRAMES and at most MOST_FRAMES."""
     count = int(np.clip(round(duration / interval), FEWEST_FRAMES, MOST_FRAMES))
-    return np.arange(1, count + 1) * (duration / count)
+    return np.asarray(np.arange(1, count + 1) * (duration / count), float)
 
 
 def _test_pieces(rig: Rig, base: History) -> Iterator[tuple[tuple[dict[str, float], ...], str]]:
@@ -221,9 +213,9 @@ def _variations(rig: Rig, base: History, made_levels: Floats, exponent: float) -
     for first, second in ((low, HIGHER_LEVEL * high), (middle, LOWER_LEVEL * middle), (middle, HIGHER_LEVEL * middle)):
         pair = rig.replace(levels=(min(first, second), max(first, second)))
         for candidate in _made(pair, base, end, loadings):
-            values = candidate.histories[0].loading.program().values
-            values = values[values > 0]
-            if abs(values[0] - first) < 0.01 * first and abs(values[-1] - second) < 0.01 * second:
+            program = candidate.histories[0].loading.program().values
+            begin, end_level = candidate.first_level, float(program[-1])
+            if abs(begin - first) < 0.01 * first and abs(end_level - second) < 0.01 * second:
                 yield candidate
     if longest > end:
         yield _like(base, "the same loading", longest, rig)
@@ -271,14 +263,3 @@ def candidates_given(histories: Sequence[History | CandidateTest], rigs: Sequenc
         hours = float(given.times[-1]) / 3600.0 + rig.setup_hours
         candidates.append(CandidateTest(given.name, (planned,), hours))
     return candidates
-
-
-__all__ = [
-    "VARIED_DIMENSION",
-    "CandidateTest",
-    "candidates_given",
-    "frame_times",
-    "grid_of_rig",
-    "hours_text",
-    "variations_of_tests",
-]

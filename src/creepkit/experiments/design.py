@@ -17,18 +17,13 @@ import numpy as np
 
 from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
-from creepkit.experiments.candidate_tests import (
-    CandidateTest,
-    candidates_given,
-    grid_of_rig,
-    variations_of_tests,
-)
+from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig, variations_of_tests
 from creepkit.experiments.expectations import Criterion, Expectation, PrecisionCriterion
 from creepkit.experiments.law_discrimination import LawCriterion
 from creepkit.experiments.planned_outcomes import KnownLaw, PlannedOutcomes
 from creepkit.experiments.rig import Rig, rigs_of
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
+from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
@@ -91,6 +86,11 @@ class PlannedTest:
     def hours(self) -> float:
         """h of the oven."""
         return self.candidate.hours
+
+    @property
+    def first_level(self) -> float:
+        """The first load above zero: MPa, or a strain."""
+        return self.candidate.first_level
 
     @property
     def information_per_hour(self) -> float:
@@ -327,7 +327,9 @@ class _Search:
                 if outcome.ruptures:
                     return f"by {fit.law.name} it would rupture before its end"
                 if rig is not None and outcome.largest > rig.largest_output:
-                    return f"it would grow to {outcome.largest:.3g}, beyond the {rig.largest_output:.3g} that is allowed"
+                    return (
+                        f"it would grow to {outcome.largest:.3g}, beyond the {rig.largest_output:.3g} that is allowed"
+                    )
             growth = self.outcomes.outcome(history, 0).growth
             if growth < SMALLEST_GROWTH:
                 return f"it would grow by {growth:.2g} noises of a frame only"
@@ -384,9 +386,7 @@ class _Search:
         left, known = self.task.budget, 0.0
         while len(chosen) < MOST_RUNS:
             fitting = [t for t in pool if t.hours <= 1.0001 * left]
-            gains = [
-                self.criterion.expectation(_histories([*chosen, t])).information - known for t in fitting
-            ]
+            gains = [self.criterion.expectation(_histories([*chosen, t])).information - known for t in fitting]
             if not fitting or max(gains) < LEAST_GAIN:
                 break
             k = int(np.argmax([gain / t.hours for gain, t in zip(gains, fitting, strict=True)]))
@@ -432,6 +432,3 @@ def _notes(laws: Sequence[Identification]) -> tuple[str, ...]:
             'taken as none: give Nuisance("rate", sd=...) where it is known'
         )
     return tuple(notes)
-
-
-

@@ -92,15 +92,16 @@ class PrecisionCriterion:
                 function = self.quantity.function(law.fit.coordinates)
                 rows = np.stack([gradient(function, u, np.sqrt(np.diag(law.fit.covariance))) for u in points])
                 sandwich = law.sandwich.mean()
-                sd = [np.sqrt(np.einsum("cp,cpq,cq->c", rows, S[:, :size, :size], rows)) for S in (before, after)]
-                gains.append(float(np.mean(np.log(sd[0] / sd[1]))))
-                current.append(float(sandwich * np.exp(np.mean(np.log(sd[0])))))
-                sds.append(float(sandwich * np.exp(np.mean(np.log(sd[1])))))
+                both = [np.sqrt(np.einsum("cp,cpq,cq->c", rows, S[:, :size, :size], rows)) for S in (before, after)]
+                mean_logs = [float(np.mean(np.log(each))) for each in both]
+                gains.append(mean_logs[0] - mean_logs[1])
+                current.append(float(sandwich * np.exp(mean_logs[0])))
+                sds.append(float(sandwich * np.exp(mean_logs[1])))
             if position == 0:
                 parameters = self._parameter_sd(position, after, points)
         weight = self.weights / self.weights.sum()
-        mixture = [float(np.sqrt(weight @ np.square(v))) if v else float("nan") for v in (sds, current)]
-        return Expectation(float(weight @ gains), *mixture, parameter_sd=parameters)
+        sd, current_sd = (float(np.sqrt(weight @ np.square(v))) if v else float("nan") for v in (sds, current))
+        return Expectation(float(weight @ gains), sd, current_sd, parameter_sd=parameters)
 
     def _parameter_sd(self, position: int, after: Floats, points: Floats) -> dict[str, float]:
         law = self.outcomes.laws[position]
@@ -112,7 +113,7 @@ class PrecisionCriterion:
     def _covariances(
         self, position: int, histories: Sequence[History], at_draws: bool
     ) -> tuple[Floats, Floats, Floats]:
-        """Covariances (draws, q, q) of q before and after the tests, and the u (draws, parameters) they are taken at."""
+        """Covariances (draws, q, q) of q before and after the tests, and u (draws, parameters) at the draws."""
         law = self.outcomes.laws[position]
         if not at_draws:
             _, K = self.outcomes.of(histories, position)

@@ -24,7 +24,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
-from creepkit.experiments.expectations import ExpectedChiSquare, Expectation
+from creepkit.experiments.expectations import Expectation, ExpectedChiSquare
 from creepkit.experiments.planned_outcomes import STATED_THICKNESS, KnownLaw, PlannedOutcomes, test_key
 from creepkit.inverse.composite_predictor import predict, search_predictor_of
 from creepkit.inverse.identify import search_problem
@@ -201,7 +201,7 @@ def _projected(r: Floats, K: Floats, information: Floats) -> Floats:
 
 
 def _as_if_made(truth: KnownLaw, u: Floats, planned: Sequence[History]) -> list[History]:
-    """Planned tests with what a law predicts at u (parameters,) in the place of what would be measured, without noise."""
+    """Planned tests with what a law predicts at u (parameters,) as if it had been measured, without noise."""
     base, predictor = truth.measured.observations, truth.measured.predictor
     named = [replace(h, name=f"plan {k}") for k, h in enumerate(planned)]
     nuisances = truth.fit.nuisance_values(named, using=predictor)
@@ -215,7 +215,7 @@ def _as_if_made(truth: KnownLaw, u: Floats, planned: Sequence[History]) -> list[
     for k, history in enumerate(named):
         values = {name: prediction.of(k)[:, j] for j, name in enumerate(prediction.outputs) if name in base.outputs}
         sd = {name: np.full(history.times.size, float(base.noise[base.outputs.index(name)])) for name in values}
-        finite = np.isfinite(np.stack([*values.values()])).all(axis=0)
+        finite = np.asarray(np.isfinite(np.stack([*values.values()])).all(axis=0), bool)
         made.append(replace(history, outputs=values, standard_deviation=sd, used=finite))
     return [history for history in made if history.used.any()]
 
@@ -240,9 +240,7 @@ def _refitted_chi_square(law: KnownLaw, noise_model: NoiseModel, further: Sequen
         )
         searched = search_problem(broad, search_predictor_of(measured.predictor))
         minima = MultiStart().minima(searched).minima
-        starts += [
-            m.x for m in distinct(minima, searched.bounds, equal_predictions=EQUAL_REDUCED_ORDER_PREDICTIONS)
-        ]
+        starts += [m.x for m in distinct(minima, searched.bounds, equal_predictions=EQUAL_REDUCED_ORDER_PREDICTIONS)]
     outputs = {name: noise_model[name] for name in observations.outputs}
     own = replace(noise_model, outputs=outputs)
     least = np.inf
@@ -260,9 +258,7 @@ def _observations(measured: LeastSquaresProblem, histories: Sequence[History]) -
     base = measured.observations
     observations = ObservationVector.from_histories(histories, measured.predictor)
     position = [base.outputs.index(name) for name in observations.outputs]
-    return replace(
-        observations, transforms=tuple(base.transforms[k] for k in position), noise=base.noise[position]
-    )
+    return replace(observations, transforms=tuple(base.transforms[k] for k in position), noise=base.noise[position])
 
 
 def _nuisances(law: KnownLaw, histories: Sequence[History]) -> NuisanceParameters:

@@ -74,9 +74,7 @@ class KnownLaw:
     def from_identification(cls, fit: Identification, noise_model: NoiseModel) -> KnownLaw:
         """The information of the tests that were made, under a noise model."""
         predictor, count = predictor_of(fit), fit.u.size
-        problem = LeastSquaresProblem.from_histories(
-            fit.law, fit.histories, predictor, fit.settings, fit.reference
-        )
+        problem = LeastSquaresProblem.from_histories(fit.law, fit.histories, predictor, fit.settings, fit.reference)
         nuisances = problem.nuisance_parameters
         if fit.nuisances:
             sd = np.array([n.prior_sd for n in fit.nuisances], float)
@@ -131,9 +129,7 @@ class KnownLaw:
         return information
 
 
-def _information(
-    problem: LeastSquaresProblem, residuals: Residuals, factor: CovarianceFactor, count: int
-) -> Floats:
+def _information(problem: LeastSquaresProblem, residuals: Residuals, factor: CovarianceFactor, count: int) -> Floats:
     assert residuals.jacobian is not None
     precision = np.concatenate([12.0 / problem.bounds.width[:count] ** 2, problem.nuisance_parameters.precision])
     weighted = factor.inverse_times(residuals.jacobian)
@@ -144,8 +140,8 @@ def _information(
 class PlannedOutcome:
     """What one law expects of one planned test, whitened.
 
-    mean : (data,) m; jacobian : (data, q) K. ruptures : whether it would rupture before its end. growth : of the leading
-    output over the test, in noises of a frame; largest : of that output, in its unit.
+    mean : (data,) m; jacobian : (data, q) K. ruptures : whether it would rupture before its end. growth : of the
+    leading output over the test, in noises of a frame; largest : of that output, in its unit.
     """
 
     mean: Floats
@@ -173,13 +169,9 @@ class _Chunk:
 
 @dataclass(eq=False)
 class PlannedOutcomes:
-    """What some laws expect of planned tests; outcomes are worked out once for each test that differs.
-
-    laws : the first sets the covariance. seed : of draws.
-    """
+    """What some laws expect of planned tests; the first law sets the covariance. Each test is worked out once."""
 
     laws: Sequence[KnownLaw]
-    seed: int = 0
     progress: Callable[[str, int, int], None] | None = None
     _known: dict[object, list[PlannedOutcome]] = field(default_factory=dict)
     _drawn: dict[object, tuple[Floats, Floats, Bools]] = field(default_factory=dict)

@@ -1,0 +1,371 @@
+"""Design of experiments: what a proposed test is expected to tell, and what it tells once it is planted and made.
+
+    python tests/benchmarks/design_of_experiments.py [--bars 60] [--dimples 40] [--laws 24] [--jobs 1] [--keep FOLDER]
+                                                     [--write]
+
+Precision. A planted law is identified from a first campaign, the next test for the rate at a stress of service is asked
+of ck.design(), planted with noise at the true values, made, and all tests are identified again. "Predicted over
+realised" is the standard deviation of ln rate that was expected over the one that the new identification states;
+"deviation" is that of its estimate from the truth in units of the predicted standard deviation, root mean square over
+campaigns (1 for a right prediction). Bars: three creep curves of 40 frames, noise of 2e-5; with scatter five, whose
+rates scatter by 10 %. Dimples: 2 h of 8, then 10 MPa with one dimple, modulus unknown by 10 %.
+
+The law. One of the four single laws of Table 1 is planted (laws, priors and noise of planted_bulge_tests.py, modulus
+unknown by 10 %). "Standard" is one dimple under 8, then 10 MPa for 12 h. Designed campaigns begin with 2 h of 8, then
+10 MPa, with dimples of 0.44, 0.50 and 0.58 mm, and go on with what ck.design() proposes for the rest of their hours of
+the oven; the rig takes three dimples at once, from 4 to 14 MPa, and each run costs 1 h beside its test. Where one law
+remains after the first run the rest is designed for the parameters. "Singled out and right" has more than 0.95 of the
+weight, explains the tests, and is the planted law; "decisive and right" stands every challenge too (see
+docs/concepts/verdicts.md). "Met over expected" is of the chi-square by which each law that remained is worse than the
+planted one, after the proposed test was made and all laws were selected again, where either is above 5.
+
+Tests of dimples are made on a finer mesh than the one that identifies (planted_bulge_tests.FINE). Finished campaigns
+are kept in the folder of --keep: stopped and started again, none is repeated.
+"""
+
+import json
+import multiprocessing
+import os
+import time
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+import planted_bulge_tests as planted
+from measured import Page, arguments, progress
+from proportions import share_with_interval
+
+import creepkit as ck
+from creepkit.errors import CreepkitError, FitWarning
+from creepkit.experiments.rig import rigs_of
+from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
+
+SERVICE = {"bars": 40.0, "scatter": 40.0, "dimples": 60.0}
+"""MPa, of the rate that is wanted: below the tests."""
+BAR_NOISE, BAR_END = 2e-5, 3.6e5
+BAR_STRESSES = {"bars": (60.0, 80.0, 100.0), "scatter": (60.0, 70.0, 80.0, 90.0, 100.0)}
+SCATTER = {"bars": 0.0, "scatter": 0.1}
+BAR_LAWS = ("norton", "strain-hardening", "time-hardening")
+FIRST_RUN = ck.PressureJump(P1=8, P2=10, Tj=2400)
+FIRST_END, FRAME_INTERVAL = 7200.0, 900.0
+THICKNESSES = (0.44, 0.50, 0.58)
+STANDARD_HOURS = 13.0
+"""12 h and 1 h to set it up."""
+SHARES = {"half": 0.5, "equal": 1.0}
+"""Of the hours of the standard test."""
+
+
+# ---- planted tests ---------------------------------------------------------------------------------------------------
+
+
+def drawn_bar_law(name, rng):
+    """Values that reach a strain of 0.3 to 3 % at 80 MPa in the time of a test."""
+    strain, n = 10.0 ** rng.uniform(-2.5, -1.5), rng.uniform(3.0, 6.0)
+    if name == "norton":
+        return {"A": strain / BAR_END / 80.0**n, "n": n}
+    m = rng.uniform(-0.6, -0.2)
+    if name == "strain-hardening":
+        return {"A": strain ** (1 - m) / (1 - m) / BAR_END / 80.0**n, "n": n, "m": m}
+    return {"A": strain * (1 + m) / BAR_END ** (1 + m) / 80.0**n, "n": n, "m": m}
+
+
+def made_bar(law, values, history, scatter, rng):
+    """A planned or blank bar with what is measured of it."""
+    own = {**values, "A": values["A"] * float(np.exp(scatter * rng.standard_normal()))}
+    run = ck.simulate(law, "uniaxial", own, loading=history.loading, times=history.times, temperature=1000.0)
+    noise = BAR_NOISE * rng.standard_normal(history.times.size)
+    sd = {"strain": np.full(history.times.size, BAR_NOISE)}
+    return history.replace(outputs={"strain": run.outputs["strain"] + noise}, standard_deviation=sd)
+
+
+def made_dimple(alloy, history, dimple, rng):
+    """A planned dimple with what is measured of it, up to where it bursts; None where it has no frame."""
+    law, values, elastic = alloy
+    finer = dimple.replace(apex_thickness=history.geometry["apex_thickness"], **planted.FINE)
+    run = ck.simulate(law, finer, values, elastic=elastic, loading=history.loading, times=history.times)
+    count = int(np.isfinite(run.outputs["amplitude"]).sum())
+    if count < 5:
+        return None
+    times = history.times[:count]
+    outputs = {name: run.outputs[name][:count] + sd * rng.standard_normal(count) for name, sd in planted.NOISE.items()}
+    sd = {name: np.full(count, value) for name, value in planted.NOISE.items()}
+    return history.replace(times=times, outputs=outputs, standard_deviation=sd)
+
+
+def blank_dimple(name, thickness, loading, end, interval=FRAME_INTERVAL):
+    """A dimple to be tested."""
+    count = max(int(end / interval), 20)
+    return ck.History(
+        name=name,
+        times=np.arange(1, count + 1) * (end / count),
+        outputs={},
+        loading=loading,
+        temperature=293.15,
+        specimen="bulge",
+        elastic=ck.Elastic(E=150e3),
+        geometry={"apex_thickness": thickness},
+    )
+
+
+def drawn_alloy(k, dimple):
+    """Law, values and elastic data of planted alloy k: one whose standard test is informative."""
+    specimen = planted.specimen(k, planted.SINGLE, planted.DESIGNS["jump"], dimple)
+    rng = np.random.default_rng([7, k])
+    modulus = 150e3 * (1.0 + 0.1 * np.clip(rng.standard_normal(), -2, 2))
+    return (specimen.law, specimen.values, ck.Elastic(E=modulus)), rng
+
+
+# ---- precision -------------------------------------------------------------------------------------------------------
+
+
+def precision_campaign(job):
+    """One planted campaign of the precision of a rate."""
+    kind, k = job
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FitWarning)
+        try:
+            return {"k": k, **(dimple_precision(k) if kind == "dimples" else bar_precision(kind, k))}
+        except CreepkitError as error:
+            return {"k": k, "failed": str(error)}
+
+
+def bar_precision(kind, k):
+    rng = np.random.default_rng([11, k, len(BAR_STRESSES[kind])])
+    law = ck.law(BAR_LAWS[k % len(BAR_LAWS)])
+    values, scatter = drawn_bar_law(law.name, rng), SCATTER[kind]
+    times = np.geomspace(1e-2, 1.0, 40) * BAR_END
+    blanks = [
+        ck.History(f"bar {j}", times, {}, ck.constant_stress(s, "stress"), 1000.0)
+        for j, s in enumerate(BAR_STRESSES[kind])
+    ]
+    tests = [made_bar(law, values, blank, scatter, rng) for blank in blanks]
+    nuisances = [ck.Nuisance("rate")] if scatter else []
+    settings = {"weights": "likelihood", "nuisances": nuisances}
+    fit = ck.identify(law, tests, "uniaxial", **settings)
+    rig = rigs_of(fit.histories, fit.predictor)[0].replace(levels=(50.0, 110.0), longest_hours=100.0)
+    start = time.process_time()
+    design = ck.design(fit, rig=rig, goal=ck.rate_at(SERVICE[kind]))
+    cpu = time.process_time() - start
+    made = [made_bar(law, values, h.replace(name="new"), scatter, rng) for h in design.best.histories]
+    after = ck.identify(law, [*tests, *made], "uniaxial", **settings)
+    truth = true_log_rate(after, values, SERVICE[kind])
+    return precision_row(law.name, design, fit, after, truth, SERVICE[kind], cpu)
+
+
+def dimple_precision(k):
+    dimple = ck.specimen("bulge").replace(threads=1)
+    alloy, rng = drawn_alloy(k, dimple)
+    law, values, _ = alloy
+    first = made_dimple(alloy, blank_dimple("first", 0.5, FIRST_RUN, FIRST_END, 300.0), dimple, rng)
+    settings = {"weights": "likelihood", "nuisances": [planted.MODULUS]}
+    fit = ck.identify(law, [first], dimple, **settings)
+    rig = rigs_of(fit.histories, dimple)[0].replace(levels=(4.0, 14.0), longest_hours=12.0, largest_output=0.8)
+    start = time.process_time()
+    design = ck.design(fit, rig=rig, goal=ck.rate_at(SERVICE["dimples"]))
+    cpu = time.process_time() - start
+    made = [made_dimple(alloy, h.replace(name=f"new {j}"), dimple, rng) for j, h in enumerate(design.best.histories)]
+    after = ck.identify(law, [first, *made], dimple, **settings)
+    truth = true_log_rate(after, values, SERVICE["dimples"])
+    return precision_row(law.name, design, fit, after, truth, SERVICE["dimples"], cpu)
+
+
+def true_log_rate(fit, values, stress):
+    """ln rate of the planted values at the strain and time at which the fit states it."""
+    u = fit.coordinates.u(fit.law.to_internal(values)[0])
+    return float(np.log(replace(fit, u=u, samples=None).rate(stress)[0]))
+
+
+def log_rate_and_sd(fit, stress):
+    """ln rate and its standard deviation by an identification."""
+    rate, low, high = (float(v) for v in fit.rate(stress))
+    quantile = 1.96 if fit.samples is not None else interval_quantile(fit.freedom)
+    return np.log(rate), np.log(high / low) / (2.0 * quantile)
+
+
+def precision_row(name, design, before, after, truth, stress, cpu):
+    estimate, realised = log_rate_and_sd(after, stress)
+    e = design.best.expectation
+    return {
+        "law": name,
+        "test": design.best.description,
+        "before": log_rate_and_sd(before, stress)[1],
+        "predicted": e.sd,
+        "realised": realised,
+        "deviation": float(estimate - truth) / e.sd,
+        "cpu": cpu,
+    }
+
+
+# ---- the law ---------------------------------------------------------------------------------------------------------
+
+
+def law_campaign(job):
+    """One planted alloy: the standard test, and designed campaigns of half and of equal hours."""
+    _, k = job
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FitWarning)
+        dimple = ck.specimen("bulge").replace(threads=1)
+        alloy, rng = drawn_alloy(k, dimple)
+        row = {"k": k, "truth": alloy[0].name, "cpu": [], "directions": []}
+        standard = made_dimple(alloy, blank_dimple("standard", 0.5, planted.JUMP, 43200.0), dimple, rng)
+        row["standard"] = verdict_row(selected([standard], dimple, k), alloy[0], STANDARD_HOURS)
+        blanks = [blank_dimple(f"first {j}", t, FIRST_RUN, FIRST_END, 300.0) for j, t in enumerate(THICKNESSES)]
+        first = [made_dimple(alloy, blank, dimple, rng) for blank in blanks]
+        if any(test is None for test in first):
+            return {"k": k, "failed": "a dimple of the first run bursts at once"}
+        ranking = selected(first, dimple, k)
+        row["first"] = verdict_row(ranking, alloy[0], FIRST_END / 3600.0 + 1.0)
+        for name, share in SHARES.items():
+            row[name] = designed_row(name, (alloy, first, ranking, dimple, k), share, rng, row)
+        return row
+
+
+def selected(tests, dimple, k):
+    return ck.select(planted.SINGLE, tests, dimple, nuisances=[planted.MODULUS], seed=k, further_laws=0)
+
+
+def designed_row(name, campaign, share, rng, row):
+    alloy, first, ranking, dimple, k = campaign
+    spent = FIRST_END / 3600.0 + 1.0
+    budget = share * STANDARD_HOURS - spent
+    rig = rigs_of(first, dimple)[0].replace(
+        levels=(4.0, 14.0), longest_hours=12.0, tests_per_run=3, frame_interval=300.0, largest_output=0.8,
+        dimensions={"apex_thickness": THICKNESSES},
+    )  # fmt: skip
+    start = time.process_time()
+    goal = "law" if len(ranking.credible) > 1 else "parameters"
+    design = ck.design(ranking if goal == "law" else ranking.best, rig=rig, goal=goal, budget=budget, seed=k)
+    row["cpu"].append(time.process_time() - start)
+    planned = [h.replace(name=f"{name} {i}.{j}") for i, t in enumerate(design.plan) for j, h in enumerate(t.histories)]
+    made = [made_dimple(alloy, h, dimple, rng) for h in planned]
+    after = selected([*first, *(test for test in made if test is not None)], dimple, k)
+    result = verdict_row(after, alloy[0], spent + sum(t.hours for t in design.plan))
+    result["plan"] = [t.description for t in design.plan]
+    if goal == "law":
+        result["probability"] = float(design.expected.probability)
+        chi = {r.fit.law.name: r.chi_square for r in after.laws}
+        for each in design.expected.chi_squares:
+            if each.reference_law == alloy[0].name and {each.reference_law, each.alternative_law} <= set(chi):
+                met = chi[each.alternative_law] - chi[each.reference_law]
+                row["directions"].append([name, each.alternative_law, each.current, each.expected, met])
+    return result
+
+
+def verdict_row(ranking, law, hours):
+    right = ranking.best.law.fingerprint == law.fingerprint
+    return {
+        "right": right,
+        "singled out": ranking.singled_out,
+        "decisive": ranking.decisive,
+        "weight": ranking.laws[0].weight,
+        "hours": hours,
+        "verdict": ranking.verdict,
+    }
+
+
+# ---- tables ----------------------------------------------------------------------------------------------------------
+
+
+def finished_rows(file, campaign, jobs, processes):
+    """The rows of all jobs; those that the file holds of an earlier run, which may have been killed, are kept."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    known = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    rows = {row["k"]: row for row in known}
+    remaining = [job for job in jobs if job[1] not in rows]
+    if remaining:
+        with multiprocessing.get_context("spawn").Pool(processes, maxtasksperchild=20) as pool, file.open("a") as out:
+            for done, row in enumerate(pool.imap_unordered(campaign, remaining), start=1):
+                rows[row["k"]] = row
+                print(json.dumps(row), file=out, flush=True)
+                progress(f"  {file.stem}: {done} of {len(remaining)}")
+    return [rows[job[1]] for job in jobs if "failed" not in rows[job[1]]]
+
+
+def print_precision(page, rows_by_kind):
+    page.heading("Precision of the rate at a stress of service")
+    page.table(
+        "campaigns", "number", "sd of ln rate before, median", "predicted, median", "realised, median",
+        "predicted over realised: median [quartiles]", "|ln ratio|: median", "rms deviation", "CPU s, median, largest",
+    )  # fmt: skip
+    everything = [row for rows in rows_by_kind.values() for row in rows]
+    for kind, rows in {**rows_by_kind, "all": everything}.items():
+        if rows:
+            ratio = np.array([row["predicted"] / row["realised"] for row in rows])
+            low, middle, high = np.quantile(ratio, (0.25, 0.5, 0.75))
+            medians = (float(np.median([row[name] for row in rows])) for name in ("before", "predicted", "realised"))
+            rms = float(np.sqrt(np.mean([row["deviation"] ** 2 for row in rows])))
+            cpu = [row["cpu"] for row in rows]
+            page.row(
+                kind, len(rows), *(f"{m:.3g}" for m in medians), f"{middle:.2f} [{low:.2f}, {high:.2f}]",
+                f"{np.median(np.abs(np.log(ratio))):.3f}", f"{rms:.2f}", f"{np.median(cpu):.1f}, {max(cpu):.1f}",
+            )  # fmt: skip
+
+
+def print_laws(page, rows):
+    page.heading("Which law it is")
+    page.table("campaign", "number", "oven, h", "best law right", "singled out and right", "singled out, wrong",
+               "decisive and right", "decisive, wrong")  # fmt: skip
+    for name in ("standard", "first", *SHARES):
+        arm = [row[name] for row in rows]
+        shares = (
+            [r["right"] for r in arm],
+            [r["singled out"] and r["right"] for r in arm],
+            [r["singled out"] and not r["right"] for r in arm],
+            [r["decisive"] and r["right"] for r in arm],
+            [r["decisive"] and not r["right"] for r in arm],
+        )
+        page.row(name, len(arm), f"{np.mean([r['hours'] for r in arm]):.1f}", *(share_with_interval(s) for s in shares))
+    directions = [d for row in rows for d in row["directions"]]
+    page.table("chi-squares, law that remained against the planted one", "directions", "above 5",
+               "met over expected: median [quartiles]", "factor between them: median")  # fmt: skip
+    for name in (*SHARES, "all"):
+        own = [d for d in directions if name in ("all", d[0])]
+        pairs = np.array([d[3:] for d in own if max(d[3:]) > 5.0])
+        if len(pairs):
+            clipped = np.maximum(pairs, 1.0)
+            ratio = clipped[:, 1] / clipped[:, 0]
+            low, middle, high = np.quantile(ratio, (0.25, 0.5, 0.75))
+            factor = float(np.median(np.maximum(ratio, 1 / ratio)))
+            page.row(name, len(own), len(pairs), f"{middle:.2f} [{low:.2f}, {high:.2f}]", f"{factor:.2f}")
+    expected = [(r[name]["probability"], r[name]["singled out"] and r[name]["right"]) for r in rows for name in SHARES
+                if "probability" in r[name]]  # fmt: skip
+    page.table("probability of a right verdict", "designs", "expected, mean", "met")
+    for label, low, high in (("below 0.5", -1, 0.5), ("0.5 to 0.9", 0.5, 0.9), ("above 0.9", 0.9, 2)):
+        own = [(p, hit) for p, hit in expected if low < p <= high]
+        if own:
+            page.row(label, len(own), f"{np.mean([p for p, _ in own]):.2f}", share_with_interval([h for _, h in own]))
+    cpu = [seconds for row in rows for seconds in row["cpu"]]
+    page.table("CPU seconds of ck.design()", "median", "largest")
+    page.row("goal law", f"{np.median(cpu):.1f}", f"{max(cpu):.1f}")
+
+
+def main():
+    parser = arguments(__doc__)
+    parser.add_argument("--bars", type=int, default=60, help="campaigns of bars, with and without scatter each")
+    parser.add_argument("--dimples", type=int, default=40, help="campaigns of the precision of dimples")
+    parser.add_argument("--laws", type=int, default=24, help="planted alloys of the part on the law")
+    parser.add_argument("--jobs", type=int, default=1, help="worker processes")
+    parser.add_argument("--keep", default="build/design_of_experiments", help="folder of finished campaigns")
+    options = parser.parse_args()
+    folder, counts = Path(options.keep), {"bars": options.bars, "scatter": options.bars, "dimples": options.dimples}
+    rows_by_kind = {
+        kind: finished_rows(
+            folder / f"{kind}.jsonl", precision_campaign, [(kind, k) for k in range(count)], options.jobs
+        )
+        for kind, count in counts.items()
+    }
+    laws = finished_rows(folder / "laws.jsonl", law_campaign, [("law", k) for k in range(options.laws)], options.jobs)
+    page = Page("design_of_experiments", __doc__)
+    print_precision(page, rows_by_kind)
+    if laws:
+        print_laws(page, laws)
+    if options.write:
+        page.write()
+
+
+if __name__ == "__main__":
+    main()
