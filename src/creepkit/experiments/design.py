@@ -45,7 +45,11 @@ EVALUATED_AT_DRAWS = 8
 """Candidates that are evaluated again at draws of the posteriors."""
 
 
-MOST_REFITS = 12
+MOST_ALIKE = 2
+"""Of these, those of one load and duration."""
+
+
+MOST_REFITS = 6
 """Refits in full, each of one candidate in one direction."""
 
 
@@ -336,38 +340,67 @@ class _Search:
         return ""
 
     def _evaluate_best(self) -> None:
-        """The best candidates at draws of the posteriors, and refits, until the best is one that was evaluated so."""
-        done: set[str] = set()
-        refits = MOST_REFITS
-        while len(done) < EVALUATED_AT_DRAWS:
-            k = next((k for k, t in enumerate(self.tests) if t.description not in done), None)
-            if k is None or (len(done) >= 3 and k > 2):
-                break
-            candidate = self.tests[k].candidate
-            done.add(candidate.description)
-            if isinstance(self.criterion, LawCriterion):
-                probability = self.criterion.probability_of_rupture(candidate.histories)
-                if probability > LARGEST_RUPTURE_PROBABILITY:
-                    self.left_out[candidate.description] = f"it would rupture with a probability of {probability:.2f}"
-                    del self.tests[k]
-                    continue
-                for a, b in self.criterion.directions()[: max(refits, 0)]:
-                    self.criterion.refit(candidate.histories, a, b)
-                    refits -= 1
-            self.tests[k] = PlannedTest(candidate, self.criterion.expectation(candidate.histories, at_draws=True), True)
-            self.tests.sort(key=self._order)
+        """The best candidates at draws of the posteriors, and then the very best with refits in full."""
+        promising = self._promising()
+        for done, test in enumerate(promising):
+            if self._ruptures(test.candidate):
+                self.tests.remove(test)
+            else:
+                self._evaluate_at_draws(test)
             if self.progress is not None:
-                self.progress("best tests at draws of the posteriors", len(done), EVALUATED_AT_DRAWS)
-        if self.progress is not None:
-            self.progress("best tests at draws of the posteriors", EVALUATED_AT_DRAWS, EVALUATED_AT_DRAWS)
+                self.progress("best tests at draws of the posteriors", done + 1, len(promising))
+        if isinstance(self.criterion, LawCriterion):
+            self._refit(self.criterion)
 
-    def _order(self, test: PlannedTest) -> tuple[float, float]:
-        """Least for the best: the cheapest that decides between laws, else the most informative; for values by hour."""
+    def _promising(self) -> list[PlannedTest]:
+        """The first candidates, no more than two of one load and duration."""
+        chosen: list[PlannedTest] = []
+        places: dict[tuple[float, float], int] = {}
+        for test in self.tests:
+            place = test.first_level, test.candidate.duration
+            places[place] = places.get(place, 0) + 1
+            if places[place] <= MOST_ALIKE and len(chosen) < EVALUATED_AT_DRAWS:
+                chosen.append(test)
+        return chosen
+
+    def _ruptures(self, candidate: CandidateTest) -> bool:
+        if not isinstance(self.criterion, LawCriterion):
+            return False
+        probability = self.criterion.probability_of_rupture(candidate.histories)
+        if probability > LARGEST_RUPTURE_PROBABILITY:
+            self.left_out[candidate.description] = f"it would rupture with a probability of {probability:.2f}"
+        return probability > LARGEST_RUPTURE_PROBABILITY
+
+    def _evaluate_at_draws(self, test: PlannedTest) -> None:
+        expectation = self.criterion.expectation(test.histories, at_draws=True)
+        position = next(k for k, t in enumerate(self.tests) if t.candidate is test.candidate)
+        self.tests[position] = PlannedTest(test.candidate, expectation, True)
+        self.tests.sort(key=self._order)
+
+    def _refit(self, criterion: LawCriterion) -> None:
+        """Refits of the first candidate in every direction, until it stays the first or there were enough of them."""
+        refits, refitted = 0, set()
+        while refits < MOST_REFITS and self.tests and id(self.tests[0].candidate) not in refitted:
+            first = self.tests[0]
+            refitted.add(id(first.candidate))
+            for a, b in criterion.directions():
+                refits += int(refits < MOST_REFITS and criterion.refit(first.histories, a, b))
+                if self.progress is not None:
+                    self.progress("refits in full", min(refits, MOST_REFITS), MOST_REFITS)
+            self._evaluate_at_draws(first)
+        if self.progress is not None:
+            self.progress("refits in full", MOST_REFITS, MOST_REFITS)
+
+    def _order(self, test: PlannedTest) -> tuple[bool, float, float]:
+        """Least for the best: the cheapest that decides between laws, else the most informative; for values by hour.
+
+        Those that were evaluated at draws come first: the others are known to first order alone, which flatters them.
+        """
         if self.task.goal != "law":
-            return (0.0, -test.information_per_hour)
+            return (not test.at_draws, 0.0, -test.information_per_hour)
         if test.expectation.probability >= DECISIVE_WEIGHT:
-            return (0.0, test.hours)
-        return (1.0, -test.expectation.information)
+            return (not test.at_draws, 0.0, test.hours)
+        return (not test.at_draws, 1.0, -test.expectation.information)
 
     def _plan(self) -> tuple[tuple[PlannedTest, ...], Expectation | None]:
         """The runs for the budget: chosen one after the other by what each adds for an hour, or the best single one."""

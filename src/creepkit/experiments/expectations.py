@@ -134,5 +134,5 @@ class PrecisionCriterion:
         if position not in self._deviations:
             law = self.outcomes.laws[position]
             self._deviations[position] = law.draws(DRAWS, self.seed)
-            self._information[position] = law.information_at(self._deviations[position])
+            self._information[position] = law.expansion(self._deviations[position]).information
         return self._deviations[position]

@@ -8,7 +8,8 @@ noise. To first order law b, refitted to the tests that were made and to this on
 more than before (see planned_outcomes): r'S^-1 r with S = I + K A^-1 K' the covariance of what b predicts. The
 chi-square of b then lies above that of a by Q_b - Q_a more than now, and weights follow as those of a ranking do. What
 a law with bounds, far from its estimates, leaves in truth is found for the best candidates by a refit in full: the
-search of an identification, from several starts, over all tests. Its ratio to the linear value corrects Q_b.
+search of an identification, from several starts, over all tests. Its ratio to the linear value corrects Q_b. Before
+that the step begins at the draw of the posterior of b which explains the outcome best.
 
 The information is the mutual information of law and outcome (Box & Hill (1967), Technometrics 9, 57), in nats: the mean
 decrease of the entropy of the weights. The mean of chi-square over laws, with weights, is the T-criterion (Atkinson &
@@ -25,14 +26,20 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
 from creepkit.experiments.expectations import Expectation, ExpectedChiSquare
-from creepkit.experiments.planned_outcomes import STATED_THICKNESS, KnownLaw, PlannedOutcomes, test_key
+from creepkit.experiments.planned_outcomes import (
+    Expansion,
+    KnownLaw,
+    PlannedOutcomes,
+    nuisances_of_planned,
+    test_key,
+    values_of_nuisances,
+)
 from creepkit.inverse.composite_predictor import predict, search_predictor_of
 from creepkit.inverse.identify import search_problem
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.inverse.iterative_estimation import starting_point
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel
-from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import Tolerances
@@ -47,7 +54,7 @@ POSTERIOR_DRAWS, POSTERIOR_REPEATS = 16, 12
 """Of the posterior itself, with a prediction each."""
 
 
-SMALLEST_REFITTED = 1.0
+SMALLEST_REFITTED = 3.0
 """A chi-square that is linearly less than this is not corrected: a ratio of it says nothing."""
 
 
@@ -75,6 +82,7 @@ class LawCriterion:
     ratios: dict[tuple[object, int, int], float] = field(default_factory=dict)
     _baseline: dict[int, float] = field(default_factory=dict)
     _deviations: dict[int, Floats] = field(default_factory=dict)
+    _expansions: dict[int, Expansion] = field(default_factory=dict)
 
     @property
     def names(self) -> list[str]:
@@ -114,33 +122,58 @@ class LawCriterion:
 
     def _increments(self, a: int, histories: Sequence[History], at_draws: bool) -> Floats:
         """(laws, outcomes) Q of each law, if a is true: over draws of its posterior and of the noise."""
-        y, distances, repeats = self._true_outcomes(a, histories, at_draws)
-        rng = np.random.default_rng(self.seed)
-        noise = rng.standard_normal((len(y) * repeats, y.shape[1]))
+        y, repeats = self._true_outcomes(a, histories, at_draws)
+        noise = np.random.default_rng(self.seed).standard_normal((len(y) * repeats, y.shape[1]))
         noisy = np.repeat(y, repeats, axis=0) + noise
         increments = np.empty((len(self.names), len(noisy)))
-        for b, law in enumerate(self.outcomes.laws):
-            m, K = self.outcomes.of(histories, b)
-            increments[b] = _projected(noisy - m, K, law.information)
+        for b in range(len(self.names)):
             ratio = self.ratios.get((_key(histories), a, b), 1.0)
-            if b == a:  # its true values are among those it may have
-                at_truth = np.repeat(distances, repeats) + (noise**2).sum(axis=1)
-                increments[b] = np.minimum(increments[b], at_truth)
-            elif ratio != 1.0:
-                without_noise = _projected(y - m, K, law.information)
-                increments[b] += (ratio - 1.0) * np.repeat(without_noise, repeats)
+            increments[b] = self._least(b, histories, noisy, at_draws)
+            if ratio != 1.0:
+                increments[b] += (ratio - 1.0) * np.repeat(self._least(b, histories, y, at_draws), repeats)
         return increments
 
-    def _true_outcomes(self, a: int, histories: Sequence[History], at_draws: bool) -> tuple[Floats, Floats, int]:
-        """Outcomes (draws, data) without noise if a is true, d'A d (draws,) of their values, repeats of the noise."""
-        law = self.outcomes.laws[a]
+    def _least(self, b: int, histories: Sequence[History], y: Floats, at_draws: bool) -> Floats:
+        """(outcomes,) the increase of chi-square that law b is left with at outcomes y (outcomes, data).
+
+        About its estimates; at draws from that draw of its posterior which explains the outcome best, by one
+        Gauss-Newton step over all tests.
+        """
+        law = self.outcomes.laws[b]
+        if not at_draws:
+            m, K = self.outcomes.of(histories, b)
+            return _projected(y - m, K, law.information)
+        deviations, made = self._drawn(b, True), self._expansion(b)
+        parts = [self.outcomes.drawn(h, b, deviations) for h in histories]
+        m, K = (np.concatenate([part[k] for part in parts], axis=1) for k in (0, 1))
+        misfits = made.chi_square + (y**2).sum(axis=1)[:, None] - 2.0 * y @ m.T + (m**2).sum(axis=1)
+        nearest, least = misfits.argmin(axis=1), np.empty(len(y))
+        bounds = law.measured.bounds
+        limits = np.full((2, deviations.shape[1]), np.inf) * [[-1.0], [1.0]]
+        limits[:, : law.size] = np.stack([bounds.lower, bounds.upper])[:, : law.size] - law.fit.u
+        for k in np.unique(nearest):
+            chosen = nearest == k
+            r = y[chosen] - m[k]
+            downhill = r @ K[k] - made.gradient[k]
+            curvature = made.information[k] + K[k].T @ K[k]
+            step = _bounded_steps(curvature, downhill, *(limits - deviations[k]))
+            change = np.einsum("cp,pq,cq->c", step, curvature, step) - 2.0 * (downhill * step).sum(axis=1)
+            least[chosen] = made.chi_square[k] + (r**2).sum(axis=1) + change
+        return least
+
+    def _expansion(self, b: int) -> Expansion:
+        if b not in self._expansions:
+            self._expansions[b] = self.outcomes.laws[b].expansion(self._drawn(b, True))
+        return self._expansions[b]
+
+    def _true_outcomes(self, a: int, histories: Sequence[History], at_draws: bool) -> tuple[Floats, int]:
+        """Outcomes (draws, data) without noise if a is true, and how often the noise is drawn for each."""
         deviations = self._drawn(a, at_draws)
-        distances = np.einsum("cp,pq,cq->c", deviations, law.information, deviations)
         if at_draws:
             parts = [self.outcomes.drawn(h, a, deviations)[0] for h in histories]
-            return np.concatenate(parts, axis=1), distances, POSTERIOR_REPEATS
+            return np.concatenate(parts, axis=1), POSTERIOR_REPEATS
         m, K = self.outcomes.of(histories, a)
-        return m + deviations @ K.T, distances, REPEATS
+        return m + deviations @ K.T, REPEATS
 
     def _drawn(self, a: int, at_draws: bool) -> Floats:
         key = 2 * a + int(at_draws)
@@ -166,26 +199,26 @@ class LawCriterion:
         pairs = [(a, b) for a in range(count) for b in range(count) if a != b]
         return sorted(pairs, key=lambda pair: -self.weights[pair[0]] * self.weights[pair[1]])
 
-    def refit(self, histories: Sequence[History], a: int, b: int) -> None:
-        """Correct the expected chi-square of one direction by a refit of b to what a predicts, at the median draw."""
-        y, _, _ = self._true_outcomes(a, histories, True)
-        law = self.outcomes.laws[b]
-        m, K = self.outcomes.of(histories, b)
-        linear = _projected(y - m, K, law.information)
+    def refit(self, histories: Sequence[History], a: int, b: int) -> bool:
+        """Correct the expected chi-square of one direction by a refit of b to what a predicts, at the median draw.
+
+        Whether it was done: not where that chi-square is so small that nothing is to be corrected.
+        """
+        y, _ = self._true_outcomes(a, histories, True)
+        law, linear = self.outcomes.laws[b], self._least(b, histories, y, True)
         chosen = int(np.argsort(linear)[linear.size // 2])
         if linear[chosen] < SMALLEST_REFITTED:
-            self.ratios[_key(histories), a, b] = 1.0
-            return
+            return False
         truth = self.outcomes.laws[a]
-        u = truth.fit.u + self._drawn(a, True)[chosen, : truth.size]
         try:
             if b not in self._baseline:
                 self._baseline[b] = _refitted_chi_square(law, self.outcomes.laws[0].noise_model, [])
-            made = _as_if_made(truth, u, histories)
+            made = _as_if_made(truth, self._drawn(a, True)[chosen], histories)
             refitted = _refitted_chi_square(law, self.outcomes.laws[0].noise_model, made) - self._baseline[b]
         except CreepkitError:  # no start can be predicted: the linear value stands
-            return
+            return False
         self.ratios[_key(histories), a, b] = float(np.clip(refitted / linear[chosen], *RATIO_LIMITS))
+        return True
 
 
 def _key(histories: Sequence[History]) -> object:
@@ -200,17 +233,30 @@ def _projected(r: Floats, K: Floats, information: Floats) -> Floats:
     return np.asarray((r**2).sum(axis=1) - (solved**2).sum(axis=0))
 
 
-def _as_if_made(truth: KnownLaw, u: Floats, planned: Sequence[History]) -> list[History]:
-    """Planned tests with what a law predicts at u (parameters,) as if it had been measured, without noise."""
+def _bounded_steps(curvature: Floats, downhill: Floats, lower: Floats, upper: Floats) -> Floats:
+    """(outcomes, q) steps to the least of d'A d - 2 b'd within bounds (q,), of b (outcomes, q).
+
+    What leaves its bounds is put on them, and the rest is solved for again.
+    """
+    steps = np.linalg.solve(curvature, downhill.T).T
+    for _ in range(2):
+        held = (steps < lower) | (steps > upper)
+        for pattern in np.unique(held[held.any(axis=1)], axis=0):
+            rows, free = (held == pattern).all(axis=1), ~pattern
+            steps[rows] = np.clip(steps[rows], lower, upper)
+            rest = downhill[rows][:, free] - steps[rows][:, pattern] @ curvature[np.ix_(pattern, free)]
+            steps[np.ix_(rows, free)] = np.linalg.solve(curvature[np.ix_(free, free)], rest.T).T
+    return np.asarray(np.clip(steps, lower, upper))
+
+
+def _as_if_made(truth: KnownLaw, deviation: Floats, planned: Sequence[History]) -> list[History]:
+    """Planned tests with what a law predicts at a deviation (q,) as if it had been measured, without noise."""
     base, predictor = truth.measured.observations, truth.measured.predictor
     named = [replace(h, name=f"plan {k}") for k, h in enumerate(planned)]
-    nuisances = truth.fit.nuisance_values(named, using=predictor)
-    if "thickness" in nuisances:
-        nuisances["thickness"] = np.array(
-            [[h.geometry.get(STATED_THICKNESS, v) for h, v in zip(named, nuisances["thickness"][0], strict=True)]]
-        )
-    theta = truth.fit.coordinates.theta(u)
-    prediction = predict(predictor, truth.fit.law, theta[None], named, nuisances=nuisances)
+    nuisances = nuisances_of_planned(truth, named)
+    e = values_of_nuisances(nuisances, truth, deviation[truth.size :])
+    theta = truth.fit.coordinates.theta(truth.fit.u + deviation[: truth.size])
+    prediction = predict(predictor, truth.fit.law, theta[None], named, nuisances=nuisances.predictor_values(e))
     made = []
     for k, history in enumerate(named):
         values = {name: prediction.of(k)[:, j] for j, name in enumerate(prediction.outputs) if name in base.outputs}
@@ -228,7 +274,7 @@ def _refitted_chi_square(law: KnownLaw, noise_model: NoiseModel, further: Sequen
     measured = law.measured
     histories = (*measured.histories, *further)
     observations = _observations(measured, histories)
-    nuisances = _nuisances(law, histories)
+    nuisances = nuisances_of_planned(law, further, of_made=True)
     problem = replace(
         measured, histories=histories, observations=observations, evaluations=EvaluationCache()
     ).with_nuisances(nuisances)
@@ -259,19 +305,6 @@ def _observations(measured: LeastSquaresProblem, histories: Sequence[History]) -
     observations = ObservationVector.from_histories(histories, measured.predictor)
     position = [base.outputs.index(name) for name in observations.outputs]
     return replace(observations, transforms=tuple(base.transforms[k] for k in position), noise=base.noise[position])
-
-
-def _nuisances(law: KnownLaw, histories: Sequence[History]) -> NuisanceParameters:
-    """Those of the tests that were made and of further ones, with the prior standard deviations of the fit."""
-    nuisances = NuisanceParameters.from_histories(law.fit.settings.nuisances, histories, law.measured.predictor)
-    spread = {n.kind: n.prior_sd for n in law.fit.nuisances}
-    mean = nuisances.mean.copy()
-    further = {h.name: h for h in histories[len(law.measured.histories) :]}
-    for k, (n, owner) in enumerate(zip(nuisances.nuisances, nuisances.owners, strict=True)):
-        if n.kind == "thickness" and n.scope == "test" and owner in further:
-            mean[k] = further[owner].geometry.get(STATED_THICKNESS, mean[k])
-    sd = np.array([spread.get(n.kind, sd) for n, sd in zip(nuisances.nuisances, nuisances.sd, strict=True)])
-    return replace(nuisances, mean=mean, sd=sd)
 
 
 def _test_weights(law: KnownLaw, further: int) -> Floats:

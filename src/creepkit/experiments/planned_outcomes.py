@@ -97,36 +97,68 @@ class KnownLaw:
         return self.fit.u.size
 
     def draws(self, count: int, seed: int) -> Floats:
-        """(draws, q) deviations from the estimates, of the posterior: its samples where there are some, else normal."""
-        size = self.information.shape[0]
-        unit = norm.ppf(np.clip(qmc.Sobol(size, seed=seed).random(count), 1e-6, 1 - 1e-6))
-        deviations = unit @ np.linalg.cholesky(scaled_inverse(self.information)).T
+        """(draws, q) deviations from the estimates, of the posterior: its samples where there are some, else normal.
+
+        Values beyond a bound are put on it; s is drawn given u.
+        """
+        p, A = self.size, self.information
+        unit = norm.ppf(np.clip(qmc.Sobol(A.shape[0], seed=seed).random(count), 1e-6, 1 - 1e-6))
         if self.fit.samples is not None:
             positions = np.linspace(0, len(self.fit.samples) - 1, count).round().astype(int)
-            deviations[:, : self.size] = self.fit.samples[positions] - self.fit.u
+            of_u = self.fit.samples[positions] - self.fit.u
+        else:
+            of_u = unit[:, :p] @ np.linalg.cholesky(scaled_inverse(A)[:p, :p]).T
         bounds = self.measured.bounds
-        lower, upper = bounds.lower[: self.size], bounds.upper[: self.size]
-        deviations[:, : self.size] = np.clip(self.fit.u + deviations[:, : self.size], lower, upper) - self.fit.u
-        return np.asarray(deviations)
+        of_u = np.clip(self.fit.u + of_u, bounds.lower[:p], bounds.upper[:p]) - self.fit.u
+        if not self.shared:
+            return np.asarray(of_u)
+        spread = scaled_inverse(A[p:, p:])
+        of_s = unit[:, p:] @ np.linalg.cholesky(spread).T - of_u @ (A[:p, p:] @ spread)
+        return np.concatenate([of_u, of_s], axis=1)
 
-    def information_at(self, deviations: Floats) -> Floats:
-        """(draws, q, q) the information of the tests that were made if the values were others.
+    def expansion(self, deviations: Floats) -> Expansion:
+        """The chi-square of the tests that were made, to second order about deviations (draws, q) from the estimates.
 
-        deviations : (draws, q). Its share of u alone is evaluated there; what couples u and s is that of the estimates.
+        Derivatives to u are those at the draws, derivatives to nuisance parameters those at the estimates.
         """
-        problem = self.measured.with_fixed_nuisances(self.x[self.size :])
-        residuals = self.fit.residuals_of(self.measured)
-        factor = CovarianceFactor.of_residuals(residuals, self.noise_model)
-        _, jacobian = problem.candidate_jacobian(self.fit.u + deviations[:, : self.size])
-        change = []
-        for one in (residuals.jacobian[..., : self.size], *jacobian):  # type: ignore[index]
-            change.append(np.einsum("tep,teq->pq", one, factor.inverse_times(one)))
-        information = np.tile(self.information, (len(deviations), 1, 1))
-        for k, own in enumerate(change[1:]):
-            moved = information[k].copy()
-            moved[: self.size, : self.size] += own - change[0]
-            information[k] = moved if np.linalg.eigvalsh(moved)[0] > 0 else information[k]
-        return information
+        p, problem, e = self.size, self.measured, self.x[self.size :]
+        residuals, nuisances = self.fit.residuals_of(problem), problem.nuisance_parameters
+        assert residuals.jacobian is not None
+        own = [k for k in range(p, self.x.size) if k not in self.shared]
+        of_own = residuals.jacobian[..., own]
+        sd = np.minimum(nuisances.sd, (nuisances.high - nuisances.low) / np.sqrt(12.0))
+        effects = _compact(of_own * sd[[k - p for k in own]]) if own else None
+        factor = CovarianceFactor.of_residuals(
+            replace(residuals, random_effect_sensitivities=effects), self.noise_model
+        )
+        shift = of_own @ (e - nuisances.mean)[[k - p for k in own]]
+        of_s = residuals.jacobian[..., list(self.shared)]
+        points = np.concatenate([np.zeros((1, deviations.shape[1])), deviations])
+        values, jacobian = problem.with_fixed_nuisances(e).candidate_jacobian(self.fit.u + points[:, :p])
+        prior = nuisances.precision[[k - p for k in self.shared]]
+        centre = (e - nuisances.mean)[[k - p for k in self.shared]]
+        precision = np.concatenate([12.0 / problem.bounds.width[:p] ** 2, prior])
+        chi_square, gradient, information = [], [], []
+        for point, r, J_u in zip(points, values, jacobian, strict=True):
+            r, J = r + of_s @ point[p:] - shift, np.concatenate([J_u, of_s], axis=-1)
+            weighted = factor.inverse_times(np.concatenate([r[..., None], J], axis=-1))
+            from_prior = centre + point[p:]
+            chi_square.append(float((r * weighted[..., 0]).sum() + prior @ from_prior**2))
+            gradient.append(np.einsum("tep,te->p", J, weighted[..., 0]) + np.r_[np.zeros(p), prior * from_prior])
+            information.append(np.einsum("tep,teq->pq", J, weighted[..., 1:]) + np.diag(precision))
+        return Expansion(np.array(chi_square[1:]) - chi_square[0], np.stack(gradient[1:]), np.stack(information[1:]))
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """Chi-squares to second order: c + 2 g'd + d'A d about each draw.
+
+    chi_square : (draws,) c, above that of the estimates; gradient : (draws, q) g; information : (draws, q, q) A.
+    """
+
+    chi_square: Floats
+    gradient: Floats
+    information: Floats
 
 
 def _information(problem: LeastSquaresProblem, residuals: Residuals, factor: CovarianceFactor, count: int) -> Floats:
@@ -276,14 +308,14 @@ class PlannedOutcomes:
         known, observations = self.laws[law], self._observations([history])
         factor = self._covariance(_predicted(self.laws[0], [history], observations), observations)
         own = self._whitened(_predicted(known, [history], observations), factor, observations)[0]
-        mask, nuisances = observations.present[0], _nuisances_of(known, [history])
+        mask, nuisances = observations.present[0], nuisances_of_planned(known, [history])
         u = known.fit.u + deviations[:, : known.size]
         prediction = predict(
             known.measured.predictor,
             known.fit.law,
             known.fit.coordinates.theta(u),
             [history],
-            nuisances=nuisances.predictor_values(_values_of(nuisances, known)),
+            nuisances=nuisances.predictor_values(values_of_nuisances(nuisances, known)),
             sensitivities=True,
         )
         jacobian = np.tile(own.jacobian, (len(u), 1, 1))
@@ -317,10 +349,10 @@ def test_key(history: History) -> tuple[object, ...]:
     )
 
 
-def _nuisances_of(law: KnownLaw, planned: Sequence[History]) -> NuisanceParameters:
+def nuisances_of_planned(law: KnownLaw, planned: Sequence[History], *, of_made: bool = False) -> NuisanceParameters:
     """The nuisance parameters of planned tests beside those of the tests that were made, for the planned ones alone.
 
-    A planned test is of the length that it states, whatever was measured of others.
+    A planned test is of the length that it states, whatever was measured of others. of_made : for all of the tests.
     """
     measured, made = law.measured, law.measured.histories
     nuisances = NuisanceParameters.from_histories(law.fit.settings.nuisances, [*made, *planned], measured.predictor)
@@ -330,21 +362,25 @@ def _nuisances_of(law: KnownLaw, planned: Sequence[History]) -> NuisanceParamete
     for k, (n, owner) in enumerate(zip(nuisances.nuisances, nuisances.owners, strict=True)):
         sd[k] = spread.get(n.kind, sd[k])
         mean[k] = stated.get(owner, mean[k]) if n.kind == "thickness" and n.scope == "test" else mean[k]
-    index = {key: positions[len(made) :] for key, positions in nuisances.test_index.items()}
+    first = 0 if of_made else len(made)
+    index = {key: positions[first:] for key, positions in nuisances.test_index.items()}
     return replace(nuisances, mean=mean, sd=sd, test_index=index)
 
 
-def _values_of(nuisances: NuisanceParameters, law: KnownLaw) -> Floats:
-    """(nuisances,) as estimated, of planned tests their prior means."""
+def values_of_nuisances(nuisances: NuisanceParameters, law: KnownLaw, deviation: Floats | None = None) -> Floats:
+    """(nuisances,) as estimated, of planned tests their prior means; deviation : (shared,) from the estimates."""
     known = {(n.key, n.owner): n.value for n in law.fit.nuisances}
+    if deviation is not None:
+        shared = [law.fit.nuisances[k - law.size] for k in law.shared]
+        known |= {(n.key, n.owner): n.value + float(d) for n, d in zip(shared, deviation, strict=True)}
     parameters = zip(nuisances.nuisances, nuisances.owners, nuisances.mean, strict=True)
     return np.array([known.get((n.key, owner), float(mean)) for n, owner, mean in parameters])
 
 
 def _predicted(law: KnownLaw, planned: Sequence[History], observations: ObservationVector) -> _Chunk:
     """What a law predicts of planned tests at its estimates, with derivatives."""
-    nuisances, problem, coordinates = _nuisances_of(law, planned), law.measured, law.fit.coordinates
-    e, u, size = _values_of(nuisances, law), law.fit.u, law.size
+    nuisances, problem, coordinates = nuisances_of_planned(law, planned), law.measured, law.fit.coordinates
+    e, u, size = values_of_nuisances(nuisances, law), law.fit.u, law.size
     prediction = predict_with_sensitivities(
         problem.predictor, law.fit.law, coordinates.theta(u), planned, nuisances.predictor_values(e)
     )
