@@ -33,8 +33,8 @@ def design_sentence(design: Design) -> str:
     if design.goal == "law" and len(design.laws) < 2:
         return f"one law remains, {design.laws[0]}: no further test is needed to tell laws apart"
     if not design.tests:
-        reasons = dict.fromkeys(reason for _, reason in design.left_out)
-        return f"no test can be made: {'; '.join(list(reasons)[:2]) or 'there are no candidates'}"
+        reasons = dict.fromkeys(f"that {_kind_of(reason)}" for _, reason in design.left_out)
+        return f"no test can be made: there are only candidates {' or '.join(reasons)}" if reasons else "no candidates"
     best, *others = design.tests
     if design.goal == "law" and _largest_information(design) < USEFUL_INFORMATION:
         return (
