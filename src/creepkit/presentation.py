@@ -87,7 +87,6 @@ PRESENTERS: dict[str, dict[str, str]] = {
     "ModulusEstimates": {"text": "creepkit.report.temperature_law:modulus_estimates_text"},
     "Design": {
         "text": "creepkit.report.design:design_text",
-        "sentence": "creepkit.report.design:design_sentence",
         "to_json": "creepkit.report.design:design_to_json",
         "plot": "creepkit.report.design:design_figure",
     },

@@ -1,6 +1,6 @@
 """Design of experiments: what a proposed test is expected to tell, and what it tells once it is planted and made.
 
-    python tests/benchmarks/design_of_experiments.py [--bars 60] [--dimples 40] [--law-bars 40] [--laws 24] [--jobs 1]
+    python tests/benchmarks/design_of_experiments.py [--bars 60] [--dimples 40] [--law-bars 120] [--laws 24] [--jobs 1]
                                                      [--keep FOLDER] [--write]
 
 Precision. A planted law is identified from a first campaign, the next test for the rate at a stress of service is
@@ -418,7 +418,7 @@ def main():
     parser = arguments(__doc__)
     parser.add_argument("--bars", type=int, default=60, help="campaigns of bars, with and without scatter each")
     parser.add_argument("--dimples", type=int, default=40, help="campaigns of the precision of dimples")
-    parser.add_argument("--law-bars", type=int, default=40, help="planted alloys of the part on the law by bars")
+    parser.add_argument("--law-bars", type=int, default=120, help="planted alloys of the part on the law by bars")
     parser.add_argument("--laws", type=int, default=24, help="planted alloys of the part on the law")
     parser.add_argument("--jobs", type=int, default=1, help="worker processes")
     parser.add_argument("--keep", default="build/design_of_experiments", help="folder of finished campaigns")

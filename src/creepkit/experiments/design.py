@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -19,8 +18,10 @@ from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig, variations_of_tests
 from creepkit.experiments.expectations import Criterion, Expectation, PrecisionCriterion
+from creepkit.experiments.known_laws import KnownLaw
 from creepkit.experiments.law_discrimination import LawCriterion
-from creepkit.experiments.planned_outcomes import KnownLaw, PlannedOutcomes
+from creepkit.experiments.planned_design import Design, PlannedTest
+from creepkit.experiments.planned_outcomes import PlannedOutcomes
 from creepkit.experiments.rig import Rig, rigs_of
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
@@ -28,12 +29,7 @@ from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
-from creepkit.presentation import Presentable, present
 from creepkit.records import History
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 Goal = Literal["parameters", "law"] | DerivedQuantity
 
@@ -65,86 +61,6 @@ GREEDY_POOL, MOST_RUNS, LEAST_GAIN = 30, 6, 0.02
 """Candidates from which runs are chosen one after the other for a budget, how many, and the gain that ends it, nats."""
 
 
-@dataclass(frozen=True)
-class PlannedTest:
-    """A run that could be made next: what it is, and what it is expected to tell.
-
-    at_draws : whether that was worked out at draws of the posteriors, else to first order about the estimates.
-    """
-
-    candidate: CandidateTest
-    expectation: Expectation
-    at_draws: bool = False
-
-    @property
-    def description(self) -> str:
-        """What it is, in words."""
-        return self.candidate.description
-
-    @property
-    def histories(self) -> tuple[History, ...]:
-        """Its test or tests, planned."""
-        return self.candidate.histories
-
-    @property
-    def hours(self) -> float:
-        """h of the oven."""
-        return self.candidate.hours
-
-    @property
-    def first_level(self) -> float:
-        """The first load above zero: MPa, or a strain."""
-        return self.candidate.first_level
-
-    @property
-    def information_per_hour(self) -> float:
-        """Nats an hour of the oven."""
-        return self.expectation.information / self.candidate.hours
-
-
-@dataclass(frozen=True)
-class Design(Presentable):
-    """The next tests, the best first.
-
-    goal : "parameters", "law", or the name of a quantity. laws, weights : that remain, the best first.
-    tests : all that were considered; without those that were left out, {description: why}.
-    plan : the run to make, or the runs that fit the budget (h of the oven) together, and expected : what they tell.
-    current : what is known now, of the quantity or the parameters. interrupted : whether the work was stopped before
-    its end. notes : what the expectation does not include.
-    """
-
-    goal: str
-    laws: tuple[str, ...]
-    weights: tuple[float, ...]
-    tests: tuple[PlannedTest, ...]
-    left_out: tuple[tuple[str, str], ...] = ()
-    plan: tuple[PlannedTest, ...] = ()
-    expected: Expectation | None = None
-    budget: float | None = None
-    interrupted: bool = False
-    notes: tuple[str, ...] = ()
-
-    @property
-    def best(self) -> PlannedTest:
-        """The best single run; FitError where none can be made."""
-        if not self.tests:
-            raise FitError(self.sentence)
-        return self.tests[0]
-
-    @property
-    def sentence(self) -> str:
-        """The advice."""
-        return present(self, "sentence")
-
-    def to_json(self) -> dict[str, object]:
-        """Laws, advice, plan and every test considered, as JSON-able data."""
-        return present(self, "to_json")
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Map of what each candidate tells for an hour of the oven, over load and duration; written to `path`."""
-        return present(self, "plot", path)
-
-
 def design(
     source: Ranking | Identification | Sequence[Identification],
     *,
@@ -170,7 +86,7 @@ def design(
     if budget is not None and not budget > 0:
         raise FitError(f"the budget is {budget!r} h; it must be above zero")
     if chosen == "law" and len(laws) < 2:
-        return Design("law", (laws[0].law.name,), (1.0,), (), budget=budget)
+        return Design("law", (laws[0].law.name,), (1.0,), (), budget=budget, notes=_challenges(ranking))
     if candidates is not None:
         planned, given = candidates_given(candidates, rigs), True
     else:
@@ -187,7 +103,7 @@ def further_tests(ranking: Ranking, *, progress: Progress | None = None) -> Desi
     """Variations of the tests that were made, by how well they would separate the remaining laws in every direction."""
     laws, weights, _ = _remaining(ranking)
     if len(laws) < 2:
-        return Design("law", (laws[0].law.name,), (1.0,), ())
+        return Design("law", (laws[0].law.name,), (1.0,), (), notes=_challenges(ranking))
     rigs = _rigs(laws[0], None)
     fit = laws[0]
     exponent = float(fit.local_exponent(fit.reference.stress, warn=False)[0])
@@ -453,6 +369,12 @@ def _law_criterion(task: _Task, outcomes: PlannedOutcomes, seed: int) -> LawCrit
         chi_squares = np.array([law.chi_square for law in outcomes.laws])
     excess = np.array([r.excess for r in ranked])
     return LawCriterion(outcomes, task.weights, excess, chi_squares, task.ranking.independent_frames, seed)
+
+
+def _challenges(ranking: Ranking | None) -> tuple[str, ...]:
+    """What the tests allow beside the one law that remains."""
+    allowed = (ranking.challenges or ()) if ranking is not None else ()
+    return tuple(f"{challenge}: ask for goal='parameters'" for challenge in allowed)
 
 
 def _notes(laws: Sequence[Identification]) -> tuple[str, ...]:

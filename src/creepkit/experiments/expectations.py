@@ -70,7 +70,7 @@ class Criterion(Protocol):
 
 @dataclass(eq=False)
 class PrecisionCriterion:
-    """The precision of the parameters (quantity None) or of one quantity, averaged over laws with weights."""
+    """The precision of the parameters (quantity None) or of one quantity, averaged over laws with weights (laws,)."""
 
     outcomes: PlannedOutcomes
     weights: Floats

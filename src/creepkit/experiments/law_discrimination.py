@@ -26,14 +26,8 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
 from creepkit.experiments.expectations import Expectation, ExpectedChiSquare
-from creepkit.experiments.planned_outcomes import (
-    Expansion,
-    KnownLaw,
-    PlannedOutcomes,
-    nuisances_of_planned,
-    test_key,
-    values_of_nuisances,
-)
+from creepkit.experiments.known_laws import Expansion, KnownLaw, nuisances_of_planned, values_of_nuisances
+from creepkit.experiments.planned_outcomes import PlannedOutcomes, test_key
 from creepkit.inverse.composite_predictor import predict, search_predictor_of
 from creepkit.inverse.identify import search_problem
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
@@ -68,9 +62,10 @@ REFIT_TOLERANCES = Tolerances(max_steps=20, tolerance=1e-5)
 
 @dataclass(eq=False)
 class LawCriterion:
-    """The laws that remain, with weights; excess : (laws,) of the criterion of the ranking; frames : independent ones.
+    """The laws that remain.
 
-    chi_squares : (laws,) of the tests that were made.
+    weights : (laws,) -. excess : (laws,) of the criterion of the ranking. chi_squares : (laws,) of the tests that were
+    made. frames : how many of them are independent. ratios : of refitted over linear chi-squares, of tests and pairs.
     """
 
     outcomes: PlannedOutcomes

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.experiments.planned_design import kind_of_reason, precision_text
 from creepkit.report.figures import empty_figure, save_figure, wrapped
 from creepkit.report.terminal import print_table
 
@@ -16,73 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh
     from matplotlib.figure import Figure
 
-    from creepkit.experiments.design import Design, PlannedTest
     from creepkit.experiments.expectations import Expectation
+    from creepkit.experiments.planned_design import Design, PlannedTest
 
 
 ROWS = 8
 """Tests in a table."""
-
-
-USEFUL_INFORMATION = 0.05
-"""Nats below which a test tells next to nothing."""
-
-
-def design_sentence(design: Design) -> str:
-    """The advice: what to make, what it is expected to tell, and the next best."""
-    if design.goal == "law" and len(design.laws) < 2:
-        return f"one law remains, {design.laws[0]}: no further test is needed to tell laws apart"
-    if not design.tests:
-        reasons = dict.fromkeys(f"that {_kind_of(reason)}" for _, reason in design.left_out)
-        return f"no test can be made: there are only candidates {' or '.join(reasons)}" if reasons else "no candidates"
-    best, *others = design.tests
-    if design.goal == "law" and _largest_information(design) < USEFUL_INFORMATION:
-        return (
-            f"none of the {len(design.tests)} tests considered tells {_and(design.laws)} apart; the most informative "
-            f"is {best.description} ({_short(design, best.expectation)})"
-        )
-    if design.budget is not None and len(design.plan) > 1 and design.expected is not None:
-        runs = "; then ".join(test.description for test in design.plan)
-        total = sum(test.hours for test in design.plan)
-        return f"{runs} ({total:.3g} h of the oven): together {_told(design, design.expected)}"
-    first = design.plan[0] if design.plan else best
-    others = [test for test in design.tests if test is not first]
-    further = f"; next best {others[0].description} ({_short(design, others[0].expectation)})" if others else ""
-    return f"{first.description} ({first.hours:.3g} h of the oven): {_told(design, first.expectation)}{further}"
-
-
-def _largest_information(design: Design) -> float:
-    best = max(test.expectation.information for test in design.tests)
-    return best if design.expected is None else max(best, design.expected.information)
-
-
-def _and(names: tuple[str, ...]) -> str:
-    return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _told(design: Design, expected: Expectation) -> str:
-    """What a test is expected to tell, as the end of a sentence."""
-    if design.goal == "law":
-        return f"separates {_and(design.laws)} with probability {expected.probability:.2f}"
-    if np.isfinite(expected.sd):
-        return (
-            f"brings the standard deviation of the {design.goal} from {_sd(expected.current_sd)} to {_sd(expected.sd)}"
-        )
-    shrinkage = np.exp(-expected.information / max(len(expected.parameter_sd), 1))
-    return (
-        f"tells {expected.information:.2g} nats of the parameters: their intervals become {shrinkage:.2g} times as "
-        "wide in the geometric mean"
-    )
-
-
-def _sd(value: float) -> str:
-    return f"{100 * value:.2g} %" if value < 1 else f"a factor of {np.exp(min(value, 50.0)):.2g}"
-
-
-def _short(design: Design, expected: Expectation) -> str:
-    if design.goal == "law":
-        return f"{expected.probability:.2f}"
-    return _sd(expected.sd) if np.isfinite(expected.sd) else f"{expected.information:.2g} nats"
 
 
 def _columns(design: Design) -> tuple[str, ...]:
@@ -97,7 +37,7 @@ def _cells(design: Design, test: PlannedTest) -> tuple[str, ...]:
     elif design.goal == "parameters":
         last = ", ".join(f"{name} {sd:.2g}" for name, sd in e.parameter_sd.items())
     else:
-        last = _sd(e.sd)
+        last = precision_text(e.sd)
     return (test.description, f"{test.hours:.3g}", f"{e.information:.2g}", f"{test.information_per_hour:.2g}", last)
 
 
@@ -129,17 +69,12 @@ def direction_lines(design: Design) -> list[str]:
 def _ending(design: Design) -> list[str]:
     reasons: dict[str, list[str]] = {}
     for description, reason in design.left_out:
-        reasons.setdefault(_kind_of(reason), []).append(description)
+        reasons.setdefault(kind_of_reason(reason), []).append(description)
     lines = [f"left out: {len(names)} that {reason} ({names[0]})" for reason, names in reasons.items()]
     if design.interrupted:
         lines.append("stopped before the end: the best so far")
-    return ["", *lines, *design.notes] if lines or design.notes else []
-
-
-def _kind_of(reason: str) -> str:
-    """A reason without its numbers, so that alike ones are counted together."""
-    kinds = {"rupture": "would rupture", "noises": "would hardly grow", "beyond": "would grow too far"}
-    return next((kind for word, kind in kinds.items() if word in reason), reason)
+    notes = design.notes if design.tests else ()
+    return ["", *lines, *notes] if lines or notes else []
 
 
 def print_design(design: Design) -> None:
