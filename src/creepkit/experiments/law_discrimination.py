@@ -36,6 +36,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
+from creepkit.inverse.residuals import residuals_at_measured_values
 from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.search.multistart import EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct
 from creepkit.records import History
@@ -123,23 +124,23 @@ class LawCriterion:
         increments = np.empty((len(self.names), len(noisy)))
         for b in range(len(self.names)):
             ratio = self.ratios.get((_key(histories), a, b), 1.0)
-            increments[b] = self._least(b, histories, noisy, at_draws)
+            increments[b] = self._least(b, a, histories, noisy, at_draws)
             if ratio != 1.0:
-                increments[b] += (ratio - 1.0) * np.repeat(self._least(b, histories, y, at_draws), repeats)
+                increments[b] += (ratio - 1.0) * np.repeat(self._least(b, a, histories, y, at_draws), repeats)
         return increments
 
-    def _least(self, b: int, histories: Sequence[History], y: Floats, at_draws: bool) -> Floats:
-        """(outcomes,) the increase of chi-square that law b is left with at outcomes y (outcomes, data).
+    def _least(self, b: int, a: int, histories: Sequence[History], y: Floats, at_draws: bool) -> Floats:
+        """(outcomes,) increase of chi-square of law b at outcomes y (outcomes, data), under the covariance of law a.
 
         About its estimates; at draws from that draw of its posterior which explains the outcome best, by one
         Gauss-Newton step over all tests.
         """
         law = self.outcomes.laws[b]
         if not at_draws:
-            m, K = self.outcomes.of(histories, b)
+            m, K = self.outcomes.of(histories, b, a)
             return _projected(y - m, K, law.information)
         deviations, made = self._drawn(b, True), self._expansion(b)
-        parts = [self.outcomes.drawn(h, b, deviations) for h in histories]
+        parts = [self.outcomes.drawn(h, b, deviations, a) for h in histories]
         m, K = (np.concatenate([part[k] for part in parts], axis=1) for k in (0, 1))
         misfits = made.chi_square + (y**2).sum(axis=1)[:, None] - 2.0 * y @ m.T + (m**2).sum(axis=1)
         nearest, least = misfits.argmin(axis=1), np.empty(len(y))
@@ -200,7 +201,7 @@ class LawCriterion:
         Whether it was done: not where that chi-square is so small that nothing is to be corrected.
         """
         y, _ = self._true_outcomes(a, histories, True)
-        law, linear = self.outcomes.laws[b], self._least(b, histories, y, True)
+        law, linear = self.outcomes.laws[b], self._least(b, a, histories, y, True)
         chosen = int(np.argsort(linear)[linear.size // 2])
         if linear[chosen] < SMALLEST_REFITTED:
             return False
@@ -287,7 +288,11 @@ def _refitted_chi_square(law: KnownLaw, noise_model: NoiseModel, further: Sequen
     least = np.inf
     for u in starts:
         x = problem.bounds.clip(starting_point(nuisances, u, known))
-        residuals = replace(problem.residuals(x), present=problem.observations.present)
+        residuals = replace(
+            problem.residuals(x),
+            present=observations.present,
+            offset_sensitivity=residuals_at_measured_values(observations).offset_sensitivity,
+        )
         residuals = residuals.with_test_weights(_test_weights(law, len(further)))
         under = problem.with_covariance(CovarianceFactor.of_residuals(residuals, own))
         least = min(least, 2.0 * under.minimise(x, tolerances=REFIT_TOLERANCES).cost)

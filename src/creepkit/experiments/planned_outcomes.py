@@ -4,7 +4,8 @@ With q the unknowns of a law (see known_laws), the outcome of a planned test is 
 Cholesky factor of its covariance: white noise, drift and discrepancy of the noise model, and as random effects its own
 offset, its own rate and its own nuisance parameters, with their priors. Afterwards the information is A + K'K.
 
-All laws are whitened by the covariance of the first, as a ranking compares them under one covariance.
+A ranking compares laws under one covariance, that of the law which explains the tests best. What is expected if a law
+is true is therefore whitened by what that law predicts: noise depends on it where outputs are compared by logarithms.
 """
 
 from __future__ import annotations
@@ -60,12 +61,13 @@ class _Chunk:
 
 @dataclass(eq=False)
 class PlannedOutcomes:
-    """What some laws expect of planned tests; the first law sets the covariance. Each test is worked out once."""
+    """What some laws expect of planned tests, under the covariance of each. Each test is worked out once."""
 
     laws: Sequence[KnownLaw]
     progress: Callable[[str, int, int], None] | None = None
-    _known: dict[object, list[PlannedOutcome]] = field(default_factory=dict)
-    _drawn: dict[object, tuple[Floats, Floats, Bools]] = field(default_factory=dict)
+    _known: dict[object, list[list[PlannedOutcome]]] = field(default_factory=dict)
+    _drawn: dict[object, tuple[list[Floats], list[Floats], Bools]] = field(default_factory=dict)
+    _covariances: dict[object, list[CovarianceFactor]] = field(default_factory=dict)
 
     def add(self, histories: Sequence[History]) -> None:
         """Predict the planned tests that are not known yet."""
@@ -74,42 +76,51 @@ class PlannedOutcomes:
             chunk = [replace(h, name=f"plan {k}") for k, h in enumerate(fresh[start : start + CHUNK])]
             by_law = self._outcomes(chunk)
             for k, history in enumerate(fresh[start : start + CHUNK]):
-                self._known[test_key(history)] = [outcomes[k] for outcomes in by_law]
+                self._known[test_key(history)] = [[under[k] for under in outcomes] for outcomes in by_law]
             if self.progress is not None:
                 self.progress("planned tests", min(start + CHUNK, len(fresh)), len(fresh))
 
-    def of(self, histories: Sequence[History], law: int) -> tuple[Floats, Floats]:
-        """Whitened means (data,) and derivatives (data, q) of some tests that were added, end to end."""
-        outcomes = [self._known[test_key(h)][law] for h in histories]
+    def of(self, histories: Sequence[History], law: int, under: int | None = None) -> tuple[Floats, Floats]:
+        """Whitened means (data,) and derivatives (data, q) of some tests that were added, end to end.
+
+        under : the law whose covariance it is, by default its own.
+        """
+        outcomes = [self._known[test_key(h)][law][law if under is None else under] for h in histories]
         return np.concatenate([o.mean for o in outcomes]), np.concatenate([o.jacobian for o in outcomes])
 
     def outcome(self, history: History, law: int) -> PlannedOutcome:
         """That of one test that was added."""
-        return self._known[test_key(history)][law]
+        return self._known[test_key(history)][law][law]
 
     def is_known(self, history: History) -> bool:
         """Whether a test was added."""
         return test_key(history) in self._known
 
-    def drawn(self, history: History, law: int, deviations: Floats) -> tuple[Floats, Floats, Bools]:
+    def drawn(
+        self, history: History, law: int, deviations: Floats, under: int | None = None
+    ) -> tuple[Floats, Floats, Bools]:
         """Whitened predictions at draws of a law's posterior, their derivatives, and which draws rupture.
 
-        deviations : (draws, q) from the estimates; s is taken as linear. Returns (draws, data), (draws, data, q) and
-        (draws,).
+        deviations : (draws, q) from the estimates; s is taken as linear. under : as in `of`. Returns (draws, data),
+        (draws, data, q) and (draws,).
         """
         key = test_key(history), law, deviations.tobytes()
         if key not in self._drawn:
             self._drawn[key] = self._evaluated_at(replace(history, name="plan 0"), law, deviations)
-        return self._drawn[key]
+        means, jacobians, ruptures = self._drawn[key]
+        covariance = law if under is None else under
+        return means[covariance], jacobians[covariance], ruptures
 
     # ---- predictions -------------------------------------------------------------------------------------------------
 
-    def _outcomes(self, chunk: Sequence[History]) -> list[list[PlannedOutcome]]:
-        """For each law the outcomes of each test of a chunk."""
+    def _outcomes(self, chunk: Sequence[History]) -> list[list[list[PlannedOutcome]]]:
+        """For each law, under the covariance of each law, the outcomes of each test of a chunk."""
         observations = self._observations(chunk)
         predicted = [_predicted(law, chunk, observations) for law in self.laws]
-        factor = self._covariance(predicted[0], observations)
-        return [self._whitened(one, factor, observations) for one in predicted]
+        factors = [self._covariance(one, observations) for one in predicted]
+        if len(chunk) == 1:
+            self._covariances[test_key(chunk[0])] = factors
+        return [[self._whitened(one, factor, observations) for factor in factors] for one in predicted]
 
     def _whitened(
         self, predicted: _Chunk, factor: CovarianceFactor, observations: ObservationVector
@@ -151,8 +162,8 @@ class PlannedOutcomes:
         )
 
     def _covariance(self, predicted: _Chunk, observations: ObservationVector) -> CovarianceFactor:
-        """Noise, offset and rate of each planned test, and its own nuisance parameters, as the first law has them."""
-        known = self.laws[0].noise_model
+        """Noise, offset and rate of each planned test, and its own nuisance parameters, as a law predicts it."""
+        known = self.laws[0].noise_model  # the same for all; the derivatives are those of each law
         outputs = {name: known[name] for name in observations.outputs}
         noise_model = NoiseModel(outputs, known.rate, known.discrepancy, known.discrepancy_length)
         residuals = replace(
@@ -163,10 +174,12 @@ class PlannedOutcomes:
         )
         return CovarianceFactor.of_residuals(residuals, noise_model)
 
-    def _evaluated_at(self, history: History, law: int, deviations: Floats) -> tuple[Floats, Floats, Bools]:
+    def _evaluated_at(self, history: History, law: int, deviations: Floats) -> tuple[list[Floats], list[Floats], Bools]:
+        """Predictions at draws whitened by the covariance of each law, their derivatives, and which draws rupture."""
         known, observations = self.laws[law], self._observations([history])
-        factor = self._covariance(_predicted(self.laws[0], [history], observations), observations)
-        own = self._whitened(_predicted(known, [history], observations), factor, observations)[0]
+        if test_key(history) not in self._covariances:
+            outcomes = self._outcomes([history])
+            self._known.setdefault(test_key(history), [[under[0] for under in by_law] for by_law in outcomes])
         mask, nuisances = observations.present[0], nuisances_of_planned(known, [history])
         u = known.fit.u + deviations[:, : known.size]
         prediction = predict(
@@ -177,19 +190,26 @@ class PlannedOutcomes:
             nuisances=nuisances.predictor_values(values_of_nuisances(nuisances, known)),
             sensitivities=True,
         )
-        jacobian = np.tile(own.jacobian, (len(u), 1, 1))
+        derivatives = None
         if prediction.jacobian is None:
             values = candidate_residuals(observations, prediction)
         else:
             values, internal = candidate_residuals_and_jacobian(observations, prediction)
-            derivatives = np.einsum("cep,cpq->ceq", internal[:, 0], known.fit.coordinates.jacobian(u))
-            columns = np.moveaxis(derivatives, 0, 1).reshape(1, mask.size, -1)
-            whitened = factor.whiten(columns)[0][mask].reshape(-1, len(u), known.size)
-            jacobian[:, :, : known.size] = np.moveaxis(whitened, 1, 0)
+            of_u = np.einsum("cep,cpq->ecq", internal[:, 0], known.fit.coordinates.jacobian(u))
+            derivatives = of_u.reshape(1, mask.size, -1)
         transformed = np.where(observations.present, values + observations.transformed_values, 0.0)
-        mean = factor.whiten(np.moveaxis(transformed, 0, -1))[0][mask].T
-        mean = mean + deviations[:, known.size :] @ own.jacobian[:, known.size :].T
-        return np.asarray(mean), jacobian, np.isin(prediction.status[:, 0], ENDED)
+        columns = np.moveaxis(transformed, 0, -1)
+        means, jacobians = [], []
+        for under, factor in enumerate(self._covariances[test_key(history)]):
+            at_estimates = self._known[test_key(history)][law][under].jacobian
+            jacobian = np.tile(at_estimates, (len(u), 1, 1))
+            if derivatives is not None:
+                whitened = factor.whiten(derivatives)[0][mask].reshape(-1, len(u), known.size)
+                jacobian[:, :, : known.size] = np.moveaxis(whitened, 1, 0)
+            of_shared = deviations[:, known.size :] @ at_estimates[:, known.size :].T
+            means.append(np.asarray(factor.whiten(columns)[0][mask].T + of_shared))
+            jacobians.append(jacobian)
+        return means, jacobians, np.isin(prediction.status[:, 0], ENDED)
 
 
 ENDED = (int(Status.RUPTURED), int(Status.NOT_CONVERGED))
