@@ -182,7 +182,10 @@ def values_of_nuisances(nuisances: NuisanceParameters, law: KnownLaw, deviation:
 
 
 def compact_effects(effects: Floats) -> Floats:
-    """(tests, observations, effects) of each test alone: its own columns first, and no others."""
+    """The effects of each test alone: its own columns first, and no others.
+
+    effects : (tests, observations, effects) -.
+    """
     counts = (np.abs(effects).sum(axis=1) > 0).sum(axis=1)
     compact = np.zeros((*effects.shape[:2], max(int(counts.max(initial=0)), 1)))
     for k, test in enumerate(effects):
