@@ -182,7 +182,7 @@ def values_of_nuisances(nuisances: NuisanceParameters, law: KnownLaw, deviation:
 
 
 def compact_effects(effects: Floats) -> Floats:
-    """The effects of each test alone: its own columns first, and no others.
+    """(tests, observations, own effects) the effects of each test alone, in its first columns.
 
     effects : (tests, observations, effects) -.
     """
