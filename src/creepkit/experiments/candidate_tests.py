@@ -115,8 +115,8 @@ def _test_pieces(rig: Rig, base: History) -> Iterator[tuple[tuple[dict[str, floa
         for count in sorted({min(rig.tests_per_run, 2), rig.tests_per_run} - {1}):
             chosen = [values[k] for k in np.linspace(0, len(values) - 1, min(count, len(values))).round().astype(int)]
             chosen = [chosen[k % len(chosen)] for k in range(count)]
-            told = ", ".join(f"{v:.3g}" for v in chosen[:-1]) + f" and {chosen[-1]:.3g}"
-            yield tuple({name: value} for value in chosen), f"{count} {label}s of {told} mm"
+            thicknesses = ", ".join(f"{v:.3g}" for v in chosen[:-1]) + f" and {chosen[-1]:.3g}"
+            yield tuple({name: value} for value in chosen), f"{count} {label}s of {thicknesses} mm"
 
 
 def _levels(rig: Rig) -> list[float]:

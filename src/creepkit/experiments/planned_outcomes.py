@@ -25,7 +25,7 @@ from creepkit.inverse.residuals import candidate_residuals, candidate_residuals_
 from creepkit.records import History, Predictor, Status
 
 CHUNK = 8
-"""Planned tests that are predicted at once: between two chunks progress is told, and a stop is heard."""
+"""Planned tests that are predicted at once: between two chunks progress is reported, and a stop takes effect."""
 
 
 @dataclass(frozen=True, eq=False)
