@@ -26,6 +26,8 @@ from .dataset.storage import write_dataset as write_dataset
 from .discovery.discover import discover as discover
 from .discovery.discover import group_by_temperature as group_by_temperature
 from .discovery.discover import temperature_study as temperature_study
+from .experiments.design import design as design
+from .experiments.rig import Rig as Rig
 from .fem.mesh_files import read_mesh as read_mesh
 from .forecasts.forecast import Forecast as Forecast
 from .forecasts.forecast import forecast as forecast
@@ -45,6 +47,8 @@ from .inverse.sparsity.penalties import Sqrt as Sqrt
 from .inverse.sparsity.penalties import Subsets as Subsets
 from .inverse.sparsity.term_selection import penalty_path as penalty_path
 from .inverse.uncertainty.model_averaging import rate_band as rate_band
+from .inverse.uncertainty.quantities import exponent_at as exponent_at
+from .inverse.uncertainty.quantities import rate_at as rate_at
 from .jobs.worker_pools import ParallelExecution as ParallelExecution
 from .kernels.lowering import lower as lower
 from .language.elastic import Elastic as Elastic

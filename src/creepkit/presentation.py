@@ -49,7 +49,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "text": "creepkit.report.ranking:ranking_text",
         "plot": "creepkit.report.ranking_plot:ranking_figure",
         "forecast": "creepkit.forecasts.forecast:forecast",
-        "further_tests": "creepkit.experiments.discriminating_experiments:further_tests",
+        "further_tests": "creepkit.experiments.design:further_tests",
     },
     "Sparsity": {"text": "creepkit.report.search:sparsity_text"},
     "PenaltyPath": {
@@ -94,7 +94,11 @@ PRESENTERS: dict[str, dict[str, str]] = {
     },
     "TemperatureStudy": {"text": "creepkit.report.temperature_law:temperature_study_text"},
     "ModulusEstimates": {"text": "creepkit.report.temperature_law:modulus_estimates_text"},
-    "DiscriminationDesign": {"text": "creepkit.report.ranking:discrimination_design_text"},
+    "Design": {
+        "text": "creepkit.report.design:design_text",
+        "to_json": "creepkit.report.design:design_to_json",
+        "plot": "creepkit.report.design:design_figure",
+    },
 }
 """{class: {verb: "module:function"}}. The verb "text" is what `str` and `print` show; other verbs are methods."""
 

@@ -57,6 +57,7 @@ BENCHMARKS = {
     "identification_speed": Benchmark(1),
     "search_success": Benchmark(15, (("--specimens", "6", "--searches", "default", "cma"),)),
     "swarm_speed": Benchmark(1),
+    "design_of_experiments": Benchmark(90),
     "law_recovery": Benchmark(45, (("--specimens", "24", "--others", "10"),)),
     "penalty_confusion": Benchmark(
         12, (("--specimens", "2", "--penalties", "L2", "GroupL2", "Sqrt", "Subsets", "paper"),)

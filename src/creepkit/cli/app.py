@@ -17,6 +17,7 @@ from creepkit.cli import (
     confirm,
     data,
     demo,
+    design,
     discover,
     export,
     generate,
@@ -93,6 +94,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "screen": screen.command,
     "confirm": confirm.command,
     "predict": predict.command,
+    "design": design.command,
     "export": export.command,
     "demo": demo.command,
 }

@@ -166,8 +166,7 @@ def command(
     else:
         print_ranking(ranking, written, len(histories))
     if further:
-        for proposed_test in ranking.further_tests():
-            typer.echo(str(proposed_test), err=as_json)
+        typer.echo(str(ranking.further_tests()), err=as_json)
 
 
 def _truncate_at_strain(histories: list[History], limit: float) -> list[History]:

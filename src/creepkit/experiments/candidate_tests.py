@@ -1,176 +1,265 @@
-"""Candidates for further tests: variations of the tests that were made, within what the same equipment can do."""
+"""Candidates for further tests: runs of the oven that a rig can make, and variations of the tests that were made."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Literal
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import predictor_for
-from creepkit.records import (
-    History,
-    Loading,
-    Predictor,
-    PressureJump,
-    StrainSteps,
-    StressSteps,
-    constant_strain,
-    constant_stress,
-)
+from creepkit.experiments.rig import HIGHER_LEVEL, LOWER_LEVEL, Rig
+from creepkit.records import History, Loading, PressureJump, StrainSteps, StressSteps, constant_strain, constant_stress
 from creepkit.records.loading import Quantity
 
 ControlledQuantity = Literal["load", "stress"]
 
 
-CANDIDATE_FRAMES = 40
-"""Of a planned test, half spread over time and half over its logarithm."""
+FEWEST_FRAMES, MOST_FRAMES = 20, 60
+"""Frames of a planned test: one each interval of the rig's frames, but no fewer and no more than these."""
 
 
-LOWER_LEVEL, HIGHER_LEVEL, EXTENSION = 0.7, 1.4, 2.0
-"""Levels of further tests, over the lowest and the highest level of those made; and how much longer they may be."""
+LEVELS, DURATIONS, CHANGE_AT = 5, (0.1, 0.2, 0.35, 0.6, 1.0), 1.0 / 3.0
+"""Of the grid: levels between the least and the greatest, durations over the longest, and when the load is changed."""
+
+
+LARGEST_CHANGE = 2.0
+"""Ratio of two levels of one test."""
 
 
 @dataclass(frozen=True)
 class CandidateTest:
-    """A test that could be made: its history, without outputs, and what it is in words."""
+    """A run of the oven that could be made.
+
+    description : in words. histories : the test or tests that it holds, without outputs, which share the oven.
+    hours : h of the oven.
+    """
 
     description: str
-    history: History
+    histories: tuple[History, ...]
+    hours: float
+
+    @property
+    def duration(self) -> float:
+        """s, of its longest test."""
+        return max(float(h.times[-1]) for h in self.histories)
+
+    @property
+    def first_level(self) -> float:
+        """The first load above zero of its first test."""
+        levels = self.histories[0].loading.program().values
+        return float(levels[levels > 0][0])
 
 
-def candidate_tests(
-    histories: Sequence[History], exponent: float = 0.0, predictor: Predictor | None = None
-) -> tuple[CandidateTest, ...]:
-    """Variations of tests that were made: other levels, a change of level, longer; of bulge tests, other thickness.
+# ---- grids -----------------------------------------------------------------------------------------------------------
 
-    Each is made on the longest test of its kind of loading. A bar at another stress is tested for a time that goes
-    with stress^-exponent, so that it strains as much, but never for more than twice as long. The thickness that is
-    varied is that of the history, else that of the specimen `predictor`.
+
+def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperature: bool = True) -> list[CandidateTest]:
+    """What a rig can make: constant loads and changes of load, durations, temperatures and dimensions.
+
+    base : a test that was made of that specimen; what is not varied is as there. budget : h, the most that one may
+    take. by_temperature : whether the temperature is varied, else it is that of `base`.
     """
-    candidates: list[CandidateTest] = []
-    for quantity in dict.fromkeys(h.loading.quantity for h in histories):
-        tests = [h for h in histories if h.loading.quantity == quantity]
-        if quantity in _VARIATIONS:
-            longest = _with_apex_thickness(max(tests, key=lambda h: float(h.times[-1])), predictor)
-            levels = np.concatenate([h.loading.program().values for h in tests])
-            candidates += _VARIATIONS[quantity](longest, levels[levels > 0], exponent)
-    if not candidates:
-        kinds = ", ".join(dict.fromkeys(h.loading.quantity for h in histories))
-        raise FitError(f"no further tests are known for a loading by {kinds}; give designs=, a list of histories")
-    return tuple(candidates)
+    longest = min(rig.longest_hours, budget - rig.setup_hours) * 3600.0
+    if longest <= 0:
+        raise FitError(f"a budget of {budget:g} h leaves no time for a test beside {rig.setup_hours:g} h to set it up")
+    quantity = base.loading.quantity
+    if quantity not in _LOADINGS:
+        raise FitError(f"no further tests are known for a loading by {quantity}; give candidates=, a list of histories")
+    temperatures: tuple[float, ...] = rig.temperatures if by_temperature else (base.mean_temperature,)
+    pieces = [*_test_pieces(rig, base)]
+    candidates = []
+    for duration, T in product([f * longest for f in DURATIONS], temperatures):
+        for loading, text in _LOADINGS[quantity](rig, base, duration):
+            at_temperature = f" at {T:.5g} K" if len(temperatures) > 1 else ""
+            whole = f"{text} for {hours_text(duration)}{at_temperature}"
+            times = frame_times(duration, rig.frame_interval)
+            for dimensions, pieces_text in pieces:
+                description = f"{pieces_text} at {whole}" if pieces_text else whole
+                histories = tuple(
+                    base.replace(
+                        times=times,
+                        outputs={},
+                        standard_deviation={},
+                        loading=loading,
+                        temperature=T,
+                        geometry={**base.geometry, **one},
+                        name=f"plan: {description}" + (f", {k + 1}" if len(dimensions) > 1 else ""),
+                        specimen=rig.specimen,
+                    )
+                    for k, one in enumerate(dimensions)
+                )
+                candidates.append(CandidateTest(description, histories, duration / 3600.0 + rig.setup_hours))
+    return candidates
 
 
-def _with_apex_thickness(history: History, predictor: Predictor | None) -> History:
-    """The history, stating the apex thickness of its specimen where that has one and the history does not say."""
-    specimen = None if predictor is None else getattr(predictor_for(predictor, history), "geometry", None)
-    nominal = getattr(specimen, "apex_thickness", None)
-    if nominal is None or "apex_thickness" in history.geometry:
-        return history
-    return replace(history, geometry={**history.geometry, "apex_thickness": float(nominal)})
+def frame_times(duration: float, interval: float) -> Floats:
+    """(frames,) s, of a planned test: frames at their interval, at least FEWEST_FRAMES and at most MOST_FRAMES."""
+    count = int(np.clip(round(duration / interval), FEWEST_FRAMES, MOST_FRAMES))
+    return np.asarray(np.arange(1, count + 1) * (duration / count), float)
 
 
-def candidate_test(
-    base_history: History, description: str, loading: Loading, end_time: float, **changes: object
-) -> CandidateTest:
-    """A test like `base_history` under another loading, to `end_time`, s; without outputs."""
-    first_time = float(base_history.times[base_history.times > 0][0]) * end_time / float(base_history.times[-1])
-    times = np.unique(
-        np.concatenate(
-            [
-                np.geomspace(first_time, end_time, CANDIDATE_FRAMES // 2),
-                np.linspace(first_time, end_time, CANDIDATE_FRAMES // 2 + 1),
-            ]
-        )
-    )
-    history = base_history.replace(
-        times=times, outputs={}, standard_deviation={}, loading=loading, name=f"plan: {description}"
-    )
-    return CandidateTest(description, replace(history, **changes) if changes else history)  # type: ignore[arg-type]
+def _test_pieces(rig: Rig, base: History) -> Iterator[tuple[tuple[dict[str, float], ...], str]]:
+    """The test pieces of one run, as lengths that differ from those of `base`: each alone, then several at once."""
+    if not rig.dimensions:
+        count = rig.tests_per_run
+        yield from (((({},) * k), "" if k == 1 else f"{k} specimens") for k in sorted({1, count}))
+        return
+    for name, values in rig.dimensions.items():
+        label = "dimple" if base.loading.quantity == "pressure" else name.replace("_", " ")
+        for value in values:
+            yield ({name: value},), f"a {label} of {value:.3g} mm"
+        for count in sorted({min(rig.tests_per_run, 2), rig.tests_per_run} - {1}):
+            chosen = [values[k] for k in np.linspace(0, len(values) - 1, min(count, len(values))).round().astype(int)]
+            chosen = [chosen[k % len(chosen)] for k in range(count)]
+            thicknesses = ", ".join(f"{v:.3g}" for v in chosen[:-1]) + f" and {chosen[-1]:.3g}"
+            yield tuple({name: value} for value in chosen), f"{count} {label}s of {thicknesses} mm"
 
 
-def _stress_variations(base_history: History, levels: Floats, exponent: float) -> Iterator[CandidateTest]:
-    lowest, highest, end_time = float(levels.min()), float(levels.max()), float(base_history.times[-1])
-    middle, base_level = float(np.sqrt(lowest * highest)), float(base_history.loading.program().values.max())
-    control: ControlledQuantity = getattr(base_history.loading, "control", "stress")
-    for level in (LOWER_LEVEL * lowest, HIGHER_LEVEL * highest, EXTENSION * highest):
-        duration = end_time * min((level / base_level) ** -exponent, EXTENSION)
-        yield candidate_test(
-            base_history, f"{level:.3g} MPa for {_hours_text(duration)}", constant_stress(level, control), duration
-        )
-    for factor in (HIGHER_LEVEL, LOWER_LEVEL):
-        change = StressSteps(((0.0, middle), (0.5 * end_time, factor * middle)), control)
-        hold, end = _hours_text(0.5 * end_time), _hours_text(end_time)
-        description = f"{middle:.3g} MPa, from {hold} on {factor * middle:.3g} MPa, for {end}"
-        yield candidate_test(base_history, description, change, end_time)
-    yield candidate_test(
-        base_history,
-        f"{middle:.3g} MPa for {_hours_text(EXTENSION * end_time)}",
-        constant_stress(middle, control),
-        EXTENSION * end_time,
-    )
+def _levels(rig: Rig) -> list[float]:
+    low, high = rig.levels
+    return [float(f"{level:.3g}") for level in np.geomspace(low, high, LEVELS if high > low else 1)]
 
 
-def _pressure_variations(base_history: History, levels: Floats, _: float) -> Iterator[CandidateTest]:
-    lowest, highest, end_time = float(levels.min()), float(levels.max()), float(base_history.times[-1])
-    ramp = float(getattr(base_history.loading, "ramp", 5.0))
-    for level in (LOWER_LEVEL * lowest, LOWER_LEVEL * highest, HIGHER_LEVEL * highest):
-        description = f"a constant {level:.3g} MPa for {_hours_text(end_time)}"
-        yield candidate_test(base_history, description, PressureJump(level, level, 0.5 * end_time, ramp), end_time)
-    for first, second in ((lowest, HIGHER_LEVEL * highest), (LOWER_LEVEL * lowest, HIGHER_LEVEL * highest)):
-        description = (
-            f"{first:.3g} MPa, from {_hours_text(0.5 * end_time)} on {second:.3g} MPa, for {_hours_text(end_time)}"
-        )
-        yield candidate_test(base_history, description, PressureJump(first, second, 0.5 * end_time, ramp), end_time)
-    yield candidate_test(
-        base_history,
-        f"the same loading for {_hours_text(EXTENSION * end_time)}",
-        base_history.loading,
-        EXTENSION * end_time,
-    )
-    thickness = base_history.geometry.get("apex_thickness")
-    for varied in () if thickness is None else (0.9 * thickness, 1.1 * thickness):
-        geometry = {**base_history.geometry, "apex_thickness": varied}
-        yield candidate_test(
-            base_history,
-            f"a dimple of {varied:.3g} mm under the same loading",
-            base_history.loading,
-            end_time,
-            geometry=geometry,
+def _pairs(rig: Rig) -> Iterator[tuple[float, float]]:
+    """Neighbouring levels up, two levels apart up, and neighbours down."""
+    levels = _levels(rig) if rig.load_changes else []
+    for first, second in product(levels, levels):
+        if first != second and max(first / second, second / first) <= LARGEST_CHANGE:
+            yield first, second
+
+
+def _pressures(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
+    ramp = min(float(getattr(base.loading, "ramp", 5.0)), 0.1 * duration)
+    for level in _levels(rig):
+        yield PressureJump(level, level, 0.5 * duration, ramp), f"{level:.3g} MPa"
+    for first, second in _pairs(rig):
+        change = CHANGE_AT * duration
+        yield (
+            PressureJump(first, second, change, ramp),
+            f"{first:.3g} MPa, from {hours_text(change)} on {second:.3g} MPa,",
         )
 
 
-def _strain_variations(base_history: History, levels: Floats, _: float) -> Iterator[CandidateTest]:
-    lowest, highest, end_time = float(levels.min()), float(levels.max()), float(base_history.times[-1])
-    ramp = float(getattr(base_history.loading, "ramp", 0.0))
-    for level in (LOWER_LEVEL * lowest, HIGHER_LEVEL * highest):
-        yield candidate_test(
-            base_history, f"a strain of {level:.3g} for {_hours_text(end_time)}", constant_strain(level, ramp), end_time
-        )
-    change = StrainSteps(((0.0, lowest), (0.5 * end_time, EXTENSION * highest)), ramp)
-    yield candidate_test(
-        base_history,
-        f"a strain of {lowest:.3g}, from {_hours_text(0.5 * end_time)} on {EXTENSION * highest:.3g}",
-        change,
-        end_time,
-    )
-    yield candidate_test(
-        base_history,
-        f"the same strain for {_hours_text(EXTENSION * end_time)}",
-        base_history.loading,
-        EXTENSION * end_time,
-    )
+def _stresses(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
+    control: ControlledQuantity = getattr(base.loading, "control", "stress")
+    for level in _levels(rig):
+        yield constant_stress(level, control), f"{level:.3g} MPa"
+    for first, second in _pairs(rig):
+        change = CHANGE_AT * duration
+        steps = StressSteps(((0.0, first), (change, second)), control)
+        yield steps, f"{first:.3g} MPa, from {hours_text(change)} on {second:.3g} MPa,"
 
 
-def _hours_text(seconds: float) -> str:
+def _strains(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
+    ramp = min(float(getattr(base.loading, "ramp", 0.0)), 0.1 * duration)
+    for level in _levels(rig):
+        yield constant_strain(level, ramp), f"a strain of {level:.3g}"
+    for first, second in _pairs(rig):
+        change = CHANGE_AT * duration
+        steps = StrainSteps(((0.0, first), (change, second)), ramp)
+        yield steps, f"a strain of {first:.3g}, from {hours_text(change)} on {second:.3g},"
+
+
+_LOADINGS: dict[Quantity, Callable[[Rig, History, float], Iterator[tuple[Loading, str]]]] = {
+    "pressure": _pressures,
+    "stress": _stresses,
+    "strain": _strains,
+}
+
+
+def hours_text(seconds: float) -> str:
+    """A duration as people say it."""
     return f"{seconds / 3600.0:.3g} h"
 
 
-_VARIATIONS: dict[Quantity, Callable[[History, Floats, float], Iterator[CandidateTest]]] = {
-    "stress": _stress_variations,
-    "pressure": _pressure_variations,
-    "strain": _strain_variations,
-}
+# ---- variations of tests that were made ------------------------------------------------------------------------------
+
+
+def variations_of_tests(
+    histories: Sequence[History], rigs: Sequence[Rig], exponent: float = 0.0
+) -> tuple[CandidateTest, ...]:
+    """Variations of tests that were made: other levels, a change of level, longer; other dimensions.
+
+    Each is made on the longest test of its specimen. A bar at another stress is tested for a time that goes with
+    stress^-exponent, so that it strains as much, but never for longer than the rig can.
+    """
+    candidates: list[CandidateTest] = []
+    for rig in rigs:
+        tests = [h for h in histories if h.specimen == rig.specimen and h.loading.quantity in _LOADINGS]
+        if tests:
+            levels = np.concatenate([h.loading.program().values for h in tests])
+            candidates += _variations(rig, max(tests, key=lambda h: float(h.times[-1])), levels[levels > 0], exponent)
+    if not candidates:
+        kinds = ", ".join(dict.fromkeys(h.loading.quantity for h in histories))
+        raise FitError(f"no further tests are known for a loading by {kinds}; give candidates=, a list of histories")
+    return tuple(candidates)
+
+
+def _variations(rig: Rig, base: History, made_levels: Floats, exponent: float) -> Iterator[CandidateTest]:
+    low, high = float(made_levels.min()), float(made_levels.max())
+    end, longest = float(base.times[-1]), rig.longest_hours * 3600.0
+    base_level = float(base.loading.program().values.max())
+    at_levels = rig.replace(load_changes=False)
+    loadings = _LOADINGS[base.loading.quantity]
+    for level in dict.fromkeys((rig.levels[0], LOWER_LEVEL * high, rig.levels[1])):
+        is_bar = base.loading.quantity == "stress"
+        duration = min(end * (level / base_level) ** -exponent, longest) if is_bar else end
+        yield from _made(at_levels.replace(levels=(level, level)), base, duration, loadings)
+    middle = float(np.sqrt(low * high))
+    for first, second in ((low, HIGHER_LEVEL * high), (middle, LOWER_LEVEL * middle), (middle, HIGHER_LEVEL * middle)):
+        pair = rig.replace(levels=(min(first, second), max(first, second)))
+        for candidate in _made(pair, base, end, loadings):
+            program = candidate.histories[0].loading.program().values
+            begin, end_level = candidate.first_level, float(program[-1])
+            if abs(begin - first) < 0.01 * first and abs(end_level - second) < 0.01 * second:
+                yield candidate
+    if longest > end:
+        yield _like(base, "the same loading", longest, rig)
+    for name, values in rig.dimensions.items():
+        for value in values:
+            changed = replace(base, geometry={**base.geometry, name: value})
+            if abs(value / base.geometry.get(name, rig.dimensions[name][len(values) // 2]) - 1.0) > 1e-3:
+                text = f"a {'dimple' if base.loading.quantity == 'pressure' else name} of {value:.3g} mm"
+                yield _like(changed, f"{text} under the same loading", end, rig)
+
+
+def _made(
+    rig: Rig, base: History, duration: float, loadings: Callable[[Rig, History, float], Iterator[tuple[Loading, str]]]
+) -> Iterator[CandidateTest]:
+    for loading, text in loadings(rig, base, duration):
+        yield _like(replace(base, loading=loading), text, duration, rig)
+
+
+def _like(base: History, text: str, duration: float, rig: Rig) -> CandidateTest:
+    description = f"{text} for {hours_text(duration)}"
+    history = base.replace(
+        times=frame_times(duration, rig.frame_interval), outputs={}, standard_deviation={}, name=f"plan: {description}"
+    )
+    return CandidateTest(description, (history,), duration / 3600.0 + rig.setup_hours)
+
+
+def candidates_given(histories: Sequence[History | CandidateTest], rigs: Sequence[Rig]) -> list[CandidateTest]:
+    """Planned tests that a user gives, with names of their own; FitError for one that no rig can make."""
+    candidates = []
+    for given in histories:
+        if isinstance(given, CandidateTest):
+            candidates.append(given)
+            continue
+        rig = next((r for r in rigs if r.specimen == given.specimen), None)
+        if rig is None:
+            known = " and ".join(f"'{r.specimen}'" for r in rigs)
+            raise FitError(
+                f"the planned test '{given.name}' is of specimen '{given.specimen}', but the law was identified from "
+                f"tests of {known}"
+            )
+        refusal = rig.refusal(given)
+        if refusal:
+            raise FitError(f"the planned test '{given.name}' cannot be made: {refusal}")
+        planned = replace(given, name=f"plan: {given.name}", outputs={}, standard_deviation={})
+        hours = float(given.times[-1]) / 3600.0 + rig.setup_hours
+        candidates.append(CandidateTest(given.name, (planned,), hours))
+    return candidates

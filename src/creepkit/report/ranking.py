@@ -1,4 +1,4 @@
-"""Text of rankings of laws, as a whole and as rows of a table, and of tests that would decide between laws."""
+"""Text of rankings of laws, as a whole and as rows of a table."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from creepkit.report.terminal import print_table
 
 if TYPE_CHECKING:
-    from creepkit.experiments.discriminating_experiments import DiscriminationDesign
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.selection.ranking import Ranking
@@ -43,12 +42,6 @@ def _equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
     if any(r.fit.predictor is None or not r.fit.histories for r in ranking.laws):
         return []
     return [pair for pair in ranking.equivalents() if {pair.first, pair.second} <= names]
-
-
-def discrimination_design_text(design: DiscriminationDesign) -> str:
-    """The most informative test in a sentence, then the expected chi-square of each, and those that burst at once."""
-    rows = [f"  {test.chi_square:9.3g}  {test.description}" for test in design.experiments]
-    return "\n".join([design.sentence, *rows, *(f"      burst  {name}" for name in design.excluded)])
 
 
 def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) -> None:

@@ -131,8 +131,8 @@ class Ranking(Presentable):
         """What tests will show, over all laws by their weights; as creepkit.forecast()."""
         return present(self, "forecast", tests, level=level, **options)
 
-    def further_tests(self) -> tuple[Any, ...]:
-        """A DiscriminationDesign for each remaining law: tests that would tell it from the best (some seconds)."""
+    def further_tests(self) -> Any:
+        """A Design: variations of the tests, by how well they would separate the remaining laws (some seconds)."""
         return present(self, "further_tests")
 
     def plot(self, path: str | Path | None = None) -> Figure:

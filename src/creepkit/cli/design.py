@@ -1,0 +1,151 @@
+"""`creepkit design`: the next tests, by what they are expected to tell for each hour of the oven."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from creepkit.report.terminal import ProgressBar, print_json
+
+if TYPE_CHECKING:
+    from creepkit.experiments.design import Goal
+    from creepkit.experiments.rig import Rig
+    from creepkit.inverse.identification import Identification
+
+
+def command(
+    fits: Annotated[
+        list[Path], typer.Argument(metavar="FIT.json...", help="Identifications of the same tests that were saved.")
+    ],
+    tests: Annotated[
+        list[str], typer.Option("--tests", metavar="TESTS", help="Their measured files, folders or patterns.")
+    ],
+    goal: Annotated[
+        str | None,
+        typer.Option(
+            metavar="GOAL",
+            help="law, parameters, or rate:STRESS or rate:STRESS:TEMPERATURE (MPa, K); by default the law where more "
+            "than one remains.",
+        ),
+    ] = None,
+    budget: Annotated[float | None, typer.Option(metavar="HOURS", help="Oven hours for one run or several.")] = None,
+    levels: Annotated[
+        str | None, typer.Option(metavar="LOW:HIGH", help="What the rig can load: MPa, or a strain; 4:14.")
+    ] = None,
+    longest: Annotated[float | None, typer.Option(metavar="HOURS", help="The rig's longest test.")] = None,
+    temperature: Annotated[
+        list[float] | None, typer.Option(metavar="K", help="At which tests can be made; may be given several times.")
+    ] = None,
+    dimension: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LENGTH=MM,...", help="Test pieces that can be made: apex_thickness=0.44,0.5,0.58."),
+    ] = None,
+    tests_per_run: Annotated[
+        int | None, typer.Option(metavar="COUNT", help="Test pieces that the oven takes at once.")
+    ] = None,
+    setup_hours: Annotated[
+        float | None, typer.Option(metavar="HOURS", help="Of the oven for each run, beside its test.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the draws.")] = 0,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a map of what tests tell, .png, .svg or .pdf.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Say which test to make next.
+
+    What is not said of the rig is a little more than what it did. Ctrl-C ends the work with the best so far.
+    """
+    import creepkit as ck
+    from creepkit.experiments.rig import rigs_of
+    from creepkit.report.design import design_to_json, print_design
+    from creepkit.report.figures import check_figure_target
+
+    if plot is not None:
+        check_figure_target(plot)
+    histories = ck.read_histories(tests)
+    identified: list[Identification] = [ck.load(path).with_histories(histories) for path in fits]
+    changes = rig_changes(
+        levels=levels, longest=longest, temperature=temperature, dimension=dimension, tests_per_run=tests_per_run,
+        setup_hours=setup_hours,
+    )  # fmt: skip
+    predictor = identified[0].predictor
+    assert predictor is not None
+    rigs: list[Rig] = [rig.replace(**changes) for rig in rigs_of(identified[0].histories, predictor)]
+    with ProgressBar() as progress:
+        result = ck.design(
+            identified[0] if len(identified) == 1 else identified,
+            rig=rigs,
+            goal=parse_goal(goal),
+            budget=budget,
+            seed=seed,
+            progress=progress.tick,
+        )
+    if plot is not None:
+        result.plot(plot)
+    if as_json:
+        print_json(design_to_json(result))
+        return
+    print_design(result)
+    if plot is not None:
+        typer.echo(f"wrote {plot}")
+
+
+def parse_goal(text: str | None) -> Goal | None:
+    """The goal, from law, parameters, rate:60 or rate:60:1073."""
+    from creepkit.errors import FitError
+    from creepkit.inverse.uncertainty.quantities import rate_at
+
+    if text is None or text == "parameters":
+        return "parameters" if text else None
+    if text == "law":
+        return "law"
+    kind, *numbers = text.split(":")
+    try:
+        values = [float(number) for number in numbers]
+    except ValueError:
+        values = []
+    if kind != "rate" or not 1 <= len(values) <= 2 or min(values) <= 0:
+        raise FitError(f"--goal {text} is not known; write law, parameters, rate:60 or rate:60:1073 (MPa, K)")
+    return rate_at(*values)
+
+
+def rig_changes(
+    *,
+    levels: str | None,
+    longest: float | None,
+    temperature: Sequence[float] | None,
+    dimension: Sequence[str] | None,
+    tests_per_run: int | None,
+    setup_hours: float | None,
+) -> dict[str, Any]:
+    """Fields of a rig that were said."""
+    given: dict[str, Any] = {
+        "levels": None if levels is None else tuple(_numbers(levels, ":", "--levels", "4:14", count=2)),
+        "longest_hours": longest,
+        "temperatures": tuple(temperature) if temperature else None,
+        "tests_per_run": tests_per_run,
+        "setup_hours": setup_hours,
+    }
+    if dimension:
+        parts = [text.partition("=") for text in dimension]
+        given["dimensions"] = {
+            name.strip(): tuple(_numbers(values, ",", "--dimension", "apex_thickness=0.44,0.5,0.58"))
+            for name, _, values in parts
+        }
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def _numbers(text: str, separator: str, option: str, example: str, count: int | None = None) -> list[float]:
+    from creepkit.errors import FitError
+
+    try:
+        values = [float(part) for part in text.split(separator)]
+    except ValueError:
+        values = []
+    if not values or (count is not None and len(values) != count):
+        raise FitError(f"{option} {text} is not known; write {option} {example}")
+    return values

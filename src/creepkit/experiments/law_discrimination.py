@@ -1,0 +1,312 @@
+"""Expected discrimination of laws: chi-squares in every direction, and the probability of a right verdict.
+
+Let law a be true with its weight, at a draw of its posterior, and y be the whitened outcome of a planned test with its
+noise. To first order law b, refitted to the tests that were made and to this one, leaves
+
+    Q_b = |r|^2 - r'K (A + K'K)^-1 K'r,    r = y - m_b
+
+more than before (see planned_outcomes): r'S^-1 r with S = I + K A^-1 K' the covariance of what b predicts. The
+chi-square of b then lies above that of a by Q_b - Q_a more than now, and weights follow as those of a ranking do. What
+a law with bounds, far from its estimates, leaves in truth is found for the best candidates by a refit in full: the
+search of an identification, from several starts, over all tests. Its ratio to the linear value corrects Q_b. Before
+that the step begins at the draw of the posterior of b which explains the outcome best.
+
+The information is the mutual information of law and outcome (Box & Hill (1967), Technometrics 9, 57), in nats: the mean
+decrease of the entropy of the weights. The mean of chi-square over laws, with weights, is the T-criterion (Atkinson &
+Fedorov (1975), Biometrika 62, 57); it grows without limit where a verdict is certain already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import CreepkitError
+from creepkit.experiments.expectations import Expectation, ExpectedChiSquare
+from creepkit.experiments.known_laws import Expansion, KnownLaw, nuisances_of_planned, values_of_nuisances
+from creepkit.experiments.planned_outcomes import PlannedOutcomes, test_key
+from creepkit.inverse.composite_predictor import predict, search_predictor_of
+from creepkit.inverse.identify import search_problem
+from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
+from creepkit.inverse.iterative_estimation import starting_point
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel
+from creepkit.inverse.observation_vector import ObservationVector
+from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
+from creepkit.inverse.residuals import residuals_at_measured_values
+from creepkit.inverse.search.local_refinement import Tolerances
+from creepkit.inverse.search.multistart import EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct
+from creepkit.records import History
+
+LINEAR_DRAWS, REPEATS = 64, 2
+"""Of the linearised posterior, and of the noise for each."""
+
+
+POSTERIOR_DRAWS, POSTERIOR_REPEATS = 16, 12
+"""Of the posterior itself, with a prediction each."""
+
+
+SMALLEST_REFITTED = 3.0
+"""A chi-square that is linearly less than this is not corrected: a ratio of it says nothing."""
+
+
+RATIO_LIMITS = (0.0, 5.0)
+"""Of the refitted over the linear chi-square."""
+
+
+REFIT_TOLERANCES = Tolerances(max_steps=20, tolerance=1e-5)
+"""Of a refit, from each of its starts."""
+
+
+@dataclass(eq=False)
+class LawCriterion:
+    """The laws that remain.
+
+    weights : (laws,) -. excess : (laws,) of the criterion of the ranking. chi_squares : (laws,) of the tests that were
+    made. frames : how many of them are independent. ratios : of refitted over linear chi-squares, of tests and pairs.
+    """
+
+    outcomes: PlannedOutcomes
+    weights: Floats
+    excess: Floats
+    chi_squares: Floats
+    frames: float
+    seed: int = 0
+    ratios: dict[tuple[object, int, int], float] = field(default_factory=dict)
+    _baseline: dict[int, float] = field(default_factory=dict)
+    _deviations: dict[int, Floats] = field(default_factory=dict)
+    _expansions: dict[int, Expansion] = field(default_factory=dict)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the laws."""
+        return [law.fit.law.name for law in self.outcomes.laws]
+
+    def expectation(self, histories: Sequence[History], *, at_draws: bool = False) -> Expectation:
+        """Information, probability of a right verdict and chi-squares of every direction, with these tests."""
+        weight = self.weights / self.weights.sum()
+        log_weight, penalty = np.log(weight), self._penalties(histories)
+        information, right, wrong, chi_squares = 0.0, 0.0, 0.0, []
+        for a, name in enumerate(self.names):
+            Q = self._increments(a, histories, at_draws)
+            score = self.excess + penalty + Q.T
+            score = score - score.min(axis=1, keepdims=True)
+            posterior = np.exp(-0.5 * score)
+            posterior /= posterior.sum(axis=1, keepdims=True)
+            information += weight[a] * float(np.mean(np.log(np.maximum(posterior[:, a], 1e-300)) - log_weight[a]))
+            decided = posterior > DECISIVE_WEIGHT
+            right += weight[a] * float(decided[:, a].mean())
+            wrong += weight[a] * float(np.delete(decided, a, axis=1).any(axis=1).mean())
+            for b, other in enumerate(self.names):
+                if a != b:
+                    current = float(self.chi_squares[b] - self.chi_squares[a])
+                    expected = current + float(np.median(Q[b] - Q[a]))
+                    is_refitted = (_key(histories), a, b) in self.ratios
+                    chi_squares.append(ExpectedChiSquare(name, other, current, expected, is_refitted))
+        chi_squares.sort(key=lambda each: -weight[self.names.index(each.reference_law)])
+        return Expectation(max(information, 0.0), probability=right, wrong=wrong, chi_squares=tuple(chi_squares))
+
+    def _penalties(self, histories: Sequence[History]) -> Floats:
+        """(laws,) growth of the penalty K ln n of BIC with the frames of these tests."""
+        if not np.isfinite(self.frames):
+            return np.zeros(len(self.names))
+        count = sum(self.outcomes.outcome(h, 0).mean.size for h in histories)
+        return np.array([law.size for law in self.outcomes.laws]) * float(np.log1p(count / self.frames))
+
+    def _increments(self, a: int, histories: Sequence[History], at_draws: bool) -> Floats:
+        """(laws, outcomes) Q of each law, if a is true: over draws of its posterior and of the noise."""
+        y, repeats = self._true_outcomes(a, histories, at_draws)
+        noise = np.random.default_rng(self.seed).standard_normal((len(y) * repeats, y.shape[1]))
+        noisy = np.repeat(y, repeats, axis=0) + noise
+        increments = np.empty((len(self.names), len(noisy)))
+        for b in range(len(self.names)):
+            ratio = self.ratios.get((_key(histories), a, b), 1.0)
+            increments[b] = self._least(b, a, histories, noisy, at_draws)
+            if ratio != 1.0:
+                increments[b] += (ratio - 1.0) * np.repeat(self._least(b, a, histories, y, at_draws), repeats)
+        return increments
+
+    def _least(self, b: int, a: int, histories: Sequence[History], y: Floats, at_draws: bool) -> Floats:
+        """(outcomes,) increase of chi-square of law b at outcomes y (outcomes, data), under the covariance of law a.
+
+        About its estimates; at draws from that draw of its posterior which explains the outcome best, by one
+        Gauss-Newton step over all tests.
+        """
+        law = self.outcomes.laws[b]
+        if not at_draws:
+            m, K = self.outcomes.of(histories, b, a)
+            return _projected(y - m, K, law.information)
+        deviations, made = self._drawn(b, True), self._expansion(b)
+        parts = [self.outcomes.drawn(h, b, deviations, a) for h in histories]
+        m, K = (np.concatenate([part[k] for part in parts], axis=1) for k in (0, 1))
+        misfits = made.chi_square + (y**2).sum(axis=1)[:, None] - 2.0 * y @ m.T + (m**2).sum(axis=1)
+        nearest, least = misfits.argmin(axis=1), np.empty(len(y))
+        bounds = law.measured.bounds
+        limits = np.full((2, deviations.shape[1]), np.inf) * [[-1.0], [1.0]]
+        limits[:, : law.size] = np.stack([bounds.lower, bounds.upper])[:, : law.size] - law.fit.u
+        for k in np.unique(nearest):
+            chosen = nearest == k
+            r = y[chosen] - m[k]
+            downhill = r @ K[k] - made.gradient[k]
+            curvature = made.information[k] + K[k].T @ K[k]
+            step = _bounded_steps(curvature, downhill, *(limits - deviations[k]))
+            change = np.einsum("cp,pq,cq->c", step, curvature, step) - 2.0 * (downhill * step).sum(axis=1)
+            least[chosen] = made.chi_square[k] + (r**2).sum(axis=1) + change
+        return least
+
+    def _expansion(self, b: int) -> Expansion:
+        if b not in self._expansions:
+            self._expansions[b] = self.outcomes.laws[b].expansion(self._drawn(b, True))
+        return self._expansions[b]
+
+    def _true_outcomes(self, a: int, histories: Sequence[History], at_draws: bool) -> tuple[Floats, int]:
+        """Outcomes (draws, data) without noise if a is true, and how often the noise is drawn for each."""
+        deviations = self._drawn(a, at_draws)
+        if at_draws:
+            parts = [self.outcomes.drawn(h, a, deviations)[0] for h in histories]
+            return np.concatenate(parts, axis=1), POSTERIOR_REPEATS
+        m, K = self.outcomes.of(histories, a)
+        return m + deviations @ K.T, REPEATS
+
+    def _drawn(self, a: int, at_draws: bool) -> Floats:
+        key = 2 * a + int(at_draws)
+        if key not in self._deviations:
+            count = POSTERIOR_DRAWS if at_draws else LINEAR_DRAWS
+            self._deviations[key] = self.outcomes.laws[a].draws(count, self.seed + a)
+        return self._deviations[key]
+
+    def probability_of_rupture(self, histories: Sequence[History]) -> float:
+        """That one of the tests ruptures, over the laws and the draws of their posteriors."""
+        weight, total = self.weights / self.weights.sum(), 0.0
+        for a in range(len(self.names)):
+            deviations = self._drawn(a, True)
+            ruptures = np.stack([self.outcomes.drawn(h, a, deviations)[2] for h in histories])
+            total += weight[a] * float(ruptures.any(axis=0).mean())
+        return total
+
+    # ---- refits in full ----------------------------------------------------------------------------------------------
+
+    def directions(self) -> list[tuple[int, int]]:
+        """All directions (true, alternative), those of most weight first."""
+        count = len(self.names)
+        pairs = [(a, b) for a in range(count) for b in range(count) if a != b]
+        return sorted(pairs, key=lambda pair: -self.weights[pair[0]] * self.weights[pair[1]])
+
+    def refit(self, histories: Sequence[History], a: int, b: int) -> bool:
+        """Correct the expected chi-square of one direction by a refit of b to what a predicts, at the median draw.
+
+        Whether it was done: not where that chi-square is so small that nothing is to be corrected.
+        """
+        y, _ = self._true_outcomes(a, histories, True)
+        law, linear = self.outcomes.laws[b], self._least(b, a, histories, y, True)
+        chosen = int(np.argsort(linear)[linear.size // 2])
+        if linear[chosen] < SMALLEST_REFITTED:
+            return False
+        truth = self.outcomes.laws[a]
+        try:
+            if b not in self._baseline:
+                self._baseline[b] = _refitted_chi_square(law, self.outcomes.laws[0].noise_model, [])
+            made = _as_if_made(truth, self._drawn(a, True)[chosen], histories)
+            refitted = _refitted_chi_square(law, self.outcomes.laws[0].noise_model, made) - self._baseline[b]
+        except CreepkitError:  # no start can be predicted: the linear value stands
+            return False
+        self.ratios[_key(histories), a, b] = float(np.clip(refitted / linear[chosen], *RATIO_LIMITS))
+        return True
+
+
+def _key(histories: Sequence[History]) -> object:
+    return tuple(test_key(h) for h in histories)
+
+
+def _projected(r: Floats, K: Floats, information: Floats) -> Floats:
+    """(outcomes,) r'(I + K A^-1 K')^-1 r of r (outcomes, data)."""
+    scale = 1.0 / np.sqrt(np.diag(information))
+    root = np.linalg.cholesky((information + K.T @ K) * np.outer(scale, scale))
+    solved = np.linalg.solve(root, scale[:, None] * (K.T @ r.T))
+    return np.asarray((r**2).sum(axis=1) - (solved**2).sum(axis=0))
+
+
+def _bounded_steps(curvature: Floats, downhill: Floats, lower: Floats, upper: Floats) -> Floats:
+    """(outcomes, q) steps to the least of d'A d - 2 b'd within bounds (q,), of b (outcomes, q).
+
+    What leaves its bounds is put on them, and the rest is solved for again.
+    """
+    steps = np.linalg.solve(curvature, downhill.T).T
+    for _ in range(2):
+        held = (steps < lower) | (steps > upper)
+        for pattern in np.unique(held[held.any(axis=1)], axis=0):
+            rows, free = (held == pattern).all(axis=1), ~pattern
+            steps[rows] = np.clip(steps[rows], lower, upper)
+            rest = downhill[rows][:, free] - steps[rows][:, pattern] @ curvature[np.ix_(pattern, free)]
+            steps[np.ix_(rows, free)] = np.linalg.solve(curvature[np.ix_(free, free)], rest.T).T
+    return np.asarray(np.clip(steps, lower, upper))
+
+
+def _as_if_made(truth: KnownLaw, deviation: Floats, planned: Sequence[History]) -> list[History]:
+    """Planned tests with what a law predicts at a deviation (q,) as if it had been measured, without noise."""
+    base, predictor = truth.measured.observations, truth.measured.predictor
+    named = [replace(h, name=f"plan {k}") for k, h in enumerate(planned)]
+    nuisances = nuisances_of_planned(truth, named)
+    e = values_of_nuisances(nuisances, truth, deviation[truth.size :])
+    theta = truth.fit.coordinates.theta(truth.fit.u + deviation[: truth.size])
+    prediction = predict(predictor, truth.fit.law, theta[None], named, nuisances=nuisances.predictor_values(e))
+    made = []
+    for k, history in enumerate(named):
+        values = {name: prediction.of(k)[:, j] for j, name in enumerate(prediction.outputs) if name in base.outputs}
+        sd = {name: np.full(history.times.size, float(base.noise[base.outputs.index(name)])) for name in values}
+        finite = np.asarray(np.isfinite(np.stack([*values.values()])).all(axis=0), bool)
+        made.append(replace(history, outputs=values, standard_deviation=sd, used=finite))
+    return [history for history in made if history.used.any()]
+
+
+def _refitted_chi_square(law: KnownLaw, noise_model: NoiseModel, further: Sequence[History]) -> float:
+    """The least chi-square of a law over the tests that were made and further ones, by the search of identify().
+
+    Without further tests from its estimates alone, which are those of such a search.
+    """
+    measured = law.measured
+    histories = (*measured.histories, *further)
+    observations = _observations(measured, histories)
+    nuisances = nuisances_of_planned(law, further, of_made=True)
+    problem = replace(
+        measured, histories=histories, observations=observations, evaluations=EvaluationCache()
+    ).with_nuisances(nuisances)
+    known = {(n.key, n.owner): n.value for n in law.fit.nuisances}
+    starts = [law.fit.u]
+    if further:
+        broad = LeastSquaresProblem.from_histories(
+            law.fit.law, histories, measured.predictor, law.fit.settings, law.fit.reference
+        )
+        searched = search_problem(broad, search_predictor_of(measured.predictor))
+        minima = MultiStart().minima(searched).minima
+        starts += [m.x for m in distinct(minima, searched.bounds, equal_predictions=EQUAL_REDUCED_ORDER_PREDICTIONS)]
+    outputs = {name: noise_model[name] for name in observations.outputs}
+    own = replace(noise_model, outputs=outputs)
+    least = np.inf
+    for u in starts:
+        x = problem.bounds.clip(starting_point(nuisances, u, known))
+        residuals = replace(
+            problem.residuals(x),
+            present=observations.present,
+            offset_sensitivity=residuals_at_measured_values(observations).offset_sensitivity,
+        )
+        residuals = residuals.with_test_weights(_test_weights(law, len(further)))
+        under = problem.with_covariance(CovarianceFactor.of_residuals(residuals, own))
+        least = min(least, 2.0 * under.minimise(x, tolerances=REFIT_TOLERANCES).cost)
+    return float(least)
+
+
+def _observations(measured: LeastSquaresProblem, histories: Sequence[History]) -> ObservationVector:
+    """The observations of histories with the transforms and the noise of the tests that were made."""
+    base = measured.observations
+    observations = ObservationVector.from_histories(histories, measured.predictor)
+    position = [base.outputs.index(name) for name in observations.outputs]
+    return replace(observations, transforms=tuple(base.transforms[k] for k in position), noise=base.noise[position])
+
+
+def _test_weights(law: KnownLaw, further: int) -> Floats:
+    """(tests,) of the fit, and one for further tests."""
+    return np.concatenate([[test.weight for test in law.fit.tests], np.ones(further)])

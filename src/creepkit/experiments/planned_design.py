@@ -1,0 +1,165 @@
+"""Design: planned tests with what they are expected to tell, the plan, and the advice in a sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.errors import FitError
+from creepkit.experiments.candidate_tests import CandidateTest
+from creepkit.experiments.expectations import Expectation
+from creepkit.presentation import Presentable, present
+from creepkit.records import History
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+USEFUL_INFORMATION = 0.05
+"""Nats below which a test tells next to nothing."""
+
+
+@dataclass(frozen=True)
+class PlannedTest:
+    """A run that could be made next: what it is, and what it is expected to tell.
+
+    at_draws : whether that was worked out at draws of the posteriors, else to first order about the estimates.
+    """
+
+    candidate: CandidateTest
+    expectation: Expectation
+    at_draws: bool = False
+
+    @property
+    def description(self) -> str:
+        """What it is, in words."""
+        return self.candidate.description
+
+    @property
+    def histories(self) -> tuple[History, ...]:
+        """Its test or tests, planned."""
+        return self.candidate.histories
+
+    @property
+    def hours(self) -> float:
+        """h of the oven."""
+        return self.candidate.hours
+
+    @property
+    def first_level(self) -> float:
+        """The first load above zero: MPa, or a strain."""
+        return self.candidate.first_level
+
+    @property
+    def information_per_hour(self) -> float:
+        """Nats an hour of the oven."""
+        return self.expectation.information / self.candidate.hours
+
+
+@dataclass(frozen=True)
+class Design(Presentable):
+    """The next tests, the best first.
+
+    goal : "parameters", "law", or the name of a quantity. laws, weights : that remain, the best first.
+    tests : all that were considered; without those that were left out, {description: why}.
+    plan : the run to make, or the runs that fit the budget (h of the oven) together, and expected : what they tell.
+    interrupted : whether the work was stopped before its end. notes : what the expectation does not include.
+    """
+
+    goal: str
+    laws: tuple[str, ...]
+    weights: tuple[float, ...]
+    tests: tuple[PlannedTest, ...]
+    left_out: tuple[tuple[str, str], ...] = ()
+    plan: tuple[PlannedTest, ...] = ()
+    expected: Expectation | None = None
+    budget: float | None = None
+    interrupted: bool = False
+    notes: tuple[str, ...] = ()
+
+    @property
+    def best(self) -> PlannedTest:
+        """The best single run; FitError where none can be made."""
+        if not self.tests:
+            raise FitError(self.sentence)
+        return self.tests[0]
+
+    @property
+    def sentence(self) -> str:
+        """The advice."""
+        return design_sentence(self)
+
+    def to_json(self) -> dict[str, object]:
+        """Laws, advice, plan and every test considered, as JSON-able data."""
+        return present(self, "to_json")
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Map of what each candidate tells for an hour of the oven, over load and duration; written to `path`."""
+        return present(self, "plot", path)
+
+
+def design_sentence(design: Design) -> str:
+    """The advice: what to make, what it is expected to tell, and the next best."""
+    if design.goal == "law" and len(design.laws) < 2:
+        doubt = f"; but {'; and '.join(design.notes)}" if design.notes else ""
+        return f"one law remains, {design.laws[0]}, and nothing is to be told apart from it{doubt}"
+    if not design.tests:
+        reasons = dict.fromkeys(f"that {kind_of_reason(reason)}" for _, reason in design.left_out)
+        return f"no test can be made: there are only candidates {' or '.join(reasons)}" if reasons else "no candidates"
+    best, *others = design.tests
+    if design.goal == "law" and _largest_information(design) < USEFUL_INFORMATION:
+        return (
+            f"none of the {len(design.tests)} tests considered tells {_and(design.laws)} apart; the most informative "
+            f"is {best.description} ({_short(design, best.expectation)})"
+        )
+    if design.budget is not None and len(design.plan) > 1 and design.expected is not None:
+        runs = "; then ".join(test.description for test in design.plan)
+        total = sum(test.hours for test in design.plan)
+        return f"{runs} ({total:.3g} h of the oven): together {_told(design, design.expected)}"
+    first = design.plan[0] if design.plan else best
+    others = [test for test in design.tests if test is not first]
+    further = f"; next best {others[0].description} ({_short(design, others[0].expectation)})" if others else ""
+    return f"{first.description} ({first.hours:.3g} h of the oven): {_told(design, first.expectation)}{further}"
+
+
+def _largest_information(design: Design) -> float:
+    best = max(test.expectation.information for test in design.tests)
+    return best if design.expected is None else max(best, design.expected.information)
+
+
+def _and(names: tuple[str, ...]) -> str:
+    return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _told(design: Design, expected: Expectation) -> str:
+    """What a test is expected to tell, as the end of a sentence."""
+    if design.goal == "law":
+        return f"separates {_and(design.laws)} with probability {expected.probability:.2f}"
+    if np.isfinite(expected.sd):
+        before, after = precision_text(expected.current_sd), precision_text(expected.sd)
+        return f"brings the standard deviation of the {design.goal} from {before} to {after}"
+    shrinkage = np.exp(-expected.information / max(len(expected.parameter_sd), 1))
+    return (
+        f"tells {expected.information:.2g} nats of the parameters: their intervals become {shrinkage:.2g} times as "
+        "wide in the geometric mean"
+    )
+
+
+def precision_text(value: float) -> str:
+    """A standard deviation of ln, as people say it."""
+    return f"{100 * value:.2g} %" if value < 1 else f"a factor of {np.exp(min(value, 50.0)):.2g}"
+
+
+def _short(design: Design, expected: Expectation) -> str:
+    if design.goal == "law":
+        return f"{expected.probability:.2f}"
+    return precision_text(expected.sd) if np.isfinite(expected.sd) else f"{expected.information:.2g} nats"
+
+
+def kind_of_reason(reason: str) -> str:
+    """A reason without its numbers, so that alike ones are counted together."""
+    kinds = {"rupture": "would rupture", "noises": "would hardly grow", "beyond": "would grow too far"}
+    return next((kind for word, kind in kinds.items() if word in reason), reason)

@@ -1,0 +1,170 @@
+"""Rig: what the equipment can do, so that planned tests can be made: loads, temperatures, durations, dimensions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from creepkit.errors import FitError
+from creepkit.inverse.composite_predictor import predictor_for
+from creepkit.records import History, Predictor
+
+LOWER_LEVEL, HIGHER_LEVEL, EXTENSION = 0.7, 1.4, 2.0
+"""Where nothing is said of a rig: its least and greatest level over those of the tests that were made, and its longest
+test over the longest of these."""
+
+
+SETUP_HOURS = 1.0
+"""Oven hours of a run beside its test, where nothing is said: heating, mounting, cooling."""
+
+
+LARGEST_GROWTH = 2.0
+"""Largest leading output of a planned test over the largest that was measured: a law is not trusted much further."""
+
+
+VARIED_DIMENSION = "apex_thickness"
+"""The length of a test piece that is varied where nothing is said, by THICKNESS_RATIOS."""
+
+
+THICKNESS_RATIOS = (0.9, 1.0, 1.1)
+
+
+ROUNDED_TEMPERATURE = 5.0
+"""K, within which two tests are at one temperature."""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """What the equipment can do with one kind of specimen.
+
+    specimen : its name, as histories have it. levels : (least, greatest) load: MPa of pressure or stress, or a strain.
+    longest_hours : h, the longest test. temperatures : K, at which tests can be made.
+    dimensions : {length: values in mm} of test pieces that can be made, such as {"apex_thickness": (0.44, 0.5, 0.58)}.
+    tests_per_run : test pieces that the oven takes at once, under one load and temperature. setup_hours : h, of the
+    oven for each run, beside its test. frame_interval : s, between frames. load_changes : whether the load may be
+    changed during a test. largest_output : up to which the leading output may grow, in its unit.
+    """
+
+    specimen: str
+    levels: tuple[float, float]
+    longest_hours: float
+    temperatures: tuple[float, ...]
+    dimensions: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    tests_per_run: int = 1
+    setup_hours: float = SETUP_HOURS
+    frame_interval: float = 900.0
+    load_changes: bool = True
+    largest_output: float = float("inf")
+
+    def __post_init__(self) -> None:
+        low, high = (float(level) for level in self.levels)
+        if not 0 < low <= high < np.inf:
+            raise FitError(f"a rig's levels are (least, greatest) above zero, such as (4, 14) MPa; found {self.levels}")
+        for name in ("longest_hours", "frame_interval", "largest_output"):
+            if not getattr(self, name) > 0:
+                raise FitError(f"a rig's {name} must be above zero, found {getattr(self, name)!r}")
+        if not (np.isfinite(self.setup_hours) and self.setup_hours >= 0):
+            raise FitError(f"a rig's setup_hours must be zero or more, found {self.setup_hours!r}")
+        if int(self.tests_per_run) != self.tests_per_run or self.tests_per_run < 1:
+            raise FitError(f"a rig's tests_per_run is a whole number from 1 on, found {self.tests_per_run!r}")
+        if not self.temperatures or any(not 0 < T < 1e4 for T in self.temperatures):
+            raise FitError(f"a rig's temperatures are numbers in K, above 0; found {tuple(self.temperatures)!r}")
+        dimensions = {name: tuple(float(v) for v in np.atleast_1d(values)) for name, values in self.dimensions.items()}
+        for name, values in dimensions.items():
+            if not values or min(values) <= 0:
+                raise FitError(f"a rig's {name} must be lengths in mm above zero, found {values}")
+        object.__setattr__(self, "levels", (low, high))
+        object.__setattr__(self, "temperatures", tuple(float(T) for T in self.temperatures))
+        object.__setattr__(self, "dimensions", MappingProxyType(dimensions))
+
+    def __hash__(self) -> int:
+        return hash((self.specimen, self.levels, self.longest_hours, self.temperatures, *self.dimensions.items()))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        state = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return _rebuild, ({**state, "dimensions": dict(self.dimensions)},)
+
+    def replace(self, **changes: Any) -> Rig:
+        """The same rig with some fields changed."""
+        known = list(self.__dataclass_fields__)
+        for name in changes:
+            if name not in known:
+                raise FitError(f"a rig has no '{name}'; its fields are {', '.join(known)}")
+        return replace(self, **changes)
+
+    def refusal(self, history: History) -> str:
+        """Why this rig cannot make a planned test, in a sentence; "" where it can."""
+        levels = history.loading.program().values
+        positive = levels[levels > 0]
+        unit = "" if history.loading.quantity == "strain" else " MPa"
+        if positive.size and (positive.max() > 1.0001 * self.levels[1] or positive.min() < 0.9999 * self.levels[0]):
+            outside = positive.max() if positive.max() > 1.0001 * self.levels[1] else positive.min()
+            return f"{outside:.3g}{unit} is outside the rig's {self.levels[0]:.3g} to {self.levels[1]:.3g}{unit}"
+        hours = float(history.times[-1]) / 3600.0
+        if hours > 1.0001 * self.longest_hours:
+            return f"{hours:.3g} h is more than the {self.longest_hours:.3g} h of the rig's longest test"
+        temperatures = history.temperature_program().values
+        if min(abs(temperatures.mean() - T) for T in self.temperatures) > ROUNDED_TEMPERATURE:
+            known = ", ".join(f"{T:.4g}" for T in self.temperatures)
+            return f"{temperatures.mean():.4g} K is none of the rig's temperatures ({known} K)"
+        return ""
+
+
+def _rebuild(state: dict[str, Any]) -> Rig:
+    return Rig(**state)
+
+
+def rigs_of(histories: Sequence[History], predictor: Predictor) -> tuple[Rig, ...]:
+    """For each specimen among the tests that were made, a rig that can do a little more than what it did.
+
+    Levels from 0.7 times the least to 1.4 times the greatest, tests twice as long, the same temperatures, one test
+    piece a run; the thickness that the tests or the specimen state, and 10 % less and more.
+    """
+    specimens = dict.fromkeys(h.specimen for h in histories)
+    return tuple(_rig_of([h for h in histories if h.specimen == name], predictor) for name in specimens)
+
+
+def _rig_of(tests: Sequence[History], predictor: Predictor) -> Rig:
+    levels = np.concatenate([h.loading.program().values for h in tests])
+    levels = levels[levels > 0]
+    if not levels.size:
+        raise FitError(f"tests of specimen '{tests[0].specimen}' hold no load above zero; say what the rig can do")
+    temperatures: list[float] = []
+    for T in sorted(h.mean_temperature for h in tests):
+        if not temperatures or T - temperatures[-1] > ROUNDED_TEMPERATURE:
+            temperatures.append(round(T, 2))
+    largest = max(_largest_output(h, predictor) for h in tests)
+    return Rig(
+        specimen=tests[0].specimen,
+        levels=(LOWER_LEVEL * float(levels.min()), HIGHER_LEVEL * float(levels.max())),
+        longest_hours=EXTENSION * max(float(h.times[-1]) for h in tests) / 3600.0,
+        temperatures=tuple(temperatures),
+        dimensions=_dimensions(tests, predictor),
+        frame_interval=float(np.median([h.times[-1] / h.times.size for h in tests])),
+        largest_output=LARGEST_GROWTH * largest if largest > 0 else float("inf"),
+    )
+
+
+def _largest_output(history: History, predictor: Predictor) -> float:
+    """The largest value of the leading output, in its unit."""
+    outputs = getattr(predictor_for(predictor, history), "outputs", tuple(history.outputs))
+    values = next((history.outputs[name] for name in outputs if name in history.outputs), np.zeros(1))
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) if finite.size else 0.0
+
+
+def _dimensions(tests: Sequence[History], predictor: Predictor) -> dict[str, tuple[float, ...]]:
+    """The thicknesses of the tests, where they or the specimen state one; a single one is varied."""
+    predictors = [predictor_for(predictor, h) for h in tests]
+    specimens = [getattr(p, "specimen", p) for p in predictors]
+    nominal = [getattr(getattr(p, "geometry", None), VARIED_DIMENSION, None) for p in specimens]
+    stated = [h.geometry.get(VARIED_DIMENSION, own) for h, own in zip(tests, nominal, strict=True)]
+    values = sorted({round(float(v), 4) for v in stated if v is not None})
+    if not values:
+        return {}
+    return {VARIED_DIMENSION: tuple(round(r * values[0], 4) for r in THICKNESS_RATIOS) if len(values) == 1 else
+            tuple(values)}  # fmt: skip

@@ -1,0 +1,122 @@
+"""What a rig can make: grids of planned tests, variations of tests that were made, and what it refuses."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+from creepkit.errors import FitError
+from creepkit.experiments.candidate_tests import frame_times, grid_of_rig, variations_of_tests
+from creepkit.experiments.rig import Rig, rigs_of
+from creepkit.laws.norton import NORTON
+from creepkit.records import PressureJump, Program, constant_strain
+from creepkit.specimens.bulge.specimen import Bulge
+from helpers.log_rate_predictor import END, LogRates, measured
+
+TRUTH = {"A": float(np.exp(-15.0 - 5.0 * np.log(50.0))), "n": 5.0}
+APEX = Bulge().geometry.apex_thickness
+
+
+def bars_made(*stresses):
+    return measured(NORTON, TRUTH, stresses, sd=0.2)
+
+
+def dimple(**changes):
+    return bars_made(50.0)[0].replace(loading=PressureJump(8.0, 10.0, 14400.0), specimen="bulge", **changes)
+
+
+def test_a_rig_can_do_a_little_more_than_what_it_did():
+    (rig,) = rigs_of(bars_made(40.0, 60.0), LogRates())
+    assert rig.levels == pytest.approx((0.7 * 40.0, 1.4 * 60.0))
+    assert rig.longest_hours == pytest.approx(2.0 * END / 3600.0)
+    assert rig.temperatures == (1000.0,)
+    assert rig.dimensions == {}
+    (bulge,) = rigs_of([dimple()], Bulge())
+    assert bulge.dimensions["apex_thickness"] == pytest.approx((0.9 * APEX, APEX, 1.1 * APEX))
+    (stated,) = rigs_of([dimple(geometry={"apex_thickness": h}) for h in (0.44, 0.58)], Bulge())
+    assert stated.dimensions["apex_thickness"] == (0.44, 0.58)
+    assert pickle.loads(pickle.dumps(stated)) == stated
+    assert copy.deepcopy(stated) == stated
+
+
+def test_a_grid_holds_levels_changes_durations_and_dimples():
+    rig = Rig("bulge", (4.0, 14.0), 12.0, (1000.0,), {"apex_thickness": (0.44, 0.5, 0.58)}, tests_per_run=3)
+    found = grid_of_rig(rig, dimple())
+    levels = {float(v) for c in found for h in c.histories for v in h.loading.program().values if v > 0}
+    assert (min(levels), max(levels)) == (4.0, 14.0)
+    assert max(c.hours for c in found) == pytest.approx(13.0)  # and an hour to set it up
+    assert {len(c.histories) for c in found} == {1, 2, 3}
+    assert all(c.histories[0].outputs == {} for c in found)
+    assert any("a dimple of 0.44 mm at 4 MPa" in c.description for c in found)
+    assert any("3 dimples of 0.44, 0.5 and 0.58 mm" in c.description for c in found)
+    assert len({c.description for c in found}) == len(found)
+    short = grid_of_rig(rig, dimple(), budget=4.0)
+    assert max(c.hours for c in short) == pytest.approx(4.0)
+    with pytest.raises(FitError, match="a budget of 0.5 h leaves no time for a test beside 1 h"):
+        grid_of_rig(rig, dimple(), budget=0.5)
+
+
+def test_temperatures_are_varied_where_the_laws_know_them():
+    rig = Rig("uniaxial", (40.0, 80.0), 10.0, (1000.0, 1050.0))
+    (base,) = bars_made(50.0)
+    assert {c.histories[0].temperature for c in grid_of_rig(rig, base)} == {1000.0, 1050.0}
+    assert {c.histories[0].temperature for c in grid_of_rig(rig, base, by_temperature=False)} == {1000.0}
+
+
+def test_frames_come_at_the_interval_of_the_rig():
+    assert frame_times(3600.0, 60.0).size == 60
+    assert frame_times(3600.0, 100.0)[0] == pytest.approx(100.0)
+    assert frame_times(3600.0, 900.0).size == 20
+    assert frame_times(1e6, 60.0).size == 60
+
+
+def test_variations_are_of_the_longest_test():
+    base = bars_made(40.0, 60.0)
+    found = variations_of_tests(base, rigs_of(base, LogRates()), exponent=4.0)
+    levels = [c.histories[0].loading.program().values for c in found]
+    assert [float(v[0]) for v in levels[:3]] == pytest.approx([28.0, 42.0, 84.0])
+    assert float(found[0].histories[0].times[-1]) == pytest.approx(2.0 * END)  # more strain would take too long
+    assert float(found[2].histories[0].times[-1]) == pytest.approx(END * (84 / 40) ** -4)
+    assert any(np.ptp(v) > 0 for v in levels)
+    assert float(found[-1].histories[0].times[-1]) == pytest.approx(2.0 * END)
+    relaxed = base[0].replace(loading=constant_strain(0.002))
+    assert variations_of_tests([relaxed], rigs_of([relaxed], LogRates()))
+
+
+def test_variations_of_bulge_tests_change_pressure_and_thickness():
+    base = dimple(geometry={"apex_thickness": 0.5})
+    told = {c.description: c for c in variations_of_tests([base], rigs_of([base], Bulge()))}
+    assert any(text.startswith("14 MPa for") for text in told)
+    assert any(text.startswith("8 MPa, from") and "on 14 MPa" in text for text in told)
+    thicknesses = {h.geometry["apex_thickness"] for c in told.values() for h in c.histories}
+    assert thicknesses == {0.45, 0.5, 0.55}
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"levels": (5.0, 4.0)}, "levels are"),
+        ({"levels": (0.0, 4.0)}, "levels are"),
+        ({"longest_hours": 0.0}, "longest_hours must be above zero"),
+        ({"setup_hours": -1.0}, "setup_hours must be zero or more"),
+        ({"tests_per_run": 0}, "tests_per_run is a whole number"),
+        ({"temperatures": ()}, "temperatures are numbers in K"),
+        ({"dimensions": {"apex_thickness": (-0.5,)}}, "apex_thickness must be lengths"),
+        ({"oven": 3}, "a rig has no 'oven'"),
+    ],
+)
+def test_a_rig_that_cannot_be_is_refused(changes, sentence):
+    rig = Rig("bulge", (4.0, 14.0), 12.0, (1000.0,))
+    with pytest.raises(FitError, match=sentence):
+        rig.replace(**changes)
+
+
+def test_a_rig_says_why_it_cannot_make_a_test():
+    rig = Rig("bulge", (4.0, 14.0), 12.0, (1000.0,))
+    assert rig.refusal(dimple(times=np.array([3600.0]), outputs={}, standard_deviation={})) == ""
+    over = dimple(times=np.array([3600.0]), outputs={}, standard_deviation={})
+    assert "20 MPa is outside the rig's 4 to 14 MPa" in rig.refusal(over.replace(loading=PressureJump(8, 20, 600.0)))
+    assert "more than the 12 h" in rig.refusal(over.replace(times=np.array([1e6])))
+    warm = over.replace(temperature=Program([0.0, 3600.0], [1100.0, 1120.0]))
+    assert "1110 K is none of the rig's temperatures (1000 K)" in rig.refusal(warm)

@@ -1,0 +1,248 @@
+"""Designs of experiments against closed forms of linear regression, and what a test tells once it is made."""
+
+import json
+
+import numpy as np
+import pytest
+
+from creepkit.errors import FitError
+from creepkit.experiments.design import design, further_tests
+from creepkit.experiments.rig import Rig
+from creepkit.inverse.identify import identify
+from creepkit.inverse.selection import rank
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.uncertainty.quantities import rate_at
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.laws.time_hardening import TIME_HARDENING
+from creepkit.records import History, StressSteps, constant_stress
+from helpers.log_rate_predictor import END, known_scatter, measured
+from helpers.planted_bars import BAR, SPL, bars
+
+TRUTH = {"A": float(np.exp(-15.0 - 5.0 * np.log(50.0))), "n": 5.0}
+SD, FRAMES, HOURS = 0.02, 20, END / 3600.0
+LIKELY = IdentificationSettings(starts=4, sobol_points=32, weights="likelihood", nuisances=())
+RIG = Rig("uniaxial", (40.0, 80.0), HOURS, (1000.0,), setup_hours=0.0, frame_interval=END / FRAMES, load_changes=False)
+
+
+@pytest.fixture(scope="module")
+def line():
+    """ln rate = ln A + n ln s + t / END from tests at 48 to 52 MPa, with white noise of 0.02."""
+    return known_scatter(NORTON, measured(NORTON, TRUTH, (48.0, 50.0, 52.0), sd=SD, seed=1), SD)
+
+
+def regression(stresses, frames):
+    """(2, 2) covariance of (ln A, n) by least squares; frames : of each test."""
+    x = np.repeat(np.log(stresses), frames)
+    X = np.stack([np.ones_like(x), x], axis=1)
+    return SD**2 * np.linalg.inv(X.T @ X)
+
+
+MADE = [48.0, 50.0, 52.0]
+
+
+def plans(*stresses, frames=FRAMES):
+    times = np.linspace(1.0 / frames, 1.0, frames) * END
+    return [History(f"{s:g} MPa", times, {}, constant_stress(s, "stress"), 1000.0) for s in stresses]
+
+
+def test_information_of_a_test_is_that_of_regression(line):
+    """A test tells (ln det S - ln det S') / 2 nats, S by textbook algebra."""
+    found = design(line, rig=RIG, candidates=plans(40.0, 60.0, 80.0))
+    for test in found.tests:
+        stress = float(test.description.split()[0])
+        before, after = regression(MADE, 10), regression([*MADE, stress], [10, 10, 10, FRAMES])
+        expected = 0.5 * np.log(np.linalg.det(before) / np.linalg.det(after))
+        assert test.expectation.information == pytest.approx(expected, rel=1e-3)
+        assert test.expectation.parameter_sd["n"] == pytest.approx(np.sqrt(after[1, 1]), rel=5e-3)
+    assert found.best.description == "80 MPa"  # the farther end: ln 80/50 > ln 50/40
+
+
+def test_two_runs_are_made_at_both_ends_of_the_range(line):
+    """The D-optimal design of a straight line: half of the observations at each end (Fedorov 1972)."""
+    found = design(line, rig=RIG, budget=2.0 * HOURS, candidates=plans(40.0, 50.0, 60.0, 80.0))
+    assert sorted(test.description for test in found.plan) == ["40 MPa", "80 MPa"]
+    assert sum(test.hours for test in found.plan) == pytest.approx(2.0 * HOURS)
+    assert "together tells" in found.sentence
+
+
+def test_the_grid_finds_the_end_that_a_rate_asks_for(line):
+    """c-optimal: the rate at 40 MPa is best measured there; its expected sd is that of regression."""
+    found = design(line, rig=RIG, goal=rate_at(40.0))
+    assert found.best.first_level == pytest.approx(40.0)
+    c = np.array([1.0, np.log(40.0)])
+    best = found.best
+    frames = best.histories[0].times.size
+    after = regression([*MADE, 40.0], [10, 10, 10, frames])
+    assert best.expectation.sd == pytest.approx(np.sqrt(c @ after @ c), rel=5e-3)
+    assert best.expectation.current_sd == pytest.approx(np.sqrt(c @ regression(MADE, 10) @ c), rel=5e-3)
+    assert "brings the standard deviation of the rate at 40 MPa from" in found.sentence
+
+
+def test_expected_precision_is_met_when_the_test_is_made():
+    """Bars: the standard deviation of ln rate after identifying all tests again is the one that was expected."""
+    tests = bars(STRAIN_HARDENING, SPL, [constant_stress(s, "stress") for s in (45.0, 55.0)], seed=3)
+    fit = identify(STRAIN_HARDENING, tests, BAR, settings=LIKELY)
+    found = design(fit, goal=rate_at(30.0))
+    planned = found.best.histories[0]
+    blank = planned.replace(name="made")
+    prediction = BAR.predict(STRAIN_HARDENING, STRAIN_HARDENING.to_internal(SPL), [blank])
+    noise = 2e-5 * np.random.default_rng(0).normal(size=blank.times.size)
+    sd = {"strain": np.full(blank.times.size, 2e-5)}
+    made = blank.replace(outputs={"strain": prediction.of(0)[:, 0] + noise}, standard_deviation=sd)
+    after = identify(STRAIN_HARDENING, [*tests, made], BAR, settings=LIKELY)
+    _, low, high = after.rate(30.0, warn=False)
+    assert np.log(high / low) / (2 * after._quantile) == pytest.approx(found.best.expectation.sd, rel=0.15)
+
+
+# ---- the law ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def slopes():
+    """Norton's law, and the same with n = 3, which it becomes: nested laws."""
+    tests = measured(NORTON, {**TRUTH, "A": np.exp(-15.0) / 50.0**3, "n": 3.0}, (49.0, 50.0, 51.0), sd=SD, seed=1)
+    fits = [known_scatter(NORTON, tests, SD), known_scatter(NORTON.fix(n=3).rename("three"), tests, SD)]
+    return rank(fits, challenge=False)
+
+
+def test_of_nested_laws_one_direction_has_power(slopes):
+    """If n = 3 holds, Norton's law is never worse; if n is free, that law is worse by what n deviates."""
+    found = design(slopes, rig=RIG, candidates=plans(40.0, 80.0))
+    assert len(found.laws) == 2
+    for test in found.tests:
+        expected = {(c.reference_law, c.alternative_law): c.expected for c in test.expectation.chi_squares}
+        assert expected["three", "norton"] < 0.1
+        assert expected["norton", "three"] > 5.0
+        assert test.expectation.wrong < 0.1
+
+
+@pytest.fixture(scope="module")
+def hardening():
+    tests = bars(STRAIN_HARDENING, SPL, [constant_stress(s, "stress") for s in (40.0, 50.0, 60.0)], seed=0)
+    return rank([identify(law, tests, BAR, settings=LIKELY) for law in (STRAIN_HARDENING, TIME_HARDENING)])
+
+
+def test_a_change_of_stress_separates_hardening_by_strain_from_hardening_by_time(hardening):
+    """At constant stress both are one law (n' = n/(1-m), m' = m/(1-m)); after a change they part, both ways."""
+    found = hardening.further_tests()
+    assert ", from " in found.best.description
+    assert found.best.expectation.probability > 0.99
+    directions = {(c.reference_law, c.alternative_law): c.expected for c in found.best.expectation.chi_squares}
+    assert min(directions.values()) > 100
+    assert len(directions) == 2
+    steady = [t for t in found.tests if ", from " not in t.description]
+    assert max(t.expectation.probability for t in steady) < 0.5
+    assert "separates" in str(found)
+    assert "if strain-hardening holds, time-hardening is worse by" in str(found)
+
+
+def test_the_expected_chi_square_is_met_when_the_test_is_made(hardening):
+    found = design(hardening, goal="law")
+    planned = found.best.histories[0]
+    prediction = BAR.predict(STRAIN_HARDENING, STRAIN_HARDENING.to_internal(SPL), [planned])
+    noise = 2e-5 * np.random.default_rng(1).normal(size=planned.times.size)
+    sd = {"strain": np.full(planned.times.size, 2e-5)}
+    made = planned.replace(outputs={"strain": prediction.of(0)[:, 0] + noise}, standard_deviation=sd)
+    tests = [*hardening.best.histories, made]
+    fits = [identify(law, tests, BAR, settings=LIKELY) for law in (STRAIN_HARDENING, TIME_HARDENING)]
+    again = rank(fits, challenge=False)
+    assert again.best.law.name == "strain-hardening"
+    assert again.laws[0].weight > 0.95
+    met = again.laws[1].chi_square - again.laws[0].chi_square
+    expected = next(c for c in found.best.expectation.chi_squares if c.reference_law == "strain-hardening").expected
+    assert 1 / 1.5 < met / expected < 1.5
+
+
+def test_where_one_law_remains_nothing_is_proposed(hardening):
+    alone = rank([hardening.best])
+    assert further_tests(alone).tests == ()
+    assert "one law remains, " in design(alone, goal="law").sentence
+
+
+# ---- records ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_design_is_told_as_text_json_and_a_map(hardening, tmp_path):
+    found = design(hardening)
+    told = json.loads(json.dumps(found.to_json()))
+    assert told["goal"] == "law"
+    assert told["advice"] == found.sentence
+    assert len(told["tests"]) == len(found.tests)
+    assert {"description", "oven_hours", "probability", "chi_squares"} <= set(told["tests"][0])
+    found.plot(tmp_path / "map.png")
+    assert (tmp_path / "map.png").stat().st_size > 1000
+    assert str(found).startswith(found.sentence)
+
+
+def test_work_that_is_stopped_gives_the_best_so_far(hardening):
+    def stop(task, done, total):
+        if task == "planned tests" and done >= 40:
+            raise KeyboardInterrupt
+
+    found = design(hardening, progress=stop)
+    assert found.interrupted
+    assert 0 < len(found.tests) <= 48
+    assert found.plan == (found.best,)
+    assert "stopped before the end" in str(found)
+
+
+def test_the_same_question_has_the_same_answer(line):
+    first, second = (design(line, rig=RIG, goal=rate_at(40.0), seed=3) for _ in range(2))
+    assert [t.description for t in first.tests] == [t.description for t in second.tests]
+    assert first.best.expectation.sd == second.best.expectation.sd
+
+
+# ---- bad input -------------------------------------------------------------------------------------------------------
+
+
+def test_what_cannot_be_made_or_told_is_one_sentence(line, hardening):
+    with pytest.raises(FitError, match=r"'120 MPa' cannot be made: 120 MPa is outside the rig's 40 to 80 MPa"):
+        design(line, rig=RIG, candidates=plans(120.0))
+    with pytest.raises(FitError, match="goal 'best' is not known"):
+        design(line, goal="best")
+    with pytest.raises(FitError, match="budget is -1 h"):
+        design(line, budget=-1)
+    with pytest.raises(FitError, match="none of the planned tests fits into a budget"):
+        design(line, rig=RIG, candidates=plans(50.0), budget=1.0)
+    with pytest.raises(FitError, match="the rig tests specimen 'bulge', but the law was identified from tests of 'uni"):
+        design(line, rig=Rig("bulge", (4.0, 14.0), 12.0, (1000.0,)))
+    with pytest.raises(FitError, match="is of specimen 'bulge', but the law was identified from"):
+        design(line, rig=RIG, candidates=[plans(50.0)[0].replace(specimen="bulge")])
+
+
+def test_a_law_without_tests_or_intervals_is_refused(line):
+    from dataclasses import replace
+
+    with pytest.raises(FitError, match="loaded from a file: attach its histories"):
+        design(replace(line, histories=()))
+    with pytest.raises(FitError, match="the identification of norton has no intervals; identify it again"):
+        design(replace(line, covariance=np.full((2, 2), np.nan)))
+
+
+def test_a_test_that_ruptures_or_does_not_grow_is_refused_or_left_out(hardening):
+    base = hardening.best.histories[0]
+    wide = Rig("uniaxial", (0.01, 5000.0), 100.0, (1000.0,))
+    far = base.replace(loading=constant_stress(4000.0, "stress"), name="far", outputs={}, standard_deviation={})
+    with pytest.raises(FitError, match="the planned test 'far' is of no use: by .* it would rupture"):
+        design(hardening, rig=wide, candidates=[far])
+    weak = far.replace(loading=constant_stress(0.1, "stress"), name="weak")
+    with pytest.raises(FitError, match="'weak' is of no use: it would grow by .* noises of a frame only"):
+        design(hardening, rig=wide, candidates=[weak])
+    found = design(hardening, rig=Rig("uniaxial", (5.0, 4000.0), 28.0, (1000.0,)))
+    assert any("rupture" in reason for _, reason in found.left_out)
+    assert all(max(h.loading.program().values) < 1000 for t in found.tests for h in t.histories)
+
+
+def test_a_loading_without_levels_is_asked_for(line):
+    from dataclasses import replace
+
+    class Odd:
+        quantity = "components"
+
+        def program(self):
+            return StressSteps(((0.0, 50.0),)).program()
+
+    odd = replace(line, histories=tuple(h.replace(loading=Odd()) for h in line.histories))
+    with pytest.raises(FitError, match="no further tests are known for a loading by components"):
+        design(odd)
