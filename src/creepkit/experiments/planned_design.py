@@ -150,7 +150,7 @@ def _told(design: Design, expected: Expectation) -> str:
 
 def precision_text(value: float) -> str:
     """A standard deviation of ln, as people say it."""
-    return f"{100 * value:.2g} %" if value < 1 else f"a factor of {np.exp(min(value, 50.0)):.2g}"
+    return f"{100 * value:.3g} %" if value < 1 else f"a factor of {np.exp(min(value, 50.0)):.2g}"
 
 
 def _short(design: Design, expected: Expectation) -> str:

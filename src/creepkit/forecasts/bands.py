@@ -45,7 +45,8 @@ def band_of_draws(
 ) -> Band:
     """The band of draws of a curve, to which white noise is added.
 
-    values : (draws, times) in the output's unit. noise : (times,) standard deviation in the transformed output.
+    values : (draws, times) in the output's unit. times : (times,) s.
+    noise : (times,) standard deviation in the transformed output.
     grows : whether a curve that has ended counts as infinitely large.
     """
     alive = np.isfinite(values)

@@ -197,10 +197,11 @@ class LinearForecast:
         return float("inf") if stated else FREEDOM_PER_FRAME * max(sum(frames), 1)
 
     def residuals_at(self, test: NewTest, mean: Floats, scatter: tuple[Floats, float], sources: Floats) -> Floats:
-        """(data,) residuals where what is uncertain is moved by `sources`, in standard deviations of its sources.
+        """(data,) residuals where what is uncertain is moved, in standard deviations of its sources.
 
-        test : which effects are known. mean : (unknowns + effects,) at sources of zero. scatter : covariance of these,
-        and variance of what is new in the factor of the test. Simulated, so that a large factor on the rate is no error
+        test : which effects are known. mean : (unknowns + effects,) at sources of zero. scatter : (unknowns + effects,
+        unknowns + effects) covariance of these, and variance of what is new in the factor of the test.
+        sources : (unknowns + effects + 1 + dimensions,). Simulated, so that a large factor on the rate is no error
         of linearisation; linear for laws whose rates have no coefficient.
         """
         covariance_of_joint, variance = scatter

@@ -18,9 +18,9 @@ from creepkit.inverse.composite_predictor import (
     refined_of,
     search_predictor_of,
 )
-from creepkit.inverse.goodness_of_fit import EXTRAPOLATION_FACTOR
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.rate_nuisances import law_with_rate_factors
+from creepkit.inverse.rupture_prediction import EXTRAPOLATION_FACTOR
 from creepkit.records import History, Prediction, Predictor, Status
 
 FOLLOWED_TIMES, ADDED_TIMES = 300, 20
@@ -212,7 +212,10 @@ def crossing_times(drawn: TestCurves, output: str, targets: Floats) -> Floats:
 
 
 def first_crossing(times: Floats, values: Floats, target: float) -> float:
-    """s, when values (times,) first reach a target from the side on which they begin; infinite where they do not."""
+    """s, when values first reach a target from the side on which they begin; infinite where they do not.
+
+    times : (times,) s. values : (times,) in the unit of the target.
+    """
     counted = np.isfinite(values) & (times > 0)
     times, values = times[counted], values[counted]
     if not values.size:

@@ -229,7 +229,7 @@ class Identification(Presentable):
         Infinite where nothing breaks within some thousand times the longest test. A stress or temperature outside
         `ranges` gives a FitWarning, a temperature that seems to be in Celsius a FitError, but for warn=False.
         """
-        from creepkit.inverse.goodness_of_fit import constant_stress_tests
+        from creepkit.inverse.rupture_prediction import constant_stress_tests
 
         T = self.reference.temperature if temperature is None else temperature
         tests, shape = constant_stress_tests(stress, T, self.ranges["time"][1], control)
@@ -242,7 +242,7 @@ class Identification(Presentable):
         self, histories: Sequence[History] | None = None, *, test_scatter: bool = True, using: Predictor | None = None
     ) -> tuple[Floats, Floats, Floats]:
         """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
-        from creepkit.inverse.goodness_of_fit import predict_rupture_times
+        from creepkit.inverse.rupture_prediction import predict_rupture_times
 
         predictor = self._predictor_or(using)
         tests, noise_model = list(histories or self.histories), self.noise_model if test_scatter else None

@@ -22,7 +22,8 @@ from creepkit.inverse.predictor_documents import predictor_documents, predictor_
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity
-from creepkit.inverse.uncertainty.rate_scatter import RateScatter, problem_with
+from creepkit.inverse.uncertainty.rate_scatter import RateScatter
+from creepkit.inverse.uncertainty.stored_rate_scatter import problem_with
 from creepkit.inverse.unmodelled_effects import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json

@@ -27,7 +27,7 @@ from creepkit.inverse.defect_correction import (
     shift_of_values,
     with_correction_at_frames,
 )
-from creepkit.inverse.goodness_of_fit import compare_rupture_times, pooled_errors, pooled_log_strain_rms, test_fits
+from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_notes import domain_notes, fitted_ranges, identification_notes, provenance_of
@@ -44,6 +44,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS, NoiseModel, initial_noise_model
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.rupture_prediction import compare_rupture_times
 from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.multistart import EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct

@@ -149,9 +149,20 @@ class RateScatter:
         return -0.5 * (chi_square + log_determinant)
 
     def joint(self, sd: Floats) -> tuple[Floats, Floats]:
-        """Mean (unknowns + effects,) and covariance of (dx, c) given standard deviations sd (levels,)."""
+        """Mean (unknowns + effects,) and covariance of (dx, c) about the estimate, given sd (levels,) of the effects.
+
+        Where the estimate is not the optimum under this covariance (it is one of least squares), its distance from
+        that counts as an error of the estimate: dx has the mean zero, and as covariance its second moment.
+        """
         precision, right, _, _ = self._normal_equations(sd)
-        return _scaled_solve(precision, right), scaled_inverse(precision)
+        optimum, covariance = _scaled_solve(precision, right), scaled_inverse(precision)
+        size = self.design.shape[1]
+        shift, own = optimum[:size], covariance[:size, :size]
+        gain = _scaled_solve(own, covariance[:size, size:]).T if size else np.zeros((len(self.groups), 0))
+        about = own + np.outer(shift, shift)
+        mean = np.concatenate([np.zeros(size), optimum[size:] - gain @ shift])
+        cross, effects = about @ gain.T, covariance[size:, size:] + gain @ np.outer(shift, shift) @ gain.T
+        return mean, np.block([[about, cross], [cross.T, effects]])
 
     def _normal_equations(self, sd: Floats) -> tuple[Floats, Floats, Floats, float]:
         """Precision and right-hand side of (dx, c), D (tests,), and ln|S|."""
@@ -354,48 +365,3 @@ def _scaled_solve(matrix: Floats, right: Floats) -> Floats:
     scaled = right / (scale if right.ndim == 1 else scale[:, None])
     solution = np.linalg.solve(matrix / np.outer(scale, scale), scaled)
     return np.asarray(solution / (scale if right.ndim == 1 else scale[:, None]))
-
-
-LARGEST_NUMBER = 1e12
-"""Of a stored record: larger ones are damage."""
-
-
-def problem_with(scatter: RateScatter, tests: Sequence[str], unknowns: int) -> str:
-    """What is wrong with a record that was read from a file, in one clause; "" for one that fits an identification.
-
-    tests : names of the fitted tests. unknowns : how many the identification has.
-    """
-    count = len(tests)
-    shapes = {
-        "log_factor": (count,),
-        "variance": (count,),
-        "weight": (count,),
-        "design": (count, unknowns),
-        "precision": (unknowns, unknowns),
-        "gradient": (unknowns,),
-    }
-    if scatter.tests != tuple(tests):
-        return "its tests are not those of the identification"
-    for name, shape in shapes.items():
-        array = np.asarray(getattr(scatter, name))
-        if array.shape != shape and not array.size == 0 == np.prod(shape):
-            return f"{name} has the shape {array.shape}, not {shape}"
-        if not (np.abs(array) < LARGEST_NUMBER**2).all():
-            return f"{name} holds numbers that are too large"
-    if not ((scatter.variance >= 0).all() and (scatter.weight > 0).all()):
-        return "a variance is negative, or a weight not above zero"
-    for level, names in scatter.members.items():
-        if level not in LEVELS[:-1] or len(names) != count:
-            return f"members of '{level:.20}' are not one for each test, of a heat or laboratory"
-    if not {*scatter.common} <= {*LEVELS[:-1]}:
-        return "common names levels that are no heat or laboratory"
-    if scatter.known is not None and not 0 <= scatter.known < LARGEST_NUMBER:
-        return f"known is {scatter.known:g}, which is no standard deviation"
-    for name in ("output_scales", "output_floors"):
-        if not all(0 < value < LARGEST_NUMBER for value in getattr(scatter, name).values()):
-            return f"{name} must be above zero"
-    scale = np.sqrt(np.maximum(np.diag(scatter.precision), 1e-300))
-    scaled = scatter.precision / np.outer(scale, scale)
-    if unknowns and (not np.allclose(scaled, scaled.T, atol=1e-8) or np.linalg.eigvalsh(scaled)[0] < -1e-6):
-        return "precision is not symmetric and positive semi-definite"
-    return ""
