@@ -69,6 +69,8 @@ BENCHMARKS = {
     "measured_creep": Benchmark(90, needs=DATA),
     "whole_life": Benchmark(60, needs=DATA),
     "rupture_coverage": Benchmark(4),
+    "forecast_coverage": Benchmark(50),
+    "forecast_measured": Benchmark(12, needs=DATA),
     "weights": Benchmark(8),
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "structure": Benchmark(0.1),

@@ -42,7 +42,7 @@ class Design:
     thicknesses : (dimples,) mm, nominal; spread : relative standard deviation of what they really are.
     loadings : one a dimple, or one for all. correlated : AR(1) noise (coefficient, sd in mm) of D_amp.
     What the fit is not told: drift : K over the test. thickness_error : relative, its sign drawn. offset : mm, added to
-    D_amp, its sign drawn.
+    D_amp, its sign drawn. rate : standard deviation of ln of a factor of each dimple on its creep rate.
     """
 
     title: str
@@ -53,6 +53,7 @@ class Design:
     drift: float = 0.0
     thickness_error: float = 0.0
     offset: float = 0.0
+    rate: float = 0.0
 
     @property
     def nuisances(self):
@@ -87,12 +88,13 @@ DESIGNS = {
 
 @dataclass(frozen=True)
 class Specimen:
-    """One planted alloy: its law, true values and modulus factor, and its measured tests."""
+    """One planted alloy: its law, true values and modulus (MPa), and its measured tests."""
 
     name: str
     law: ck.CreepLaw
     values: dict
     tests: list
+    modulus: float
 
 
 def drawn_values(name, rng):
@@ -207,7 +209,7 @@ def specimen(k, names, design, using, seed=2026):
         alloy = law, values, ck.Elastic(E=modulus)
         tests = [planted_test(alloy, j, design, using, rng) for j in range(len(design.thicknesses))]
         if all(t is not None for t in tests):
-            return Specimen(f"{law.name} {k}", law, values, tests)
+            return Specimen(f"{law.name} {k}", law, values, tests, modulus)
     raise SystemExit(f"no specimen of {name} in 100 draws")
 
 
@@ -219,6 +221,8 @@ def planted_test(alloy, number, design, using, rng):
     dimple = using.replace(apex_thickness=nominal * (1.0 + error), **FINE)
     loading = design.loadings[number % len(design.loadings)]
     temperature = 293.15
+    if design.rate:
+        values = {**values, "A": values["A"] * np.exp(design.rate * rng.standard_normal())}
     if design.drift:
         law = law.times(ck.arrhenius(T_ref=TEST_TEMPERATURE))
         values = {**values, "Q": ACTIVATION_ENERGY}

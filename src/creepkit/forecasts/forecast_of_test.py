@@ -25,7 +25,13 @@ from creepkit.forecasts.results import (
     TimeForecast,
 )
 from creepkit.forecasts.simulation import at_times, crossing_times, first_crossing
-from creepkit.forecasts.variance_shares import band_transform, discrepancy_variance, noise_in_output, variance_shares
+from creepkit.forecasts.variance_shares import (
+    band_transform,
+    discrepancy_variance,
+    noise_in_output,
+    offset_draws,
+    variance_shares,
+)
 from creepkit.inverse.extrapolation import extrapolation_text
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT, usable_frames
@@ -106,8 +112,7 @@ def _output_forecast(
     parts = []
     for one in drawn:
         values = at_times(one.drawn, history.times).of(name)
-        if name in fit.noise_model.outputs:
-            values = values + fit.noise_model[name].offset * rng.standard_normal((len(values), 1))
+        values = values + offset_draws(fit, name, len(values), rng)[:, None]
         parts.append(values + one.numerical.get(name, 0.0) * rng.standard_normal((len(values), 1)))
     values = np.concatenate(parts)
     alive = np.isfinite(values)
@@ -174,7 +179,7 @@ def _targets_of_curves(
     known = fit.noise_model.outputs.get(name)
     if known is None:
         return np.full(count, target)
-    shifted = target - known.offset * rng.standard_normal(count)
+    shifted = target - offset_draws(fit, name, count, rng)
     transform = band_transform(fit, history, name, at_times(best.central, history.times).of(name)[0])
     slow = np.sqrt(known.drift**2 + discrepancy_variance(fit, name, transform)) * rng.standard_normal(count)
     if name in LOGARITHMIC_OUTPUTS:

@@ -12,7 +12,7 @@ from creepkit.forecasts.draws import SOURCES
 from creepkit.forecasts.results import CHOICE_OF_LAW, LAW, MISFIT, NOISE, NUMERICAL, OFFSET
 from creepkit.forecasts.simulation import at_times
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.noise_model import OutputNoise
+from creepkit.inverse.noise_model import OutputNoise, components_fixed_by_priors
 from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH, LOGARITHMIC_OUTPUTS, RELATIVE_DISCREPANCY_UNIT
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform, OutputTransform
 from creepkit.records import History
@@ -45,6 +45,16 @@ def frame_noise_of(fit: Identification, history: History, name: str) -> Floats:
     known, stated = fit.noise_model.outputs.get(name), history.standard_deviation.get(name)
     usual = np.full(history.times.size, 0.0 if known is None else known.noise)
     return usual if stated is None else np.where(np.isfinite(stated) & (stated > 0), stated, usual)
+
+
+def offset_draws(fit: Identification, name: str, count: int, rng: np.random.Generator) -> Floats:
+    """(count,) offsets of a test in one output: where n tests told of their size they are Student's t of n."""
+    known = fit.noise_model.outputs.get(name)
+    if known is None:
+        return np.zeros(count)
+    if (name, "offset") in components_fixed_by_priors(fit.settings.nuisances, [name]):
+        return np.asarray(known.offset * rng.standard_normal(count))
+    return np.asarray(known.offset * rng.standard_t(len(fit.scatter_of_rates.tests), count))
 
 
 def noise_in_output(

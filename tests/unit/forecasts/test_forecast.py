@@ -2,6 +2,7 @@
 
 import json
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy.stats import norm
 
 import creepkit as ck
 from creepkit.errors import FitError
+from creepkit.forecasts.draws import law_draws
 from creepkit.forecasts.forecast import forecast
 from creepkit.inverse.ranking_document import read_fit_or_ranking, write_ranking_document
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
@@ -90,6 +92,32 @@ def test_a_measured_test_is_scored_and_its_own_factor_is_found(fit):
     (time,) = one.times
     assert time.measured == pytest.approx(0.002 / (RATE * 0.95**EXPONENT * 1.3), rel=0.02)
     assert time.inside is False
+
+
+def test_draws_lie_within_the_bounds_of_the_law_and_keep_what_compensates(fit):
+    """The exponent is drawn far beyond its bounds; the rate at the reference hardly differs between draws."""
+    known, size = fit.scatter_of_rates, fit.x.size
+    nothing = {"design": np.zeros((len(known.tests), size)), "gradient": np.zeros(size)}
+    scatter = replace(known, precision=np.diag([1e4, 0.25]), **nothing)
+    draws = law_draws(replace(fit, rate_scatter=scatter), 400, np.random.default_rng(1))
+    assert draws.count == 400
+    low, high = fit.law.internal_bounds
+    theta = fit.coordinates.theta(draws.u)
+    assert ((theta >= low - 1e-3) & (theta <= high + 1e-3)).all()
+    assert np.std(draws.u[:, 0]) == pytest.approx(1e-2, rel=0.15)
+
+
+def test_the_time_to_a_strain_is_that_of_the_measured_strain(fit):
+    """With an offset the interval of ln t is wider by that of ln strain: an offset of 0.1 of the strain."""
+    offset = 1e-3
+    noise = replace(fit.noise_model, outputs={"strain": replace(fit.noise_model["strain"], offset=offset)})
+    plan = bar("plan", 100.0, noise=0.0)
+    half = [
+        np.log(one.high / one.low) / 2
+        for f in (fit, replace(fit, noise_model=noise))
+        for one in f.forecast(plan, draws=4000).tests[0].times
+    ]
+    assert half[1] == pytest.approx(np.hypot(half[0], norm.ppf(0.975) * offset / 0.01), rel=0.06)
 
 
 def test_a_likely_test_is_inside(fit):

@@ -12,8 +12,10 @@ effects of heats and laboratories, c, are those of a linear mixed model: given t
     (dx, c) is normal with precision [K 0; 0 S^-1] + [X Z]' D^-1 [X Z],    D = s_test^2 + var e,
 
 Z saying which heat and laboratory a test is of, and S being diagonal with s_heat^2 and s_laboratory^2. Integrating it
-out leaves the restricted likelihood of s. Few tests say little of s: a half-normal prior, of the size that is usual
-between creep tests, holds it. Intervals of predictions are integrals over the posterior distribution of s.
+out leaves the restricted likelihood of s. Few tests say little of s: a prior of the size u that is usual between creep
+tests holds it, exp(-s^2 / 2 u^2) / (s + u / 3). Below u it is like that of Jeffreys, 1 / s, with which intervals by few
+tests are those of Student's t, but flat where s is too small to matter; a flat prior made them wider by a quarter.
+Intervals of predictions are integrals over the posterior distribution of s.
 
 Source: S. Searle, G. Casella and C. McCulloch, Variance Components (1992), chapters 6 and 7.
 """
@@ -35,7 +37,11 @@ from creepkit.inverse.variance_components import scaled_inverse
 from creepkit.records import History, Nuisance
 
 USUAL_SD = {"test": ASSUMED_RATE_SD, "heat": 0.5, "laboratory": 0.3}
-"""Of ln rate: standard deviation of the half-normal prior of each level's standard deviation."""
+"""Of ln rate: what is usual of each level, u."""
+
+
+FLAT_BELOW = 1.0 / 3.0
+"""Of what is usual: standard deviations that the prior hardly tells apart, since rates are not known that well."""
 
 
 LEVELS = ("laboratory", "heat", "test")
@@ -136,7 +142,8 @@ class RateScatter:
         count, scale = NODES[low.size], np.array([USUAL_SD[level] for level in self.levels])
         axes = [np.linspace(first, last, count) for first, last in zip(low, high, strict=True)]
         sd = np.exp(np.stack([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")], axis=-1))
-        log_weight = np.log(sd).sum(axis=1) - 0.5 * ((sd / scale) ** 2).sum(axis=1)  # d sd = sd d ln sd
+        log_weight = np.log(sd / (sd + FLAT_BELOW * scale)).sum(axis=1)  # d sd = sd d ln sd
+        log_weight -= 0.5 * ((sd / scale) ** 2).sum(axis=1)
         log_weight += np.array([self.restricted_log_likelihood(one) for one in sd])
         weight = np.exp(log_weight - log_weight.max())
         return ScatterPosterior(self.levels, sd, weight / weight.sum())

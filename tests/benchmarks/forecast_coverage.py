@@ -1,0 +1,382 @@
+"""Coverage of forecasts over planted campaigns: whole curves inside their bands, and times inside their intervals.
+
+    python tests/benchmarks/forecast_coverage.py [--rows NAME ...] [--campaigns 100] [--dimples 40] [--quick]
+                                                 [--jobs 2] [--keep FOLDER] [--write]
+
+Each campaign plants an alloy, makes tests of it, identifies the planted law from them with two starts and forecasts one
+further test at a condition of its own, `ck.forecast(ck.identify(law, tests), test)`, with defaults. Bars have closed
+forms (planted_creep_tests.py), noise of 5e-5 and a loading strain of 1e-4 of each test, and a factor on all rates of
+each test, whose standard deviation stands in the row; lives scatter further by a factor on the growth of damage, the
+second number. The fifth test to rupture is stopped at half its life. Dimples (planted_bulge_tests.py) are made by
+finite elements on a mesh of a third of the element size with a thirtieth of the tolerance: a jump from 8 to 10 MPa, a
+thickness that is known to 2 %, a modulus to 10 %, 48 frames in 12 h, laws and values drawn from the four single laws.
+
+Curves: the share of tests whose whole measured curve lies inside the simultaneous 95 % band, with its 95 % binomial
+interval; the mean share of frames inside the pointwise band; the share of p-values of the score below 0.05. Times: the
+share of measured times inside the 95 % interval; the mean half width of this interval in ln time, the same of an
+oracle that knows the law, the scatter and the noise, and their ratio. The time of a dimple is that to the deflection
+which a dimple of nominal thickness reaches after 8 h. Of a known heat the oracle knows the factor. The goal is a
+coverage of 0.90 to 0.98.
+
+Finished campaigns are kept in the folder of --keep: stopped and started again, none is identified twice. Another
+version of creepkit needs another folder.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+import planted_bulge_tests as dimples
+import planted_creep_tests as bars
+from measured import Page, arguments, progress
+from proportions import share_with_interval
+
+import creepkit as ck
+from creepkit.errors import CreepkitError
+
+LEVEL = 0.95
+STARTS = 2
+"""Of each search: the planted laws have one minimum."""
+NORMAL, STUDENT = "normal", "Student's t, 4"
+STUDENT_FREEDOM = 4
+QUICK = {"bar": 6, "dimple": 2}
+"""Campaigns of a row in the quick form."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the tables.
+
+    law : planted and identified; "" stands for the four single laws of dimples in turn. tests : that are identified.
+    rate, damage : standard deviations of ln of a test's own factors. heats : number of heats, with `between` the
+    standard deviation of ln of their factors; known : whether the further test is of one of them.
+    """
+
+    title: str
+    law: str
+    tests: int
+    rate: float = 0.0
+    damage: float = 0.0
+    distribution: str = NORMAL
+    heats: int = 0
+    between: float = 0.0
+    known: bool = False
+    states_noise: bool = True
+    isothermal: bool = False
+    weights: str = "noise"
+    correlated: tuple[float, float] | None = None
+
+    @property
+    def kind(self) -> str:
+        """What the tests are made of."""
+        return "bar" if self.law else "dimple"
+
+    @property
+    def nuisances(self) -> tuple[ck.Nuisance, ...]:
+        """Those of a fit of dimples."""
+        own = (dimples.MODULUS, ck.Nuisance("thickness", sd=0.02 * dimples.NOMINAL))
+        return (*own, ck.Nuisance("offset"), ck.Nuisance("rate")) if self.rate else own
+
+
+def _hardening(tests: int, rate: float, **further: object) -> Row:
+    return Row(f"strain hardening, {tests} tests, {rate:g}", bars.HARDENING, tests, rate, **further)  # type: ignore[arg-type]
+
+
+def _heats(known: bool) -> Row:
+    title = (
+        f"strain hardening, 4 heats of 3 tests, 0.15 between and 0.05 within; {'a known' if known else 'a new'} heat"
+    )
+    return Row(title, bars.HARDENING, 12, 0.05, heats=4, between=0.15, known=known)
+
+
+def _rupture(law: str, tests: int, rate: float, damage: float, **further: object) -> Row:
+    name = "Kachanov-Rabotnov" if law == bars.KACHANOV else "MPC Omega"
+    return Row(f"{name}, {tests} tests, {rate:g} and {damage:g}", law, tests, rate, damage, **further)  # type: ignore[arg-type]
+
+
+def _dimples(title: str, tests: int, **further: object) -> Row:
+    return Row(f"{tests} dimples{title}", "", tests, **further)  # type: ignore[arg-type]
+
+
+ROWS = {
+    "sh-3-0.03": _hardening(3, 0.03),
+    "sh-3-0.2": _hardening(3, 0.2),
+    "sh-4-0.1": _hardening(4, 0.1),
+    "sh-6-0.03": _hardening(6, 0.03),
+    "sh-6-0.1": _hardening(6, 0.1),
+    "sh-6-0.2": _hardening(6, 0.2),
+    "sh-12-0.03": _hardening(12, 0.03),
+    "sh-12-0.1": _hardening(12, 0.1),
+    "sh-12-0.2": _hardening(12, 0.2),
+    "norton": Row("Norton, 6 tests, 0.1, noise estimated", "norton", 6, 0.1, states_noise=False),
+    "student": Row("strain hardening, 6 tests, 0.1, Student's t of 4", bars.HARDENING, 6, 0.1, distribution=STUDENT),
+    "likelihood": Row("strain hardening, 6 tests, 0.1, by likelihood", bars.HARDENING, 6, 0.1, weights="likelihood"),
+    "heat-known": _heats(known=True),
+    "heat-new": _heats(known=False),
+    "kr-4-small": _rupture(bars.KACHANOV, 4, 0.03, 0.03, isothermal=True),
+    "kr-7": _rupture(bars.KACHANOV, 7, 0.1, 0.05, isothermal=True),
+    "omega-5": _rupture(bars.OMEGA, 5, 0.05, 0.03),
+    "omega-8": _rupture(bars.OMEGA, 8, 0.15, 0.08),
+    "omega-8-likelihood": _rupture(bars.OMEGA, 8, 0.15, 0.08, weights="likelihood"),
+    "dimples-2": _dimples("", 2),
+    "dimples-3": _dimples("", 3),
+    "dimples-4": _dimples("", 4),
+    "dimples-3-rate": _dimples(", rates scatter by 0.1", 3, rate=0.1),
+    "dimples-3-correlated": _dimples(", AR(1) noise of D_amp (0.9, 5 um)", 3, correlated=(0.9, 5e-3)),
+    "dimples-3-likelihood": _dimples(", by likelihood", 3, weights="likelihood"),
+}
+
+
+# ---- bars ----------------------------------------------------------------------------------------------------
+
+
+def drawn(row: Row, sd: float, count: int, rng: np.random.Generator) -> np.ndarray:
+    """(count,) ln factors of standard deviation sd."""
+    if row.distribution == NORMAL:
+        return sd * rng.standard_normal(count)
+    return sd * np.sqrt((STUDENT_FREEDOM - 2) / STUDENT_FREEDOM) * rng.standard_t(STUDENT_FREEDOM, count)
+
+
+def bar_campaign(row: Row, rng: np.random.Generator):
+    """The tests that are identified, the further one, the alloy, and the oracle's half widths by event."""
+    alloy = bars.drawn_alloy(row.law, rng)
+    conditions = bars.ISOTHERMAL if row.isothermal else bars.CONDITIONS
+    own, damage = drawn(row, row.rate, row.tests + 1, rng), drawn(row, row.damage, row.tests + 1, rng)
+    heat_of, labels = np.zeros(row.tests + 1, int), [{}] * (row.tests + 1)
+    if row.heats:
+        heat_of = np.arange(row.tests + 1) * row.heats // row.tests
+        heat_of[-1] = rng.integers(row.heats) if row.known else row.heats
+        own = own + (row.between * rng.standard_normal(row.heats + 1))[heat_of]
+        labels = [{"heat": f"heat {k}"} for k in heat_of]
+    tests = [
+        bars.planted_bar(
+            f"test {k}",
+            alloy,
+            conditions[k % len(conditions)],
+            bars.Factors(own[k], damage[k]),
+            rng,
+            states_noise=row.states_noise,
+            stopped=k == 4,
+            labels=labels[k],
+        )
+        for k in range(row.tests)
+    ]
+    condition = rng.uniform(45, 65), bars.T_REF if row.isothermal else rng.uniform(980, 1020)
+    factors = bars.Factors(own[-1], damage[-1])
+    further = bars.planted_bar(
+        "further", alloy, condition, factors, rng, states_noise=row.states_noise, labels=labels[-1]
+    )
+    unknown_heat = 0.0 if row.known else row.between
+
+    def factors_of_oracle(count, rng):
+        rate = drawn(row, row.rate, count, rng) + unknown_heat * rng.standard_normal(count)
+        return rate, drawn(row, row.damage, count, rng)
+
+    events = {"strain 0.01": 0.01, **({"rupture": None} if further.rupture_time else {})}
+    oracle = {
+        event: bars.oracle_half_width(alloy, condition, factors_of_oracle, target, rng)
+        for event, target in events.items()
+    }
+    return tests, further, alloy.law, oracle
+
+
+# ---- dimples -------------------------------------------------------------------------------------------------
+
+
+def dimple_campaign(k: int, row: Row, rng: np.random.Generator):
+    """As bar_campaign; the last of the specimen's tests is the further one. And the deflection that is asked for."""
+    design = dimples.Design(
+        row.title,
+        thicknesses=(dimples.NOMINAL,) * (row.tests + 1),
+        spread=0.02,
+        correlated=row.correlated,
+        rate=row.rate,
+    )
+    using = ck.specimen("bulge").replace(threads=1)
+    specimen = dimples.specimen(k, dimples.SINGLE, design, using, seed=2027)
+    elastic = ck.Elastic(E=specimen.modulus)
+    curves = [
+        ck.simulate(
+            specimen.law,
+            using.replace(apex_thickness=dimples.NOMINAL * (1 + step), **dimples.FINE),
+            specimen.values,
+            elastic=elastic,
+            loading=dimples.JUMP,
+            times=dimples.TIMES,
+            temperature=293.15,
+        ).outputs["amplitude"]
+        for step in (0.0, -0.01, 0.01)
+    ]
+    target = float(curves[0][dimples.TIMES == 8 * 3600.0][0])
+    thinner, thicker = (np.interp(target, c, np.log(dimples.TIMES)) for c in curves[1:])
+    slope = float(thicker - thinner) / 0.02
+    half_width = 1.96 * float(np.hypot(slope * 0.02, row.rate))
+    return specimen.tests[:-1], specimen.tests[-1], specimen.law, {"deflection": half_width}, target
+
+
+# ---- campaigns -----------------------------------------------------------------------------------------------
+
+
+def campaign_result(job: tuple[int, str]) -> dict:
+    """All that the tables need of one campaign, as plain numbers."""
+    k, name = job
+    row = ROWS[name]
+    rng = np.random.default_rng([2026, k, *name.encode()])
+    settings: dict = {"seed": k, "weights": row.weights, "starts": STARTS}
+    targets = None
+    if row.kind == "bar":
+        tests, further, law, oracle = bar_campaign(row, rng)
+    else:
+        tests, further, law, oracle, target = dimple_campaign(k, row, rng)
+        settings |= {"using": ck.specimen("bulge").replace(threads=1), "nuisances": row.nuisances}
+        targets = {"amplitude": [target]}
+    start = time.process_time()
+    try:
+        fit = ck.identify(law, tests, **settings)
+        forecast = ck.forecast(fit, further, level=LEVEL, targets=targets)
+    except CreepkitError as error:
+        return {"k": k, "law": law.name, "failed": str(error)}
+    cpu = time.process_time() - start
+    (one,) = forecast.tests
+    times = {}
+    for t in one.times:
+        event = "deflection" if t.event.startswith("amplitude") else t.event
+        if event in oracle and t.inside is not None and t.low > 0:
+            half_width = 0.5 * float(np.log(t.high / t.low))
+            times[event] = {"inside": bool(t.inside), "half width": half_width, "oracle": oracle[event]}
+            times[event] |= {"error": float(np.log(t.measured / t.median))}
+    score = one.score
+    assert score is not None
+    return {
+        "k": k,
+        "law": law.name,
+        "whole": score.whole_inside,
+        "share": score.inside,
+        "p": score.p_value,
+        "times": times,
+        "rate": fit.noise_model.rate,
+        "cpu": cpu,
+    }
+
+
+def finished_rows(file: Path, jobs: list[tuple[int, str]], pool) -> list[dict]:
+    """The rows of all jobs; those that the file holds of an earlier run, which may have been killed, are kept."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    known = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    rows = {row["k"]: row for row in known}
+    remaining = [job for job in jobs if job[0] not in rows]
+    with file.open("a") as out:
+        for row in pool.imap_unordered(campaign_result, remaining):
+            rows[row["k"]] = row
+            print(json.dumps(row), file=out, flush=True)
+    done = [rows[job[0]] for job in jobs]
+    whole = [hit for r in done if "whole" in r for hit in list(r["whole"].values())[:1]]
+    progress(f"{file.stem}: {len(done)} campaigns, {share_with_interval(whole)} of the curves inside")
+    return done
+
+
+# ---- tables --------------------------------------------------------------------------------------------------
+
+
+def print_curves(page: Page, results: dict[str, list[dict]]) -> None:
+    """Coverage of curves, one line for each output of a row."""
+    page.heading("Curves")
+    page.table(
+        "campaign",
+        "output",
+        "campaigns (failed)",
+        "whole curve inside [95 % interval]",
+        "frames inside the pointwise band",
+        "p-value of the score below 0.05",
+    )
+    for name, rows in results.items():
+        done = [r for r in rows if "whole" in r]
+        for output in done[0]["whole"] if done else ():
+            page.row(
+                ROWS[name].title,
+                output,
+                f"{len(done)} ({len(rows) - len(done)})",
+                share_with_interval([r["whole"][output] for r in done]),
+                f"{np.mean([r['share'][output] for r in done]):.3f}",
+                f"{np.mean([r['p'] < 0.05 for r in done]):.2f}",
+            )
+
+
+def print_times(page: Page, results: dict[str, list[dict]]) -> None:
+    """Coverage and width of times."""
+    page.heading("Times")
+    page.table(
+        "campaign",
+        "time to",
+        "campaigns",
+        "inside [95 % interval]",
+        "mean half width of ln t",
+        "of an oracle",
+        "ratio of means",
+        "sd of ln(measured / median)",
+    )
+    for name, rows in results.items():
+        events = dict.fromkeys(event for r in rows for event in r.get("times", ()))
+        for event in events:
+            times = [r["times"][event] for r in rows if event in r.get("times", ())]
+            finite = [t for t in times if np.isfinite(t["half width"])]
+            width, oracle = (float(np.mean([t[key] for t in finite])) for key in ("half width", "oracle"))
+            page.row(
+                ROWS[name].title,
+                event,
+                len(times),
+                share_with_interval([t["inside"] for t in times]),
+                f"{width:.3f}" + (f" ({len(times) - len(finite)} infinite)" if len(finite) < len(times) else ""),
+                f"{oracle:.3f}",
+                f"{width / oracle:.2f}",
+                f"{np.std([t['error'] for t in times]):.3f}",
+            )
+
+
+def print_costs(page: Page, results: dict[str, list[dict]]) -> None:
+    """CPU time of the identifications and forecasts."""
+    cpu = {
+        kind: [r["cpu"] for n, rows in results.items() if ROWS[n].kind == kind for r in rows if "cpu" in r]
+        for kind in QUICK
+    }
+    texts = [f"{np.median(values):.2g} s of a {kind}'s campaign" for kind, values in cpu.items() if values]
+    page.paragraph(f"CPU time of an identification and a forecast, median: {', '.join(texts)}.")
+    failures = {r["failed"] for rows in results.values() for r in rows if "failed" in r}
+    for failure in sorted(failures)[:5]:
+        page.paragraph(f"Failed: {failure}")
+
+
+def main() -> None:
+    parser = arguments(__doc__)
+    parser.add_argument("--rows", nargs="*", default=list(ROWS), choices=list(ROWS))
+    parser.add_argument("--campaigns", type=int, default=100, help="of each row of bars")
+    parser.add_argument("--dimples", type=int, default=40, help="campaigns of each row of dimples")
+    parser.add_argument("--quick", action="store_true", help="a few campaigns of each row")
+    parser.add_argument("--jobs", type=int, default=2, help="worker processes")
+    parser.add_argument("--keep", default="build/forecast_coverage", help="folder in which finished campaigns are kept")
+    options = parser.parse_args()
+    counts = QUICK if options.quick else {"bar": options.campaigns, "dimple": options.dimples}
+    results = {}
+    with multiprocessing.get_context("spawn").Pool(options.jobs, maxtasksperchild=40) as pool:
+        for name in options.rows:
+            jobs = [(k, name) for k in range(counts[ROWS[name].kind])]
+            results[name] = finished_rows(Path(options.keep) / f"{name}.jsonl", jobs, pool)
+    page = Page("forecast_coverage", __doc__)
+    print_curves(page, results)
+    print_times(page, results)
+    print_costs(page, results)
+    if options.write:
+        page.write()
+
+
+if __name__ == "__main__":
+    main()
