@@ -114,7 +114,16 @@ STEPS = {
     "identify": [["identify", *(f"curve_{s}.csv" for s in CURVES), "--law", "soft-steel", "--starts", "2", "--json"]],
     "confirm": [["confirm", "identified/soft-steel.json", *(f"curve_{s}.csv" for s in CURVES), "--json"]],
     "predict": [["predict", "identified/ranking.json", "curve_80.csv"]],
-    "design": [["design", "identified/soft-steel.json", "--tests", "curve_80.csv", "--goal", "parameters", "--json"]],
+    "design": [
+        [
+            "design",
+            "identified/soft-steel.json",
+            *(w for s in CURVES for w in ("--tests", f"curve_{s}.csv")),
+            "--goal",
+            "parameters",
+            "--json",
+        ]
+    ],
     "screen": [
         ["screen", ".", "--law", "soft-steel", "--dense", "none", "--workers", "1", "--to", "screened", "--json"]
     ],

@@ -338,7 +338,7 @@ def test_text_json_and_picture(fit, tmp_path):
     result = fit.forecast([bar("another", 95.0, seed=5), bar("plan", 130.0, noise=0.0)])
     text = str(result)
     assert "strain 0.01:" in text
-    assert "measured: frames in the pointwise band: strain 100 %" in text
+    assert "measured: strain 100 % of the frames in the band and the whole curve in the wider one" in text
     assert "extrapolated" not in text.split("plan: ")[0]
     json.dumps(forecast_to_json(result), allow_nan=False)
     result.plot(tmp_path / "forecast.png")
