@@ -133,7 +133,7 @@ def rig_changes(
     if dimension:
         parts = [text.partition("=") for text in dimension]
         given["dimensions"] = {
-            name.strip(): tuple(_numbers(values, ",", "--dimension", "apex_thickness=0.44,0.5,0.58"))
+            name.strip(): tuple(_numbers(values, ",", f"--dimension {name.strip()}", "0.44,0.5,0.58 after ="))
             for name, _, values in parts
         }
     return {name: value for name, value in given.items() if value is not None}

@@ -246,6 +246,10 @@ def candidates_given(histories: Sequence[History | CandidateTest], rigs: Sequenc
     """Planned tests that a user gives, with names of their own; FitError for one that no rig can make."""
     candidates = []
     for given in histories:
+        if not isinstance(given, CandidateTest | History):
+            raise FitError(f"a planned test is a history without outputs, found {given!r:.60}")
+        if isinstance(given, CandidateTest) and not (given.histories and 0 < given.hours < np.inf):
+            raise FitError(f"the planned test '{given.description}' needs a history and hours of the oven above zero")
         if isinstance(given, CandidateTest):
             candidates.append(given)
             continue

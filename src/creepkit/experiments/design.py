@@ -17,6 +17,7 @@ import numpy as np
 from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig, variations_of_tests
+from creepkit.experiments.design_checks import check_arguments, notes_of
 from creepkit.experiments.expectations import Criterion, Expectation, PrecisionCriterion
 from creepkit.experiments.known_laws import KnownLaw
 from creepkit.experiments.law_discrimination import LawCriterion
@@ -25,7 +26,6 @@ from creepkit.experiments.planned_outcomes import PlannedOutcomes
 from creepkit.experiments.rig import Rig, rigs_of
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
-from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
@@ -78,15 +78,16 @@ def design(
     candidates : planned histories (without outputs) in the place of what the rig can make.
     Stopped by Ctrl-C it gives the best so far.
     """
+    check_arguments(goal, budget, seed)
     laws, weights, ranking = _remaining(source)
     rigs = _rigs(laws[0], rig)
     chosen: Goal = goal if goal is not None else "law" if len(laws) > 1 else "parameters"
     if isinstance(chosen, str) and chosen not in ("law", "parameters"):
         raise FitError(f"goal '{chosen}' is not known: 'law', 'parameters', or a quantity such as ck.rate_at(60.0)")
-    if budget is not None and not budget > 0:
-        raise FitError(f"the budget is {budget!r} h; it must be above zero")
     if chosen == "law" and len(laws) < 2:
         return Design("law", (laws[0].law.name,), (1.0,), (), budget=budget, notes=_challenges(ranking))
+    if candidates is not None and not (isinstance(candidates, Sequence) and len(candidates) > 0):
+        raise FitError(f"candidates= takes a list of planned histories, found {candidates!r:.60}")
     if candidates is not None:
         planned, given = candidates_given(candidates, rigs), True
     else:
@@ -115,6 +116,11 @@ def _remaining(
     source: Ranking | Identification | Sequence[Identification],
 ) -> tuple[list[Identification], np.ndarray, Ranking | None]:
     """The laws that the tests cannot rule out, with their weights, best first."""
+    is_list = (
+        isinstance(source, Sequence) and all(isinstance(fit, Identification) for fit in source) and len(source) > 0
+    )
+    if not (isinstance(source, Identification | Ranking) or is_list):
+        raise FitError(f"a design is made from an identification, a list of them or a ranking; found {source!r:.60}")
     if isinstance(source, Identification):
         ranking, fits, weights = None, [source], [1.0]
     else:
@@ -137,7 +143,9 @@ def _rigs(fit: Identification, rig: Rig | Sequence[Rig] | None) -> tuple[Rig, ..
     assert fit.predictor is not None
     if rig is None:
         return rigs_of(fit.histories, fit.predictor)
-    rigs = (rig,) if isinstance(rig, Rig) else tuple(rig)
+    rigs = (rig,) if isinstance(rig, Rig) else tuple(rig) if isinstance(rig, Sequence) else ()
+    if not rigs or not all(isinstance(one, Rig) for one in rigs):
+        raise FitError(f"rig= takes a ck.Rig, or several in a list; found {rig!r:.60}")
     known = dict.fromkeys(h.specimen for h in fit.histories)
     for one in rigs:
         if one.specimen not in known:
@@ -215,7 +223,7 @@ class _Search:
             expected=expected,
             budget=task.budget,
             interrupted=interrupted,
-            notes=_notes(task.laws),
+            notes=notes_of(task.laws),
         )
 
     def _evaluate_all(self, planned: Sequence[CandidateTest], refuse: bool) -> None:
@@ -375,15 +383,3 @@ def _challenges(ranking: Ranking | None) -> tuple[str, ...]:
     """What the tests allow beside the one law that remains."""
     allowed = (ranking.challenges or ()) if ranking is not None else ()
     return tuple(f"{challenge}: ask for goal='parameters'" for challenge in allowed)
-
-
-def _notes(laws: Sequence[Identification]) -> tuple[str, ...]:
-    """What an expectation takes for granted."""
-    notes = []
-    scatters = any(n.kind == "rate" and n.sd is None for n in laws[0].settings.nuisances)
-    if scatters and len(laws[0].histories) < MINIMUM_TESTS and laws[0].noise_model.rate == 0.0:
-        notes.append(
-            f"fewer than {MINIMUM_TESTS} tests do not show by how much the rate scatters from test to test; it is "
-            'taken as none: give Nuisance("rate", sd=...) where it is known'
-        )
-    return tuple(notes)

@@ -70,7 +70,10 @@ class Criterion(Protocol):
 
 @dataclass(eq=False)
 class PrecisionCriterion:
-    """The precision of the parameters (quantity None) or of one quantity, averaged over laws with weights (laws,)."""
+    """The precision of the parameters (quantity None) or of one quantity, averaged over laws with weights (laws,).
+
+    About the estimates where rates scatter between tests; else at draws of the posterior, where they are asked for.
+    """
 
     outcomes: PlannedOutcomes
     weights: Floats
@@ -115,7 +118,9 @@ class PrecisionCriterion:
     ) -> tuple[Floats, Floats, Floats]:
         """Covariances (draws, q, q) of q before and after the tests, and u (draws, parameters) at the draws."""
         law = self.outcomes.laws[position]
-        if not at_draws:
+        # The effect of a factor on the rate of a test is that at the estimates. At a draw it would not quite be the
+        # derivative to the law's own coefficient, and tests would seem to tell the two apart.
+        if not at_draws or law.fit.noise_model.rate > 0:
             _, K = self.outcomes.of(histories, position)
             information = law.information
             before, after = scaled_inverse(information), scaled_inverse(information + K.T @ K)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
@@ -61,21 +61,32 @@ class Rig:
     largest_output: float = float("inf")
 
     def __post_init__(self) -> None:
-        low, high = (float(level) for level in self.levels)
+        low, high = numbers(self.levels, "a rig's levels", "(least, greatest) above zero, such as (4, 14) MPa", count=2)
         if not 0 < low <= high < np.inf:
             raise FitError(f"a rig's levels are (least, greatest) above zero, such as (4, 14) MPa; found {self.levels}")
         for name in ("longest_hours", "frame_interval", "largest_output"):
-            if not getattr(self, name) > 0:
-                raise FitError(f"a rig's {name} must be above zero, found {getattr(self, name)!r}")
-        if not (np.isfinite(self.setup_hours) and self.setup_hours >= 0):
+            (value,) = numbers([getattr(self, name)], f"a rig's {name}", "a number", count=1)
+            if not 0 < value <= (np.inf if name == "largest_output" else LARGEST_HOURS):
+                raise FitError(f"a rig's {name} must be above zero and at most {LARGEST_HOURS:g}, found {value:g}")
+        (setup_hours,) = numbers([self.setup_hours], "a rig's setup_hours", "a number", count=1)
+        if not 0 <= setup_hours <= LARGEST_HOURS:
             raise FitError(f"a rig's setup_hours must be zero or more, found {self.setup_hours!r}")
-        if int(self.tests_per_run) != self.tests_per_run or self.tests_per_run < 1:
-            raise FitError(f"a rig's tests_per_run is a whole number from 1 on, found {self.tests_per_run!r}")
-        if not self.temperatures or any(not 0 < T < 1e4 for T in self.temperatures):
-            raise FitError(f"a rig's temperatures are numbers in K, above 0; found {tuple(self.temperatures)!r}")
-        dimensions = {name: tuple(float(v) for v in np.atleast_1d(values)) for name, values in self.dimensions.items()}
+        (count,) = numbers([self.tests_per_run], "a rig's tests_per_run", "a number", count=1)
+        if not (1 <= count <= MOST_TESTS_PER_RUN and int(count) == count):
+            raise FitError(
+                f"a rig's tests_per_run is a whole number from 1 to {MOST_TESTS_PER_RUN}, found {self.tests_per_run!r}"
+            )
+        temperatures = numbers(self.temperatures, "a rig's temperatures", "numbers in K, above 0")
+        if any(not 0 < T < 1e4 for T in temperatures):
+            raise FitError(f"a rig's temperatures are numbers in K, above 0; found {self.temperatures!r}")
+        if not isinstance(self.dimensions, Mapping):
+            raise FitError(f"a rig's dimensions are lengths in mm by name, found {self.dimensions!r:.60}")
+        dimensions = {
+            str(name): tuple(numbers(np.atleast_1d(values), f"a rig's {name}", "lengths in mm above zero"))
+            for name, values in self.dimensions.items()
+        }
         for name, values in dimensions.items():
-            if not values or min(values) <= 0:
+            if not all(0 < value < LONGEST_DIMENSION for value in values):
                 raise FitError(f"a rig's {name} must be lengths in mm above zero, found {values}")
         object.__setattr__(self, "levels", (low, high))
         object.__setattr__(self, "temperatures", tuple(float(T) for T in self.temperatures))
@@ -168,3 +179,18 @@ def _dimensions(tests: Sequence[History], predictor: Predictor) -> dict[str, tup
         return {}
     return {VARIED_DIMENSION: tuple(round(r * values[0], 4) for r in THICKNESS_RATIOS) if len(values) == 1 else
             tuple(values)}  # fmt: skip
+
+
+LARGEST_HOURS, LONGEST_DIMENSION, MOST_TESTS_PER_RUN = 1e7, 1e4, 25
+"""Of a rig: h (or s between frames), mm, and test pieces that an oven takes at once."""
+
+
+def numbers(values: Iterable[float] | object, what: str, allowed: str, count: int | None = None) -> list[float]:
+    """The values as numbers; FitError, naming what is allowed, for anything else."""
+    try:
+        result = [float(value) for value in values]  # type: ignore[union-attr]
+    except (TypeError, ValueError):
+        result = []
+    if not result or (count is not None and len(result) != count):
+        raise FitError(f"{what} are {allowed}; found {values!r:.60}")
+    return result

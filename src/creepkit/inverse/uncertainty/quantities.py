@@ -52,6 +52,7 @@ def rate_at(
     stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
 ) -> DerivedQuantity:
     """The creep rate, 1/s, at a stress (MPa) and temperature (K); what is left out is that of the reference point."""
+    _check_point(stress, temperature, strain, time)
     point_text = _point_text(stress, temperature)
     return DerivedQuantity(f"rate {point_text}", "1/s", "log", lambda c: log_rate(c, stress, temperature, strain, time))
 
@@ -60,10 +61,18 @@ def exponent_at(
     stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
 ) -> DerivedQuantity:
     """The local stress exponent d ln rate / d ln stress there."""
+    _check_point(stress, temperature, strain, time)
     point_text = _point_text(stress, temperature)
     return DerivedQuantity(
         f"local exponent {point_text}", "1", "linear", lambda c: local_exponent(c, stress, temperature, strain, time)
     )
+
+
+def _check_point(stress: float, *others: float | None) -> None:
+    """FitError for a point that is no finite state of a material."""
+    given = [stress, *(value for value in others if value is not None)]
+    if not (np.isfinite(given).all() and stress > 0 and min(given) >= 0):
+        raise FitError(f"a quantity was asked for at {given}; give a stress in MPa above zero, a temperature in K")
 
 
 def _point_text(stress: float, temperature: float | None) -> str:
