@@ -249,7 +249,7 @@ def campaign_result(job: tuple[int, str]) -> dict:
     (one,) = forecast.tests
     times = {}
     for t in one.times:
-        event = "deflection" if t.event.startswith("amplitude") else t.event
+        event = {"amplitude": "deflection", "": "rupture"}.get(t.output, f"{t.output} {t.target:g}")
         if event in oracle and t.inside is not None and t.low > 0:
             half_width = 0.5 * float(np.log(t.high / t.low))
             times[event] = {"inside": bool(t.inside), "half width": half_width, "oracle": oracle[event]}

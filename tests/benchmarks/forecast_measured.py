@@ -137,7 +137,7 @@ def forecast_of(case: Case, fit: Identification, history: History) -> Result:
     score = one.score
     times = [
         {
-            "event": t.event,
+            "event": t.event.removeprefix("engineering ").removeprefix("logarithmic "),
             "value": t.value,
             "median": t.median,
             "interval": [t.low, t.high],
