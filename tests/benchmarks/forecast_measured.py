@@ -356,7 +356,7 @@ def main() -> None:
     options = parser.parse_args()
     cases = [case for name in options.sets for case in SETS[name](options.data)]
     results = {(case.set, case.name): finished_results(case, options) for case in cases}
-    page = Page("forecasts", __doc__)
+    page = Page("forecast_measured", __doc__)
     print_summary(page, results)
     print_loading_strains(page, cases, results)
     for (name, law), rows in results.items():
