@@ -1,7 +1,10 @@
 """What all tests share."""
 
+from collections.abc import Iterator
+
 import pytest
 
+from creepkit.registry import default_registry
 from helpers.compilers import compiler_or_skip, skipped_without_need
 
 
@@ -21,6 +24,14 @@ def gcc() -> str:
 def gxx() -> str:
     """The C++ compiler."""
     return compiler_or_skip("g++")
+
+
+@pytest.fixture(autouse=True)
+def plugin_files_of_one_test_alone() -> Iterator[None]:
+    """What a test loads by `load_plugin` or `--plugin` is gone with it: tests run in any order, in any process."""
+    yield
+    if any(plugin.provenance.origin.endswith(".py") for plugin in default_registry().plugins()):
+        default_registry.cache_clear()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
