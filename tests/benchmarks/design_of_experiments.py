@@ -1,7 +1,7 @@
 """Design of experiments: what a proposed test is expected to tell, and what it tells once it is planted and made.
 
-    python tests/benchmarks/design_of_experiments.py [--bars 60] [--dimples 40] [--law-bars 120] [--laws 24] [--jobs 1]
-                                                     [--keep FOLDER] [--write]
+    python tests/benchmarks/design_of_experiments.py [--bars 60] [--dimples 40] [--law-bars 120] [--laws 100]
+                                                     [--shares half equal] [--jobs 1] [--keep FOLDER] [--write]
 
 Precision. A planted law is identified from a first campaign, the next test for the rate at a stress of service is
 asked of ck.design(), planted with noise at the true values, made, and all tests are identified again. "Predicted over
@@ -15,19 +15,18 @@ The law, by bars. One of the four single laws of Table 1 is identified from thre
 of 1e-4 and all four laws are selected; the test proposed for the law is made, and all are selected again.
 
 The law, by dimples. One of the four single laws of Table 1 is planted (laws, priors and noise of
-planted_bulge_tests.py, modulus unknown by 10 %). "Standard" is one dimple under 8, then 10 MPa for 12 h. Designed
-campaigns begin with 2 h of 8, then 10 MPa, with dimples of 0.44, 0.50 and 0.58 mm, and go on with what ck.design()
-proposes for the rest of their hours of the oven; the rig takes three dimples at once, from 4 to 14 MPa, and each run
-costs 1 h beside its test. Where one law remains after the first run the rest is designed for the parameters. "Singled
-out and right" has more than 0.95 of the weight, explains the tests, and is the planted law; "decisive and right"
-stands every challenge too (see docs/concepts/verdicts.md). "Met over expected" is of the chi-square by which each law
-that remained is worse than the planted one, after the proposed test was made and all laws were selected again, where
-either is above 5.
+planted_bulge_tests.py, modulus unknown by 10 %). "Standard" is 8, then 10 MPa for 12 h, with one dimple of 0.50 mm, or
+with three of 0.44, 0.50 and 0.58 mm. Designed campaigns begin with 2 h of 8, then 10 MPa, with these three dimples, and
+go on with what ck.design() proposes for the rest of their hours of the oven, unless the verdict is decisive already;
+the rig takes three dimples at once, from 4 to 14 MPa, and each run costs 1 h beside its test. All tests have a frame
+each 300 s, and 60 at most, which lie further apart then. "Singled out and right" has more than 0.95 of the weight,
+explains the tests, and is the planted law; "decisive and right" stands every challenge too (docs/concepts/verdicts.md).
+"Met over expected" is of the chi-square by which each law that remained is worse than the planted one, after the
+proposed test was made and all laws were selected again, where either is above 5; the expected probability is that of a
+verdict which is decisive and right.
 
-Two things are not like for like: the designed campaigns have three dimples in the oven and frames each 300 s (60 a
-test at most), the standard test has one dimple and frames each 900 s. Norton's law is a special case of the other
-three, so that where it is planted nothing but the penalty on parameters speaks for it, and no test singles it out;
-rows without it are given too.
+Norton's law is a special case of the other three, so that where it is planted nothing but the penalty on parameters
+speaks for it, and no test singles it out; rows without it are given too.
 
 Tests of dimples are made on a finer mesh than the one that identifies (planted_bulge_tests.FINE). Finished campaigns
 are kept in the folder of --keep: stopped and started again, none is repeated.
@@ -51,6 +50,7 @@ from proportions import share_with_interval
 
 import creepkit as ck
 from creepkit.errors import CreepkitError, FitWarning
+from creepkit.experiments.candidate_tests import frame_times
 from creepkit.experiments.rig import rigs_of
 from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
 
@@ -62,10 +62,11 @@ SCATTER = {"bars": 0.0, "scatter": 0.1}
 BAR_LAWS = ("norton", "strain-hardening", "time-hardening")
 LAW_BAR_STRESSES, LAW_BAR_NOISE = (70.0, 80.0, 90.0), 1e-4
 FIRST_RUN = ck.PressureJump(P1=8, P2=10, Tj=2400)
-FIRST_END, FRAME_INTERVAL = 7200.0, 900.0
+FIRST_END, STANDARD_END, FRAME_INTERVAL = 7200.0, 43200.0, 300.0
 THICKNESSES = (0.44, 0.50, 0.58)
 STANDARD_HOURS = 13.0
 """12 h and 1 h to set it up."""
+STANDARD = {"standard, one dimple": (0.50,), "standard, three dimples": THICKNESSES}
 SHARES = {"half": 0.5, "equal": 1.0}
 """Of the hours of the standard test."""
 
@@ -111,12 +112,11 @@ def made_dimple(alloy, history, dimple, rng):
     return history.replace(times=times, outputs=outputs, standard_deviation=sd)
 
 
-def blank_dimple(name, thickness, loading, end, interval=FRAME_INTERVAL):
-    """A dimple to be tested."""
-    count = max(int(end / interval), 20)
+def blank_dimple(name, thickness, loading, end):
+    """A dimple to be tested, with the frames of a planned test."""
     return ck.History(
         name=name,
-        times=np.arange(1, count + 1) * (end / count),
+        times=frame_times(end, FRAME_INTERVAL),
         outputs={},
         loading=loading,
         temperature=293.15,
@@ -175,7 +175,7 @@ def dimple_precision(k):
     dimple = ck.specimen("bulge").replace(threads=1)
     alloy, rng = drawn_alloy(k, dimple)
     law, values, _ = alloy
-    first = made_dimple(alloy, blank_dimple("first", 0.5, FIRST_RUN, FIRST_END, 300.0), dimple, rng)
+    first = made_dimple(alloy, blank_dimple("first", 0.5, FIRST_RUN, FIRST_END), dimple, rng)
     settings = {"weights": "likelihood", "nuisances": [planted.MODULUS]}
     fit = ck.identify(law, [first], dimple, **settings)
     rig = rigs_of(fit.histories, dimple)[0].replace(levels=(4.0, 14.0), longest_hours=12.0, largest_output=0.8)
@@ -267,24 +267,39 @@ def met_directions(name, expected, after, law):
 
 
 def law_campaign(job):
-    """One planted alloy: the standard test, and designed campaigns of half and of equal hours."""
-    _, k = job
+    """One planted alloy: standard tests, and designed campaigns."""
+    _, k, shares = job
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)
-        dimple = ck.specimen("bulge").replace(threads=1)
-        alloy, rng = drawn_alloy(k, dimple)
-        row = {"k": k, "truth": alloy[0].name, "cpu": [], "directions": []}
-        standard = made_dimple(alloy, blank_dimple("standard", 0.5, planted.JUMP, 43200.0), dimple, rng)
-        row["standard"] = verdict_row(selected([standard], dimple, k), alloy[0], STANDARD_HOURS)
-        blanks = [blank_dimple(f"first {j}", t, FIRST_RUN, FIRST_END, 300.0) for j, t in enumerate(THICKNESSES)]
-        first = [made_dimple(alloy, blank, dimple, rng) for blank in blanks]
-        if any(test is None for test in first):
-            return {"k": k, "failed": "a dimple of the first run bursts at once"}
-        ranking = selected(first, dimple, k)
-        row["first"] = verdict_row(ranking, alloy[0], FIRST_END / 3600.0 + 1.0)
-        for name, share in SHARES.items():
-            row[name] = designed_row(name, (alloy, first, ranking, dimple, k), share, rng, row)
-        return row
+        try:
+            return planted_law(k, shares)
+        except CreepkitError as error:
+            return {"k": k, "failed": str(error)}
+
+
+def planted_law(k, shares):
+    """The verdicts of all campaigns of one planted alloy."""
+    dimple = ck.specimen("bulge").replace(threads=1)
+    alloy, rng = drawn_alloy(k, dimple)
+    row = {"k": k, "truth": alloy[0].name, "cpu": [], "directions": []}
+
+    def made(name, thicknesses, loading, end):
+        blanks = [blank_dimple(f"{name} {j}", t, loading, end) for j, t in enumerate(thicknesses)]
+        return [made_dimple(alloy, blank, dimple, rng) for blank in blanks]
+
+    for name, thicknesses in STANDARD.items():
+        tests = [test for test in made(name, thicknesses, planted.JUMP, STANDARD_END) if test is not None]
+        row[name] = verdict_row(selected(tests, dimple, k), alloy[0], STANDARD_HOURS)
+    first = made("first", THICKNESSES, FIRST_RUN, FIRST_END)
+    if any(test is None for test in first):
+        return {"k": k, "failed": "a dimple of the first run bursts at once"}
+    ranking = selected(first, dimple, k)
+    row["first"] = verdict_row(ranking, alloy[0], FIRST_END / 3600.0 + 1.0)
+    for name in shares:
+        row[name] = row["first"]
+        if not ranking.decisive:
+            row[name] = designed_row(name, (alloy, first, ranking, dimple, k), SHARES[name], rng, row)
+    return row
 
 
 def selected(tests, dimple, k):
@@ -292,23 +307,22 @@ def selected(tests, dimple, k):
 
 
 def designed_row(name, campaign, share, rng, row):
+    """The verdict after the runs that are proposed for the rest of the hours."""
     alloy, first, ranking, dimple, k = campaign
     spent = FIRST_END / 3600.0 + 1.0
-    budget = share * STANDARD_HOURS - spent
     rig = rigs_of(first, dimple)[0].replace(
-        levels=(4.0, 14.0), longest_hours=12.0, tests_per_run=3, frame_interval=300.0, largest_output=0.8,
+        levels=(4.0, 14.0), longest_hours=12.0, tests_per_run=3, frame_interval=FRAME_INTERVAL, largest_output=0.8,
         dimensions={"apex_thickness": THICKNESSES},
     )  # fmt: skip
     start = time.process_time()
-    goal = "law" if len(ranking.credible) > 1 else "parameters"
-    design = ck.design(ranking if goal == "law" else ranking.best, rig=rig, goal=goal, budget=budget, seed=k)
+    design = ck.design(ranking, rig=rig, goal="law", budget=share * STANDARD_HOURS - spent, seed=k)
     row["cpu"].append(time.process_time() - start)
     planned = [h.replace(name=f"{name} {i}.{j}") for i, t in enumerate(design.plan) for j, h in enumerate(t.histories)]
-    made = [made_dimple(alloy, h, dimple, rng) for h in planned]
-    after = selected([*first, *(test for test in made if test is not None)], dimple, k)
+    tests = [made_dimple(alloy, h, dimple, rng) for h in planned]
+    after = selected([*first, *(test for test in tests if test is not None)], dimple, k)
     result = verdict_row(after, alloy[0], spent + sum(t.hours for t in design.plan))
     result["plan"] = [t.description for t in design.plan]
-    if goal == "law":
+    if design.expected is not None:
         result["probability"] = float(design.expected.probability)
         row["directions"] += met_directions(name, design.expected, after, alloy[0])
     return result
@@ -367,13 +381,13 @@ def print_precision(page, rows_by_kind):
             )  # fmt: skip
 
 
-def print_arms(page, rows):
+def print_arms(page, rows, shares):
     page.heading("Which law it is, by dimples")
     page.table("campaign", "number", "oven, h", "best law right", "singled out and right", "singled out, wrong",
                "decisive and right", "decisive, wrong")  # fmt: skip
     groups = {"": rows, ", planted is not norton": [row for row in rows if row["truth"] != "norton"]}
     for label, group in groups.items():
-        for name in ("standard", "first", *SHARES):
+        for name in (*STANDARD, "first", *shares):
             arm = [row[name] for row in group]
             if not arm:
                 continue
@@ -406,7 +420,7 @@ def print_expectations(page, rows, names):
                 f"{middle:.2f} [{low:.2f}, {high:.2f}]", f"{np.median(np.maximum(ratio, 1 / ratio)):.2f}",
             ]  # fmt: skip
         page.row(name, len(own), f"{np.median(small):.1f}" if small else "", len(pairs), *cells)
-    expected = [(r[name]["probability"], r[name]["singled out"] and r[name]["right"]) for r in rows for name in names
+    expected = [(r[name]["probability"], r[name]["decisive"] and r[name]["right"]) for r in rows for name in names
                 if "probability" in r.get(name, {})]  # fmt: skip
     page.table("expected probability of a right verdict", "designs", "mean", "met")
     for label, low, high in (("below 0.2", -1, 0.2), ("0.2 to 0.8", 0.2, 0.8), ("above 0.8", 0.8, 2)):
@@ -424,7 +438,8 @@ def main():
     parser.add_argument("--bars", type=int, default=60, help="campaigns of bars, with and without scatter each")
     parser.add_argument("--dimples", type=int, default=40, help="campaigns of the precision of dimples")
     parser.add_argument("--law-bars", type=int, default=120, help="planted alloys of the part on the law by bars")
-    parser.add_argument("--laws", type=int, default=24, help="planted alloys of the part on the law")
+    parser.add_argument("--laws", type=int, default=100, help="planted alloys of the part on the law by dimples")
+    parser.add_argument("--shares", nargs="*", default=list(SHARES), choices=list(SHARES), help="hours of designs")
     parser.add_argument("--jobs", type=int, default=1, help="worker processes")
     parser.add_argument("--keep", default="build/design_of_experiments", help="folder of finished campaigns")
     options = parser.parse_args()
@@ -437,15 +452,16 @@ def main():
     }
     bars = [("law bars", k) for k in range(options.law_bars)]
     law_bars = finished_rows(folder / "law_bars.jsonl", law_bar_campaign, bars, options.jobs)
-    laws = finished_rows(folder / "laws.jsonl", law_campaign, [("law", k) for k in range(options.laws)], options.jobs)
+    jobs = [("law", k, options.shares) for k in range(options.laws)]
+    laws = finished_rows(folder / "laws.jsonl", law_campaign, jobs, options.jobs)
     page = Page("design_of_experiments", __doc__)
     print_precision(page, rows_by_kind)
     if law_bars:
         page.heading("Which law it is, by bars")
         print_expectations(page, law_bars, ("bars",))
     if laws:
-        print_arms(page, laws)
-        print_expectations(page, laws, tuple(SHARES))
+        print_arms(page, laws, options.shares)
+        print_expectations(page, laws, options.shares)
     if options.write:
         page.write()
 

@@ -167,7 +167,7 @@ def law_only_of(case: Case, fit: Identification, history: History, output: str) 
     fixed = {kind: np.full((DRAWS, 1), value) for kind, value in centre.items()}
     drawn = curves(fit, cheaper, followed, drawn_theta(fit, draws.u), np.zeros(DRAWS), fixed)
     if history.specimen == "bulge":
-        central, _ = central_curves(fit, predictor, followed, centre)
+        central, _ = central_curves(fit, predictor, followed, centre, 0.0)
         one = {kind: np.array([[value]]) for kind, value in centre.items()}
         theta = fit.coordinates.theta(fit.u)[None]
         drawn = corrected(drawn, curves(fit, cheaper, followed, theta, np.zeros(1), one), central)

@@ -18,12 +18,17 @@ from creepkit.records.loading import Quantity
 ControlledQuantity = Literal["load", "stress"]
 
 
-FEWEST_FRAMES, MOST_FRAMES = 20, 60
-"""Frames of a planned test: one each interval of the rig's frames, but no fewer and no more than these."""
+FEWEST_FRAMES, MOST_FRAMES = 8, 60
+"""Frames of a planned test: one each interval of the rig's frames; no test is shorter than the first of these, and what
+more frames than the second would tell is not counted."""
 
 
-LEVELS, DURATIONS, CHANGE_AT = 5, (0.1, 0.2, 0.35, 0.6, 1.0), 1.0 / 3.0
-"""Of the grid: levels between the least and the greatest, durations over the longest, and when the load is changed."""
+LEVELS, DURATIONS, CHANGE_AT = 5, 6, 1.0 / 3.0
+"""Of the grid: levels between the least and the greatest, durations up to the longest, and when the load is changed."""
+
+
+SHORTEST = 1.0 / 30.0
+"""Duration over the longest."""
 
 
 LARGEST_CHANGE = 2.0
@@ -72,7 +77,7 @@ def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperatu
     temperatures: tuple[float, ...] = rig.temperatures if by_temperature else (base.mean_temperature,)
     pieces = [*_test_pieces(rig, base)]
     candidates = []
-    for duration, T in product([f * longest for f in DURATIONS], temperatures):
+    for duration, T in product(_durations(rig, longest), temperatures):
         for loading, text in _LOADINGS[quantity](rig, base, duration):
             at_temperature = f" at {T:.5g} K" if len(temperatures) > 1 else ""
             whole = f"{text} for {hours_text(duration)}{at_temperature}"
@@ -94,6 +99,13 @@ def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperatu
                 )
                 candidates.append(CandidateTest(description, histories, duration / 3600.0 + rig.setup_hours))
     return candidates
+
+
+def _durations(rig: Rig, longest: float) -> list[float]:
+    """Of the grid, s, geometric; the shortest has FEWEST_FRAMES."""
+    shortest = min(longest, max(SHORTEST * longest, FEWEST_FRAMES * rig.frame_interval))
+    count = int(np.clip(np.ceil(np.log2(longest / shortest)) + 1, 1, DURATIONS))
+    return [float(duration) for duration in np.geomspace(longest, shortest, count)[::-1]]
 
 
 def frame_times(duration: float, interval: float) -> Floats:
@@ -251,19 +263,27 @@ def candidates_given(histories: Sequence[History | CandidateTest], rigs: Sequenc
         if isinstance(given, CandidateTest) and not (given.histories and 0 < given.hours < np.inf):
             raise FitError(f"the planned test '{given.description}' needs a history and hours of the oven above zero")
         if isinstance(given, CandidateTest):
+            for history in given.histories:
+                _rig_for(history, rigs)
             candidates.append(given)
             continue
-        rig = next((r for r in rigs if r.specimen == given.specimen), None)
-        if rig is None:
-            known = " and ".join(f"'{r.specimen}'" for r in rigs)
-            raise FitError(
-                f"the planned test '{given.name}' is of specimen '{given.specimen}', but the law was identified from "
-                f"tests of {known}"
-            )
-        refusal = rig.refusal(given)
-        if refusal:
-            raise FitError(f"the planned test '{given.name}' cannot be made: {refusal}")
+        rig = _rig_for(given, rigs)
         planned = replace(given, name=f"plan: {given.name}", outputs={}, standard_deviation={})
         hours = float(given.times[-1]) / 3600.0 + rig.setup_hours
         candidates.append(CandidateTest(given.name, (planned,), hours))
     return candidates
+
+
+def _rig_for(history: History, rigs: Sequence[Rig]) -> Rig:
+    """The rig of a planned test; FitError where none can make it."""
+    rig = next((r for r in rigs if r.specimen == history.specimen), None)
+    if rig is None:
+        known = " and ".join(f"'{r.specimen}'" for r in rigs)
+        raise FitError(
+            f"the planned test '{history.name}' is of specimen '{history.specimen}', but the law was identified from "
+            f"tests of {known}"
+        )
+    refusal = rig.refusal(history)
+    if refusal:
+        raise FitError(f"the planned test '{history.name}' cannot be made: {refusal}")
+    return rig

@@ -17,16 +17,18 @@ import numpy as np
 from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig, variations_of_tests
-from creepkit.experiments.design_checks import check_arguments, notes_of
+from creepkit.experiments.design_checks import check_arguments, edges_of, notes_of, rigs_for
 from creepkit.experiments.expectations import Criterion, Expectation, PrecisionCriterion
 from creepkit.experiments.known_laws import KnownLaw
 from creepkit.experiments.law_discrimination import LawCriterion
 from creepkit.experiments.planned_design import Design, PlannedTest
 from creepkit.experiments.planned_outcomes import PlannedOutcomes
-from creepkit.experiments.rig import Rig, rigs_of
+from creepkit.experiments.remaining_laws import RemainingLaws
+from creepkit.experiments.rig import Rig
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
-from creepkit.inverse.selection.ranking import Ranking, rank
+from creepkit.inverse.selection.challenges import AlteredLaw
+from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
 from creepkit.records import History
@@ -51,6 +53,10 @@ MOST_REFITS = 6
 
 LARGEST_RUPTURE_PROBABILITY = 0.1
 """Of a planned test, from which on it is left out."""
+
+
+ALIKE = 0.05
+"""Probabilities of a decisive verdict that differ by less are taken as equal: the more informative test is better."""
 
 
 SMALLEST_GROWTH = 5.0
@@ -79,81 +85,46 @@ def design(
     Stopped by Ctrl-C it gives the best so far.
     """
     check_arguments(goal, budget, seed)
-    laws, weights, ranking = _remaining(source)
-    rigs = _rigs(laws[0], rig)
-    chosen: Goal = goal if goal is not None else "law" if len(laws) > 1 else "parameters"
-    if isinstance(chosen, str) and chosen not in ("law", "parameters"):
-        raise FitError(f"goal '{chosen}' is not known: 'law', 'parameters', or a quantity such as ck.rate_at(60.0)")
-    if chosen == "law" and len(laws) < 2:
-        return Design("law", (laws[0].law.name,), (1.0,), (), budget=budget, notes=_challenges(ranking))
+    remaining = RemainingLaws.of(source)
+    rigs = rigs_for(remaining.fits[0], rig)
     if candidates is not None and not (isinstance(candidates, Sequence) and len(candidates) > 0):
         raise FitError(f"candidates= takes a list of planned histories, found {candidates!r:.60}")
-    if candidates is not None:
-        planned, given = candidates_given(candidates, rigs), True
-    else:
-        planned, given = _grids(laws, rigs, budget), False
+    search = _Search(_task(remaining, goal, budget), rigs, seed, progress)
+    if search.nothing_to_do is not None:
+        return search.nothing_to_do
+    planned = _grids(remaining.fits, rigs, budget) if candidates is None else candidates_given(candidates, rigs)
     if budget is not None:
         planned = [c for c in planned if c.hours <= 1.0001 * budget]
         if not planned:
             raise FitError(f"none of the planned tests fits into a budget of {budget:g} h of the oven")
-    search = _Search(_Task(laws, weights, ranking, chosen, budget), rigs, seed, progress)
-    return search.run(planned, refuse=given)
+    return search.run(planned, refuse=candidates is not None)
 
 
 def further_tests(ranking: Ranking, *, progress: Progress | None = None) -> Design:
     """Variations of the tests that were made, by how well they would separate the remaining laws in every direction."""
-    laws, weights, _ = _remaining(ranking)
-    if len(laws) < 2:
-        return Design("law", (laws[0].law.name,), (1.0,), (), notes=_challenges(ranking))
-    rigs = _rigs(laws[0], None)
-    fit = laws[0]
+    remaining = RemainingLaws.of(ranking)
+    fit = remaining.fits[0]
+    rigs = rigs_for(fit, None)
+    search = _Search(_task(remaining, "law", None), rigs, 0, progress)
+    if search.nothing_to_do is not None:
+        return search.nothing_to_do
     exponent = float(fit.local_exponent(fit.reference.stress, warn=False)[0])
-    planned = list(variations_of_tests(fit.histories, rigs, exponent))
-    return _Search(_Task(laws, weights, ranking, "law", None), rigs, 0, progress).run(planned)
+    return search.run(list(variations_of_tests(fit.histories, rigs, exponent)))
 
 
-def _remaining(
-    source: Ranking | Identification | Sequence[Identification],
-) -> tuple[list[Identification], np.ndarray, Ranking | None]:
-    """The laws that the tests cannot rule out, with their weights, best first."""
-    is_list = (
-        isinstance(source, Sequence) and all(isinstance(fit, Identification) for fit in source) and len(source) > 0
-    )
-    if not (isinstance(source, Identification | Ranking) or is_list):
-        raise FitError(f"a design is made from an identification, a list of them or a ranking; found {source!r:.60}")
-    if isinstance(source, Identification):
-        ranking, fits, weights = None, [source], [1.0]
-    else:
-        ranking = source if isinstance(source, Ranking) else rank(list(source), challenge=False)
-        remaining = ranking.credible or ranking.laws[:1]
-        fits, weights = [r.fit for r in remaining], [r.weight for r in remaining]
-    for fit in fits:
-        if fit.predictor is None or not fit.histories:
-            raise FitError(
-                f"the identification of {fit.law.name} was loaded from a file: attach its histories and specimen with "
-                "fit.with_histories()"
-            )
-        if fit.covariance.shape != (fit.u.size, fit.u.size) or not np.isfinite(fit.covariance).all():
-            raise FitError(f"the identification of {fit.law.name} has no intervals; identify it again from its tests")
-    return fits, np.array(weights), ranking
-
-
-def _rigs(fit: Identification, rig: Rig | Sequence[Rig] | None) -> tuple[Rig, ...]:
-    """The rigs given, or those that the tests suggest; FitError for one of another specimen."""
-    assert fit.predictor is not None
-    if rig is None:
-        return rigs_of(fit.histories, fit.predictor)
-    rigs = (rig,) if isinstance(rig, Rig) else tuple(rig) if isinstance(rig, Sequence) else ()
-    if not rigs or not all(isinstance(one, Rig) for one in rigs):
-        raise FitError(f"rig= takes a ck.Rig, or several in a list; found {rig!r:.60}")
-    known = dict.fromkeys(h.specimen for h in fit.histories)
-    for one in rigs:
-        if one.specimen not in known:
-            raise FitError(
-                f"the rig tests specimen '{one.specimen}', but the law was identified from tests of "
-                f"{' and '.join(repr(name) for name in known)}"
-            )
-    return rigs
+def _task(remaining: RemainingLaws, goal: Goal | None, budget: float | None) -> _Task:
+    """What is asked: by default the law where more than one remains, or where the tests allow more than the one."""
+    several = len(remaining.fits) > 1
+    if isinstance(goal, str) and goal not in ("law", "parameters"):
+        raise FitError(f"goal '{goal}' is not known: 'law', 'parameters', or a quantity such as ck.rate_at(60.0)")
+    if goal == "law" and remaining.ranking is None:
+        raise FitError(
+            f"there is one law, {remaining.fits[0].law.name}, and nothing to tell it apart from: give the ranking of "
+            "several laws, or goal='parameters'"
+        )
+    altered = remaining.altered() if goal == "law" or (goal is None and remaining.ranking is not None) else []
+    chosen: Goal = goal if goal is not None else "law" if several or altered else "parameters"
+    return _Task(remaining, chosen, budget, altered if chosen == "law" else [])
 
 
 def _grids(laws: Sequence[Identification], rigs: Sequence[Rig], budget: float | None) -> list[CandidateTest]:
@@ -168,13 +139,17 @@ def _grids(laws: Sequence[Identification], rigs: Sequence[Rig], budget: float | 
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """What is asked: the laws that remain, with weights, the goal and the budget."""
+    """What is asked: the laws that remain, the goal, the budget, and altered laws that a verdict has to exclude."""
 
-    laws: Sequence[Identification]
-    weights: np.ndarray
-    ranking: Ranking | None
+    remaining: RemainingLaws
     goal: Goal
     budget: float | None
+    altered: Sequence[tuple[int, AlteredLaw]]
+
+    @property
+    def laws(self) -> tuple[Identification, ...]:
+        """Identifications, best first."""
+        return self.remaining.fits
 
 
 class _Search:
@@ -185,18 +160,28 @@ class _Search:
         with single_threaded_blas():
             noise_model = task.laws[0].noise_model
             known = [KnownLaw.from_identification(fit, noise_model) for fit in task.laws]
-        self.outcomes = PlannedOutcomes(known, progress)
+            known += [KnownLaw.from_altered(task.laws[k], altered, noise_model) for k, altered in task.altered]
+        self.outcomes = PlannedOutcomes(known, progress, len(task.laws))
         self.criterion: Criterion
         if task.goal == "law":
             self.criterion = _law_criterion(task, self.outcomes, seed)
         else:
             quantity = task.goal if isinstance(task.goal, DerivedQuantity) else None
-            self.criterion = PrecisionCriterion(self.outcomes, task.weights, quantity, seed)
+            self.criterion = PrecisionCriterion(self.outcomes, task.remaining.weights, quantity, seed)
         self.tests: list[PlannedTest] = []
         self.left_out: dict[str, str] = {}
 
+    @property
+    def nothing_to_do(self) -> Design | None:
+        """The answer where one law remains and the tests allow nothing beside it."""
+        task = self.task
+        if task.goal != "law" or len(task.laws) > 1 or task.altered:
+            return None
+        notes = task.remaining.unmodelled_effects()
+        return Design("law", (task.laws[0].law.name,), (1.0,), (), budget=task.budget, notes=notes)
+
     def run(self, planned: Sequence[CandidateTest], *, refuse: bool = False) -> Design:
-        """The design; refuse : whether a test that cannot be made is an error, as one that a user names is."""
+        """The design; refuse : whether it is an error that no test can be made, as where a user names them."""
         interrupted = False
         plan: tuple[PlannedTest, ...] = ()
         expected: Expectation | None = None
@@ -212,7 +197,7 @@ class _Search:
                 self.tests.sort(key=self._order)
         if not plan and self.tests:
             plan, expected = (self.tests[0],), self.tests[0].expectation
-        task, weight = self.task, self.task.weights / self.task.weights.sum()
+        task, weight = self.task, self.task.remaining.weights / self.task.remaining.weights.sum()
         return Design(
             goal=task.goal if isinstance(task.goal, str) else task.goal.name,
             laws=tuple(fit.law.name for fit in task.laws),
@@ -223,7 +208,8 @@ class _Search:
             expected=expected,
             budget=task.budget,
             interrupted=interrupted,
-            notes=notes_of(task.laws),
+            altered=tuple(altered.problem.law.name for _, altered in task.altered),
+            notes=(*notes_of(task.laws, tuple(self.rigs.values())), *self._notes_of_plan(plan)),
         )
 
     def _evaluate_all(self, planned: Sequence[CandidateTest], refuse: bool) -> None:
@@ -236,12 +222,14 @@ class _Search:
             if not all(self.outcomes.is_known(h) for h in candidate.histories):
                 continue
             refusal = self._refusal(candidate)
-            if refusal and refuse:
-                raise FitError(f"the planned test '{candidate.description}' is of no use: {refusal}")
             if refusal:
                 self.left_out[candidate.description] = refusal
             else:
-                self.tests.append(PlannedTest(candidate, self.criterion.expectation(candidate.histories)))
+                expectation = self.criterion.expectation(candidate.histories)
+                self.tests.append(PlannedTest(candidate, expectation, expectation))
+        if refuse and not self.tests and self.left_out:
+            name, refusal = next(iter(self.left_out.items()))
+            raise FitError(f"the planned test '{name}' is of no use: {refusal}")
         self.tests.sort(key=self._order)
         if stopped:
             raise KeyboardInterrupt
@@ -298,7 +286,7 @@ class _Search:
     def _evaluate_at_draws(self, test: PlannedTest) -> None:
         expectation = self.criterion.expectation(test.histories, at_draws=True)
         position = next(k for k, t in enumerate(self.tests) if t.candidate is test.candidate)
-        self.tests[position] = PlannedTest(test.candidate, expectation, True)
+        self.tests[position] = PlannedTest(test.candidate, expectation, test.first_order, True)
         self.tests.sort(key=self._order)
 
     def _refit(self, criterion: LawCriterion) -> None:
@@ -315,23 +303,26 @@ class _Search:
         if self.progress is not None:
             self.progress("refits in full", MOST_REFITS, MOST_REFITS)
 
-    def _order(self, test: PlannedTest) -> tuple[bool, float, float]:
-        """Least for the best: the cheapest that decides between laws, else the most informative; for values by hour.
+    def _order(self, test: PlannedTest) -> tuple[float, ...]:
+        """Least for the best: the cheapest that decides between laws, else the likeliest to; for values by the hour.
 
         Those that were evaluated at draws come first: the others are known to first order alone, which flatters them.
         """
         if self.task.goal != "law":
-            return (not test.at_draws, 0.0, -test.information_per_hour)
-        if test.expectation.probability >= DECISIVE_WEIGHT:
+            return (not test.at_draws, -test.information_per_hour)
+        probability, information = test.expectation.probability, test.expectation.information
+        if probability >= DECISIVE_WEIGHT:
             return (not test.at_draws, 0.0, test.hours)
-        return (not test.at_draws, 1.0, -test.expectation.information)
+        return (not test.at_draws, 1.0, -round(probability / ALIKE), -information)
 
     def _plan(self) -> tuple[tuple[PlannedTest, ...], Expectation | None]:
         """The runs for the budget: chosen one after the other by what each adds for an hour, or the best single one."""
         if self.task.budget is None or not self.tests:
             return (), None
         by_hour = sorted(self.tests, key=lambda t: -t.information_per_hour)
-        by_total = sorted(self.tests, key=lambda t: -t.expectation.information)
+        by_total = sorted(
+            self.tests, key=lambda t: (-np.nan_to_num(t.expectation.probability), -t.expectation.information)
+        )
         pool = list({id(t): t for t in (*by_hour[:GREEDY_POOL], *by_total[: GREEDY_POOL // 3])}.values())
         plans = [self._greedy(pool), (by_total[0],), (self.tests[0],)]
         judged = [(plan, self._together(plan)) for plan in plans if plan]
@@ -355,6 +346,16 @@ class _Search:
                 self.progress("runs for the budget", len(chosen), MOST_RUNS)
         return tuple(chosen)
 
+    def _notes_of_plan(self, plan: Sequence[PlannedTest]) -> list[str]:
+        """Where the plan is at an edge of what was considered, or was cut short."""
+        notes = []
+        if len(plan) >= MOST_RUNS and self.task.budget is not None:
+            left = self.task.budget - sum(test.hours for test in plan)
+            notes.append(f"a plan has at most {MOST_RUNS} runs; {left:.3g} h of the budget are left")
+        if plan and self.rigs:
+            notes += edges_of(plan[0].candidate, [t.candidate for t in self.tests], self.rigs)
+        return notes
+
     def _together(self, plan: Sequence[PlannedTest]) -> Expectation:
         if len(plan) == 1 and plan[0].at_draws:
             return plan[0].expectation
@@ -370,16 +371,14 @@ def _histories(plan: Sequence[PlannedTest]) -> list[History]:
 
 
 def _law_criterion(task: _Task, outcomes: PlannedOutcomes, seed: int) -> LawCriterion:
-    assert task.ranking is not None
-    ranked = [next(r for r in task.ranking.laws if r.fit is fit) for fit in task.laws]
+    ranking = task.remaining.ranking
+    assert ranking is not None
+    ranked = [next(r for r in ranking.laws if r.fit is fit) for fit in task.laws]
     chi_squares = np.array([r.chi_square for r in ranked])
     if not np.isfinite(chi_squares).all():
-        chi_squares = np.array([law.chi_square for law in outcomes.laws])
+        chi_squares = np.array([law.chi_square for law in outcomes.laws[: len(task.laws)]])
     excess = np.array([r.excess for r in ranked])
-    return LawCriterion(outcomes, task.weights, excess, chi_squares, task.ranking.independent_frames, seed)
-
-
-def _challenges(ranking: Ranking | None) -> tuple[str, ...]:
-    """What the tests allow beside the one law that remains."""
-    allowed = (ranking.challenges or ()) if ranking is not None else ()
-    return tuple(f"{challenge}: ask for goal='parameters'" for challenge in allowed)
+    altered = [(k, one.excess) for k, one in task.altered]
+    return LawCriterion(
+        outcomes, task.remaining.weights, excess, chi_squares, ranking.independent_frames, altered, seed
+    )

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from creepkit.errors import FitError
+from creepkit.experiments.candidate_tests import CandidateTest, hours_text
+from creepkit.experiments.rig import Rig, rigs_of
+from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
+from creepkit.language import temperature
 
 
 def check_arguments(goal: object, budget: object, seed: object) -> None:
@@ -22,9 +26,64 @@ def check_arguments(goal: object, budget: object, seed: object) -> None:
         raise FitError(f"the seed is {seed!r:.40}; it must be a whole number from 0 on")
 
 
-def notes_of(laws: Sequence[Identification]) -> tuple[str, ...]:
+def rigs_for(fit: Identification, rig: Rig | Sequence[Rig] | None) -> tuple[Rig, ...]:
+    """The rigs given, or those that the tests suggest; FitError for one of another specimen."""
+    assert fit.predictor is not None
+    if rig is None:
+        return rigs_of(fit.histories, fit.predictor)
+    rigs = (rig,) if isinstance(rig, Rig) else tuple(rig) if isinstance(rig, Sequence) else ()
+    if not rigs or not all(isinstance(one, Rig) for one in rigs):
+        raise FitError(f"rig= takes a ck.Rig, or several in a list; found {rig!r:.60}")
+    known = dict.fromkeys(h.specimen for h in fit.histories)
+    for one in rigs:
+        if one.specimen not in known:
+            raise FitError(
+                f"the rig tests specimen '{one.specimen}', but the law was identified from tests of "
+                f"{' and '.join(repr(name) for name in known)}"
+            )
+        check_dimensions(one, fit)
+    return rigs
+
+
+def check_dimensions(rig: Rig, fit: Identification) -> None:
+    """FitError for a dimension that the test pieces of a rig do not have."""
+    assert fit.predictor is not None
+    history = next(h for h in fit.histories if h.specimen == rig.specimen)
+    predictor = predictor_for(fit.predictor, history)
+    geometry = getattr(getattr(predictor, "specimen", predictor), "geometry", None)
+    known = getattr(geometry, "__dataclass_fields__", None)
+    for name in rig.dimensions:
+        if name not in history.geometry and known is not None and name not in known:
+            raise FitError(f"a test piece of '{rig.specimen}' has no dimension '{name}'; it has {', '.join(known)}")
+        if known is None and name not in history.geometry:
+            raise FitError(f"a test piece of '{rig.specimen}' has no dimension '{name}'")
+
+
+def edges_of(chosen: CandidateTest, considered: Sequence[CandidateTest], rigs: Mapping[str, Rig]) -> list[str]:
+    """Where the first run of a plan lies at an edge of what was considered, one sentence each."""
+    rig = rigs.get(chosen.histories[0].specimen)
+    durations = [c.duration for c in considered]
+    if rig is None or len(durations) < 3:
+        return []
+    notes = []
+    if chosen.duration <= 1.001 * min(durations) and min(durations) < 0.999 * max(durations):
+        notes.append(
+            f"it is as short as any test that was considered ({hours_text(min(durations))}, for frames each "
+            f"{rig.frame_interval:.3g} s): more frequent frames may make a shorter one better"
+        )
+    levels = chosen.histories[0].loading.program().values
+    levels = levels[levels > 0]
+    if levels.max() >= 0.999 * rig.levels[1] > rig.levels[0]:
+        notes.append(f"it takes the rig to the greatest load that it was said to reach ({rig.levels[1]:.3g})")
+    return notes
+
+
+def notes_of(laws: Sequence[Identification], rigs: Sequence[Rig]) -> tuple[str, ...]:
     """What an expectation takes for granted."""
     notes = []
+    if any(len(rig.temperatures) > 1 for rig in rigs) and not all(fit.law.uses(temperature) for fit in laws):
+        names = ", ".join(fit.law.name for fit in laws if not fit.law.uses(temperature))
+        notes.append(f"the temperatures of the rig were not varied: {names} says nothing of temperature")
     scatters = any(n.kind == "rate" and n.sd is None for n in laws[0].settings.nuisances)
     if scatters and len(laws[0].histories) < MINIMUM_TESTS and laws[0].noise_model.rate == 0.0:
         notes.append(

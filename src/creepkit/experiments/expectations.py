@@ -21,6 +21,7 @@ from creepkit.arrays import Floats
 from creepkit.experiments.planned_outcomes import PlannedOutcomes
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity, gradient
 from creepkit.inverse.variance_components import scaled_inverse
+from creepkit.language import CreepLaw
 from creepkit.records import History
 
 DRAWS = 8
@@ -47,14 +48,16 @@ class Expectation:
     """What one planned test, or several together, are expected to tell.
 
     information : nats. sd, current_sd : of the quantity asked for, on its scale (of ln where that is log), NaN without.
-    parameter_sd : {parameter: standard deviation} of the best law, of ln where its scale is log.
-    probability : that one law, the right one, has more than 0.95 of the weight; wrong : that a wrong one has.
+    parameter_sd, current_parameter_sd : {name: standard deviation} of the best law's parameters after the test and now,
+    of ln where the scale is log, when the name is "ln A". probability : that the right law has more than 0.95 of the
+    weight, with all that the tests allow beside it excluded; wrong : that a wrong one has more than 0.95.
     """
 
     information: float
     sd: float = float("nan")
     current_sd: float = float("nan")
     parameter_sd: Mapping[str, float] = field(default_factory=dict)
+    current_parameter_sd: Mapping[str, float] = field(default_factory=dict)
     probability: float = float("nan")
     wrong: float = float("nan")
     chi_squares: tuple[ExpectedChiSquare, ...] = ()
@@ -84,7 +87,7 @@ class PrecisionCriterion:
 
     def expectation(self, histories: Sequence[History], *, at_draws: bool = False) -> Expectation:
         """The expected precision after these tests."""
-        gains, sds, current, parameters = [], [], [], {}
+        gains, sds, current, parameters = [], [], [], [dict[str, float](), dict[str, float]()]
         for position, law in enumerate(self.outcomes.laws):
             before, after, points = self._covariances(position, histories, at_draws)
             size = law.size
@@ -101,17 +104,19 @@ class PrecisionCriterion:
                 current.append(float(sandwich * np.exp(mean_logs[0])))
                 sds.append(float(sandwich * np.exp(mean_logs[1])))
             if position == 0:
-                parameters = self._parameter_sd(position, after, points)
+                parameters = [self._parameter_sd(position, S, points) for S in (before, after)]
         weight = self.weights / self.weights.sum()
         sd, current_sd = (float(np.sqrt(weight @ np.square(v))) if v else float("nan") for v in (sds, current))
-        return Expectation(float(weight @ gains), sd, current_sd, parameter_sd=parameters)
+        return Expectation(
+            float(weight @ gains), sd, current_sd, parameter_sd=parameters[1], current_parameter_sd=parameters[0]
+        )
 
     def _parameter_sd(self, position: int, after: Floats, points: Floats) -> dict[str, float]:
         law = self.outcomes.laws[position]
         to_theta = law.fit.coordinates.jacobian(points)
         variances = np.einsum("cpq,cqr,cpr->cp", to_theta, after[:, : law.size, : law.size], to_theta)
         sd = np.exp(0.5 * np.log(np.maximum(variances, 1e-300)).mean(axis=0)) * law.sandwich.mean()
-        return dict(zip(law.fit.law.names, sd.tolist(), strict=True))
+        return dict(zip(_scaled_names(law.fit.law), sd.tolist(), strict=True))
 
     def _covariances(
         self, position: int, histories: Sequence[History], at_draws: bool
@@ -141,3 +146,8 @@ class PrecisionCriterion:
             self._deviations[position] = law.draws(DRAWS, self.seed)
             self._information[position] = law.expansion(self._deviations[position]).information
         return self._deviations[position]
+
+
+def _scaled_names(law: CreepLaw) -> list[str]:
+    """Names of parameters, "ln A" of one whose scale is log."""
+    return [f"ln {p.name}" if param.scale == "log" else p.name for p, param in law.params.items()]

@@ -23,6 +23,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.selection.challenges import AlteredLaw
 from creepkit.inverse.variance_components import scaled_inverse
 from creepkit.records import History, Predictor
 
@@ -44,6 +45,7 @@ class KnownLaw:
     shared : positions among x of the nuisance parameters that tests share. information : (q, q) A.
     chi_square : of the tests that were made, under the covariance of the noise model. sandwich : standard deviation of
     the fit over that of A, (parameters,), other than 1 where values were not found by likelihood.
+    held : (q, q) information of what is held beside the tests, such as the share of a second law.
     """
 
     fit: Identification
@@ -54,10 +56,28 @@ class KnownLaw:
     information: Floats
     chi_square: float
     sandwich: Floats
+    held: Floats
 
     @classmethod
-    def from_identification(cls, fit: Identification, noise_model: NoiseModel) -> KnownLaw:
-        """The information of the tests that were made, under a noise model."""
+    def from_altered(cls, best: Identification, altered: AlteredLaw, noise_model: NoiseModel) -> KnownLaw:
+        """A law altered as a challenge of a verdict says, with what is held of it."""
+        u, e = np.split(altered.x, [altered.problem.parameter_count])
+        nuisances = tuple(replace(n, value=float(value)) for n, value in zip(best.nuisances, e, strict=True))
+        fit = replace(
+            best,
+            law=altered.problem.law,
+            u=u,
+            covariance=np.eye(u.size),
+            nuisances=nuisances,
+            samples=None,
+            problem=None,
+            linearised=None,
+        )
+        return cls.from_identification(fit, noise_model, altered.constraints.T @ altered.constraints)
+
+    @classmethod
+    def from_identification(cls, fit: Identification, noise_model: NoiseModel, held: Floats | float = 0.0) -> KnownLaw:
+        """The information of the tests that were made, under a noise model, and of what is held of the unknowns."""
         predictor, count = predictor_of(fit), fit.u.size
         problem = LeastSquaresProblem.from_histories(fit.law, fit.histories, predictor, fit.settings, fit.reference)
         nuisances = problem.nuisance_parameters
@@ -66,7 +86,7 @@ class KnownLaw:
             problem = problem.with_nuisances(replace(nuisances, sd=sd))
         residuals = fit.residuals_of(problem)
         factor = CovarianceFactor.of_residuals(residuals, noise_model)
-        information = _information(problem, residuals, factor, count)
+        information = _information(problem, residuals, factor, count) + held
         shared = tuple(count + k for k, n in enumerate(nuisances.nuisances) if n.scope != "test")
         kept = [*range(count), *shared]
         marginal = scaled_inverse(scaled_inverse(information)[np.ix_(kept, kept)])
@@ -74,7 +94,8 @@ class KnownLaw:
         by_likelihood = fit.settings.weights == "likelihood"
         sandwich = np.ones(count) if by_likelihood else np.sqrt(np.diag(fit.covariance)) / sd_of_information
         chi_square = float((factor.whiten(residuals.values) ** 2).sum())
-        return cls(fit, problem, noise_model, fit.x, shared, marginal, chi_square, sandwich)
+        of_kept = np.broadcast_to(held, information.shape)[np.ix_(kept, kept)]
+        return cls(fit, problem, noise_model, fit.x, shared, marginal, chi_square, sandwich, of_kept)
 
     @property
     def size(self) -> int:
@@ -130,7 +151,7 @@ class KnownLaw:
             from_prior = centre + point[p:]
             chi_square.append(float((r * weighted[..., 0]).sum() + prior @ from_prior**2))
             gradient.append(np.einsum("tep,te->p", J, weighted[..., 0]) + np.r_[np.zeros(p), prior * from_prior])
-            information.append(np.einsum("tep,teq->pq", J, weighted[..., 1:]) + np.diag(precision))
+            information.append(np.einsum("tep,teq->pq", J, weighted[..., 1:]) + np.diag(precision) + self.held)
         return Expansion(np.array(chi_square[1:]) - chi_square[0], np.stack(gradient[1:]), np.stack(information[1:]))
 
 

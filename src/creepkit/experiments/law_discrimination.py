@@ -12,8 +12,10 @@ search of an identification, from several starts, over all tests. Its ratio to t
 that the step begins at the draw of the posterior of b which explains the outcome best.
 
 The information is the mutual information of law and outcome (Box & Hill (1967), Technometrics 9, 57), in nats: the mean
-decrease of the entropy of the weights. The mean of chi-square over laws, with weights, is the T-criterion (Atkinson &
-Fedorov (1975), Biometrika 62, 57); it grows without limit where a verdict is certain already.
+decrease of the entropy of the weights. A decisive verdict has to exclude more than the other laws: shares of them, and
+a threshold stress (selection.challenges). Those that the tests allow are compared in the same way with the law that
+they alter. The mean of chi-square over laws, with weights, is the T-criterion (Atkinson & Fedorov (1975), Biometrika
+62, 57); it grows without limit where a verdict is certain already.
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
 from creepkit.inverse.residuals import residuals_at_measured_values
 from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.search.multistart import EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct
+from creepkit.inverse.selection.challenges import NOT_EXCLUDED
 from creepkit.records import History
 
 LINEAR_DRAWS, REPEATS = 64, 2
@@ -63,10 +66,11 @@ REFIT_TOLERANCES = Tolerances(max_steps=20, tolerance=1e-5)
 
 @dataclass(eq=False)
 class LawCriterion:
-    """The laws that remain.
+    """The laws that remain, the first of the outcomes, and after them what else a verdict has to exclude.
 
     weights : (laws,) -. excess : (laws,) of the criterion of the ranking. chi_squares : (laws,) of the tests that were
-    made. frames : how many of them are independent. ratios : of refitted over linear chi-squares, of tests and pairs.
+    made. frames : how many of them are independent. altered : of the further laws, which law they alter and by how much
+    their chi-square is above that law's. ratios : of refitted over linear chi-squares, of tests and pairs.
     """
 
     outcomes: PlannedOutcomes
@@ -74,6 +78,7 @@ class LawCriterion:
     excess: Floats
     chi_squares: Floats
     frames: float
+    altered: Sequence[tuple[int, float]] = ()
     seed: int = 0
     ratios: dict[tuple[object, int, int], float] = field(default_factory=dict)
     _baseline: dict[int, float] = field(default_factory=dict)
@@ -82,30 +87,39 @@ class LawCriterion:
 
     @property
     def names(self) -> list[str]:
-        """Names of the laws."""
-        return [law.fit.law.name for law in self.outcomes.laws]
+        """Names of the laws that may be true."""
+        return [law.fit.law.name for law in self.outcomes.laws[: len(self.weights)]]
 
     def expectation(self, histories: Sequence[History], *, at_draws: bool = False) -> Expectation:
-        """Information, probability of a right verdict and chi-squares of every direction, with these tests."""
-        weight = self.weights / self.weights.sum()
-        log_weight, penalty = np.log(weight), self._penalties(histories)
+        """Information, probability of a right verdict and chi-squares of every direction, with these tests.
+
+        An altered law counts, for the information, as another law of as many parameters.
+        """
+        weight, count = self.weights / self.weights.sum(), len(self.weights)
+        penalty = self._penalties(histories)
         information, right, wrong, chi_squares = 0.0, 0.0, 0.0, []
         for a, name in enumerate(self.names):
             Q = self._increments(a, histories, at_draws)
-            score = self.excess + penalty + Q.T
-            score = score - score.min(axis=1, keepdims=True)
-            posterior = np.exp(-0.5 * score)
-            posterior /= posterior.sum(axis=1, keepdims=True)
-            information += weight[a] * float(np.mean(np.log(np.maximum(posterior[:, a], 1e-300)) - log_weight[a]))
-            decided = posterior > DECISIVE_WEIGHT
-            right += weight[a] * float(decided[:, a].mean())
-            wrong += weight[a] * float(np.delete(decided, a, axis=1).any(axis=1).mean())
+            score = (self.excess + penalty + Q[:count].T).T
+            own = [k for k, (law, _) in enumerate(self.altered) if law == a]
+            more = np.array([self.altered[k][1] + Q[count + k] - Q[a] for k in own]).reshape(-1, Q.shape[1])
+            before = _shares(np.append(self.excess, [self.excess[a] + self.altered[k][1] for k in own])[:, None])
+            after = _shares(np.concatenate([score, score[a] + more]))
+            information += weight[a] * float(np.mean(np.log(np.maximum(after[a], 1e-300)) - np.log(before[a])))
+            decided = _shares(score) > DECISIVE_WEIGHT
+            right += weight[a] * float((decided[a] & (more > NOT_EXCLUDED).all(axis=0)).mean())
+            wrong += weight[a] * float(np.delete(decided, a, axis=0).any(axis=0).mean())
             for b, other in enumerate(self.names):
                 if a != b:
                     current = float(self.chi_squares[b] - self.chi_squares[a])
                     expected = current + float(np.median(Q[b] - Q[a]))
                     is_refitted = (_key(histories), a, b) in self.ratios
                     chi_squares.append(ExpectedChiSquare(name, other, current, expected, is_refitted))
+            for k, expected_more in zip(own, more, strict=True):
+                altered = self.outcomes.laws[count + k].fit.law.name
+                chi_squares.append(
+                    ExpectedChiSquare(name, altered, self.altered[k][1], float(np.median(expected_more)))
+                )
         chi_squares.sort(key=lambda each: -weight[self.names.index(each.reference_law)])
         return Expectation(max(information, 0.0), probability=right, wrong=wrong, chi_squares=tuple(chi_squares))
 
@@ -114,20 +128,26 @@ class LawCriterion:
         if not np.isfinite(self.frames):
             return np.zeros(len(self.names))
         count = sum(self.outcomes.outcome(h, 0).mean.size for h in histories)
-        return np.array([law.size for law in self.outcomes.laws]) * float(np.log1p(count / self.frames))
+        sizes = np.array([law.size for law in self.outcomes.laws[: len(self.names)]])
+        return np.asarray(sizes * float(np.log1p(count / self.frames)))
 
     def _increments(self, a: int, histories: Sequence[History], at_draws: bool) -> Floats:
-        """(laws, outcomes) Q of each law, if a is true: over draws of its posterior and of the noise."""
+        """(laws and altered ones, outcomes) Q of each, if a is true: over draws of its posterior and of the noise."""
         y, repeats = self._true_outcomes(a, histories, at_draws)
         noise = np.random.default_rng(self.seed).standard_normal((len(y) * repeats, y.shape[1]))
         noisy = np.repeat(y, repeats, axis=0) + noise
-        increments = np.empty((len(self.names), len(noisy)))
-        for b in range(len(self.names)):
+        increments = np.zeros((len(self.outcomes.laws), len(noisy)))
+        for b in self._compared(a):
             ratio = self.ratios.get((_key(histories), a, b), 1.0)
             increments[b] = self._least(b, a, histories, noisy, at_draws)
             if ratio != 1.0:
                 increments[b] += (ratio - 1.0) * np.repeat(self._least(b, a, histories, y, at_draws), repeats)
         return increments
+
+    def _compared(self, a: int) -> list[int]:
+        """Positions of the laws, and of what a verdict for law a has to exclude."""
+        count = len(self.names)
+        return [*range(count), *(count + k for k, (law, _) in enumerate(self.altered) if law == a)]
 
     def _least(self, b: int, a: int, histories: Sequence[History], y: Floats, at_draws: bool) -> Floats:
         """(outcomes,) increase of chi-square of law b at outcomes y (outcomes, data), under the covariance of law a.
@@ -215,6 +235,12 @@ class LawCriterion:
             return False
         self.ratios[_key(histories), a, b] = float(np.clip(refitted / linear[chosen], *RATIO_LIMITS))
         return True
+
+
+def _shares(scores: Floats) -> Floats:
+    """(laws, outcomes) weights of scores (laws, outcomes), which are -2 ln of evidence."""
+    weights = np.exp(-0.5 * (scores - scores.min(axis=0)))
+    return np.asarray(weights / weights.sum(axis=0))
 
 
 def _key(histories: Sequence[History]) -> object:

@@ -26,11 +26,13 @@ USEFUL_INFORMATION = 0.05
 class PlannedTest:
     """A run that could be made next: what it is, and what it is expected to tell.
 
-    at_draws : whether that was worked out at draws of the posteriors, else to first order about the estimates.
+    first_order : the same worked out to first order about the estimates, as it is of all tests; of the best ones the
+    expectation is at draws of the posteriors (at_draws).
     """
 
     candidate: CandidateTest
     expectation: Expectation
+    first_order: Expectation
     at_draws: bool = False
 
     @property
@@ -58,12 +60,18 @@ class PlannedTest:
         """Nats an hour of the oven."""
         return self.expectation.information / self.candidate.hours
 
+    @property
+    def first_order_per_hour(self) -> float:
+        """Nats an hour of the oven, to first order: like for like over all tests."""
+        return self.first_order.information / self.candidate.hours
+
 
 @dataclass(frozen=True)
 class Design(Presentable):
     """The next tests, the best first.
 
     goal : "parameters", "law", or the name of a quantity. laws, weights : that remain, the best first.
+    altered : names of what the tests allow beside them, which a decisive verdict has to exclude (goal "law").
     tests : all that were considered; without those that were left out, {description: why}.
     plan : the run to make, or the runs that fit the budget (h of the oven) together, and expected : what they tell.
     interrupted : whether the work was stopped before its end. notes : what the expectation does not include.
@@ -79,6 +87,7 @@ class Design(Presentable):
     budget: float | None = None
     interrupted: bool = False
     notes: tuple[str, ...] = ()
+    altered: tuple[str, ...] = ()
 
     @property
     def best(self) -> PlannedTest:
@@ -103,20 +112,23 @@ class Design(Presentable):
 
 def design_sentence(design: Design) -> str:
     """The advice: what to make, what it is expected to tell, and the next best."""
-    if design.goal == "law" and len(design.laws) < 2:
+    if design.goal == "law" and len(design.laws) < 2 and not design.altered:
         doubt = f"; but {'; and '.join(design.notes)}" if design.notes else ""
-        return f"one law remains, {design.laws[0]}, and nothing is to be told apart from it{doubt}"
+        return (
+            f"one law remains, {design.laws[0]}, and nothing is to be told apart from it{doubt}; ask for "
+            "goal='parameters' or for a quantity"
+        )
     if not design.tests:
         reasons = dict.fromkeys(f"that {kind_of_reason(reason)}" for _, reason in design.left_out)
         return f"no test can be made: there are only candidates {' or '.join(reasons)}" if reasons else "no candidates"
     best, *others = design.tests
     if design.goal == "law" and _largest_information(design) < USEFUL_INFORMATION:
         return (
-            f"none of the {len(design.tests)} tests considered tells {_and(design.laws)} apart; the most informative "
+            f"none of the {len(design.tests)} tests considered tells {_question(design)}; the most informative "
             f"is {best.description} ({_short(design, best.expectation)})"
         )
     if design.budget is not None and len(design.plan) > 1 and design.expected is not None:
-        runs = "; then ".join(test.description for test in design.plan)
+        runs = "; then ".join(_repeated(design.plan))
         total = sum(test.hours for test in design.plan)
         return f"{runs} ({total:.3g} h of the oven): together {_told(design, design.expected)}"
     first = design.plan[0] if design.plan else best
@@ -134,10 +146,32 @@ def _and(names: tuple[str, ...]) -> str:
     return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
+def _separated(design: Design) -> str:
+    """What a decisive verdict does."""
+    if len(design.laws) == 1:
+        return f"makes {design.laws[0]} decisive, against {_and(design.altered)},"
+    against = ", and from what the tests allow beside each," if design.altered else ""
+    return f"separates {_and(design.laws)}{against}"
+
+
+def _question(design: Design) -> str:
+    if len(design.laws) == 1:
+        return f"{design.laws[0]} from {_and(design.altered)}"
+    return f"{_and(design.laws)} apart"
+
+
+def _repeated(plan: tuple[PlannedTest, ...]) -> list[str]:
+    """The runs of a plan in words; the same ones are counted."""
+    counts: dict[str, int] = {}
+    for test in plan:
+        counts[test.description] = counts.get(test.description, 0) + 1
+    return [text if count == 1 else f"{count} times {text}" for text, count in counts.items()]
+
+
 def _told(design: Design, expected: Expectation) -> str:
     """What a test is expected to tell, as the end of a sentence."""
     if design.goal == "law":
-        return f"separates {_and(design.laws)} with probability {expected.probability:.2f}"
+        return f"{_separated(design)} with probability {expected.probability:.2f}"
     if np.isfinite(expected.sd):
         before, after = precision_text(expected.current_sd), precision_text(expected.sd)
         return f"brings the standard deviation of the {design.goal} from {before} to {after}"

@@ -61,10 +61,14 @@ class _Chunk:
 
 @dataclass(eq=False)
 class PlannedOutcomes:
-    """What some laws expect of planned tests, under the covariance of each. Each test is worked out once."""
+    """What some laws expect of planned tests, under the covariance of each that may be true; each test is done once.
+
+    candidates : how many of the laws, the first, may be true; the rest are what a verdict has to exclude. None for all.
+    """
 
     laws: Sequence[KnownLaw]
     progress: Callable[[str, int, int], None] | None = None
+    candidates: int | None = None
     _known: dict[object, list[list[PlannedOutcome]]] = field(default_factory=dict)
     _drawn: dict[object, tuple[list[Floats], list[Floats], Bools]] = field(default_factory=dict)
     _covariances: dict[object, list[CovarianceFactor]] = field(default_factory=dict)
@@ -117,7 +121,7 @@ class PlannedOutcomes:
         """For each law, under the covariance of each law, the outcomes of each test of a chunk."""
         observations = self._observations(chunk)
         predicted = [_predicted(law, chunk, observations) for law in self.laws]
-        factors = [self._covariance(one, observations) for one in predicted]
+        factors = [self._covariance(one, observations) for one in predicted[: self.candidates]]
         if len(chunk) == 1:
             self._covariances[test_key(chunk[0])] = factors
         return [[self._whitened(one, factor, observations) for factor in factors] for one in predicted]

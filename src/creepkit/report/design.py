@@ -26,7 +26,9 @@ ROWS = 8
 
 
 def _columns(design: Design) -> tuple[str, ...]:
-    last = {"law": "probability of a right verdict", "parameters": "standard deviations"}.get(design.goal, "sd after")
+    last = {"law": "decisive and right", "parameters": "standard deviations, before > after"}.get(
+        design.goal, "sd after"
+    )
     return ("planned test", "oven, h", "nats", "nats / h", last)
 
 
@@ -35,7 +37,7 @@ def _cells(design: Design, test: PlannedTest) -> tuple[str, ...]:
     if design.goal == "law":
         last = f"{e.probability:.2f}"
     elif design.goal == "parameters":
-        last = ", ".join(f"{name} {sd:.2g}" for name, sd in e.parameter_sd.items())
+        last = ", ".join(f"{name} {e.current_parameter_sd[name]:.2g} > {sd:.2g}" for name, sd in e.parameter_sd.items())
     else:
         last = precision_text(e.sd)
     return (test.description, f"{test.hours:.3g}", f"{e.information:.2g}", f"{test.information_per_hour:.2g}", last)
@@ -114,6 +116,7 @@ def design_to_json(design: Design) -> dict[str, object]:
     return {
         "goal": design.goal,
         "laws": dict(zip(design.laws, design.weights, strict=True)),
+        "to_exclude": list(design.altered),
         "advice": design.sentence,
         "budget": design.budget,
         "plan": [test.description for test in design.plan],
@@ -134,6 +137,7 @@ def _expectation_to_json(e: Expectation) -> dict[str, object]:
             known[name] = value
     if e.parameter_sd:
         known["parameter_sd"] = dict(e.parameter_sd)
+        known["current_parameter_sd"] = dict(e.current_parameter_sd)
     if e.chi_squares:
         known["chi_squares"] = [
             {
@@ -154,11 +158,12 @@ def _expectation_to_json(e: Expectation) -> dict[str, object]:
 def design_figure(design: Design, path: str | Path | None = None) -> Figure:
     """What candidates tell for each hour of the oven, over the first load and the duration; the best of each place.
 
-    Left: constant loads; right: the load changes during the test. The runs of the plan are marked.
+    To first order about the estimates, which is what is known of all candidates alike. Left: constant loads; right: the
+    load changes during the test. The runs of the plan are marked.
     """
     figure = empty_figure(10.5, 5.0)
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
-    rates = [test.information_per_hour for test in design.tests] or [1.0]
+    rates = [test.first_order_per_hour for test in design.tests] or [1.0]
     largest = max(*rates, 1e-9)
     groups = [[t for t in design.tests if _is_constant(t)], [t for t in design.tests if not _is_constant(t)]]
     drawn = None
@@ -173,7 +178,7 @@ def design_figure(design: Design, path: str | Path | None = None) -> Figure:
         panel.set_xlabel(_load_label(design))
     axes[0].set_ylabel("duration, h")
     if drawn is not None:
-        figure.colorbar(drawn, ax=list(axes), label="expected information, nats per oven hour")
+        figure.colorbar(drawn, ax=list(axes), label="expected information to first order, nats per oven hour")
     figure.suptitle(wrapped(design.sentence, 10.0, 9.0), fontsize=9)
     return save_figure(figure, path)
 
@@ -186,12 +191,12 @@ def _draw_map(panel: Axes, tests: list[PlannedTest], largest: float) -> QuadMesh
     best: dict[tuple[float, float], PlannedTest] = {}
     for test in tests:
         place = round(test.first_level, 6), round(test.candidate.duration / 3600.0, 6)
-        if place not in best or test.information_per_hour > best[place].information_per_hour:
+        if place not in best or test.first_order_per_hour > best[place].first_order_per_hour:
             best[place] = test
     loads, durations = (sorted({place[k] for place in best}) for k in (0, 1))
     values = np.full((len(durations), len(loads)), np.nan)
     for (load, duration), test in best.items():
-        values[durations.index(duration), loads.index(load)] = test.information_per_hour
+        values[durations.index(duration), loads.index(load)] = test.first_order_per_hour
     mesh = panel.pcolormesh(
         _edges(loads), _edges(durations), values, cmap="viridis", vmin=0.0, vmax=largest, edgecolors="w", linewidth=0.5
     )
@@ -202,9 +207,9 @@ def _draw_map(panel: Axes, tests: list[PlannedTest], largest: float) -> QuadMesh
         axis.set_ticks(shown, labels=[f"{tick:.3g}" for tick in shown])
         axis.set_ticks([], minor=True)
     for (load, duration), test in best.items():
-        if np.isfinite(test.expectation.probability):
-            light = test.information_per_hour > 0.6 * largest
-            panel.text(load, duration, f"{test.expectation.probability:.2f}", ha="center", va="center", fontsize=7,
+        if np.isfinite(test.first_order.probability):
+            light = test.first_order_per_hour > 0.6 * largest
+            panel.text(load, duration, f"{test.first_order.probability:.2f}", ha="center", va="center", fontsize=7,
                        color="k" if light else "w")  # fmt: skip
     return mesh
 

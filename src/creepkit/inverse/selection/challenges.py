@@ -24,7 +24,7 @@ import sympy
 from scipy.stats import chi2
 
 from creepkit.arrays import Floats
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.composite_predictor import reduced_order_model_of
 from creepkit.inverse.defect_correction import difference_of_predictors
 from creepkit.inverse.identification import Identification
@@ -114,28 +114,107 @@ class ShareResidual:
         return row
 
 
+@dataclass(frozen=True, eq=False)
+class AlteredLaw:
+    """The best law altered as a challenge says, fitted to the same tests under the same covariance.
+
+    x : (unknowns,) its values. excess : its chi-square above that of the best law.
+    constraints : (rows, unknowns) derivatives over tolerances of what was held, such as the share of a second law.
+    sentence : what it says, to follow "but".
+    """
+
+    kind: Literal["sum", "threshold"]
+    problem: LeastSquaresProblem
+    x: Floats
+    excess: float
+    constraints: Floats
+    sentence: str
+
+    @property
+    def is_allowed(self) -> bool:
+        """Whether the tests do not exclude it."""
+        return self.excess <= NOT_EXCLUDED
+
+
 def compatible_sum(best: Identification, other: Identification) -> Challenge | None:
     """The sum of the best law and another one that carries SHARE of the rate, if the tests do not exclude it."""
+    try:
+        found = sum_with_share(best, other)
+    except CreepkitError:
+        return _unexamined("sum", f"a sum with {other.law.name}")
+    return _challenge_of(found)
+
+
+def compatible_threshold(best: Identification) -> Challenge | None:
+    """The best law above a threshold stress, if the tests do not exclude it."""
+    try:
+        found = above_threshold(best)
+    except CreepkitError:
+        return _unexamined("threshold", f"{best.law.name} above a threshold")
+    return _challenge_of(found)
+
+
+def _challenge_of(found: AlteredLaw | None) -> Challenge | None:
+    if found is None or not found.is_allowed:
+        return None
+    return Challenge(found.kind, found.problem.law.name, f"{found.sentence} {_change_text(found.excess)}")
+
+
+def sum_with_share(best: Identification, other: Identification) -> AlteredLaw | None:
+    """The sum of the best law and another one that carries SHARE of the rate; None where it is the best law itself.
+
+    FitError where one of them has no rate at the reference point of its own, or where it cannot be fitted.
+    """
     single = best.least_squares_problem
     own_terms = len(single.coordinates.term_rates)
     if not (own_terms and other.least_squares_problem.coordinates.term_rates):
-        return _unexamined("sum", f"a sum with {other.law.name}")
-    try:
-        law = best.law + other.law
-        problem = _of_law(single, law)
-        own_rates, further_rates = (list(part) for part in np.split(problem.coordinates.term_rates, [own_terms]))
-        x = np.concatenate([best.u, other.u, best.x[best.u.size :]])
-        x[own_rates] += np.log(1.0 - SHARE)
-        x[further_rates] += np.log(SHARE)
-        share = ShareResidual(own_rates[0], further_rates[0], float(x[further_rates[0]] - x[own_rates[0]]))
-        least, x = _least_chi_square(best, problem, x, share=share)
-    except CreepkitError:
-        return _unexamined("sum", f"a sum with {other.law.name}")
-    excess = least - _chi_square(single, best.x)
-    if excess > NOT_EXCLUDED or _are_one_function(problem, x, own_terms):
+        raise FitError(f"{best.law.name} and {other.law.name} have no rates of which one could be a share")
+    law = best.law + other.law
+    problem = _of_law(single, law)
+    own_rates, further_rates = (list(part) for part in np.split(problem.coordinates.term_rates, [own_terms]))
+    x = np.concatenate([best.u, other.u, best.x[best.u.size :]])
+    x[own_rates] += np.log(1.0 - SHARE)
+    x[further_rates] += np.log(SHARE)
+    share = ShareResidual(own_rates[0], further_rates[0], float(x[further_rates[0]] - x[own_rates[0]]))
+    least, x = _least_chi_square(best, problem, x, share=share)
+    if _are_one_function(problem, x, own_terms):
         return None
-    percent = f"{100 * SHARE:.0f} % of the rate from {other.law.name}"
-    return Challenge("sum", law.name, f"{law.name} with {percent} explains them as well {_change_text(excess)}")
+    sentence = f"{law.name} with {100 * SHARE:.0f} % of the rate from {other.law.name} explains them as well"
+    excess = least - _chi_square(single, best.x)
+    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), sentence)
+
+
+def above_threshold(best: Identification) -> AlteredLaw:
+    """The best law above a threshold stress; CreepkitError where it cannot be fitted."""
+    single, threshold = best.least_squares_problem, THRESHOLD * best.reference.stress
+    s_0 = sympy.Symbol("s_0_threshold", real=True)
+    terms = {label: term.subs(stress, sympy.Max(stress - s_0, 0)) for label, term in best.law.terms.items()}
+    param = Param("threshold stress", unit="MPa", bounds=(0.0, 2.0 * threshold))
+    law = replace(
+        best.law, name=f"{best.law.name} above a threshold", terms=terms, params={**best.law.params, s_0: param}
+    )
+    problem = _of_law(single, law)
+    position = best.u.size
+    x = np.concatenate([best.u, [threshold], best.x[position:]])
+    least, x = _least_chi_square(best, problem, x, fixed={position: threshold})
+    held = np.zeros((1, x.size))
+    held[0, position] = 1.0 / (SHARE_TOLERANCE * threshold)
+    sentence = f"{law.name} of {threshold:.3g} MPa explains them as well"
+    return AlteredLaw("threshold", problem, x, least - _chi_square(single, best.x), held, sentence)
+
+
+def altered_laws(fits: Sequence[Identification]) -> list[AlteredLaw]:
+    """Every alteration of the first of some identifications that the tests allow; what cannot be fitted is left out."""
+    best, *others = fits
+    results = []
+    for other in (*others, None):
+        try:
+            found = above_threshold(best) if other is None else sum_with_share(best, other)
+        except CreepkitError:
+            continue
+        if found is not None and found.is_allowed:
+            results.append(found)
+    return results
 
 
 def _unexamined(kind: Literal["sum", "threshold"], name: str) -> Challenge:
@@ -172,29 +251,6 @@ def _are_one_function(problem: LeastSquaresProblem, x: Floats, own_terms: int) -
     own, further = (np.logaddexp.reduce(np.array(part), axis=0) for part in (rates[:own_terms], rates[own_terms:]))
     difference = own - further
     return bool(np.isfinite(difference).all() and np.ptp(difference) < SAME_FUNCTION)
-
-
-def compatible_threshold(best: Identification) -> Challenge | None:
-    """The best law above a threshold stress, if the tests do not exclude it."""
-    single, threshold = best.least_squares_problem, THRESHOLD * best.reference.stress
-    s_0 = sympy.Symbol("s_0_threshold", real=True)
-    terms = {label: term.subs(stress, sympy.Max(stress - s_0, 0)) for label, term in best.law.terms.items()}
-    param = Param("threshold stress", unit="MPa", bounds=(0.0, 2.0 * threshold))
-    try:
-        law = replace(
-            best.law, name=f"{best.law.name} above a threshold", terms=terms, params={**best.law.params, s_0: param}
-        )
-        problem = _of_law(single, law)
-        position = best.u.size
-        x = np.concatenate([best.u, [threshold], best.x[position:]])
-        least, _ = _least_chi_square(best, problem, x, fixed={position: threshold})
-    except CreepkitError:
-        return _unexamined("threshold", f"{best.law.name} above a threshold")
-    excess = least - _chi_square(single, best.x)
-    if excess > NOT_EXCLUDED:
-        return None
-    sentence = f"{law.name} of {threshold:.3g} MPa explains them as well {_change_text(excess)}"
-    return Challenge("threshold", law.name, sentence)
 
 
 def _of_law(single: LeastSquaresProblem, law: CreepLaw) -> LeastSquaresProblem:

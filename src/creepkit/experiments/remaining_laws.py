@@ -1,0 +1,80 @@
+"""The laws that tests cannot rule out, with their weights, and what a verdict for each would still have to exclude."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import FitError
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.selection.challenges import AlteredLaw, altered_laws
+from creepkit.inverse.selection.ranking import Ranking, rank
+
+CHALLENGED_LAWS = 2
+"""Of the laws that remain, the first ones, whose alterations a design seeks to exclude."""
+
+
+@dataclass(frozen=True, eq=False)
+class RemainingLaws:
+    """Identifications of the laws that the tests cannot rule out, best first.
+
+    weights : (laws,) -. ranking : of all laws that were tried, None for a single identification.
+    """
+
+    fits: tuple[Identification, ...]
+    weights: Floats
+    ranking: Ranking | None
+
+    @classmethod
+    def of(cls, source: Ranking | Identification | Sequence[Identification]) -> RemainingLaws:
+        """Those of an identification, of several or of a ranking; FitError for what no design can be made from."""
+        is_list = (
+            isinstance(source, Sequence) and all(isinstance(fit, Identification) for fit in source) and len(source) > 0
+        )
+        if not (isinstance(source, Identification | Ranking) or is_list):
+            raise FitError(f"a design is made from identifications or a ranking, found {source!r:.60}")
+        if isinstance(source, Identification):
+            return cls((_usable(source),), np.ones(1), None)
+        if not isinstance(source, Ranking):
+            _refuse_repeated(source)
+        ranking = source if isinstance(source, Ranking) else rank(list(source), challenge=False)
+        remaining = ranking.credible or ranking.laws[:1]
+        return cls(tuple(_usable(r.fit) for r in remaining), np.array([r.weight for r in remaining]), ranking)
+
+    def altered(self) -> list[tuple[int, AlteredLaw]]:
+        """What the tests allow beside the first laws: the position of the law, and the law altered (fitted here)."""
+        if self.ranking is None or len(self.ranking.laws) < 2:
+            return []
+        tried = [ranked.fit for ranked in self.ranking.laws]
+        return [
+            (k, altered)
+            for k, fit in enumerate(self.fits[:CHALLENGED_LAWS])
+            for altered in altered_laws([fit, *(other for other in tried if other is not fit)])
+        ]
+
+    def unmodelled_effects(self) -> tuple[str, ...]:
+        """Challenges of the ranking that no test piece can answer, as sentences."""
+        challenges = (self.ranking.challenges or ()) if self.ranking is not None else ()
+        return tuple(str(c) for c in challenges if c.kind == "unmodelled effect")
+
+
+def _usable(fit: Identification) -> Identification:
+    if fit.predictor is None or not fit.histories:
+        raise FitError(
+            f"the identification of {fit.law.name} was loaded from a file: attach its histories and specimen with "
+            "fit.with_histories()"
+        )
+    if fit.covariance.shape != (fit.u.size, fit.u.size) or not np.isfinite(fit.covariance).all():
+        raise FitError(f"the identification of {fit.law.name} has no intervals; identify it again from its tests")
+    return fit
+
+
+def _refuse_repeated(fits: Sequence[Identification]) -> None:
+    seen: set[str] = set()
+    for fit in fits:
+        if fit.law.fingerprint in seen:
+            raise FitError(f"the law {fit.law.name} is given twice; give each law once")
+        seen.add(fit.law.fingerprint)
