@@ -362,8 +362,8 @@ class _Search:
         return self.criterion.expectation(_histories(plan), at_draws=True)
 
     def _merit(self, expectation: Expectation) -> tuple[float, float]:
-        probability = min(round(np.nan_to_num(expectation.probability), 2), DECISIVE_WEIGHT)
-        return (float(probability), expectation.information)
+        probability = min(float(np.nan_to_num(expectation.probability)), DECISIVE_WEIGHT)
+        return (float(round(probability / ALIKE)), expectation.information)
 
 
 def _histories(plan: Sequence[PlannedTest]) -> list[History]:

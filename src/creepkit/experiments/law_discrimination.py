@@ -175,7 +175,7 @@ class LawCriterion:
             step = _bounded_steps(curvature, downhill, *(limits - deviations[k]))
             change = np.einsum("cp,pq,cq->c", step, curvature, step) - 2.0 * (downhill * step).sum(axis=1)
             least[chosen] = made.chi_square[k] + (r**2).sum(axis=1) + change
-        return least
+        return np.maximum(least, 0.0)  # further tests never lessen a least chi-square; a step may promise that they do
 
     def _expansion(self, b: int) -> Expansion:
         if b not in self._expansions:

@@ -10,11 +10,15 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.selection.challenges import AlteredLaw, altered_laws
+from creepkit.inverse.selection.challenges import NOT_EXCLUDED, AlteredLaw, altered_laws
 from creepkit.inverse.selection.ranking import Ranking, rank
 
 CHALLENGED_LAWS = 2
 """Of the laws that remain, the first ones, whose alterations a design seeks to exclude."""
+
+
+NEARLY_EXCLUDED = 3.0 * NOT_EXCLUDED
+"""Chi-square above the law's own, up to which the noise of a further test may make an alteration allowed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,14 +49,14 @@ class RemainingLaws:
         return cls(tuple(_usable(r.fit) for r in remaining), np.array([r.weight for r in remaining]), ranking)
 
     def altered(self) -> list[tuple[int, AlteredLaw]]:
-        """What the tests allow beside the first laws: the position of the law, and the law altered (fitted here)."""
+        """What the tests allow, or nearly exclude, beside the first laws: position of the law, and the law altered."""
         if self.ranking is None or len(self.ranking.laws) < 2:
             return []
         tried = [ranked.fit for ranked in self.ranking.laws]
         return [
             (k, altered)
             for k, fit in enumerate(self.fits[:CHALLENGED_LAWS])
-            for altered in altered_laws([fit, *(other for other in tried if other is not fit)])
+            for altered in altered_laws([fit, *(other for other in tried if other is not fit)], NEARLY_EXCLUDED)
         ]
 
     def unmodelled_effects(self) -> tuple[str, ...]:

@@ -203,8 +203,11 @@ def above_threshold(best: Identification) -> AlteredLaw:
     return AlteredLaw("threshold", problem, x, least - _chi_square(single, best.x), held, sentence)
 
 
-def altered_laws(fits: Sequence[Identification]) -> list[AlteredLaw]:
-    """Every alteration of the first of some identifications that the tests allow; what cannot be fitted is left out."""
+def altered_laws(fits: Sequence[Identification], limit: float = NOT_EXCLUDED) -> list[AlteredLaw]:
+    """Every alteration of the first of some identifications whose chi-square is higher by no more than a limit.
+
+    What cannot be fitted is left out.
+    """
     best, *others = fits
     results = []
     for other in (*others, None):
@@ -212,7 +215,7 @@ def altered_laws(fits: Sequence[Identification]) -> list[AlteredLaw]:
             found = above_threshold(best) if other is None else sum_with_share(best, other)
         except CreepkitError:
             continue
-        if found is not None and found.is_allowed:
+        if found is not None and found.excess <= limit:
             results.append(found)
     return results
 
