@@ -68,7 +68,7 @@ def test_two_runs_are_made_at_both_ends_of_the_range(line):
 
 def test_the_grid_finds_the_end_that_a_rate_asks_for(line):
     """c-optimal: the rate at 40 MPa is best measured there; its expected sd is that of regression."""
-    found = design(line, rig=RIG, goal=rate_at(40.0))
+    found = design(line, rig=RIG.replace(setup_hours=1e4), goal=rate_at(40.0))
     assert found.best.first_level == pytest.approx(40.0)
     c = np.array([1.0, np.log(40.0)])
     best = found.best
@@ -130,11 +130,36 @@ def test_a_change_of_stress_separates_hardening_by_strain_from_hardening_by_time
     assert found.best.expectation.probability > 0.99
     directions = {(c.reference_law, c.alternative_law): c.expected for c in found.best.expectation.chi_squares}
     assert min(directions.values()) > 100
-    assert len(directions) == 2
+    names = "strain-hardening", "time-hardening"
+    shares = "+".join(names), "+".join(reversed(names))
+    assert set(directions) == {names, names[::-1], (names[0], shares[0]), (names[1], shares[1])}
     steady = [t for t in found.tests if ", from " not in t.description]
     assert max(t.expectation.probability for t in steady) < 0.5
     assert "separates" in str(found)
     assert "if strain-hardening holds, time-hardening is worse by" in str(found)
+
+
+def test_one_law_is_made_decisive_by_excluding_what_the_tests_allow_beside_it():
+    """A small change of stress singles strain hardening out, but does not exclude a share of time hardening."""
+    jump = StressSteps(((0.0, 50.0), (2e4, 52.0)), "stress")
+    tests = bars(STRAIN_HARDENING, SPL, [constant_stress(45.0, "stress"), jump], seed=0)
+    ranking = rank([identify(law, tests, BAR, settings=LIKELY) for law in (STRAIN_HARDENING, TIME_HARDENING)])
+    assert len(ranking.credible) == 1
+    assert ranking.challenges
+    found = design(ranking)
+    assert found.goal == "law"
+    assert "strain-hardening+time-hardening" in found.altered
+    assert "makes strain-hardening decisive, against strain-hardening+time-hardening" in found.sentence
+    made = []
+    for history in found.best.histories:
+        prediction = BAR.predict(STRAIN_HARDENING, STRAIN_HARDENING.to_internal(SPL), [history])
+        noise = 2e-5 * np.random.default_rng(1).normal(size=history.times.size)
+        sd = {"strain": np.full(history.times.size, 2e-5)}
+        outputs = {"strain": prediction.of(0)[:, 0] + noise}
+        made.append(history.replace(name="made", outputs=outputs, standard_deviation=sd))
+    assert found.best.expectation.probability > 0.95
+    after = [identify(law, [*tests, *made], BAR, settings=LIKELY) for law in (STRAIN_HARDENING, TIME_HARDENING)]
+    assert rank(after).decisive
 
 
 def test_the_expected_chi_square_is_met_when_the_test_is_made(hardening):
