@@ -13,12 +13,12 @@ from creepkit.report.terminal import ProgressBar, print_json
 if TYPE_CHECKING:
     from creepkit.experiments.design import Goal
     from creepkit.experiments.rig import Rig
-    from creepkit.inverse.identification import Identification
 
 
 def command(
     fits: Annotated[
-        list[Path], typer.Argument(metavar="FIT.json...", help="Identifications of the same tests that were saved.")
+        list[Path],
+        typer.Argument(metavar="FIT.json...", help="A ranking.json, or saved identifications of the same tests."),
     ],
     tests: Annotated[
         list[str], typer.Option("--tests", metavar="TESTS", help="Their measured files, folders or patterns.")
@@ -61,13 +61,17 @@ def command(
     """
     import creepkit as ck
     from creepkit.experiments.rig import rigs_of
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.ranking_document import read_fit_or_ranking
     from creepkit.report.design import design_to_json, print_design
     from creepkit.report.figures import check_figure_target
 
     if plot is not None:
         check_figure_target(plot)
     histories = ck.read_histories(tests)
-    identified: list[Identification] = [ck.load(path).with_histories(histories) for path in fits]
+    found = [read_fit_or_ranking(path) for path in fits]
+    laws = [fit for one in found for fit in ((one,) if isinstance(one, Identification) else one.fits)]
+    identified = [fit.with_histories(histories) for fit in laws]
     changes = rig_changes(
         levels=levels, longest=longest, temperature=temperature, dimension=dimension, tests_per_run=tests_per_run,
         setup_hours=setup_hours,

@@ -152,8 +152,8 @@ class LawCriterion:
     def _least(self, b: int, a: int, histories: Sequence[History], y: Floats, at_draws: bool) -> Floats:
         """(outcomes,) increase of chi-square of law b at outcomes y (outcomes, data), under the covariance of law a.
 
-        About its estimates; at draws from that draw of its posterior which explains the outcome best, by one
-        Gauss-Newton step over all tests.
+        About its estimates; at draws from that of its estimates and the draws of its posterior which explains the
+        outcome best, by one Gauss-Newton step over all tests.
         """
         law = self.outcomes.laws[b]
         if not at_draws:
@@ -186,16 +186,18 @@ class LawCriterion:
         """Outcomes (draws, data) without noise if a is true, and how often the noise is drawn for each."""
         deviations = self._drawn(a, at_draws)
         if at_draws:
-            parts = [self.outcomes.drawn(h, a, deviations)[0] for h in histories]
+            parts = [self.outcomes.drawn(h, a, deviations)[0][1:] for h in histories]
             return np.concatenate(parts, axis=1), POSTERIOR_REPEATS
         m, K = self.outcomes.of(histories, a)
         return m + deviations @ K.T, REPEATS
 
     def _drawn(self, a: int, at_draws: bool) -> Floats:
+        """(draws, q) deviations from the estimates; those at which predictions are made begin with the estimates."""
         key = 2 * a + int(at_draws)
         if key not in self._deviations:
             count = POSTERIOR_DRAWS if at_draws else LINEAR_DRAWS
-            self._deviations[key] = self.outcomes.laws[a].draws(count, self.seed + a)
+            drawn = self.outcomes.laws[a].draws(count, self.seed + a)
+            self._deviations[key] = np.concatenate([0.0 * drawn[:1], drawn]) if at_draws else drawn
         return self._deviations[key]
 
     def probability_of_rupture(self, histories: Sequence[History]) -> float:
@@ -229,7 +231,7 @@ class LawCriterion:
         try:
             if b not in self._baseline:
                 self._baseline[b] = _refitted_chi_square(law, self.outcomes.laws[0].noise_model, [])
-            made = _as_if_made(truth, self._drawn(a, True)[chosen], histories)
+            made = _as_if_made(truth, self._drawn(a, True)[1 + chosen], histories)
             refitted = _refitted_chi_square(law, self.outcomes.laws[0].noise_model, made) - self._baseline[b]
         except CreepkitError:  # no start can be predicted: the linear value stands
             return False

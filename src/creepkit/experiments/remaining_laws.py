@@ -49,15 +49,20 @@ class RemainingLaws:
         return cls(tuple(_usable(r.fit) for r in remaining), np.array([r.weight for r in remaining]), ranking)
 
     def altered(self) -> list[tuple[int, AlteredLaw]]:
-        """What the tests allow, or nearly exclude, beside the first laws: position of the law, and the law altered."""
+        """What the tests allow, or nearly exclude, beside the first laws: position of the law, and the law altered.
+
+        Nothing where one law remains and all that was tried beside it is excluded.
+        """
         if self.ranking is None or len(self.ranking.laws) < 2:
             return []
         tried = [ranked.fit for ranked in self.ranking.laws]
-        return [
+        found = [
             (k, altered)
             for k, fit in enumerate(self.fits[:CHALLENGED_LAWS])
             for altered in altered_laws([fit, *(other for other in tried if other is not fit)], NEARLY_EXCLUDED)
         ]
+        is_settled = len(self.fits) == 1 and not any(altered.is_allowed for _, altered in found)
+        return [] if is_settled else found
 
     def unmodelled_effects(self) -> tuple[str, ...]:
         """Challenges of the ranking that no test piece can answer, as sentences."""
