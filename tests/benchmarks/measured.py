@@ -64,6 +64,10 @@ class Page:
         print(*lines, sep="\n", flush=True)
 
 
+FOLDERS = ("--keep", "--data", "--jobs")
+"""Options with a value that change no result."""
+
+
 def write(name: str, title: str, text: str, command: str) -> Path:
     """Write docs/measured/<name>.md: title, text, and a line with date, machine, versions and the command."""
     FOLDER.mkdir(parents=True, exist_ok=True)
@@ -93,8 +97,10 @@ def progress(text: str) -> None:
 
 
 def command_line() -> str:
-    """The command that this process was started with, from the root of the project."""
-    return shlex.join(["python", f"tests/benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]])
+    """The command that this process was started with, from the root of the project, without the folders it used."""
+    words = sys.argv[1:]
+    shown = [word for k, word in enumerate(words) if word not in FOLDERS and (k == 0 or words[k - 1] not in FOLDERS)]
+    return shlex.join(["python", f"tests/benchmarks/{Path(sys.argv[0]).name}", *shown])
 
 
 def machine() -> str:
