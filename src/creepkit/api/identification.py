@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, cast
 
 from creepkit import registry
 from creepkit.errors import ExportError, FitError, nearest
@@ -32,7 +32,7 @@ class SettingChanges(TypedDict, total=False):
     frames: int
     seed: int
     loss: str
-    nuisances: Sequence[Nuisance] | None
+    nuisances: Sequence[Nuisance | str] | Nuisance | str | None
     weights: OutputWeights
     test_loss: str
     further_laws: int
@@ -63,7 +63,7 @@ def identify(
         A surrogate that does not know the class of the law is replaced by its specimen, and a note says so.
     settings : what is minimised, nuisance parameters, starts, seed, frames, robust losses, and whether suspect frames
         are left out; see IdentificationSettings. changes : single fields of it by name:
-        starts=4, nuisances=[Nuisance("offset")], weights="likelihood".
+        starts=4, nuisances=["offset", Nuisance("rate", sd=0.1)], weights="likelihood".
     """
     from creepkit.inverse.composite_predictor import through_for_law
     from creepkit.inverse.history_checks import rig_notes, without_suspect_frames
@@ -130,7 +130,7 @@ def select(
     predictor = resolve_predictors(using, histories)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     ranking = run(
-        [resolve_law(law) for law in laws],
+        [resolve_law(law) for law in ((laws,) if isinstance(laws, str) else laws)],
         histories,
         predictor,
         settings=settings,
@@ -202,7 +202,9 @@ def change_settings(settings: IdentificationSettings, changes: SettingChanges) -
         if name not in known:
             raise FitError(f"settings of an identification have no '{name}'; {nearest(name, known)}")
     if "nuisances" in given:
-        given["nuisances"] = tuple(given["nuisances"])
+        listed: Any = given["nuisances"]
+        listed = [listed] if isinstance(listed, str | Nuisance) else listed
+        given["nuisances"] = tuple(Nuisance(cast(Any, one)) if isinstance(one, str) else one for one in listed)
     if "starts" in given:  # eight points a start, a power of two, and at least 64
         points = max(64, 1 << (8 * max(int(given["starts"]), 1) - 1).bit_length())
         given.setdefault("sobol_points", points)

@@ -12,7 +12,7 @@ from creepkit.errors import DatasetError, SolveError, SurrogateError
 from creepkit.language import symbols
 from creepkit.records import History, Loading, Predictor, Program, Specimen, Status, checked_prediction
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictor
-from creepkit.specimens.run import Run, Runnable, run_from_outputs
+from creepkit.specimens.run import Run, Runnable, run_from_outputs, unusual_values, with_explanation
 
 if TYPE_CHECKING:
     from creepkit.arrays import ArrayLike
@@ -67,6 +67,16 @@ def simulate(
         source=f"simulation of law '{law.name}'",
     )
     values = law.values(values)
+    explanation = unusual_values(law, values, elastic)
+    try:
+        return with_explanation(_simulated(law, using, values, planned_test), explanation)
+    except SolveError as error:
+        if not explanation:
+            raise
+        raise SolveError(f"{error}{explanation}") from error
+
+
+def _simulated(law: CreepLaw, using: Predictor, values: Mapping[str, float], planned_test: History) -> Run:
     if isinstance(using, Runnable):
         return using.run(law, values, planned_test)
     theta = law.to_internal(values)

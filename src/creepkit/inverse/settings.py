@@ -132,6 +132,8 @@ def _check_weights(weights: OutputWeights) -> None:
 
 
 def _check_nuisance(nuisance: Nuisance) -> None:
+    if not isinstance(nuisance, Nuisance):
+        raise FitError(f"nuisances are names or such as Nuisance('thickness', sd=0.01), found {nuisance!r:.40}")
     n, finite = nuisance, nuisance.sd is None or np.isfinite(nuisance.sd)
     if n.output and n.kind != "offset":
         raise FitError(f"nuisance '{n.kind}' acts on a whole test: it has no output, found output='{n.output}'")

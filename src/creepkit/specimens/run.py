@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -14,7 +14,7 @@ from creepkit.presentation import Presentable
 from creepkit.records import History, Status
 
 if TYPE_CHECKING:
-    from creepkit.language import CreepLaw
+    from creepkit.language import CreepLaw, Elastic
 
 
 _RunType = TypeVar("_RunType", bound="Run")
@@ -78,3 +78,28 @@ def run_from_outputs(
     frames = {"times": plan.times[reached], "used": plan.used[reached], "outputs": outputs, "labels": labels}
     ends = {"rupture_time": end_time if status is Status.RUPTURED else None, "unruptured": False}
     return kind(**{**known, **frames, **ends, **more}, status=status, end_time=end_time, reason=reason)
+
+
+SMALLEST_USUAL_MODULUS = 1e3
+"""MPa, below which a number may have been meant in GPa."""
+
+
+def unusual_values(law: CreepLaw, values: Mapping[str, float], elastic: Elastic | None) -> str:
+    """What may explain that a simulation ended early, as the end of a sentence; "" where nothing is unusual."""
+    found = []
+    for symbol, param in law.params.items():
+        value, (low, high) = values[symbol.name], param.bounds
+        if value != param.off and not low <= value <= high:
+            found.append(f"{symbol.name} = {value:g} lies outside its bounds, {low:g} to {high:g}")
+    E = getattr(elastic, "E", None)
+    if isinstance(E, int | float) and E < SMALLEST_USUAL_MODULUS:
+        found.append(f"E is {E:g} MPa (write {E * 1e3:g} if GPa were meant)")
+    return "".join(f"; {each}" for each in found)
+
+
+def with_explanation(run: _RunType, explanation: str) -> _RunType:
+    """A run that ended early, its reason with an explanation."""
+    if run.status is Status.COMPLETE or not explanation:
+        return run
+    reason = f"{run.reason}{explanation}"
+    return replace(run, reason=reason, labels={**run.labels, "ended": reason})

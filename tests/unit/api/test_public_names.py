@@ -70,6 +70,10 @@ def test_settings_are_changed_by_name() -> None:
     settings = ck.IdentificationSettings()
     assert change_settings(settings, {}) is not None
     assert change_settings(settings, {"nuisances": None, "seed": 0}) == settings
+    assert change_settings(settings, {"nuisances": ["offset"]}).nuisances == (ck.Nuisance("offset"),)
+    assert change_settings(settings, {"nuisances": "rate"}).nuisances == (ck.Nuisance("rate"),)
+    with pytest.raises(FitError, match=r"nuisances are names or such as Nuisance\('thickness', sd=0.01\), found 3"):
+        change_settings(settings, {"nuisances": [3]})
     assert change_settings(settings, {"starts": 20}).sobol_points == 256
     assert change_settings(settings, {"starts": 20, "sobol_points": 32}).sobol_points == 32
     with pytest.raises(FitError, match="have no 'start'; did you mean 'starts'"):

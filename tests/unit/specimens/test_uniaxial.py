@@ -186,3 +186,17 @@ def test_elastic_strain_needs_elastic_data() -> None:
 def test_a_missing_value_is_named() -> None:
     with pytest.raises(LawError, match="needs a value for n"):
         ck.simulate(NORTON, Uniaxial(), {"A": 1e-13}, loading=constant_stress(100.0), times=TIMES)
+
+
+def test_an_early_end_names_values_outside_their_bounds_and_a_modulus_in_gpa() -> None:
+    import creepkit as ck
+
+    times = np.linspace(1.0, 7200.0, 10)
+    with pytest.raises(SolveError, match="; n = 40 lies outside its bounds, 1 to 8$"):
+        ck.simulate("norton", "uniaxial", {"A": 1e-16, "n": 40.0}, loading=constant_stress(100.0), times=times)
+    soft = ck.simulate(
+        "norton", "bulge", {"A": 1e-16, "n": 5.0}, loading=ck.PressureJump(8, 10, 3600), times=times,
+        temperature=1073.0, elastic=ck.Elastic(E=150.0),
+    )  # fmt: skip
+    assert soft.reason.endswith("; E is 150 MPa (write 150000 if GPa were meant)")
+    assert soft.labels["ended"] == soft.reason
