@@ -11,7 +11,7 @@ import typer
 from creepkit.report.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
-    from creepkit.experiments.design import Goal
+    from creepkit.experiments.design_task import Goal
     from creepkit.experiments.rig import Rig
 
 
@@ -63,6 +63,7 @@ def command(
     from creepkit.experiments.rig import rigs_of
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.ranking_document import read_fit_or_ranking
+    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.report.design import design_to_json, print_design
     from creepkit.report.figures import check_figure_target
 
@@ -72,6 +73,11 @@ def command(
     found = [read_fit_or_ranking(path) for path in fits]
     laws = [fit for one in found for fit in ((one,) if isinstance(one, Identification) else one.fits)]
     identified = [fit.with_histories(histories) for fit in laws]
+    source: Identification | list[Identification] | ModelAverage = identified
+    if len(found) == 1 and not isinstance(found[0], Identification):
+        source = ModelAverage(tuple(identified), found[0].weights)
+    elif len(identified) == 1:
+        source = identified[0]
     changes = rig_changes(
         levels=levels, longest=longest, temperature=temperature, dimension=dimension, tests_per_run=tests_per_run,
         setup_hours=setup_hours,
@@ -80,14 +86,7 @@ def command(
     assert predictor is not None
     rigs: list[Rig] = [rig.replace(**changes) for rig in rigs_of(identified[0].histories, predictor)]
     with ProgressBar() as progress:
-        result = ck.design(
-            identified[0] if len(identified) == 1 else identified,
-            rig=rigs,
-            goal=parse_goal(goal),
-            budget=budget,
-            seed=seed,
-            progress=progress.tick,
-        )
+        result = ck.design(source, rig=rigs, goal=parse_goal(goal), budget=budget, seed=seed, progress=progress.tick)
     if plot is not None:
         result.plot(plot)
     if as_json:

@@ -9,8 +9,6 @@ service (c-optimal), and the law.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -18,6 +16,7 @@ from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig, variations_of_tests
 from creepkit.experiments.design_checks import check_arguments, edges_of, notes_of, rigs_for
+from creepkit.experiments.design_task import DesignTask, Goal, task_of
 from creepkit.experiments.expectations import Criterion, Expectation, PrecisionCriterion
 from creepkit.experiments.known_laws import KnownLaw
 from creepkit.experiments.law_discrimination import LawCriterion
@@ -27,14 +26,11 @@ from creepkit.experiments.remaining_laws import RemainingLaws
 from creepkit.experiments.rig import Rig
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
-from creepkit.inverse.selection.challenges import AlteredLaw
 from creepkit.inverse.selection.ranking import Ranking
+from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
 from creepkit.records import History
-
-Goal = Literal["parameters", "law"] | DerivedQuantity
-
 
 Progress = Callable[[str, int, int], None]
 
@@ -68,7 +64,7 @@ GREEDY_POOL, MOST_RUNS, LEAST_GAIN = 30, 6, 0.02
 
 
 def design(
-    source: Ranking | Identification | Sequence[Identification],
+    source: Ranking | ModelAverage | Identification | Sequence[Identification],
     *,
     rig: Rig | Sequence[Rig] | None = None,
     goal: Goal | None = None,
@@ -77,7 +73,7 @@ def design(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Design:
-    """The next tests of an identification or of a ranking of laws.
+    """The next tests of an identification or of a ranking of laws, also of one that was loaded from its file.
 
     rig : what the equipment can do; by default a little more than what it did. goal : "law", "parameters" or a
         quantity; by default the law where more than one remains. budget : h of the oven for one run or several.
@@ -89,7 +85,7 @@ def design(
     rigs = rigs_for(remaining.fits[0], rig)
     if candidates is not None and not (isinstance(candidates, Sequence) and len(candidates) > 0):
         raise FitError(f"candidates= takes a list of planned histories, found {candidates!r:.60}")
-    search = _Search(_task(remaining, goal, budget), rigs, seed, progress)
+    search = _Search(task_of(remaining, goal, budget), rigs, seed, progress)
     if search.nothing_to_do is not None:
         return search.nothing_to_do
     planned = _grids(remaining.fits, rigs, budget) if candidates is None else candidates_given(candidates, rigs)
@@ -105,26 +101,11 @@ def further_tests(ranking: Ranking, *, progress: Progress | None = None) -> Desi
     remaining = RemainingLaws.of(ranking)
     fit = remaining.fits[0]
     rigs = rigs_for(fit, None)
-    search = _Search(_task(remaining, "law", None), rigs, 0, progress)
+    search = _Search(task_of(remaining, "law", None), rigs, 0, progress)
     if search.nothing_to_do is not None:
         return search.nothing_to_do
     exponent = float(fit.local_exponent(fit.reference.stress, warn=False)[0])
     return search.run(list(variations_of_tests(fit.histories, rigs, exponent)))
-
-
-def _task(remaining: RemainingLaws, goal: Goal | None, budget: float | None) -> _Task:
-    """What is asked: by default the law where more than one remains, or where the tests allow more than the one."""
-    several = len(remaining.fits) > 1
-    if isinstance(goal, str) and goal not in ("law", "parameters"):
-        raise FitError(f"goal '{goal}' is not known: 'law', 'parameters', or a quantity such as ck.rate_at(60.0)")
-    if goal == "law" and remaining.ranking is None:
-        raise FitError(
-            f"there is one law, {remaining.fits[0].law.name}, and nothing to tell it apart from: give the ranking of "
-            "several laws, or goal='parameters'"
-        )
-    altered = remaining.altered() if goal == "law" or (goal is None and remaining.ranking is not None) else []
-    chosen: Goal = goal if goal is not None else "law" if several or altered else "parameters"
-    return _Task(remaining, chosen, budget, altered if chosen == "law" else [])
 
 
 def _grids(laws: Sequence[Identification], rigs: Sequence[Rig], budget: float | None) -> list[CandidateTest]:
@@ -137,25 +118,10 @@ def _grids(laws: Sequence[Identification], rigs: Sequence[Rig], budget: float | 
     return candidates
 
 
-@dataclass(frozen=True, eq=False)
-class _Task:
-    """What is asked: the laws that remain, the goal, the budget, and altered laws that a verdict has to exclude."""
-
-    remaining: RemainingLaws
-    goal: Goal
-    budget: float | None
-    altered: Sequence[tuple[int, AlteredLaw]]
-
-    @property
-    def laws(self) -> tuple[Identification, ...]:
-        """Identifications, best first."""
-        return self.remaining.fits
-
-
 class _Search:
     """The evaluation of candidates: all to first order, the best at draws, and for the law with refits in full."""
 
-    def __init__(self, task: _Task, rigs: Sequence[Rig], seed: int, progress: Progress | None) -> None:
+    def __init__(self, task: DesignTask, rigs: Sequence[Rig], seed: int, progress: Progress | None) -> None:
         self.task, self.rigs, self.progress = task, {rig.specimen: rig for rig in rigs}, progress
         with single_threaded_blas():
             noise_model = task.laws[0].noise_model
@@ -173,12 +139,12 @@ class _Search:
 
     @property
     def nothing_to_do(self) -> Design | None:
-        """The answer where one law remains and the tests allow nothing beside it."""
+        """The answer where no test can help."""
         task = self.task
-        if task.goal != "law" or len(task.laws) > 1 or task.altered:
+        if not task.obstacle:
             return None
-        notes = task.remaining.unmodelled_effects()
-        return Design("law", (task.laws[0].law.name,), (1.0,), (), budget=task.budget, notes=notes)
+        names = tuple(fit.law.name for fit in task.laws)
+        return Design(task.goal_name, names, task.weights, (), budget=task.budget, obstacle=task.obstacle)
 
     def run(self, planned: Sequence[CandidateTest], *, refuse: bool = False) -> Design:
         """The design; refuse : whether it is an error that no test can be made, as where a user names them."""
@@ -188,7 +154,8 @@ class _Search:
         with single_threaded_blas():
             try:
                 self._evaluate_all(planned, refuse)
-                self._evaluate_best()
+                if self.criterion.differs_at_draws:
+                    self._evaluate_best()
                 plan, expected = self._plan()
             except KeyboardInterrupt:
                 if not self.tests:
@@ -197,17 +164,18 @@ class _Search:
                 self.tests.sort(key=self._order)
         if not plan and self.tests:
             plan, expected = (self.tests[0],), self.tests[0].expectation
-        task, weight = self.task, self.task.remaining.weights / self.task.remaining.weights.sum()
+        task = self.task
         return Design(
-            goal=task.goal if isinstance(task.goal, str) else task.goal.name,
+            goal=task.goal_name,
             laws=tuple(fit.law.name for fit in task.laws),
-            weights=tuple(float(w) for w in weight),
+            weights=task.weights,
             tests=tuple(self.tests),
             left_out=tuple(self.left_out.items()),
             plan=plan,
             expected=expected,
             budget=task.budget,
             interrupted=interrupted,
+            unit=task.goal.unit if isinstance(task.goal, DerivedQuantity) and task.goal.scale == "linear" else None,
             altered=tuple(altered.problem.law.name for _, altered in task.altered),
             notes=(*notes_of(task.laws, tuple(self.rigs.values())), *self._notes_of_plan(plan)),
         )
@@ -326,7 +294,7 @@ class _Search:
         pool = list({id(t): t for t in (*by_hour[:GREEDY_POOL], *by_total[: GREEDY_POOL // 3])}.values())
         plans = [self._greedy(pool), (by_total[0],), (self.tests[0],)]
         judged = [(plan, self._together(plan)) for plan in plans if plan]
-        return max(judged, key=lambda pair: self._merit(pair[1]))
+        return max(judged, key=lambda pair: self._merit(*pair))
 
     def _greedy(self, pool: Sequence[PlannedTest]) -> tuple[PlannedTest, ...]:
         assert self.task.budget is not None
@@ -357,12 +325,15 @@ class _Search:
         return notes
 
     def _together(self, plan: Sequence[PlannedTest]) -> Expectation:
-        if len(plan) == 1 and plan[0].at_draws:
+        if len(plan) == 1 and (plan[0].at_draws or not self.criterion.differs_at_draws):
             return plan[0].expectation
         return self.criterion.expectation(_histories(plan), at_draws=True)
 
-    def _merit(self, expectation: Expectation) -> tuple[float, float]:
-        probability = min(float(np.nan_to_num(expectation.probability)), DECISIVE_WEIGHT)
+    def _merit(self, plan: Sequence[PlannedTest], expectation: Expectation) -> tuple[float, float]:
+        """Largest for the best: of plans that decide the one of fewest hours."""
+        probability = float(np.nan_to_num(expectation.probability))
+        if probability >= DECISIVE_WEIGHT:
+            return (np.inf, -sum(test.hours for test in plan))
         return (float(round(probability / ALIKE)), expectation.information)
 
 
@@ -370,7 +341,7 @@ def _histories(plan: Sequence[PlannedTest]) -> list[History]:
     return [history for test in plan for history in test.histories]
 
 
-def _law_criterion(task: _Task, outcomes: PlannedOutcomes, seed: int) -> LawCriterion:
+def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> LawCriterion:
     ranking = task.remaining.ranking
     assert ranking is not None
     ranked = [next(r for r in ranking.laws if r.fit is fit) for fit in task.laws]

@@ -64,7 +64,15 @@ class Expectation:
 
 
 class Criterion(Protocol):
-    """A goal, made a number for planned tests that were added to the outcomes."""
+    """A goal, made a number for planned tests that were added to the outcomes.
+
+    differs_at_draws : whether it is worked out at draws of the posterior where that is asked for.
+    """
+
+    @property
+    def differs_at_draws(self) -> bool:
+        """Whether expectations at draws are others than those about the estimates."""
+        ...
 
     def expectation(self, histories: Sequence[History], *, at_draws: bool = False) -> Expectation:
         """What these tests together tell; at draws of the posterior, or linearised about the estimates."""
@@ -75,7 +83,7 @@ class Criterion(Protocol):
 class PrecisionCriterion:
     """The precision of the parameters (quantity None) or of one quantity, averaged over laws with weights (laws,).
 
-    About the estimates where rates scatter between tests; else at draws of the posterior, where they are asked for.
+    About the estimates, or at draws of the posterior where they are asked for and differ.
     """
 
     outcomes: PlannedOutcomes
@@ -97,12 +105,11 @@ class PrecisionCriterion:
             else:
                 function = self.quantity.function(law.fit.coordinates)
                 rows = np.stack([gradient(function, u, np.sqrt(np.diag(law.fit.covariance))) for u in points])
-                sandwich = law.sandwich.mean()
                 both = [np.sqrt(np.einsum("cp,cpq,cq->c", rows, S[:, :size, :size], rows)) for S in (before, after)]
                 mean_logs = [float(np.mean(np.log(each))) for each in both]
                 gains.append(mean_logs[0] - mean_logs[1])
-                current.append(float(sandwich * np.exp(mean_logs[0])))
-                sds.append(float(sandwich * np.exp(mean_logs[1])))
+                current.append(float(np.exp(mean_logs[0])))
+                sds.append(float(np.exp(mean_logs[1])))
             if position == 0:
                 parameters = [self._parameter_sd(position, S, points) for S in (before, after)]
         weight = self.weights / self.weights.sum()
@@ -111,11 +118,21 @@ class PrecisionCriterion:
             float(weight @ gains), sd, current_sd, parameter_sd=parameters[1], current_parameter_sd=parameters[0]
         )
 
+    @property
+    def differs_at_draws(self) -> bool:
+        """Whether anything is worked out at draws: not where rates scatter, or where values have a sandwich covariance.
+
+        The effect of a factor on the rate of a test is that at the estimates. At a draw it would not quite be the
+        derivative to the law's own coefficient, and tests would seem to tell the two apart.
+        """
+        fits = [law.fit for law in self.outcomes.laws]
+        return all(fit.noise_model.rate == 0 and fit.settings.weights == "likelihood" for fit in fits)
+
     def _parameter_sd(self, position: int, after: Floats, points: Floats) -> dict[str, float]:
         law = self.outcomes.laws[position]
         to_theta = law.fit.coordinates.jacobian(points)
         variances = np.einsum("cpq,cqr,cpr->cp", to_theta, after[:, : law.size, : law.size], to_theta)
-        sd = np.exp(0.5 * np.log(np.maximum(variances, 1e-300)).mean(axis=0)) * law.sandwich.mean()
+        sd = np.exp(0.5 * np.log(np.maximum(variances, 1e-300)).mean(axis=0))
         return dict(zip(_scaled_names(law.fit.law), sd.tolist(), strict=True))
 
     def _covariances(
@@ -123,9 +140,7 @@ class PrecisionCriterion:
     ) -> tuple[Floats, Floats, Floats]:
         """Covariances (draws, q, q) of q before and after the tests, and u (draws, parameters) at the draws."""
         law = self.outcomes.laws[position]
-        # The effect of a factor on the rate of a test is that at the estimates. At a draw it would not quite be the
-        # derivative to the law's own coefficient, and tests would seem to tell the two apart.
-        if not at_draws or law.fit.noise_model.rate > 0:
+        if not (at_draws and self.differs_at_draws):
             _, K = self.outcomes.of(histories, position)
             information = law.information
             before, after = scaled_inverse(information), scaled_inverse(information + K.T @ K)

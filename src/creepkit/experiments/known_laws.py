@@ -43,8 +43,7 @@ class KnownLaw:
 
     measured : the problem of these tests, through the predictor of planned tests. x : (unknowns,) its values.
     shared : positions among x of the nuisance parameters that tests share. information : (q, q) A.
-    chi_square : of the tests that were made, under the covariance of the noise model. sandwich : standard deviation of
-    the fit over that of A, (parameters,), other than 1 where values were not found by likelihood.
+    chi_square : of the tests that were made, under the covariance of the noise model.
     held : (q, q) information of what is held beside the tests, such as the share of a second law.
     """
 
@@ -55,7 +54,6 @@ class KnownLaw:
     shared: tuple[int, ...]
     information: Floats
     chi_square: float
-    sandwich: Floats
     held: Floats
 
     @classmethod
@@ -90,12 +88,11 @@ class KnownLaw:
         shared = tuple(count + k for k, n in enumerate(nuisances.nuisances) if n.scope != "test")
         kept = [*range(count), *shared]
         marginal = scaled_inverse(scaled_inverse(information)[np.ix_(kept, kept)])
-        sd_of_information = np.sqrt(np.diag(scaled_inverse(marginal)))[:count]
-        by_likelihood = fit.settings.weights == "likelihood"
-        sandwich = np.ones(count) if by_likelihood else np.sqrt(np.diag(fit.covariance)) / sd_of_information
+        if fit.settings.weights != "likelihood" and not np.any(held):
+            marginal = _with_covariance_of(fit.covariance, marginal)
         chi_square = float((factor.whiten(residuals.values) ** 2).sum())
         of_kept = np.broadcast_to(held, information.shape)[np.ix_(kept, kept)]
-        return cls(fit, problem, noise_model, fit.x, shared, marginal, chi_square, sandwich, of_kept)
+        return cls(fit, problem, noise_model, fit.x, shared, marginal, chi_square, of_kept)
 
     @property
     def size(self) -> int:
@@ -172,6 +169,25 @@ def _information(problem: LeastSquaresProblem, residuals: Residuals, factor: Cov
     precision = np.concatenate([12.0 / problem.bounds.width[:count] ** 2, problem.nuisance_parameters.precision])
     weighted = factor.inverse_times(residuals.jacobian)
     return np.asarray(np.einsum("tep,teq->pq", residuals.jacobian, weighted) + np.diag(precision))
+
+
+def _with_covariance_of(covariance: Floats, information: Floats) -> Floats:
+    """(q, q) information with another covariance (parameters, parameters) of the first unknowns, the rest with them.
+
+    Values that were not found by likelihood have a covariance of their own: that of a sandwich.
+    """
+    count = len(covariance)
+    own = _cholesky(scaled_inverse(information)[:count, :count])
+    stated = _cholesky(covariance)
+    inverse = np.eye(len(information))
+    inverse[:count, :count] = own @ np.linalg.inv(stated)
+    return np.asarray(inverse.T @ information @ inverse)
+
+
+def _cholesky(covariance: Floats) -> Floats:
+    """(n, n) Cholesky factor of a covariance (n, n), whose scales may differ by many orders."""
+    scale = np.sqrt(np.diag(covariance))
+    return np.asarray(scale[:, None] * np.linalg.cholesky(covariance / np.outer(scale, scale)))
 
 
 def nuisances_of_planned(law: KnownLaw, planned: Sequence[History], *, of_made: bool = False) -> NuisanceParameters:

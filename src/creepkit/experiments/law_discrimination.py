@@ -85,6 +85,8 @@ class LawCriterion:
     _deviations: dict[int, Floats] = field(default_factory=dict)
     _expansions: dict[int, Expansion] = field(default_factory=dict)
 
+    differs_at_draws = True
+
     @property
     def names(self) -> list[str]:
         """Names of the laws that may be true."""

@@ -22,6 +22,10 @@ USEFUL_INFORMATION = 0.05
 """Nats below which a test tells next to nothing."""
 
 
+USEFUL_PROBABILITY = 0.05
+"""Of a decisive verdict, below which a test is not advised for it."""
+
+
 @dataclass(frozen=True)
 class PlannedTest:
     """A run that could be made next: what it is, and what it is expected to tell.
@@ -75,6 +79,8 @@ class Design(Presentable):
     tests : all that were considered; without those that were left out, {description: why}.
     plan : the run to make, or the runs that fit the budget (h of the oven) together, and expected : what they tell.
     interrupted : whether the work was stopped before its end. notes : what the expectation does not include.
+    unit : of a quantity whose standard deviation is its own, None where it is that of its logarithm.
+    obstacle : why no test is proposed, in a sentence.
     """
 
     goal: str
@@ -87,7 +93,9 @@ class Design(Presentable):
     budget: float | None = None
     interrupted: bool = False
     notes: tuple[str, ...] = ()
+    obstacle: str = ""
     altered: tuple[str, ...] = ()
+    unit: str | None = None
 
     @property
     def best(self) -> PlannedTest:
@@ -112,20 +120,16 @@ class Design(Presentable):
 
 def design_sentence(design: Design) -> str:
     """The advice: what to make, what it is expected to tell, and the next best."""
-    if design.goal == "law" and len(design.laws) < 2 and not design.altered:
-        doubt = f"; but {'; and '.join(design.notes)}" if design.notes else ""
-        return (
-            f"one law remains, {design.laws[0]}, and nothing is to be told apart from it{doubt}; ask for "
-            "goal='parameters' or for a quantity"
-        )
+    if design.obstacle:
+        return design.obstacle
     if not design.tests:
         reasons = dict.fromkeys(f"that {kind_of_reason(reason)}" for _, reason in design.left_out)
         return f"no test can be made: there are only candidates {' or '.join(reasons)}" if reasons else "no candidates"
     best, *others = design.tests
-    if design.goal == "law" and _largest_information(design) < USEFUL_INFORMATION:
+    if design.goal == "law" and _is_hopeless(design):
         return (
-            f"none of the {len(design.tests)} tests considered tells {_question(design)}; the most informative "
-            f"is {best.description} ({_short(design, best.expectation)})"
+            f"none of the {len(design.tests)} tests considered is likely to tell {_question(design)}; the best is "
+            f"{best.description}, with probability {_short(design, best.expectation)}"
         )
     if design.budget is not None and len(design.plan) > 1 and design.expected is not None:
         runs = "; then ".join(_repeated(design.plan))
@@ -137,9 +141,11 @@ def design_sentence(design: Design) -> str:
     return f"{first.description} ({first.hours:.3g} h of the oven): {_told(design, first.expectation)}{further}"
 
 
-def _largest_information(design: Design) -> float:
-    best = max(test.expectation.information for test in design.tests)
-    return best if design.expected is None else max(best, design.expected.information)
+def _is_hopeless(design: Design) -> bool:
+    """Whether no test, nor the plan, is likely to decide, and none says anything to speak of."""
+    expected = [test.expectation for test in design.tests] + ([design.expected] if design.expected is not None else [])
+    decides = max(e.probability for e in expected) >= USEFUL_PROBABILITY
+    return not decides and (max(e.information for e in expected) < USEFUL_INFORMATION or bool(design.altered))
 
 
 def _and(names: tuple[str, ...]) -> str:
@@ -173,7 +179,7 @@ def _told(design: Design, expected: Expectation) -> str:
     if design.goal == "law":
         return f"{_separated(design)} with probability {expected.probability:.2f}"
     if np.isfinite(expected.sd):
-        before, after = precision_text(expected.current_sd), precision_text(expected.sd)
+        before, after = (precision_text(sd, design.unit) for sd in (expected.current_sd, expected.sd))
         return f"brings the standard deviation of the {design.goal} from {before} to {after}"
     shrinkage = np.exp(-expected.information / max(len(expected.parameter_sd), 1))
     return (
@@ -182,15 +188,17 @@ def _told(design: Design, expected: Expectation) -> str:
     )
 
 
-def precision_text(value: float) -> str:
-    """A standard deviation of ln, as people say it."""
+def precision_text(value: float, unit: str | None = None) -> str:
+    """A standard deviation, of ln where it has no unit, as people say it."""
+    if unit is not None:
+        return f"{value:.3g} {unit}".removesuffix(" 1")
     return f"{100 * value:.3g} %" if value < 1 else f"a factor of {np.exp(min(value, 50.0)):.2g}"
 
 
 def _short(design: Design, expected: Expectation) -> str:
     if design.goal == "law":
         return f"{expected.probability:.2f}"
-    return precision_text(expected.sd) if np.isfinite(expected.sd) else f"{expected.information:.2g} nats"
+    return precision_text(expected.sd, design.unit) if np.isfinite(expected.sd) else f"{expected.information:.2g} nats"
 
 
 def kind_of_reason(reason: str) -> str:

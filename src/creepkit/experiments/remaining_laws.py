@@ -11,7 +11,8 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.challenges import NOT_EXCLUDED, AlteredLaw, altered_laws
-from creepkit.inverse.selection.ranking import Ranking, rank
+from creepkit.inverse.selection.ranking import Ranking, rank, ranking_from_scores
+from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 
 CHALLENGED_LAWS = 2
 """Of the laws that remain, the first ones, whose alterations a design seeks to exclude."""
@@ -33,18 +34,21 @@ class RemainingLaws:
     ranking: Ranking | None
 
     @classmethod
-    def of(cls, source: Ranking | Identification | Sequence[Identification]) -> RemainingLaws:
+    def of(cls, source: Ranking | ModelAverage | Identification | Sequence[Identification]) -> RemainingLaws:
         """Those of an identification, of several or of a ranking; FitError for what no design can be made from."""
         is_list = (
             isinstance(source, Sequence) and all(isinstance(fit, Identification) for fit in source) and len(source) > 0
         )
-        if not (isinstance(source, Identification | Ranking) or is_list):
+        if not (isinstance(source, Identification | Ranking | ModelAverage) or is_list):
             raise FitError(f"a design is made from identifications or a ranking, found {source!r:.60}")
         if isinstance(source, Identification):
             return cls((_usable(source),), np.ones(1), None)
-        if not isinstance(source, Ranking):
-            _refuse_repeated(source)
-        ranking = source if isinstance(source, Ranking) else rank(list(source), challenge=False)
+        if isinstance(source, Ranking):
+            ranking = source
+        else:
+            fits = source.fits if isinstance(source, ModelAverage) else source
+            _refuse_repeated(fits)
+            ranking = _with_weights(source) if isinstance(source, ModelAverage) else rank(list(fits), challenge=False)
         remaining = ranking.credible or ranking.laws[:1]
         return cls(tuple(_usable(r.fit) for r in remaining), np.array([r.weight for r in remaining]), ranking)
 
@@ -68,6 +72,16 @@ class RemainingLaws:
         """Challenges of the ranking that no test piece can answer, as sentences."""
         challenges = (self.ranking.challenges or ()) if self.ranking is not None else ()
         return tuple(str(c) for c in challenges if c.kind == "unmodelled effect")
+
+
+def _with_weights(laws: ModelAverage) -> Ranking:
+    """The ranking of laws whose weights are known, such as those of a file."""
+    scores = -2.0 * np.log(np.maximum(laws.weights, SMALLEST_WEIGHT))
+    frames = max(fit.effective_frames for fit in laws.fits)
+    return ranking_from_scores(laws.fits, scores, "bic", independent_frames=frames)
+
+
+SMALLEST_WEIGHT = 1e-300
 
 
 def _usable(fit: Identification) -> Identification:

@@ -144,9 +144,13 @@ def _times(
     forecasts = []
     for output, values in targets.items():
         for target in values if output in best.central.outputs else ():
+            curve = best.central.of(output)[0]
+            rising = bool(np.append(curve[np.isfinite(curve)], target)[0] <= target)
             crossings = np.concatenate(
                 [
-                    crossing_times(one.drawn, output, _targets_of_curves(best, history, output, target, one, rng))
+                    crossing_times(
+                        one.drawn, output, _targets_of_curves(best, history, output, target, one, rng), rising=rising
+                    )
                     for one in drawn
                 ]
             )
@@ -305,19 +309,19 @@ def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputFo
     if scatter.known is None and len(fit.tests) < FEW_TESTS:
         notes.append(
             f"{len(fit.tests)} test{'s say' if len(fit.tests) > 1 else ' says'} little of the scatter between tests: "
-            f"what is usual holds it, {100 * USUAL_SD['test']:.0f} % of the rate (rms)"
+            f"what is usual holds it, {100 * USUAL_SD['test']:.0f} % of the rate"
         )
     for level, names in scatter.members.items():
         if len(set(names)) < FEW_TESTS:
             plural = {"heat": "heats", "laboratory": "laboratories"}[level]
             notes.append(
                 f"{len(set(names))} {plural} say little of the scatter between them: what is usual holds it, "
-                f"{100 * USUAL_SD[level]:.0f} % of the rate (rms)"
+                f"{100 * USUAL_SD[level]:.0f} % of the rate"
             )
     for level in test.unseen:
         notes.append(
             f"all fitted tests are of one {level}, and this is of another: the scatter between them is what is usual, "
-            f"{100 * USUAL_SD[level]:.0f} % of the rate (rms)"
+            f"{100 * USUAL_SD[level]:.0f} % of the rate"
         )
     mean, covariance = scatter.mean_joint
     for level, position in test.known.items():

@@ -199,34 +199,36 @@ def at_times(followed: TestCurves, times: Floats) -> TestCurves:
     return replace(followed, times=times, values=followed.values[:, np.searchsorted(followed.times, times)])
 
 
-def crossing_times(drawn: TestCurves, output: str, targets: Floats) -> Floats:
-    """(draws,) s, when an output first reaches targets (draws,), from below or from above.
+def crossing_times(drawn: TestCurves, output: str, targets: Floats, *, rising: bool | None = None) -> Floats:
+    """(draws,) s, when an output first reaches targets (draws,): from below where it is `rising`, else from above.
 
-    The rupture where that comes first; infinite where neither comes, NaN where the prediction failed.
+    rising : by default whether the first value of a draw lies below its target. The rupture where that comes first;
+    infinite where neither comes, NaN where the prediction failed.
     """
     values, times = drawn.of(output), drawn.times
     result = np.where(np.isnan(drawn.end_times), np.nan, drawn.end_times)
     for k in range(len(values)):
-        result[k] = min(first_crossing(times, values[k], float(targets[k])), result[k])
+        result[k] = min(first_crossing(times, values[k], float(targets[k]), rising), result[k])
     return np.asarray(result)
 
 
-def first_crossing(times: Floats, values: Floats, target: float) -> float:
+def first_crossing(times: Floats, values: Floats, target: float, rising: bool | None = None) -> float:
     """s, when values first reach a target from the side on which they begin; infinite where they do not.
 
+    rising : whether that is from below; a rising output that begins beyond its target has reached it at once.
     times : (times,) s. values : (times,) in the unit of the target.
     """
     counted = np.isfinite(values) & (times > 0)
     times, values = times[counted], values[counted]
     if not values.size:
         return float("inf")
-    sign = 1.0 if values[0] <= target else -1.0
+    sign = 1.0 if (values[0] <= target if rising is None else rising) else -1.0
     reached = np.flatnonzero(sign * (values - target) >= 0.0)
     if not reached.size:
         return float("inf")
     j = int(reached[0])
     if j == 0:  # before the first time an output is taken to be in proportion to time
-        return float(times[0] * target / values[0]) if sign > 0 and values[0] > 0 else float(times[0])
+        return float(times[0] * max(target, 0.0) / values[0]) if sign > 0 and values[0] > 0 else float(times[0])
     below, above = values[j - 1], values[j]
     positive = min(below, above, target) > 0
     share = np.log(target / below) / np.log(above / below) if positive else (target - below) / (above - below)

@@ -39,7 +39,7 @@ def _cells(design: Design, test: PlannedTest) -> tuple[str, ...]:
     elif design.goal == "parameters":
         last = ", ".join(f"{name} {e.current_parameter_sd[name]:.2g} > {sd:.2g}" for name, sd in e.parameter_sd.items())
     else:
-        last = precision_text(e.sd)
+        last = precision_text(e.sd, design.unit)
     return (test.description, f"{test.hours:.3g}", f"{e.information:.2g}", f"{test.information_per_hour:.2g}", last)
 
 
@@ -62,10 +62,13 @@ def direction_lines(design: Design) -> list[str]:
     lines = ["", f"expected chi-squares with {first.description}:"]
     for each in first.expectation.chi_squares:
         lines.append(
-            f"  if {each.reference_law} holds, {each.alternative_law} is worse by {each.expected:.3g} "
-            f"(now {each.current:.3g})"
+            f"  if {each.reference_law} holds, {each.alternative_law} is {_by(each.expected)} (now {_by(each.current)})"
         )
     return lines
+
+
+def _by(chi_square: float) -> str:
+    return f"worse by {chi_square:.3g}" if chi_square >= 0 else f"better by {-chi_square:.3g}"
 
 
 def _ending(design: Design) -> list[str]:

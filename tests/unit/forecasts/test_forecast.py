@@ -126,16 +126,17 @@ def test_a_likely_test_is_inside(fit):
     assert min(one.score.p_value, one.score.departure_p_value) > 0.05
 
 
-def test_a_known_heat_narrows_the_band():
+@pytest.mark.parametrize("label", ["heat", "laboratory"])
+def test_a_known_heat_or_laboratory_narrows_the_band(label):
     rng = np.random.default_rng(3)
     heats = {"a": 0.4, "b": -0.4, "c": 0.1, "d": -0.1}
     made = [
-        bar(f"{heat} {k}", 80 + 10 * k, np.exp(effect + rng.normal(0.0, 0.03)), seed=k, labels={"heat": heat})
+        bar(f"{heat} {k}", 80 + 10 * k, np.exp(effect + rng.normal(0.0, 0.03)), seed=k, labels={label: heat})
         for heat, effect in heats.items()
         for k in range(4)
     ]
     fit = ck.identify("norton", made, using=BAR, starts=2)
-    plans = [bar(h, 95.0, noise=0.0, labels={"heat": h}) for h in ("a", "b", "new")]
+    plans = [bar(h, 95.0, noise=0.0, labels={label: h}) for h in ("a", "b", "new")]
     a, b, new = (t.times[0] for t in fit.forecast(plans).tests)
     assert b.median / a.median == pytest.approx(np.exp(0.8), rel=0.1)
     assert np.log(a.high / a.low) < 0.25

@@ -21,6 +21,7 @@ from typing import Literal
 
 import numpy as np
 import sympy
+from scipy.special import logsumexp, softmax
 from scipy.stats import chi2
 
 from creepkit.arrays import Floats
@@ -96,21 +97,24 @@ def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
 class ShareResidual:
     """One residual that holds the ratio of two rates at the reference point; see search.AdditionalResiduals.
 
-    first, second : positions of the ln rates among the unknowns. log_ratio : of the second over the first.
+    first, second : positions of the ln rates of the terms of two laws among the unknowns. log_ratio : of the rate of
+    the second law, all its terms, over that of the first.
     """
 
-    first: int
-    second: int
+    first: Sequence[int]
+    second: Sequence[int]
     log_ratio: float
 
     def residuals(self, x: Floats) -> Floats:
         """(1,) - at x (unknowns,)."""
-        return np.array([(x[self.second] - x[self.first] - self.log_ratio) / SHARE_TOLERANCE])
+        log_rates = [logsumexp(x[list(terms)]) for terms in (self.first, self.second)]
+        return np.array([(log_rates[1] - log_rates[0] - self.log_ratio) / SHARE_TOLERANCE])
 
     def jacobian(self, x: Floats) -> Floats:
         """(1, unknowns) derivatives at x (unknowns,)."""
         row = np.zeros((1, x.size))
-        row[0, [self.first, self.second]] = -1.0 / SHARE_TOLERANCE, 1.0 / SHARE_TOLERANCE
+        row[0, list(self.first)] = -softmax(x[list(self.first)]) / SHARE_TOLERANCE
+        row[0, list(self.second)] = softmax(x[list(self.second)]) / SHARE_TOLERANCE
         return row
 
 
@@ -166,16 +170,17 @@ def sum_with_share(best: Identification, other: Identification) -> AlteredLaw | 
     FitError where one of them has no rate at the reference point of its own, or where it cannot be fitted.
     """
     single = best.least_squares_problem
-    own_terms = len(single.coordinates.term_rates)
-    if not (own_terms and other.least_squares_problem.coordinates.term_rates):
+    own, others = (list(fit.least_squares_problem.coordinates.term_rates) for fit in (best, other))
+    own_terms = len(own)
+    if not (own and others):
         raise FitError(f"{best.law.name} and {other.law.name} have no rates of which one could be a share")
     law = best.law + other.law
     problem = _of_law(single, law)
     own_rates, further_rates = (list(part) for part in np.split(problem.coordinates.term_rates, [own_terms]))
     x = np.concatenate([best.u, other.u, best.x[best.u.size :]])
     x[own_rates] += np.log(1.0 - SHARE)
-    x[further_rates] += np.log(SHARE)
-    share = ShareResidual(own_rates[0], further_rates[0], float(x[further_rates[0]] - x[own_rates[0]]))
+    x[further_rates] += np.log(SHARE) + logsumexp(best.u[own]) - logsumexp(other.u[others])
+    share = ShareResidual(own_rates, further_rates, float(np.log(SHARE / (1.0 - SHARE))))
     least, x = _least_chi_square(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None

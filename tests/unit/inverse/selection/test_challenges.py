@@ -91,7 +91,7 @@ def test_a_planted_sum_of_two_fifths_is_not_decided_against():
 
 def test_the_share_is_held_in_the_fit(power_law_narrow):
     """At the least chi-square the ratio of the rates at the reference point is still that of the start."""
-    share = ShareResidual(0, 2, float(np.log(SHARE / (1 - SHARE))))
+    share = ShareResidual([0], [2], float(np.log(SHARE / (1 - SHARE))))
     x = np.array([-15.0, 4.0, -16.0])
     assert share.residuals(x) == pytest.approx((-1.0 - np.log(SHARE / (1 - SHARE))) / 1e-3)
     assert share.jacobian(x) == pytest.approx(np.array([[-1e3, 0.0, 1e3]]))
