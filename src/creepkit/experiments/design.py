@@ -19,7 +19,7 @@ from creepkit.experiments.design_checks import check_arguments, edges_of, notes_
 from creepkit.experiments.design_task import DesignTask, Goal, task_of
 from creepkit.experiments.expectations import Criterion, Expectation, PrecisionCriterion
 from creepkit.experiments.known_laws import KnownLaw
-from creepkit.experiments.law_discrimination import LawCriterion
+from creepkit.experiments.law_discrimination import Alteration, LawCriterion
 from creepkit.experiments.planned_design import Design, PlannedTest
 from creepkit.experiments.planned_outcomes import PlannedOutcomes
 from creepkit.experiments.remaining_laws import RemainingLaws
@@ -43,7 +43,7 @@ MOST_ALIKE = 2
 """Of these, those of one load and duration."""
 
 
-MOST_REFITS = 6
+MOST_REFITS = 10
 """Refits in full, each of one candidate in one direction."""
 
 
@@ -349,7 +349,13 @@ def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> La
     if not np.isfinite(chi_squares).all():
         chi_squares = np.array([law.chi_square for law in outcomes.laws[: len(task.laws)]])
     excess = np.array([r.excess for r in ranked])
-    altered = [(k, one.excess) for k, one in task.altered]
+    known = {fit.law.name: law for fit, law in zip(task.laws, outcomes.laws, strict=False)}
+    tried = {r.fit.law.name: r.fit for r in ranking.laws}
+    altered = []
+    for k, one in task.altered:
+        if one.other and one.other not in known:
+            known[one.other] = KnownLaw.from_identification(tried[one.other], task.laws[0].noise_model)
+        altered.append(Alteration(k, one.excess, known[one.other] if one.other else None))
     return LawCriterion(
         outcomes, task.remaining.weights, excess, chi_squares, ranking.independent_frames, altered, seed
     )

@@ -143,7 +143,8 @@ class PrecisionCriterion:
         if not (at_draws and self.differs_at_draws):
             _, K = self.outcomes.of(histories, position)
             information = law.information
-            before, after = scaled_inverse(information), scaled_inverse(information + K.T @ K)
+            T = law.sandwich
+            before, after = (T @ scaled_inverse(A) @ T.T for A in (information, information + K.T @ K))
             return before[None], after[None], law.fit.u[None]
         deviations = self._drawn(position)
         information = self._information[position]

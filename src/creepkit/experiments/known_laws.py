@@ -43,7 +43,8 @@ class KnownLaw:
 
     measured : the problem of these tests, through the predictor of planned tests. x : (unknowns,) its values.
     shared : positions among x of the nuisance parameters that tests share. information : (q, q) A.
-    chi_square : of the tests that were made, under the covariance of the noise model.
+    chi_square : of the tests that were made, under the covariance of the noise model. sandwich : (q, q) T, with
+    which T A^-1 T' has the covariance of the fit: other than 1 where values were not found by likelihood.
     held : (q, q) information of what is held beside the tests, such as the share of a second law.
     """
 
@@ -54,6 +55,7 @@ class KnownLaw:
     shared: tuple[int, ...]
     information: Floats
     chi_square: float
+    sandwich: Floats
     held: Floats
 
     @classmethod
@@ -88,11 +90,11 @@ class KnownLaw:
         shared = tuple(count + k for k, n in enumerate(nuisances.nuisances) if n.scope != "test")
         kept = [*range(count), *shared]
         marginal = scaled_inverse(scaled_inverse(information)[np.ix_(kept, kept)])
-        if fit.settings.weights != "likelihood" and not np.any(held):
-            marginal = _with_covariance_of(fit.covariance, marginal)
+        by_likelihood = fit.settings.weights == "likelihood" or np.any(held)
+        sandwich = np.eye(len(marginal)) if by_likelihood else _sandwich(fit.covariance, marginal)
         chi_square = float((factor.whiten(residuals.values) ** 2).sum())
         of_kept = np.broadcast_to(held, information.shape)[np.ix_(kept, kept)]
-        return cls(fit, problem, noise_model, fit.x, shared, marginal, chi_square, of_kept)
+        return cls(fit, problem, noise_model, fit.x, shared, marginal, chi_square, sandwich, of_kept)
 
     @property
     def size(self) -> int:
@@ -171,17 +173,13 @@ def _information(problem: LeastSquaresProblem, residuals: Residuals, factor: Cov
     return np.asarray(np.einsum("tep,teq->pq", residuals.jacobian, weighted) + np.diag(precision))
 
 
-def _with_covariance_of(covariance: Floats, information: Floats) -> Floats:
-    """(q, q) information with another covariance (parameters, parameters) of the first unknowns, the rest with them.
-
-    Values that were not found by likelihood have a covariance of their own: that of a sandwich.
-    """
+def _sandwich(covariance: Floats, information: Floats) -> Floats:
+    """(q, q) T of a fit's covariance (parameters, parameters) and the information (q, q) of its tests."""
     count = len(covariance)
-    own = _cholesky(scaled_inverse(information)[:count, :count])
-    stated = _cholesky(covariance)
-    inverse = np.eye(len(information))
-    inverse[:count, :count] = own @ np.linalg.inv(stated)
-    return np.asarray(inverse.T @ information @ inverse)
+    result = np.eye(len(information))
+    by_information = _cholesky(scaled_inverse(information)[:count, :count])
+    result[:count, :count] = _cholesky(covariance) @ np.linalg.inv(by_information)
+    return np.asarray(result)
 
 
 def _cholesky(covariance: Floats) -> Floats:

@@ -41,7 +41,7 @@ from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
 from creepkit.inverse.residuals import residuals_at_measured_values
 from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.search.multistart import EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct
-from creepkit.inverse.selection.challenges import NOT_EXCLUDED
+from creepkit.inverse.selection.challenges import NOT_EXCLUDED, AlteredLaw, FittedLaw, above_threshold, sum_with_share
 from creepkit.records import History
 
 LINEAR_DRAWS, REPEATS = 64, 2
@@ -69,8 +69,8 @@ class LawCriterion:
     """The laws that remain, the first of the outcomes, and after them what else a verdict has to exclude.
 
     weights : (laws,) -. excess : (laws,) of the criterion of the ranking. chi_squares : (laws,) of the tests that were
-    made. frames : how many of them are independent. altered : of the further laws, which law they alter and by how much
-    their chi-square is above that law's. ratios : of refitted over linear chi-squares, of tests and pairs.
+    made. frames : how many of them are independent. altered : the further laws. ratios : of refitted over linear
+    chi-squares, of tests and pairs.
     """
 
     outcomes: PlannedOutcomes
@@ -78,7 +78,7 @@ class LawCriterion:
     excess: Floats
     chi_squares: Floats
     frames: float
-    altered: Sequence[tuple[int, float]] = ()
+    altered: Sequence[Alteration] = ()
     seed: int = 0
     ratios: dict[tuple[object, int, int], float] = field(default_factory=dict)
     _baseline: dict[int, float] = field(default_factory=dict)
@@ -103,9 +103,9 @@ class LawCriterion:
         for a, name in enumerate(self.names):
             Q = self._increments(a, histories, at_draws)
             score = (self.excess + penalty + Q[:count].T).T
-            own = [k for k, (law, _) in enumerate(self.altered) if law == a]
-            more = np.array([self.altered[k][1] + Q[count + k] - Q[a] for k in own]).reshape(-1, Q.shape[1])
-            before = _shares(np.append(self.excess, [self.excess[a] + self.altered[k][1] for k in own])[:, None])
+            own = [k for k, alteration in enumerate(self.altered) if alteration.law == a]
+            more = np.array([self.altered[k].excess + Q[count + k] - Q[a] for k in own]).reshape(-1, Q.shape[1])
+            before = _shares(np.append(self.excess, [self.excess[a] + self.altered[k].excess for k in own])[:, None])
             after = _shares(np.concatenate([score, score[a] + more]))
             information += weight[a] * float(np.mean(np.log(np.maximum(after[a], 1e-300)) - np.log(before[a])))
             decided = _shares(score) > DECISIVE_WEIGHT
@@ -118,9 +118,10 @@ class LawCriterion:
                     is_refitted = (_key(histories), a, b) in self.ratios
                     chi_squares.append(ExpectedChiSquare(name, other, current, expected, is_refitted))
             for k, expected_more in zip(own, more, strict=True):
-                altered = self.outcomes.laws[count + k].fit.law.name
+                altered, key = self.outcomes.laws[count + k].fit.law.name, (_key(histories), a, count + k)
+                expected = float(np.median(expected_more))
                 chi_squares.append(
-                    ExpectedChiSquare(name, altered, self.altered[k][1], float(np.median(expected_more)))
+                    ExpectedChiSquare(name, altered, self.altered[k].excess, expected, key in self.ratios)
                 )
         chi_squares.sort(key=lambda each: -weight[self.names.index(each.reference_law)])
         return Expectation(max(information, 0.0), probability=right, wrong=wrong, chi_squares=tuple(chi_squares))
@@ -149,7 +150,7 @@ class LawCriterion:
     def _compared(self, a: int) -> list[int]:
         """Positions of the laws, and of what a verdict for law a has to exclude."""
         count = len(self.names)
-        return [*range(count), *(count + k for k, (law, _) in enumerate(self.altered) if law == a)]
+        return [*range(count), *(count + k for k, alteration in enumerate(self.altered) if alteration.law == a)]
 
     def _least(self, b: int, a: int, histories: Sequence[History], y: Floats, at_draws: bool) -> Floats:
         """(outcomes,) increase of chi-square of law b at outcomes y (outcomes, data), under the covariance of law a.
@@ -214,10 +215,11 @@ class LawCriterion:
     # ---- refits in full ----------------------------------------------------------------------------------------------
 
     def directions(self) -> list[tuple[int, int]]:
-        """All directions (true, alternative), those of most weight first."""
+        """All directions (true, alternative), those of most weight first, then those to altered laws."""
         count = len(self.names)
         pairs = [(a, b) for a in range(count) for b in range(count) if a != b]
-        return sorted(pairs, key=lambda pair: -self.weights[pair[0]] * self.weights[pair[1]])
+        pairs.sort(key=lambda pair: -self.weights[pair[0]] * self.weights[pair[1]])
+        return pairs + [(alteration.law, count + k) for k, alteration in enumerate(self.altered)]
 
     def refit(self, histories: Sequence[History], a: int, b: int) -> bool:
         """Correct the expected chi-square of one direction by a refit of b to what a predicts, at the median draw.
@@ -229,16 +231,49 @@ class LawCriterion:
         chosen = int(np.argsort(linear)[linear.size // 2])
         if linear[chosen] < SMALLEST_REFITTED:
             return False
-        truth = self.outcomes.laws[a]
+        truth, deviation = self.outcomes.laws[a], self._drawn(a, True)[1 + chosen]
         try:
-            if b not in self._baseline:
-                self._baseline[b] = _refitted_chi_square(law, self.outcomes.laws[0].noise_model, [])
-            made = _as_if_made(truth, self._drawn(a, True)[1 + chosen], histories)
-            refitted = _refitted_chi_square(law, self.outcomes.laws[0].noise_model, made) - self._baseline[b]
+            made = _as_if_made(truth, deviation, histories)
+            if b < len(self.names):
+                refitted = _refit_in_full(law, self._noise_model, made)[1] - self._baseline_of(b)
+            else:
+                altered = self.altered[b - len(self.names)]
+                own, _ = _refit_in_full(truth, self._noise_model, made, [truth.fit.u + deviation[: truth.size]])
+                found = altered.refitted(own, self._noise_model, made)
+                excess = 0.0 if found is None else found.excess
+                refitted = excess - altered.excess + float(self._least(a, a, histories, y[[chosen]], True)[0])
         except CreepkitError:  # no start can be predicted: the linear value stands
             return False
         self.ratios[_key(histories), a, b] = float(np.clip(refitted / linear[chosen], *RATIO_LIMITS))
         return True
+
+    @property
+    def _noise_model(self) -> NoiseModel:
+        return self.outcomes.laws[0].noise_model
+
+    def _baseline_of(self, b: int) -> float:
+        if b not in self._baseline:
+            self._baseline[b] = _refit_in_full(self.outcomes.laws[b], self._noise_model, [])[1]
+        return self._baseline[b]
+
+
+@dataclass(frozen=True, eq=False)
+class Alteration:
+    """What a verdict for one law has to exclude.
+
+    law : position of that law. excess : chi-square of the altered law above that law's. other : of a sum, what is known
+    of the law that has a share; None for a threshold.
+    """
+
+    law: int
+    excess: float
+    other: KnownLaw | None = None
+
+    def refitted(self, own: FittedLaw, noise_model: NoiseModel, further: Sequence[History]) -> AlteredLaw | None:
+        """The altered law fitted to further tests too, as a challenge does; own : the law itself, fitted to these."""
+        if self.other is None:
+            return above_threshold(own)
+        return sum_with_share(own, _refit_in_full(self.other, noise_model, further)[0])
 
 
 def _shares(scores: Floats) -> Floats:
@@ -292,10 +327,13 @@ def _as_if_made(truth: KnownLaw, deviation: Floats, planned: Sequence[History]) 
     return [history for history in made if history.used.any()]
 
 
-def _refitted_chi_square(law: KnownLaw, noise_model: NoiseModel, further: Sequence[History]) -> float:
-    """The least chi-square of a law over the tests that were made and further ones, by the search of identify().
+def _refit_in_full(
+    law: KnownLaw, noise_model: NoiseModel, further: Sequence[History], starts: Sequence[Floats] | None = None
+) -> tuple[FittedLaw, float]:
+    """A law fitted to the tests that were made and to further ones, and its least chi-square with all penalties.
 
-    Without further tests from its estimates alone, which are those of such a search.
+    starts : of u (parameters,); by default the estimates and, with further tests, the minima of the search of
+    identify().
     """
     measured = law.measured
     histories = (*measured.histories, *further)
@@ -305,18 +343,18 @@ def _refitted_chi_square(law: KnownLaw, noise_model: NoiseModel, further: Sequen
         measured, histories=histories, observations=observations, evaluations=EvaluationCache()
     ).with_nuisances(nuisances)
     known = {(n.key, n.owner): n.value for n in law.fit.nuisances}
-    starts = [law.fit.u]
-    if further:
+    begun = [law.fit.u] if starts is None else list(starts)
+    if further and starts is None:
         broad = LeastSquaresProblem.from_histories(
             law.fit.law, histories, measured.predictor, law.fit.settings, law.fit.reference
         )
         searched = search_problem(broad, search_predictor_of(measured.predictor))
         minima = MultiStart().minima(searched).minima
-        starts += [m.x for m in distinct(minima, searched.bounds, equal_predictions=EQUAL_REDUCED_ORDER_PREDICTIONS)]
+        begun += [m.x for m in distinct(minima, searched.bounds, equal_predictions=EQUAL_REDUCED_ORDER_PREDICTIONS)]
     outputs = {name: noise_model[name] for name in observations.outputs}
     own = replace(noise_model, outputs=outputs)
-    least = np.inf
-    for u in starts:
+    found = []
+    for u in begun:
         x = problem.bounds.clip(starting_point(nuisances, u, known))
         residuals = replace(
             problem.residuals(x),
@@ -325,8 +363,9 @@ def _refitted_chi_square(law: KnownLaw, noise_model: NoiseModel, further: Sequen
         )
         residuals = residuals.with_test_weights(_test_weights(law, len(further)))
         under = problem.with_covariance(CovarianceFactor.of_residuals(residuals, own))
-        least = min(least, 2.0 * under.minimise(x, tolerances=REFIT_TOLERANCES).cost)
-    return float(least)
+        minimum = under.minimise(x, tolerances=REFIT_TOLERANCES)
+        found.append((FittedLaw(under, minimum.x), 2.0 * float(minimum.cost)))
+    return min(found, key=lambda pair: pair[1])
 
 
 def _observations(measured: LeastSquaresProblem, histories: Sequence[History]) -> ObservationVector:

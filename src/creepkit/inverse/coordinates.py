@@ -43,11 +43,12 @@ class LocalExponent:
     def evaluate(self, point: Sequence[float], theta: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """a, b (...,) and their derivatives to the internal parameters `others`, (..., others).
 
+        point : of the reference; internal variables behind it are left alone, for no such term mentions them.
         theta : (..., parameters) internal values.
         """
         other_values = [theta[..., k] for k in self.others]
         with np.errstate(all="ignore"):
-            evaluated = self.coefficients(*point, *other_values)
+            evaluated = self.coefficients(*point[: len(POINT_VARIABLES)], *other_values)
         shape, count = theta.shape[:-1], len(self.others)
         broadcast = [np.broadcast_to(np.asarray(v, float), shape) for v in evaluated]
         da, db = (

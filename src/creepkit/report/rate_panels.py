@@ -83,7 +83,8 @@ def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> No
         if not np.isfinite(r.predicted):
             continue
         measured, predicted = r.measured / SECONDS_PER_HOUR, r.predicted / SECONDS_PER_HOUR
-        interval = [[predicted - r.low / SECONDS_PER_HOUR], [r.high / SECONDS_PER_HOUR - predicted]]
+        ends = [predicted - r.low / SECONDS_PER_HOUR, r.high / SECONDS_PER_HOUR - predicted]
+        interval = [[max(end, 0.0)] for end in ends]  # the median may lie outside where draws disagree with it
         marker, face = (">", "white") if r.censored else ("o", colour)
         axes.errorbar(measured, predicted, yerr=interval, fmt=marker, ms=4.5, lw=0.7, color=colour, mfc=face)
     finite = [(r.measured, r.predicted, r.low, r.high) for r, _ in ruptures if np.isfinite(r.predicted)]

@@ -119,12 +119,43 @@ class ShareResidual:
 
 
 @dataclass(frozen=True, eq=False)
+class FittedLaw:
+    """A problem and where its chi-square is least: x (unknowns,), the coordinates u first."""
+
+    problem: LeastSquaresProblem
+    x: Floats
+
+    @classmethod
+    def of(cls, fit: Identification) -> FittedLaw:
+        """That of an identification."""
+        return cls(fit.least_squares_problem, fit.x)
+
+    @property
+    def law(self) -> CreepLaw:
+        """The law."""
+        return self.problem.law
+
+    @property
+    def u(self) -> Floats:
+        """(parameters,) conditioned coordinates."""
+        return self.x[: self.problem.parameter_count]
+
+    @property
+    def log_rate(self) -> float:
+        """ln of the rate of all terms at the reference point, 1/s; FitError where it has none of its own."""
+        rates = list(self.problem.coordinates.term_rates)
+        if not rates:
+            raise FitError(f"{self.law.name} has no rate at the reference point of which a share could be taken")
+        return float(logsumexp(self.u[rates]))
+
+
+@dataclass(frozen=True, eq=False)
 class AlteredLaw:
     """The best law altered as a challenge says, fitted to the same tests under the same covariance.
 
     x : (unknowns,) its values. excess : its chi-square above that of the best law.
     constraints : (rows, unknowns) derivatives over tolerances of what was held, such as the share of a second law.
-    sentence : what it says, to follow "but".
+    other : name of the law that has a share of a sum, else "". sentence : what it says, to follow "but".
     """
 
     kind: Literal["sum", "threshold"]
@@ -132,6 +163,7 @@ class AlteredLaw:
     x: Floats
     excess: float
     constraints: Floats
+    other: str
     sentence: str
 
     @property
@@ -143,7 +175,7 @@ class AlteredLaw:
 def compatible_sum(best: Identification, other: Identification) -> Challenge | None:
     """The sum of the best law and another one that carries SHARE of the rate, if the tests do not exclude it."""
     try:
-        found = sum_with_share(best, other)
+        found = sum_with_share(FittedLaw.of(best), FittedLaw.of(other))
     except CreepkitError:
         return _unexamined("sum", f"a sum with {other.law.name}")
     return _challenge_of(found)
@@ -152,7 +184,7 @@ def compatible_sum(best: Identification, other: Identification) -> Challenge | N
 def compatible_threshold(best: Identification) -> Challenge | None:
     """The best law above a threshold stress, if the tests do not exclude it."""
     try:
-        found = above_threshold(best)
+        found = above_threshold(FittedLaw.of(best))
     except CreepkitError:
         return _unexamined("threshold", f"{best.law.name} above a threshold")
     return _challenge_of(found)
@@ -164,48 +196,45 @@ def _challenge_of(found: AlteredLaw | None) -> Challenge | None:
     return Challenge(found.kind, found.problem.law.name, f"{found.sentence} {_change_text(found.excess)}")
 
 
-def sum_with_share(best: Identification, other: Identification) -> AlteredLaw | None:
+def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     """The sum of the best law and another one that carries SHARE of the rate; None where it is the best law itself.
 
     FitError where one of them has no rate at the reference point of its own, or where it cannot be fitted.
     """
-    single = best.least_squares_problem
-    own, others = (list(fit.least_squares_problem.coordinates.term_rates) for fit in (best, other))
-    own_terms = len(own)
-    if not (own and others):
-        raise FitError(f"{best.law.name} and {other.law.name} have no rates of which one could be a share")
+    start, own_terms = best.log_rate - other.log_rate, len(best.problem.coordinates.term_rates)
     law = best.law + other.law
-    problem = _of_law(single, law)
+    problem = _of_law(best.problem, law)
     own_rates, further_rates = (list(part) for part in np.split(problem.coordinates.term_rates, [own_terms]))
     x = np.concatenate([best.u, other.u, best.x[best.u.size :]])
     x[own_rates] += np.log(1.0 - SHARE)
-    x[further_rates] += np.log(SHARE) + logsumexp(best.u[own]) - logsumexp(other.u[others])
+    x[further_rates] += np.log(SHARE) + start
     share = ShareResidual(own_rates, further_rates, float(np.log(SHARE / (1.0 - SHARE))))
     least, x = _least_chi_square(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
     sentence = f"{law.name} with {100 * SHARE:.0f} % of the rate from {other.law.name} explains them as well"
-    excess = least - _chi_square(single, best.x)
-    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), sentence)
+    excess = least - _chi_square(best.problem, best.x)
+    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), other.law.name, sentence)
 
 
-def above_threshold(best: Identification) -> AlteredLaw:
+def above_threshold(best: FittedLaw) -> AlteredLaw:
     """The best law above a threshold stress; CreepkitError where it cannot be fitted."""
-    single, threshold = best.least_squares_problem, THRESHOLD * best.reference.stress
+    threshold = THRESHOLD * best.problem.coordinates.reference.stress
     s_0 = sympy.Symbol("s_0_threshold", real=True)
     terms = {label: term.subs(stress, sympy.Max(stress - s_0, 0)) for label, term in best.law.terms.items()}
     param = Param("threshold stress", unit="MPa", bounds=(0.0, 2.0 * threshold))
     law = replace(
         best.law, name=f"{best.law.name} above a threshold", terms=terms, params={**best.law.params, s_0: param}
     )
-    problem = _of_law(single, law)
+    problem = _of_law(best.problem, law)
     position = best.u.size
     x = np.concatenate([best.u, [threshold], best.x[position:]])
     least, x = _least_chi_square(best, problem, x, fixed={position: threshold})
     held = np.zeros((1, x.size))
     held[0, position] = 1.0 / (SHARE_TOLERANCE * threshold)
     sentence = f"{law.name} of {threshold:.3g} MPa explains them as well"
-    return AlteredLaw("threshold", problem, x, least - _chi_square(single, best.x), held, sentence)
+    excess = least - _chi_square(best.problem, best.x)
+    return AlteredLaw("threshold", problem, x, excess, held, "", sentence)
 
 
 def altered_laws(fits: Sequence[Identification], limit: float = NOT_EXCLUDED) -> list[AlteredLaw]:
@@ -213,7 +242,7 @@ def altered_laws(fits: Sequence[Identification], limit: float = NOT_EXCLUDED) ->
 
     What cannot be fitted is left out.
     """
-    best, *others = fits
+    best, *others = (FittedLaw.of(fit) for fit in fits)
     results = []
     for other in (*others, None):
         try:
@@ -266,12 +295,13 @@ def _of_law(single: LeastSquaresProblem, law: CreepLaw) -> LeastSquaresProblem:
     problem = LeastSquaresProblem.from_histories(
         law, single.histories, single.predictor, single.settings, single.coordinates.reference
     )
-    problem = replace(problem, covariance_factor=single.covariance_factor, histories=single.histories)
+    same = {name: getattr(single, name) for name in ("covariance_factor", "histories", "observations")}
+    problem = replace(problem, **same)
     return problem.with_nuisances(single.nuisance_parameters).with_correction(single.correction)
 
 
 def _least_chi_square(
-    best: Identification,
+    best: FittedLaw,
     problem: LeastSquaresProblem,
     x: Floats,
     *,
@@ -281,7 +311,7 @@ def _least_chi_square(
     """The least chi-square from x (unknowns,), and where: by the reduced-order model, then by the predictor itself."""
     reduced = reduced_order_model_of(problem.predictor)
     if reduced is not None:
-        difference = difference_of_predictors(best.least_squares_problem, best.x, reduced)
+        difference = difference_of_predictors(best.problem, best.x, reduced)
         cheap = problem.with_predictor(reduced).with_correction(difference)
         x = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS).x
     x = problem.minimise(x, additional=share, fixed=fixed, tolerances=LAST_STEPS).x

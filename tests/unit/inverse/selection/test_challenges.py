@@ -13,6 +13,7 @@ from creepkit.inverse.selection.challenges import (
     NOT_EXCLUDED,
     SHARE,
     THRESHOLD,
+    FittedLaw,
     ShareResidual,
     _chi_square,
     _least_chi_square,
@@ -100,7 +101,9 @@ def test_the_share_is_held_in_the_fit(power_law_narrow):
     assert _chi_square(single, best.x) == pytest.approx(
         float((single.whiten(single.residuals(best.x).values) ** 2).sum())
     )
-    assert _least_chi_square(best, single, best.x + 0.05)[0] == pytest.approx(_chi_square(single, best.x), abs=0.02)
+    assert _least_chi_square(FittedLaw.of(best), single, best.x + 0.05)[0] == pytest.approx(
+        _chi_square(single, best.x), abs=0.02
+    )
     assert NOT_EXCLUDED == pytest.approx(1.96**2, abs=1e-3)
 
 
