@@ -27,8 +27,8 @@ def command(
         str | None,
         typer.Option(
             metavar="GOAL",
-            help="law, parameters, or rate:STRESS or rate:STRESS:TEMPERATURE (MPa, K); by default the law where more "
-            "than one remains.",
+            help="law, parameters, or rate:STRESS, rate:STRESS:TEMPERATURE, exponent:STRESS (MPa, K); by default the "
+            "law where the tests allow more than one.",
         ),
     ] = None,
     budget: Annotated[float | None, typer.Option(metavar="HOURS", help="Oven hours for one run or several.")] = None,
@@ -36,8 +36,11 @@ def command(
         str | None, typer.Option(metavar="LOW:HIGH", help="What the rig can load: MPa, or a strain; 4:14.")
     ] = None,
     longest: Annotated[float | None, typer.Option(metavar="HOURS", help="The rig's longest test.")] = None,
-    temperature: Annotated[
-        list[float] | None, typer.Option(metavar="K", help="At which tests can be made; may be given several times.")
+    specimen: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Whose rig is described, where tests are of several specimens.")
+    ] = None,
+    temperature_c: Annotated[
+        list[float] | None, typer.Option(metavar="C", help="At which tests can be made; may be given several times.")
     ] = None,
     dimension: Annotated[
         list[str] | None,
@@ -49,6 +52,7 @@ def command(
     setup_hours: Annotated[
         float | None, typer.Option(metavar="HOURS", help="Of the oven for each run, beside its test.")
     ] = None,
+    frame_interval: Annotated[float | None, typer.Option(metavar="S", help="Seconds between frames.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the draws.")] = 0,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write a map of what tests tell, .png, .svg or .pdf.")
@@ -79,28 +83,29 @@ def command(
     elif len(identified) == 1:
         source = identified[0]
     changes = rig_changes(
-        levels=levels, longest=longest, temperature=temperature, dimension=dimension, tests_per_run=tests_per_run,
-        setup_hours=setup_hours,
+        levels=levels, longest=longest, temperature_c=temperature_c, dimension=dimension, tests_per_run=tests_per_run,
+        setup_hours=setup_hours, frame_interval=frame_interval,
     )  # fmt: skip
     predictor = identified[0].predictor
     assert predictor is not None
-    rigs: list[Rig] = [rig.replace(**changes) for rig in rigs_of(identified[0].histories, predictor)]
+    rigs = changed_rigs(list(rigs_of(identified[0].histories, predictor)), specimen, changes)
     with ProgressBar() as progress:
         result = ck.design(source, rig=rigs, goal=parse_goal(goal), budget=budget, seed=seed, progress=progress.tick)
-    if plot is not None:
-        result.plot(plot)
     if as_json:
         print_json(design_to_json(result))
-        return
-    print_design(result)
-    if plot is not None:
-        typer.echo(f"wrote {plot}")
+    else:
+        print_design(result)
+    if plot is not None and result.tests:
+        result.plot(plot)
+        typer.echo(f"wrote {plot}", err=as_json)
+    elif plot is not None:
+        typer.echo(f"there is no test to draw: {plot} is not written", err=True)
 
 
 def parse_goal(text: str | None) -> Goal | None:
-    """The goal, from law, parameters, rate:60 or rate:60:1073."""
+    """The goal, from law, parameters, rate:60, rate:60:1073 or exponent:60."""
     from creepkit.errors import FitError
-    from creepkit.inverse.uncertainty.quantities import rate_at
+    from creepkit.inverse.uncertainty.quantities import exponent_at, rate_at
 
     if text is None or text == "parameters":
         return "parameters" if text else None
@@ -111,27 +116,46 @@ def parse_goal(text: str | None) -> Goal | None:
         values = [float(number) for number in numbers]
     except ValueError:
         values = []
-    if kind != "rate" or not 1 <= len(values) <= 2 or min(values) <= 0:
-        raise FitError(f"--goal {text} is not known; write law, parameters, rate:60 or rate:60:1073 (MPa, K)")
-    return rate_at(*values)
+    quantities = {"rate": rate_at, "exponent": exponent_at}
+    if kind not in quantities or not 1 <= len(values) <= 2 or min(values) <= 0:
+        raise FitError(
+            f"--goal {text} is not known; write law, parameters, rate:60, rate:60:1073 (MPa, K) or exponent:60"
+        )
+    return quantities[kind](*values)
+
+
+def changed_rigs(rigs: list[Rig], specimen: str | None, changes: dict[str, Any]) -> list[Rig]:
+    """The rigs with what was said of one of them."""
+    from creepkit.errors import FitError
+
+    names = [rig.specimen for rig in rigs]
+    if specimen is not None and specimen not in names:
+        raise FitError(f"--specimen {specimen}: the tests are of {' and '.join(names)}")
+    if changes and len(rigs) > 1 and specimen is None:
+        raise FitError(f"the tests are of {' and '.join(names)}: say by --specimen whose rig is described")
+    return [rig.replace(**changes) if rig.specimen == (specimen or names[0]) else rig for rig in rigs]
 
 
 def rig_changes(
     *,
     levels: str | None,
     longest: float | None,
-    temperature: Sequence[float] | None,
+    temperature_c: Sequence[float] | None,
     dimension: Sequence[str] | None,
     tests_per_run: int | None,
     setup_hours: float | None,
+    frame_interval: float | None,
 ) -> dict[str, Any]:
     """Fields of a rig that were said."""
+    from creepkit.records import ZERO_CELSIUS
+
     given: dict[str, Any] = {
         "levels": None if levels is None else tuple(_numbers(levels, ":", "--levels", "4:14", count=2)),
         "longest_hours": longest,
-        "temperatures": tuple(temperature) if temperature else None,
+        "temperatures": tuple(celsius + ZERO_CELSIUS for celsius in temperature_c) if temperature_c else None,
         "tests_per_run": tests_per_run,
         "setup_hours": setup_hours,
+        "frame_interval": frame_interval,
     }
     if dimension:
         parts = [text.partition("=") for text in dimension]

@@ -177,7 +177,7 @@ class _Search:
             interrupted=interrupted,
             unit=task.goal.unit if isinstance(task.goal, DerivedQuantity) and task.goal.scale == "linear" else None,
             altered=tuple(altered.problem.law.name for _, altered in task.altered),
-            notes=(*notes_of(task.laws, tuple(self.rigs.values())), *self._notes_of_plan(plan)),
+            notes=(*task.extrapolation, *notes_of(task.laws, tuple(self.rigs.values())), *self._notes_of_plan(plan)),
         )
 
     def _evaluate_all(self, planned: Sequence[CandidateTest], refuse: bool) -> None:

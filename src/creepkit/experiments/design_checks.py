@@ -20,7 +20,7 @@ def check_arguments(goal: object, budget: object, seed: object) -> None:
     """FitError for a goal, a budget or a seed that is none."""
     if goal is not None and not isinstance(goal, str | DerivedQuantity):
         raise FitError(f"the goal is 'law', 'parameters', or a quantity such as ck.rate_at(60.0); found {goal!r:.60}")
-    if budget is not None and not (isinstance(budget, int | float) and 0 < budget < np.inf):
+    if budget is not None and not (isinstance(budget, int | float | np.number) and 0 < budget < np.inf):
         raise FitError(f"the budget is {budget!r:.40} h; it must be above zero")
     if not (isinstance(seed, int) and seed >= 0):
         raise FitError(f"the seed is {seed!r:.40}; it must be a whole number from 0 on")
@@ -89,6 +89,21 @@ def notes_of(laws: Sequence[Identification], rigs: Sequence[Rig]) -> tuple[str, 
         notes.append(
             f"fewer than {MINIMUM_TESTS} tests do not show by how much the rate scatters from test to test; it is "
             'taken as none: give Nuisance("rate", sd=...) where it is known'
+        )
+    elif scatters and len(laws[0].histories) < MINIMUM_TESTS:
+        notes.append(
+            f"fewer than {MINIMUM_TESTS} tests do not show by how much the rate scatters from test to test: it is "
+            f"assumed to be {100 * laws[0].noise_model.rate:.0f} %; what tests tell of rates is more if it is less"
+        )
+    if laws[0].noise_model.rate > 0 and any(rig.tests_per_run > 1 for rig in rigs):
+        notes.append(
+            "the rates of test pieces in one run are taken to scatter like those of tests one by one: where the oven "
+            "scatters, several of them tell less"
+        )
+    if any(fit.settings.weights != "likelihood" for fit in laws):
+        notes.append(
+            'values were found with other weights than weights="likelihood", by which expectations are worked out: '
+            "intervals after further tests may differ from what is expected here by a factor of two"
         )
     for fit in laws:
         if fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy":

@@ -8,6 +8,7 @@ from typing import Literal
 
 from creepkit.errors import FitError
 from creepkit.experiments.remaining_laws import RemainingLaws
+from creepkit.inverse.extrapolation import check_kelvin, extrapolation_text
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.challenges import AlteredLaw
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
@@ -33,6 +34,13 @@ class DesignTask:
     def goal_name(self) -> str:
         """The goal in words."""
         return self.goal if isinstance(self.goal, str) else self.goal.name
+
+    @property
+    def extrapolation(self) -> tuple[str, ...]:
+        """What of the point of a quantity lies beyond the tests, in a sentence; none where nothing does."""
+        point = self.goal.point if isinstance(self.goal, DerivedQuantity) else {}
+        text = extrapolation_text(self.laws[0].ranges, point)
+        return (f"the {self.goal_name} is {text}",) if text else ()
 
     @property
     def obstacle(self) -> str:
@@ -70,5 +78,7 @@ def task_of(remaining: RemainingLaws, goal: Goal | None, budget: float | None) -
             "several laws, or goal='parameters'"
         )
     altered = remaining.altered() if goal == "law" or (goal is None and remaining.ranking is not None) else []
+    if isinstance(goal, DerivedQuantity):
+        check_kelvin(remaining.fits[0].ranges, goal.point.get("temperature"))
     chosen: Goal = goal if goal is not None else "law" if several or altered else "parameters"
     return DesignTask(remaining, chosen, budget, altered if chosen == "law" else [])

@@ -76,7 +76,9 @@ class Rig:
             raise FitError(
                 f"a rig's tests_per_run is a whole number from 1 to {MOST_TESTS_PER_RUN}, found {self.tests_per_run!r}"
             )
-        temperatures = numbers(self.temperatures, "a rig's temperatures", "numbers in K, above 0")
+        temperatures = list(dict.fromkeys(numbers(self.temperatures, "a rig's temperatures", "numbers in K, above 0")))
+        if len(temperatures) > MOST_VALUES:
+            raise FitError(f"a rig has {len(temperatures)} temperatures; give {MOST_VALUES} at most")
         if any(not 0 < T < 1e4 for T in temperatures):
             raise FitError(f"a rig's temperatures are numbers in K, above 0; found {self.temperatures!r}")
         if not isinstance(self.dimensions, Mapping):
@@ -86,10 +88,12 @@ class Rig:
             for name, values in self.dimensions.items()
         }
         for name, values in dimensions.items():
+            if len(values) > MOST_VALUES:
+                raise FitError(f"a rig has {len(values)} values of {name}; give {MOST_VALUES} at most")
             if not all(0 < value < LONGEST_DIMENSION for value in values):
                 raise FitError(f"a rig's {name} must be lengths in mm above zero, found {values}")
         object.__setattr__(self, "levels", (low, high))
-        object.__setattr__(self, "temperatures", tuple(float(T) for T in self.temperatures))
+        object.__setattr__(self, "temperatures", tuple(temperatures))
         object.__setattr__(self, "dimensions", MappingProxyType(dimensions))
 
     def __hash__(self) -> int:
@@ -118,10 +122,10 @@ class Rig:
         hours = float(history.times[-1]) / 3600.0
         if hours > 1.0001 * self.longest_hours:
             return f"{hours:.3g} h is more than the {self.longest_hours:.3g} h of the rig's longest test"
-        temperatures = history.temperature_program().values
-        if min(abs(temperatures.mean() - T) for T in self.temperatures) > ROUNDED_TEMPERATURE:
-            known = ", ".join(f"{T:.4g}" for T in self.temperatures)
-            return f"{temperatures.mean():.4g} K is none of the rig's temperatures ({known} K)"
+        for temperature in history.temperature_program().values:
+            if min(abs(temperature - T) for T in self.temperatures) > ROUNDED_TEMPERATURE:
+                known = ", ".join(f"{T:.4g}" for T in self.temperatures)
+                return f"{temperature:.4g} K is none of the rig's temperatures ({known} K)"
         return ""
 
 
@@ -181,6 +185,10 @@ def _dimensions(tests: Sequence[History], predictor: Predictor) -> dict[str, tup
             tuple(values)}  # fmt: skip
 
 
+MOST_VALUES = 20
+"""Temperatures of a rig, and values of one dimension."""
+
+
 LARGEST_HOURS, LONGEST_DIMENSION, MOST_TESTS_PER_RUN = 1e7, 1e4, 25
 """Of a rig: h (or s between frames), mm, and test pieces that an oven takes at once."""
 
@@ -188,7 +196,8 @@ LARGEST_HOURS, LONGEST_DIMENSION, MOST_TESTS_PER_RUN = 1e7, 1e4, 25
 def numbers(values: Iterable[float] | object, what: str, allowed: str, count: int | None = None) -> list[float]:
     """The values as numbers; FitError, naming what is allowed, for anything else."""
     try:
-        result = [float(value) for value in values]  # type: ignore[union-attr]
+        listed: list[Any] = list(values)  # type: ignore[arg-type]
+        result = [] if any(isinstance(value, str) for value in listed) else [float(value) for value in listed]
     except (TypeError, ValueError):
         result = []
     if not result or (count is not None and len(result) != count):

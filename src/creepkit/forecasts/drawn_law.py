@@ -66,7 +66,7 @@ def drawn_law(
     fit = draws.fit
     dimensions = dimensions_of(fit, history, predictor, tolerances)
     centre = {d.kind: d.mean for d in dimensions}
-    followed, own = followed_history(history, predictor), predictor_for(predictor, history)
+    followed, own = followed_history(history, predictor, [*centre]), predictor_for(predictor, history)
     mean, _ = fit.scatter_of_rates.mean_joint
     known = float(mean[[*fit.scatter_of_rates.new_test(history).known.values()]].sum())
     central, numerical = central_curves(fit, predictor, followed, centre, known)

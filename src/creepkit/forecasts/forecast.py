@@ -92,8 +92,8 @@ def forecast(
     """
     if not isinstance(level, int | float) or not 0.5 <= level < 1.0:
         raise FitError(f"level is {level!r}; give a probability from 0.5 to below 1, such as 0.95")
-    if draws is not None and not 50 <= draws <= 100_000:
-        raise FitError(f"draws is {draws}; allowed are 50 to 100000")
+    if draws is not None and not (isinstance(draws, int) and 50 <= draws <= 100_000):
+        raise FitError(f"draws is {draws!r:.40}; allowed are whole numbers from 50 to 100000")
     if not isinstance(tests, History) and not hasattr(tests, "__iter__"):
         raise FitError(f"tests are histories, found {tests!r:.60}; read_histories(path) returns them")
     histories = check_histories([tests] if isinstance(tests, History) else tests)
@@ -143,6 +143,8 @@ def _predictor(
             return known[history.specimen]
         if not known:
             return fit.predictor
+    if isinstance(using, Mapping) and history.specimen not in using:
+        raise FitError(f"using= says nothing of specimen '{history.specimen}' of test '{history.name}'; name it there")
     resolved = resolve_predictors(using, [history])
     return resolved[history.specimen] if isinstance(resolved, Mapping) else resolved
 

@@ -185,10 +185,13 @@ def corrected(drawn: TestCurves, at_values: TestCurves, exact: TestCurves) -> Te
     )
 
 
-def followed_history(history: History, predictor: Predictor) -> History:
-    """The history at its own times and at times up to its rupture, far beyond where the specimen is followed to it."""
+def followed_history(history: History, predictor: Predictor, kinds: Sequence[str] = ()) -> History:
+    """The history at its own times and at times up to its rupture, far beyond where the specimen is followed to it.
+
+    kinds : of nuisance parameters that are drawn. A drift is one over the test: with it nothing is followed beyond.
+    """
     last = max(float(history.times[-1]), history.rupture_time or 0.0)
-    far = predicts_rupture(predictor, history)
+    far = predicts_rupture(predictor, history) and not any("drift" in kind for kind in kinds)
     horizon, count = (EXTRAPOLATION_FACTOR * last, FOLLOWED_TIMES) if far else (last, ADDED_TIMES)
     times = np.geomspace((FIRST_OF_FOLLOWED if far else FIRST_OF_ADDED) * last, horizon, count)
     return history.replace(times=np.union1d(times, history.times), outputs={}, standard_deviation={})

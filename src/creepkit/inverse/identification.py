@@ -31,7 +31,7 @@ from creepkit.inverse.unmodelled_effects import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import SIMULATED_NUISANCES, History, Nuisance, Prediction, Predictor
-from creepkit.registry.arguments import resolve_predictors
+from creepkit.registry.arguments import check_histories, resolve_predictors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -297,6 +297,7 @@ class Identification(Presentable):
 
         using : by default the specimen that the file names, with its settings.
         """
+        histories = check_histories(histories)
         by_name = {h.name: h for h in histories}
         missing = [m.name for m in self.tests if m.name not in by_name]
         if missing:
@@ -311,7 +312,9 @@ class Identification(Presentable):
             predictor = using
         else:
             raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")
-        return replace(self, histories=tests, predictor=predictor, problem=None)
+        from creepkit.inverse.attached_histories import with_attached
+
+        return with_attached(self, tests, predictor)
 
     def _predictor_or(self, using: Predictor | None) -> Predictor:
         """The predictor given, or the identification's own; FitError where a file does not give it."""

@@ -148,6 +148,9 @@ def identification_from_json(data: Any, source: str = "identification") -> Ident
         raise FitError(f"{source}: estimates, u and covariance do not belong to the {size} parameters of the law")
     if fit.samples is not None and (fit.samples.ndim != 2 or fit.samples.shape[1] != size or not len(fit.samples)):
         raise FitError(f"{source}: samples do not belong to the {size} parameters of the law; the file is damaged")
+    stated = fit.law.to_internal(fit.values)[0] if size else np.zeros(0)
+    if size and not np.allclose(fit.coordinates.theta(fit.u), stated, rtol=1e-6, atol=1e-6):
+        raise FitError(f"{source}: the values of the parameters and the coordinates u contradict each other")
     covariance = fit.covariance.reshape(size, size)
     scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     correlation = covariance / np.maximum(np.outer(scale, scale), 1e-300)

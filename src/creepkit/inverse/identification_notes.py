@@ -56,12 +56,12 @@ def provenance_of(problem: LeastSquaresProblem, search_evaluations: int) -> dict
         "specimen": getattr(problem.predictor, "name", type(problem.predictor).__name__),
         "evaluations": problem.evaluations.count,
         "search_evaluations": search_evaluations,
-        "data": _data_digest(problem),
+        "data": data_digest(problem),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
 
-def _data_digest(problem: LeastSquaresProblem) -> str:
+def data_digest(problem: LeastSquaresProblem) -> str:
     """What was compared, and how: identifications that share it can be ranked against one another."""
     digest, observations, settings = hashlib.sha256(), problem.observations, problem.settings
     for array in (observations.values, observations.times, observations.present, observations.output_index):

@@ -69,6 +69,10 @@ def _ranking_from_json(data: Any, path: str | Path) -> ModelAverage:
         except FitError as error:
             raise FitError(f"{path} names {name}: {error}") from None
         weights.append(float(weight))
+    if len({fit.provenance.get("data") for fit in fits}) > 1:
+        raise FitError(f"{path}: its laws were not identified alike from the same tests; {RANKING.kind.advice}")
+    if sum(weights) > 1.0 + 1e-6:
+        raise FitError(f"{path}: the weights add up to {sum(weights):g}, more than 1; {RANKING.kind.advice}")
     if not sum(weights) > 0:
         raise FitError(f"{path}: no law has a weight above zero; {RANKING.kind.advice}")
     return ModelAverage(tuple(fits), tuple(weights))

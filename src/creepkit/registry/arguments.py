@@ -55,6 +55,8 @@ def check_histories(values: Sequence[History]) -> list[History]:
     """The histories as a list; FitError for anything else."""
     if isinstance(values, (str, Path, History)):
         raise FitError("histories must be a list of them: read_histories(path) returns one, [history] makes one")
+    if not hasattr(values, "__iter__"):
+        raise FitError(f"histories must be a list of them, found {values!r:.40}; read_histories(path) returns one")
     histories = list(values)
     wrong_types = [type(h).__name__ for h in histories if not isinstance(h, History)]
     if wrong_types:

@@ -37,7 +37,7 @@ def _cells(design: Design, test: PlannedTest) -> tuple[str, ...]:
     if design.goal == "law":
         last = f"{e.probability:.2f}"
     elif design.goal == "parameters":
-        last = ", ".join(f"{name} {e.current_parameter_sd[name]:.2g} > {sd:.2g}" for name, sd in e.parameter_sd.items())
+        last = ", ".join(f"{name} {e.current_parameter_sd[name]:.3g} > {sd:.3g}" for name, sd in e.parameter_sd.items())
     else:
         last = precision_text(e.sd, design.unit)
     return (test.description, f"{test.hours:.3g}", f"{e.information:.2g}", f"{test.information_per_hour:.2g}", last)
@@ -55,12 +55,13 @@ def design_text(design: Design) -> str:
 
 
 def direction_lines(design: Design) -> list[str]:
-    """The expected chi-squares of the first planned test, a line for each direction."""
+    """The expected chi-squares of the plan, else of the first test, a line for each direction."""
     first = design.plan[0] if design.plan else design.tests[0] if design.tests else None
-    if first is None or not first.expectation.chi_squares:
+    expected = design.expected or (None if first is None else first.expectation)
+    if first is None or expected is None or not expected.chi_squares:
         return []
-    lines = ["", f"expected chi-squares with {first.description}:"]
-    for each in first.expectation.chi_squares:
+    lines = ["", f"expected chi-squares with {'the plan' if len(design.plan) > 1 else first.description}:"]
+    for each in expected.chi_squares:
         lines.append(
             f"  if {each.reference_law} holds, {each.alternative_law} is {_by(each.expected)} (now {_by(each.current)})"
         )
@@ -122,7 +123,7 @@ def design_to_json(design: Design) -> dict[str, object]:
         "to_exclude": list(design.altered),
         "advice": design.sentence,
         "budget": design.budget,
-        "plan": [test.description for test in design.plan],
+        "plan": [row(test) for test in design.plan],
         "plan_oven_hours": sum(test.hours for test in design.plan),
         "expected": None if design.expected is None else _expectation_to_json(design.expected),
         "interrupted": design.interrupted,
@@ -162,20 +163,23 @@ def design_figure(design: Design, path: str | Path | None = None) -> Figure:
     """What candidates tell for each hour of the oven, over the first load and the duration; the best of each place.
 
     To first order about the estimates, which is what is known of all candidates alike. Left: constant loads; right: the
-    load changes during the test. The runs of the plan are marked.
+    load changes during the test. The runs of the plan are marked. Of several specimens that of the best test is drawn.
     """
     figure = empty_figure(10.5, 5.0)
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
-    rates = [test.first_order_per_hour for test in design.tests] or [1.0]
+    drawn_tests = [test for test in design.tests if test.histories[0].specimen == design.best.histories[0].specimen]
+    rates = [test.first_order_per_hour for test in drawn_tests] or [1.0]
     largest = max(*rates, 1e-9)
-    groups = [[t for t in design.tests if _is_constant(t)], [t for t in design.tests if not _is_constant(t)]]
+    groups = [[t for t in drawn_tests if _is_constant(t)], [t for t in drawn_tests if not _is_constant(t)]]
     drawn = None
     for panel, tests, title in zip(axes, groups, ("constant load", "the load changes during the test"), strict=True):
         drawn = _draw_map(panel, tests, largest) or drawn
         panel.set_title(title)
         for k, test in enumerate(t for t in design.plan if _is_constant(t) == (title == "constant load")):
             label = "plan" if k == 0 else None
-            panel.plot(test.first_level, test.candidate.duration / 3600.0, "*", ms=16, mfc="w", mec="k", label=label)
+            panel.plot(
+                test.first_level, test.candidate.duration / 3600.0, "s", ms=24, mfc="none", mec="r", mew=2, label=label
+            )
         if any(_is_constant(t) == (title == "constant load") for t in design.plan):
             panel.legend(loc="best", frameon=True)
         panel.set_xlabel(_load_label(design))

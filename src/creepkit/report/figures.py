@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal
@@ -61,7 +62,15 @@ def check_figure_target(path: Path, error_type: type[CreepkitError] = FitError) 
 
 
 def save_figure(figure: Figure, path: str | Path | None, error_type: type[CreepkitError] = FitError) -> Figure:
-    """The figure, written whole or not at all where a path is given; an error of `error_type` where it cannot be."""
+    """The figure, written whole or not at all where a path is given; an error of `error_type` where it cannot be.
+
+    A dollar in the name of a test or of a law is a dollar: only powers of ten on axes are formulas.
+    """
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        if "$" in text.get_text() and not POWER_OF_TEN.fullmatch(text.get_text()):
+            text.set_parse_math(False)
     if path is not None:
         target = Path(path)
         check_figure_target(target, error_type)
@@ -69,6 +78,10 @@ def save_figure(figure: Figure, path: str | Path | None, error_type: type[Creepk
         with replace_on_success(target, error_type) as temporary:
             figure.savefig(temporary, dpi=resolution, format=target.suffix.lower().lstrip("."))
     return figure
+
+
+POWER_OF_TEN = re.compile(r"\$(\\mathdefault\{[^$]*\}|([\d.]+\\times)?10\^\{-?\d+\})\$")
+"""Labels of logarithmic axes."""
 
 
 MOST_LABELS = 8

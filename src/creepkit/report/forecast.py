@@ -73,7 +73,7 @@ def _time_text(one: TimeForecast, end: float) -> str:
 def _hours(seconds: float) -> str:
     if math.isnan(seconds):
         return "?"
-    return f"{seconds / SECONDS_PER_HOUR:.3g}" if math.isfinite(seconds) else "never"
+    return f"{seconds / SECONDS_PER_HOUR:.3g}" if math.isfinite(seconds) else "later"
 
 
 def _number(value: float) -> str:

@@ -213,7 +213,7 @@ def rate_bands_figure(bands: Sequence[RateBand], path: str | Path | None = None)
     figure, axes = _figure_and_axes(6.6, 4.6)
     for k, band in enumerate(bands):
         colour = f"C{k % 10}"
-        label = f"{band.temperature - ZERO_CELSIUS:.0f} $\\pm$ {band.temperature_uncertainty:g} °C"
+        label = f"{band.temperature - ZERO_CELSIUS:.0f} ± {band.temperature_uncertainty:g} °C"
         axes.fill_between(band.stress, band.low, band.high, color=colour, alpha=0.2, lw=0)
         axes.fill_between(band.stress, *band.parameter_band, color=colour, alpha=0.35, lw=0)
         axes.plot(band.stress, band.rate, color=colour, lw=1.4, label=label)

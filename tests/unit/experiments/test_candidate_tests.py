@@ -119,4 +119,4 @@ def test_a_rig_says_why_it_cannot_make_a_test():
     assert "20 MPa is outside the rig's 4 to 14 MPa" in rig.refusal(over.replace(loading=PressureJump(8, 20, 600.0)))
     assert "more than the 12 h" in rig.refusal(over.replace(times=np.array([1e6])))
     warm = over.replace(temperature=Program([0.0, 3600.0], [1100.0, 1120.0]))
-    assert "1110 K is none of the rig's temperatures (1000 K)" in rig.refusal(warm)
+    assert "1100 K is none of the rig's temperatures (1000 K)" in rig.refusal(warm)

@@ -5,9 +5,9 @@ Each is a function of the conditioned coordinates u, looked at on the scale on w
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 
@@ -29,12 +29,14 @@ class DerivedQuantity:
 
     scale : "log" where its logarithm is what is nearly normal.
     function : the function of u, on that scale, of a law's coordinates; u (..., parameters) to (...,).
+    point : {"stress", "temperature", ...: number} where it is asked for, in MPa, K, - and s.
     """
 
     name: str
     unit: str
     scale: Literal["linear", "log"]
     function: Callable[[Coordinates], CoordinateFunction]
+    point: Mapping[str, float | None] = field(default_factory=dict)
 
     def to_unit(self, value: Floats | float) -> Floats:
         """In the quantity's unit, (...,), from a value (...,) on its scale."""
@@ -52,27 +54,38 @@ def rate_at(
     stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
 ) -> DerivedQuantity:
     """The creep rate, 1/s, at a stress (MPa) and temperature (K); what is left out is that of the reference point."""
-    _check_point(stress, temperature, strain, time)
-    point_text = _point_text(stress, temperature)
-    return DerivedQuantity(f"rate {point_text}", "1/s", "log", lambda c: log_rate(c, stress, temperature, strain, time))
+    point = _checked_point(stress, temperature, strain, time)
+    name = f"rate {_point_text(stress, temperature)}"
+    return DerivedQuantity(name, "1/s", "log", lambda c: log_rate(c, stress, temperature, strain, time), point)
 
 
 def exponent_at(
     stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
 ) -> DerivedQuantity:
     """The local stress exponent d ln rate / d ln stress there."""
-    _check_point(stress, temperature, strain, time)
-    point_text = _point_text(stress, temperature)
-    return DerivedQuantity(
-        f"local exponent {point_text}", "1", "linear", lambda c: local_exponent(c, stress, temperature, strain, time)
-    )
+    point = _checked_point(stress, temperature, strain, time)
+    name = f"local exponent {_point_text(stress, temperature)}"
+    return DerivedQuantity(name, "1", "linear", lambda c: local_exponent(c, stress, temperature, strain, time), point)
 
 
-def _check_point(stress: float, *others: float | None) -> None:
-    """FitError for a point that is no finite state of a material."""
-    given = [stress, *(value for value in others if value is not None)]
-    if not (np.isfinite(given).all() and stress > 0 and min(given) >= 0):
-        raise FitError(f"a quantity was asked for at {given}; give a stress in MPa above zero, a temperature in K")
+LARGEST_STRESS = 1e5
+"""MPa, at which a quantity can be asked for."""
+
+
+def _checked_point(stress: Any, temperature: Any, strain: Any, time: Any) -> dict[str, float | None]:
+    """The point by name; FitError for one that is no state of a material."""
+    given = {"stress": stress, "temperature": temperature, "strain": strain, "time": time}
+    for name, value in given.items():
+        if value is None and name != "stress":
+            continue
+        is_number = isinstance(value, int | float | np.number) and bool(np.isfinite(value))
+        lowest_excluded, largest = name in ("stress", "temperature"), LARGEST_STRESS if name == "stress" else np.inf
+        if not is_number or not 0 <= value <= largest or (lowest_excluded and value == 0):
+            raise FitError(
+                f"a quantity was asked for at {name} {value!r:.40}; give a number: a stress in MPa above zero, a "
+                "temperature in K above zero, a strain, a time in s"
+            )
+    return {name: None if value is None else float(value) for name, value in given.items()}
 
 
 def _point_text(stress: float, temperature: float | None) -> str:
