@@ -23,8 +23,19 @@ TOLERANCE_KINDS = tuple(kind for kind in SIMULATED_NUISANCES if kind not in STEP
 """Kinds of nuisance parameters that a tolerance can be given of."""
 
 
-LARGEST_TOLERANCES = {"modulus": 0.3, "temperature": 100.0, "temperature drift": 100.0, "thickness": 0.5, "window": 1.5}
-"""Standard deviations, in the unit of the kind: relative, K, K, mm, mm."""
+LARGEST_TOLERANCES = {
+    "modulus": 0.3,
+    "temperature": 100.0,
+    "temperature drift": 100.0,
+    "rate drift": 5.0,
+    "thickness": 0.5,
+    "window": 1.5,
+}
+"""Standard deviations, in the unit of the kind: relative, K, K, ln of a factor, mm, mm."""
+
+
+LARGEST_OF_LENGTH = 0.25
+"""Standard deviation of a length over the length itself."""
 
 
 SOURCES = {
@@ -209,6 +220,14 @@ def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[Histor
             )
         if not any(supports_nuisance(predictor_for(predictor, h), kind) for h in histories):
             raise FitError(f"the tolerance of '{kind}' means nothing to the specimens of these tests; leave it out")
+        for history in histories if kind == "thickness" else ():
+            own = predictor_for(predictor, history)
+            length = prior_mean(Nuisance("thickness", sd=sd), history, own) if supports_nuisance(own, kind) else np.inf
+            if sd > LARGEST_OF_LENGTH * length:
+                raise FitError(
+                    f"the tolerance of '{kind}' is {sd:g} mm, of test '{history.name}' with {length:g} mm; at most "
+                    f"{LARGEST_OF_LENGTH * length:g} mm is allowed"
+                )
 
 
 def dimension_draws(dimensions: Sequence[Dimension], draws: LawDraws, rng: np.random.Generator) -> dict[str, Floats]:

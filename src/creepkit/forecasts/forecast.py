@@ -190,8 +190,13 @@ def _checked_targets(targets: Mapping[str, Sequence[float]]) -> dict[str, list[f
         ) from None
 
 
+MOST_TARGETS = 50
+
+
 def _check_targets(targets: Mapping[str, Sequence[float]], asked: bool, predictors: Sequence[Predictor]) -> None:
     """FitError for a target of what no test has, or that is not above zero."""
+    if sum(len(values) for values in targets.values()) > MOST_TARGETS:
+        raise FitError(f"there are more than {MOST_TARGETS} targets; ask for those that matter")
     known = list(dict.fromkeys(name for p in predictors for name in getattr(p, "outputs", ())))
     for output, values in targets.items():
         if asked and known and output not in known:

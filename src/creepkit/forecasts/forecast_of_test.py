@@ -36,7 +36,7 @@ from creepkit.inverse.extrapolation import extrapolation_text
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT, usable_frames
 from creepkit.inverse.reference_conditions import reference_stresses
-from creepkit.inverse.uncertainty.rate_scatter import USUAL_SD
+from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
 from creepkit.records import ZERO_CELSIUS, History, Predictor, output_unit
 
 
@@ -301,6 +301,10 @@ def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputFo
     notes = []
     if any(m.name == history.name for m in fit.tests):
         notes.append("this test was fitted: the forecast is that of another one like it")
+    scatter = fit.scatter_of_rates
+    for level in LEVELS:
+        if history.labels.get(level) and not (level in scatter.levels or level in scatter.common):
+            notes.append(f"its {level} ('{history.labels[level]}') says nothing: the fitted tests state none")
     unknown = [name for name in outputs if name not in fit.noise_model.outputs]
     if unknown:
         notes.append(f"no fitted test shows the noise of {' and '.join(unknown)}; it is not in the band")

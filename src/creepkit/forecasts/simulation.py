@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import (
     outside_class,
     predict,
@@ -162,6 +163,9 @@ def _curves_of(prediction: Prediction, history: History) -> TestCurves:
     end_times = np.where(ended, prediction.end_times[:, 0], np.inf)
     values = np.array(prediction.values[:, 0, : history.times.size])
     failed = prediction.status[:, 0] == Status.NOT_CONVERGED
+    finished = prediction.status[:, 0] == Status.COMPLETE
+    if finished.any() and not np.isfinite(values[finished]).any():
+        raise FitError(f"test '{history.name}': the predictor says that the test is complete, but gives no numbers")
     values[failed] = np.nan
     end_times[failed] = np.nan
     return TestCurves(prediction.outputs, history.times, values, end_times)

@@ -97,10 +97,13 @@ def score_lines(score: TestScore) -> list[str]:
     ]
 
 
+LARGEST_LOG = 700.0
+
+
 def nuisance_text(one: ExplainedNuisance) -> str:
     """A nuisance and how far it lies from its prior mean."""
     if one.kind == "rate":
-        return f"rate x {math.exp(one.value):.3g} ({one.deviation:+.1f} sd)"
+        return f"rate x {math.exp(min(one.value, LARGEST_LOG)):.3g} ({one.deviation:+.1f} sd)"
     return f"{one.kind} {one.value:.4g} ({one.deviation:+.1f} sd)"
 
 
