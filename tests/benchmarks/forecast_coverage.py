@@ -100,7 +100,9 @@ def _heats(known: bool) -> Row:
 
 def _rupture(law: str, tests: int, rate: float, damage: float, **further: object) -> Row:
     name = "Kachanov-Rabotnov" if law == bars.KACHANOV else "MPC Omega"
-    return Row(f"{name}, {tests} tests, {rate:g} and {damage:g}", law, tests, rate, damage, **further)  # type: ignore[arg-type]
+    by_likelihood = ", by likelihood" if further.get("weights") == "likelihood" else ""
+    title = f"{name}, {tests} tests, {rate:g} and {damage:g}{by_likelihood}"
+    return Row(title, law, tests, rate, damage, **further)  # type: ignore[arg-type]
 
 
 def _dimples(title: str, tests: int, **further: object) -> Row:
