@@ -222,7 +222,7 @@ def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[Histor
             raise FitError(f"the tolerance of '{kind}' means nothing to the specimens of these tests; leave it out")
         for history in histories if kind == "thickness" else ():
             own = predictor_for(predictor, history)
-            length = prior_mean(Nuisance("thickness", sd=sd), history, own) if supports_nuisance(own, kind) else np.inf
+            length = prior_mean(Nuisance("thickness"), history, own) if supports_nuisance(own, kind) else np.inf
             if sd > LARGEST_OF_LENGTH * length:
                 raise FitError(
                     f"the tolerance of '{kind}' is {sd:g} mm, of test '{history.name}' with {length:g} mm; at most "

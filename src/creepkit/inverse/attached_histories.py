@@ -31,7 +31,7 @@ def with_attached(fit: Identification, tests: Sequence[History], predictor: Pred
         f"the tests given differ from those that {fit.law.name} was identified from, although they have the same "
         "names: identify it again, or give the same files",
         FitWarning,
-        stacklevel=4,
+        stacklevel=5,
     )
     return attached
 

@@ -149,7 +149,8 @@ def identification_from_json(data: Any, source: str = "identification") -> Ident
     if fit.samples is not None and (fit.samples.ndim != 2 or fit.samples.shape[1] != size or not len(fit.samples)):
         raise FitError(f"{source}: samples do not belong to the {size} parameters of the law; the file is damaged")
     stated = fit.law.to_internal(fit.values)[0] if size else np.zeros(0)
-    if size and not np.allclose(fit.coordinates.theta(fit.u), stated, rtol=1e-6, atol=1e-6):
+    # A value at its bound is stated as the bound, a little beside u.
+    if size and not np.allclose(fit.coordinates.theta(fit.u), stated, rtol=0.01, atol=0.05):
         raise FitError(f"{source}: the values of the parameters and the coordinates u contradict each other")
     covariance = fit.covariance.reshape(size, size)
     scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -181,7 +181,7 @@ def design_figure(design: Design, path: str | Path | None = None) -> Figure:
                 test.first_level, test.candidate.duration / 3600.0, "s", ms=24, mfc="none", mec="r", mew=2, label=label
             )
         if any(_is_constant(t) == (title == "constant load") for t in design.plan):
-            panel.legend(loc="best", frameon=True)
+            panel.legend(loc="best", frameon=True, markerscale=0.4)
         panel.set_xlabel(_load_label(design))
     axes[0].set_ylabel("duration, h")
     if drawn is not None:

@@ -95,6 +95,19 @@ def test_expected_precision_is_met_when_the_test_is_made():
     assert np.log(high / low) / (2 * after._quantile) == pytest.approx(found.best.expectation.sd, rel=0.15)
 
 
+def test_what_is_known_before_a_test_is_what_the_fit_states():
+    """Also of values that were not found by likelihood, whose covariance is a sandwich."""
+    tests = bars(STRAIN_HARDENING, SPL, [constant_stress(s, "stress") for s in (45.0, 50.0, 55.0, 60.0)], seed=3)
+    fit = identify(STRAIN_HARDENING, tests, BAR, settings=IdentificationSettings(starts=4, sobol_points=32))
+    found = design(fit, goal=rate_at(50.0))
+    _, low, high = fit.rate(50.0)
+    assert found.best.expectation.current_sd == pytest.approx(np.log(high / low) / (2 * fit._quantile), rel=1e-3)
+    known = found.best.expectation.current_parameter_sd
+    to_theta = fit.coordinates.jacobian(fit.u)
+    stated = np.sqrt(np.diag(to_theta @ fit.covariance @ to_theta.T))
+    assert [known[name] for name in ("ln A", "n", "m")] == pytest.approx(stated, rel=1e-3)
+
+
 # ---- the law ---------------------------------------------------------------------------------------------------------
 
 

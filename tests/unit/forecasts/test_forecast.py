@@ -120,6 +120,26 @@ def test_the_time_to_a_strain_is_that_of_the_measured_strain(fit):
     assert half[1] == pytest.approx(np.hypot(half[0], norm.ppf(0.975) * offset / 0.01), rel=0.06)
 
 
+def test_a_target_below_the_offset_is_reached_at_once(fit):
+    """Where half of the draws of the offset lie above the target, the test begins beyond it."""
+    noise = replace(fit.noise_model, outputs={"strain": replace(fit.noise_model["strain"], offset=1e-3)})
+    plan = bar("plan", 100.0, noise=0.0)
+    (time,) = replace(fit, noise_model=noise).forecast(plan, targets={"strain": [1e-8]}, draws=2000).tests[0].times
+    assert time.low == 0.0
+    assert time.chance > 0.98
+    assert time.high < TIMES[-1]
+
+
+def test_a_drift_of_the_rate_over_a_test_widens_the_band_by_half_of_it(fit):
+    """Strain at the end is the mean of exp(d t / end) times the strain without drift: 1 + d / 2 to first order."""
+    plan = bar("plan", 100.0, noise=0.0)
+    half = []
+    for tolerances in ({}, {"rate drift": 0.2}):
+        band = fit.forecast(plan, draws=8000, tolerances=tolerances).tests[0].outputs["strain"].band
+        half.append(np.log(band.high[-1] / band.low[-1]) / 2)
+    assert half[1] == pytest.approx(np.hypot(half[0], norm.ppf(0.975) * 0.1), rel=0.05)
+
+
 def test_a_likely_test_is_inside(fit):
     one = fit.forecast(bar("another", 95.0, factor=1.02, seed=6)).tests[0]
     assert one.score.whole_inside == {"strain": True}
@@ -371,4 +391,21 @@ def test_other_files_of_rankings_are_refused(laws, sentence, tmp_path):
     path = tmp_path / "ranking.json"
     path.write_text(json.dumps({"format": "creepkit-ranking", "version": 1, "laws": laws}))
     with pytest.raises(FitError, match=sentence):
+        read_fit_or_ranking(path)
+
+
+def test_weights_of_a_ranking_that_add_up_to_more_than_one_are_refused(fit, tmp_path):
+    for name in ("a.json", "b.json"):
+        fit.save(tmp_path / name)
+    path = write_ranking_document({"a.json": 0.9, "b.json": 0.9}, tmp_path / "ranking.json")
+    with pytest.raises(FitError, match=r"the weights add up to 1\.8, more than 1"):
+        read_fit_or_ranking(path)
+
+
+def test_values_and_coordinates_of_a_file_that_contradict_each_other_are_refused(fit, tmp_path):
+    path = fit.save(tmp_path / "fit.json")
+    content = json.loads(path.read_text())
+    content["u"][0] += 2.0
+    path.write_text(json.dumps(content))
+    with pytest.raises(FitError, match="contradict each other"):
         read_fit_or_ranking(path)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.kernels import lower
@@ -63,3 +64,11 @@ def test_sums_in_either_order_have_the_coordinates_of_their_own_parameters():
     theta = [*HYPERBOLIC_SINE.to_internal(sinh)[0], *NORTON.to_internal(power)[0]]
     u, v = first.u(np.array(theta)), second.u(np.array([*theta[3:], *theta[:3]]))
     assert u == pytest.approx([*v[2:], *v[:2]])
+
+
+def test_terms_beside_internal_variables_have_the_local_exponent_of_their_own():
+    """The exponent of a power law stands as it is beside a law with damage, whose variables it does not mention."""
+    law = ck.law("hyperbolic-sine") + ck.law("kachanov-rabotnov")
+    coordinates = Coordinates(law, ReferencePoint(stress=100.0, strain=0.01, time=1e5, temperature=1000.0))
+    theta = law.internal_bounds.mean(axis=0)
+    np.testing.assert_allclose(coordinates.theta(coordinates.u(theta)), theta, rtol=1e-9)

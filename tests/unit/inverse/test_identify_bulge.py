@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.errors import FitError, SolveError
+from creepkit.errors import FitError, FitWarning, SolveError
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.identification import IdentificationSettings
@@ -238,7 +238,7 @@ def test_text_says_what_a_bulge_test_needs(fit):
 
 def test_round_trip_through_json(fit, tests, tmp_path):
     free = replace(WITH_THICKNESS, nuisances=(Nuisance("thickness", mean=MEAN, sd=np.inf, bounds=(0.4, 0.6)),))
-    for one in (fit, replace(fit, settings=replace(free, weights={"amplitude": 0.99}))):
+    for one in (replace(fit, settings=replace(free, weights={"amplitude": 0.99})), fit):
         again = read_identification(one.save(tmp_path / "fit.json"))
         assert identification_to_json(again) == identification_to_json(one)
         assert again.settings == one.settings
@@ -319,3 +319,9 @@ def test_a_refit_keeps_everything(fit, tests):
     again = refit(fit, tests)
     assert again.settings == fit.settings
     assert (np.abs(again.u - fit.u) < 0.05 * np.sqrt(np.diag(fit.covariance))).all()
+
+
+def test_tests_that_were_changed_are_told_from_those_that_were_identified(fit, tests):
+    changed = [h.replace(outputs={**h.outputs, "amplitude": 1.1 * h.outputs["amplitude"]}) for h in tests]
+    with pytest.warns(FitWarning, match="the tests given differ from those that .* was identified from"):
+        fit.with_histories(changed, EXACT)

@@ -107,6 +107,16 @@ def test_the_share_is_held_in_the_fit(power_law_narrow):
     assert NOT_EXCLUDED == pytest.approx(1.96**2, abs=1e-3)
 
 
+def test_the_share_is_that_of_all_terms_of_a_law():
+    """30 % of the sum of two terms against one of the other law, and derivatives as differences say."""
+    share = ShareResidual([0, 1], [3], float(np.log(0.3 / 0.7)))
+    x = np.array([np.log(0.2), np.log(0.5), 7.0, np.log(0.3)])
+    assert share.residuals(x) == pytest.approx(0.0, abs=1e-9)
+    step = 1e-6 * np.eye(4)
+    differences = [(share.residuals(x + d) - share.residuals(x - d)) / 2e-6 for d in step]
+    np.testing.assert_allclose(share.jacobian(x), np.transpose(differences), rtol=1e-6, atol=1e-6)
+
+
 # ---- thresholds --------------------------------------------------------------------------------------------------
 
 

@@ -267,7 +267,7 @@ def test_a_rate_beyond_all_numbers_is_no_answer() -> None:
         simulate(values={"A": 1e300, "n": 3.0})
     assert str(found.value) == (
         f"{WHERE} ended at 0 s, before any of the times asked for: the law gave no finite rate at a point; "
-        "check values, loading and times"
+        "check values, loading and times; A = 1e+300 lies outside its bounds, 1e-40 to 1e-05"
     )
 
 
