@@ -73,6 +73,8 @@ from .language.temperature_forms import linear as linear
 from .readers.history_csv import write_history as write_history
 from .records.history import History as History
 from .records.history_selection import select_tests as select_tests
+from .records.interfaces import Predictor as Predictor
+from .records.interfaces import Specimen as Specimen
 from .records.law_with_values import LawWithValues as LawWithValues
 from .records.law_with_values import Units as Units
 from .records.loading import PointLoading as PointLoading
@@ -83,12 +85,16 @@ from .records.loading import StressSteps as StressSteps
 from .records.loading import constant_strain as constant_strain
 from .records.loading import constant_stress as constant_stress
 from .records.prediction import Nuisance as Nuisance
+from .records.prediction import Prediction as Prediction
+from .records.prediction import Status as Status
 from .registry.arguments import read_histories as read_histories
 from .sampling.conditions import TimeGrid as TimeGrid
 from .screening.planted import planted_plate as planted_plate
 from .screening.screen import ScreeningOptions as ScreeningOptions
 from .screening.screen import screen as screen
 from .specimens.bulge.observation import fit_field as fit_field
+from .specimens.per_test import OneTest as OneTest
+from .specimens.per_test import PerTest as PerTest
 from .surrogates.parameter_gru import ParameterGru as ParameterGru
 from .surrogates.recipe import Training as Training
 from .testing import check_law as check_law

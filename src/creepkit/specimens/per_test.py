@@ -1,0 +1,147 @@
+"""PerTest: a specimen or predictor of which its author writes one candidate in one test."""
+
+from __future__ import annotations
+
+import traceback
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import CreepkitError, SolveError
+from creepkit.records import History, Prediction, Status
+from creepkit.records.prediction_assembly import (
+    HistoryPrediction,
+    assemble_prediction,
+    broadcast_candidates,
+    check_nuisances,
+)
+
+if TYPE_CHECKING:
+    from creepkit.language import CreepLaw
+    from creepkit.records import NuisanceValues
+
+
+@dataclass(frozen=True)
+class OneTest:
+    """What one candidate does in one test, where it does not reach the end.
+
+    outputs : {output: (times,)} in its unit, NaN after the end. status : how it ended. end_time : s, when.
+    """
+
+    outputs: Mapping[str, ArrayLike]
+    status: Status = Status.RUPTURED
+    end_time: float = float("nan")
+
+
+class PerTest(ABC):
+    """Predicts by a function of one candidate in one test: a beam of fibres, a formula, another program.
+
+    A subclass states `name`, `title` and `outputs`, the first the one that grows with creep; `nuisances`, the kinds
+    that one() takes (none by default); and `workers`, how many tests are predicted at once by threads: more than one
+    where one() waits for another program. Batches, padding and errors are done here, sensitivities by differences where
+    they are asked for.
+    """
+
+    name: str
+    title: str
+    outputs: tuple[str, ...]
+    nuisances: tuple[str, ...] = ()
+    workers: int = 1
+
+    @abstractmethod
+    def one(
+        self, law: CreepLaw, values: Mapping[str, float], history: History, nuisances: Mapping[str, float]
+    ) -> Mapping[str, ArrayLike] | OneTest:
+        """{output: (times,)} at the times of the history, in the output's unit; a OneTest where it ends before.
+
+        values : {parameter: value} in the law's units. nuisances : {kind: value} of this test.
+        SolveError where these values cannot be solved for: the candidate then counts as one that did not converge.
+        """
+
+    def predict(
+        self,
+        law: CreepLaw,
+        theta: Floats,
+        histories: Sequence[History],
+        *,
+        nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
+    ) -> Prediction:
+        """All candidates in all tests, see records.Predictor; derivatives are left to differences.
+
+        theta : (candidates, parameters) internal values.
+        """
+        check_nuisances(nuisances or (), self.nuisances, f"specimen '{self.name}'")
+        theta, of_tests = broadcast_candidates(theta, nuisances, len(histories))
+        columns = law.from_internal(theta)
+        values = [{name: float(column[c]) for name, column in columns.items()} for c in range(len(theta))]
+
+        def outcome(task: tuple[int, int]) -> tuple[Floats, Status, float, str]:
+            c, k = task
+            own = {kind: float(given[c, k]) for kind, given in of_tests.items()}
+            return self._checked(law, values[c], histories[k], own)
+
+        tasks = [(c, k) for k in range(len(histories)) for c in range(len(theta))]
+        if self.workers > 1:
+            with ThreadPoolExecutor(self.workers) as pool:
+                found = list(pool.map(outcome, tasks))
+        else:
+            found = [outcome(task) for task in tasks]
+        parts = []
+        for k in range(len(histories)):
+            rows, status, ends, _ = zip(*found[k * len(theta) : (k + 1) * len(theta)], strict=True)
+            parts.append(HistoryPrediction(np.stack(rows), np.array(status, np.int64), np.array(ends, float)))
+        reason = next((reason for *_, reason in found if reason), "")
+        return replace(assemble_prediction(parts, histories, self.outputs, len(theta)), reason=reason)
+
+    def _checked(
+        self, law: CreepLaw, values: Mapping[str, float], history: History, nuisances: Mapping[str, float]
+    ) -> tuple[Floats, Status, float, str]:
+        """Outputs (times, outputs), status, end and reason of one candidate; a SolveError names test, values and line."""
+        end = float(history.times[-1])
+        try:
+            found = self.one(law, values, history, nuisances)
+        except SolveError as error:
+            return np.full((history.times.size, len(self.outputs)), np.nan), Status.NOT_CONVERGED, 0.0, str(error)
+        except CreepkitError as error:
+            raise SolveError(f"{self._place(values, history)}: {error}") from error
+        except Exception as error:  # of the author's code, whatever it is
+            last = traceback.extract_tb(error.__traceback__)[-1]
+            raise SolveError(
+                f"{self._place(values, history)}: {type(error).__name__}: {error} ({last.filename}:{last.lineno})"
+            ) from error
+        if not isinstance(found, OneTest):
+            found = OneTest(found, Status.COMPLETE, end)
+        ended = end if np.isnan(found.end_time) else found.end_time
+        return self._rows(found, values, history), found.status, ended, ""
+
+    def _rows(self, found: OneTest, values: Mapping[str, float], history: History) -> Floats:
+        missing = [name for name in self.outputs if name not in found.outputs]
+        if missing:
+            raise SolveError(
+                f"{self._place(values, history)}: one() gave no '{missing[0]}'; it gives {', '.join(self.outputs)}"
+            )
+        rows = []
+        for name in self.outputs:
+            row = np.asarray(found.outputs[name], float)
+            if row.shape != history.times.shape:
+                raise SolveError(
+                    f"{self._place(values, history)}: one() gave '{name}' of shape {row.shape}; the test has "
+                    f"{history.times.size} times"
+                )
+            if found.status is Status.COMPLETE and not np.isfinite(row).all():
+                raise SolveError(
+                    f"{self._place(values, history)}: one() gave no finite '{name}' at some time and no end; "
+                    "return OneTest(outputs, status, end_time) where a test ends early"
+                )
+            rows.append(row)
+        return np.stack(rows, axis=-1)
+
+    def _place(self, values: Mapping[str, float], history: History) -> str:
+        text = ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
+        return f"specimen '{self.name}', test '{history.name}' with {text}"

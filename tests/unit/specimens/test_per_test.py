@@ -1,0 +1,125 @@
+"""Predictors of which one candidate in one test is written, against the bar that ships, and what is said of errors."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import SolveError
+from creepkit.records import Status
+from creepkit.specimens.per_test import OneTest, PerTest
+
+NORTON = ck.law("norton")
+TRUTH = {"A": 1e-16, "n": 4.0}
+TIMES = np.geomspace(600.0, 4e5, 20)
+
+
+class Bar(PerTest):
+    """Norton bars at constant true stress, in closed form."""
+
+    name, title, outputs = "closed-form-bar", "Bar in closed form", ("strain",)
+    nuisances = ("temperature",)
+
+    def one(self, law, values, history, nuisances):
+        stress = history.loading.program().values[0]
+        return {"strain": values["A"] * stress ** values["n"] * history.times}
+
+
+class Awk(PerTest):
+    """The same by another program."""
+
+    name, title, outputs, workers = "awk", "Another program", ("strain",), 2
+
+    def one(self, law, values, history, nuisances):
+        stress = history.loading.program().values[0]
+        code = "import sys; A, n, s, *t = map(float, sys.argv[1:]); print(*[A * s**n * x for x in t])"
+        numbers = map(repr, map(float, (values["A"], values["n"], stress, *history.times)))
+        answer = subprocess.run([sys.executable, "-c", code, *numbers], capture_output=True, text=True, check=True)
+        return {"strain": [float(word) for word in answer.stdout.split()]}
+
+
+def plans(*stresses):
+    return [ck.History(f"bar {s:g}", TIMES, {}, ck.constant_stress(s, "stress"), 1000.0) for s in stresses]
+
+
+def planted(noise=1e-6):
+    rng = np.random.default_rng(4)
+    runs = ck.specimen("uniaxial").predict(NORTON, NORTON.to_internal(TRUTH), plans(60.0, 80.0, 100.0))
+    return [
+        h.replace(
+            outputs={"strain": runs.of(k)[:, 0] + noise * rng.standard_normal(20)},
+            standard_deviation={"strain": np.full(20, noise)},
+        )
+        for k, h in enumerate(plans(60.0, 80.0, 100.0))
+    ]
+
+
+def test_a_batch_is_that_of_the_bar_that_ships():
+    theta = NORTON.to_internal({"A": np.array([1e-16, 3e-16, 1e-17]), "n": np.array([4.0, 3.5, 5.0])})
+    tests = [plans(60.0)[0], plans(90.0)[0].replace(times=TIMES[:7])]
+    found, bar = Bar().predict(NORTON, theta, tests), ck.specimen("uniaxial").predict(NORTON, theta, tests)
+    np.testing.assert_allclose(found.values, bar.values, rtol=1e-6)
+    assert (found.status == Status.COMPLETE).all()
+    np.testing.assert_array_equal(found.lengths, [20, 7])
+
+
+@pytest.mark.parametrize("using", [Bar(), Awk()], ids=["formula", "program"])
+def test_planted_values_are_found_from_data_of_another_solver(using):
+    fit = ck.identify(NORTON, planted(), using, starts=1, sobol_points=4, nuisances=[], weights="likelihood")
+    for estimate in fit.estimates:
+        assert estimate.low < TRUTH[estimate.name] < estimate.high
+    assert fit.values["n"] == pytest.approx(4.0, rel=1e-3)
+
+
+def test_it_simulates_and_forecasts():
+    run = ck.simulate(NORTON, Bar(), TRUTH, loading=ck.constant_stress(80.0, "stress"), times=TIMES)
+    np.testing.assert_allclose(run.outputs["strain"], 1e-16 * 80.0**4 * TIMES, rtol=1e-12)
+    fit = ck.identify(NORTON, planted(), Bar(), starts=1, nuisances=[ck.Nuisance("rate", sd=0.1)])
+    one = fit.forecast(plans(70.0)).tests[0].outputs["strain"]
+    assert one.band.low[-1] < 1e-16 * 70.0**4 * TIMES[-1] < one.band.high[-1]
+
+
+class Ends(Bar):
+    def one(self, law, values, history, nuisances):
+        strain = np.asarray(super().one(law, values, history, nuisances)["strain"])
+        if strain[-1] > 0.01:
+            return OneTest({"strain": np.where(strain > 0.01, np.nan, strain)}, Status.RUPTURED, 1e5)
+        if values["n"] > 7.0:
+            raise SolveError("no equilibrium")
+        return {"strain": strain}
+
+
+def test_an_early_end_and_values_without_a_solution_are_results():
+    theta = NORTON.to_internal({"A": np.array([1e-16, 1e-12, 1e-30]), "n": np.array([4.0, 4.0, 7.5])})
+    found = Ends().predict(NORTON, theta, plans(60.0))
+    assert found.status[:, 0].tolist() == [Status.COMPLETE, Status.RUPTURED, Status.NOT_CONVERGED]
+    assert found.end_times[1, 0] == 1e5
+    assert np.isnan(found.values[2]).all()
+    assert found.reason == "no equilibrium"
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (lambda h: {"strain": h.times[:3]}, r"one\(\) gave 'strain' of shape \(3,\); the test has 20 times"),
+        (lambda h: {"strian": h.times}, r"one\(\) gave no 'strain'"),
+        (lambda h: {"strain": np.nan * h.times}, r"no finite 'strain' at some time and no end"),
+        (lambda h: {"strain": h.times / h.missing}, r"AttributeError: .*missing.* \(.*test_per_test.py:\d+\)"),
+    ],
+)
+def test_an_author_is_told_which_test_values_and_line(given, sentence):
+    class Wrong(Bar):
+        def one(self, law, values, history, nuisances):
+            return given(history)
+
+    with pytest.raises(
+        SolveError, match=f"specimen 'closed-form-bar', test 'bar 60' with A = 1e-16, n = 4: .*{sentence}"
+    ):
+        Wrong().predict(NORTON, NORTON.to_internal(TRUTH), plans(60.0))
+
+
+def test_a_nuisance_that_one_does_not_take_is_refused():
+    with pytest.raises(SolveError, match="specimen 'awk' does not know the nuisance 'thickness'"):
+        Awk().predict(NORTON, NORTON.to_internal(TRUTH), plans(60.0), nuisances={"thickness": np.array([[0.5]])})
