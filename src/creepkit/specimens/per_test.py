@@ -102,7 +102,7 @@ class PerTest(ABC):
     def _checked(
         self, law: CreepLaw, values: Mapping[str, float], history: History, nuisances: Mapping[str, float]
     ) -> tuple[Floats, Status, float, str]:
-        """Outputs (times, outputs), status, end and reason of one candidate; a SolveError names test, values and line."""
+        """Outputs (times, outputs), status, end and reason of one candidate; errors name test, values and line."""
         end = float(history.times[-1])
         try:
             found = self.one(law, values, history, nuisances)
