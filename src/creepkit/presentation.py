@@ -41,7 +41,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "correlation": "creepkit.inverse.uncertainty.correlation:correlation",
         "undetermined": "creepkit.inverse.uncertainty.correlation:undetermined",
         "forecast": "creepkit.forecasts.forecast:forecast",
-        "with_attached": "creepkit.inverse.attached_histories:with_attached",
+        "with_histories": "creepkit.inverse.attached_histories:with_attached",
     },
     "CrossValidation": {"text": "creepkit.report.identification_text:cross_validation_text"},
     "Confirmation": {"text": "creepkit.report.identification_text:confirmation_text"},

@@ -312,7 +312,7 @@ class Identification(Presentable):
             predictor = using
         else:
             raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")
-        return cast(Identification, present(self, "with_attached", tests, predictor))
+        return cast(Identification, present(self, "with_histories", tests, predictor))
 
     def _predictor_or(self, using: Predictor | None) -> Predictor:
         """The predictor given, or the identification's own; FitError where a file does not give it."""
