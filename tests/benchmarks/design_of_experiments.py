@@ -391,7 +391,7 @@ def print_arms(page, rows, shares):
             arm = [row[name] for row in group]
             if not arm:
                 continue
-            shares = (
+            found = (
                 [r["right"] for r in arm],
                 [r["singled out"] and r["right"] for r in arm],
                 [r["singled out"] and not r["right"] for r in arm],
@@ -399,7 +399,7 @@ def print_arms(page, rows, shares):
                 [r["decisive"] and not r["right"] for r in arm],
             )
             hours = f"{np.mean([r['hours'] for r in arm]):.1f}"
-            page.row(name + label, len(arm), hours, *(share_with_interval(share) for share in shares))
+            page.row(name + label, len(arm), hours, *(share_with_interval(share) for share in found))
 
 
 def print_expectations(page, rows, names):
