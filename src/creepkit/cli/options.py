@@ -284,7 +284,7 @@ def _nuisance(text: str) -> Nuisance:
     scope: Any = tests[0] if tests in (["test"], ["alloy"], ["all"]) else "all" if tests else "test"
     try:
         return Nuisance(
-            kind.strip(),  # type: ignore[arg-type]
+            kind.strip(),
             scope,
             mean=numbers[0],
             sd=numbers[1],

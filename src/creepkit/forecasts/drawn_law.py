@@ -9,12 +9,12 @@ import numpy as np
 
 from creepkit.errors import FitError
 from creepkit.forecasts.draws import (
-    Dimension,
     LawDraws,
+    UncertainQuantity,
     dimension_draws,
-    dimensions_of,
     log_factor_draws,
     own_variances,
+    uncertain_quantities,
 )
 from creepkit.forecasts.simulation import (
     TestCurves,
@@ -47,7 +47,7 @@ class DrawnLaw:
     weight: float
     drawn: TestCurves
     central: TestCurves
-    dimensions: Sequence[Dimension]
+    dimensions: Sequence[UncertainQuantity]
     own_variances: Mapping[str, float]
     sensitivities: TestSensitivities
     numerical: Mapping[str, float]
@@ -64,7 +64,7 @@ def drawn_law(
 ) -> DrawnLaw:
     """What one law says of one test; weight : of the law. tolerances : {kind: standard deviation}."""
     fit = draws.fit
-    dimensions = dimensions_of(fit, history, predictor, tolerances)
+    dimensions = uncertain_quantities(fit, history, predictor, tolerances)
     centre = {d.kind: d.mean for d in dimensions}
     followed, own = followed_history(history, predictor, [*centre]), predictor_for(predictor, history)
     mean, _ = fit.scatter_of_rates.mean_joint

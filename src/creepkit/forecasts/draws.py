@@ -17,21 +17,23 @@ from creepkit.inverse.composite_predictor import predictor_for, supports_nuisanc
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import owner_of, prior_mean
 from creepkit.inverse.uncertainty.rate_scatter import USUAL_SD
-from creepkit.records import LENGTH_NUISANCES, SIMULATED_NUISANCES, STEP_NUISANCES, History, Nuisance, Predictor
+from creepkit.records import (
+    COVARIANCE_NUISANCES,
+    GENERAL_NUISANCES,
+    STEP_NUISANCES,
+    History,
+    Nuisance,
+    Predictor,
+    dimensions_of,
+    is_length_nuisance,
+)
 
-TOLERANCE_KINDS = tuple(kind for kind in SIMULATED_NUISANCES if kind not in STEP_NUISANCES)
-"""Kinds of nuisance parameters that a tolerance can be given of."""
+TOLERANCE_KINDS = tuple(kind for kind in GENERAL_NUISANCES if kind not in (*COVARIANCE_NUISANCES, *STEP_NUISANCES))
+"""Kinds of nuisance parameters that a tolerance can be given of, beside the lengths of test pieces."""
 
 
-LARGEST_TOLERANCES = {
-    "modulus": 0.3,
-    "temperature": 100.0,
-    "temperature drift": 100.0,
-    "rate drift": 5.0,
-    "thickness": 0.5,
-    "window": 1.5,
-}
-"""Standard deviations, in the unit of the kind: relative, K, K, ln of a factor, mm, mm."""
+LARGEST_TOLERANCES = {"modulus": 0.3, "temperature": 100.0, "temperature drift": 100.0, "rate drift": 5.0}
+"""Standard deviations, in the unit of the kind: relative, K, K, ln of a factor."""
 
 
 LARGEST_OF_LENGTH = 0.25
@@ -147,7 +149,7 @@ def own_variances(fit: Identification, history: History) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Dimension:
+class UncertainQuantity:
     """A quantity of a test that is known to a tolerance: kind and unit are those of a Nuisance.
 
     shared : position among the unknowns of what all tests, or those of the alloy, share; None for its own.
@@ -161,16 +163,16 @@ class Dimension:
     shared: int | None = None
 
 
-def dimensions_of(
+def uncertain_quantities(
     fit: Identification, history: History, predictor: Predictor, tolerances: Mapping[str, float]
-) -> list[Dimension]:
+) -> list[UncertainQuantity]:
     """What of a test is known to a tolerance: as given, as the fit estimated it, or as the specimen states it."""
     estimated = {(n.key, n.owner): k for k, n in enumerate(fit.nuisances)}
     own_predictor = predictor_for(predictor, history)
-    dimensions: dict[str, Dimension] = {}
+    dimensions: dict[str, UncertainQuantity] = {}
     for nuisance in fit.settings.nuisances:
         kind = nuisance.kind
-        if kind not in TOLERANCE_KINDS or not supports_nuisance(own_predictor, kind):
+        if not _has_tolerance(kind) or not supports_nuisance(own_predictor, kind):
             continue
         if not nuisance.applies_to(history.name):
             continue
@@ -179,16 +181,16 @@ def dimensions_of(
         low, high = nuisance.bounds
         if nuisance.scope != "test" and position is not None:
             estimate = fit.nuisances[position]
-            dimensions[kind] = Dimension(kind, estimate.value, estimate.sd, low, high, fit.u.size + position)
+            dimensions[kind] = UncertainQuantity(kind, estimate.value, estimate.sd, low, high, fit.u.size + position)
         else:
-            dimensions[kind] = Dimension(kind, mean, _spread_between_tests(fit, nuisance), low, high)
+            dimensions[kind] = UncertainQuantity(kind, mean, _spread_between_tests(fit, nuisance), low, high)
     for given, relative in (*_stated_tolerances(own_predictor), *((kind, None) for kind in tolerances)):
         if not supports_nuisance(own_predictor, given) or (relative is not None and given in dimensions):
             continue
         known = dimensions.get(given)
-        mean = known.mean if known else prior_mean(Nuisance(given), history, predictor)  # type: ignore[arg-type]
+        mean = known.mean if known else prior_mean(Nuisance(given), history, predictor)
         sd = tolerances[given] if relative is None else relative * mean
-        dimensions[given] = Dimension(given, mean, sd, 0.0 if mean > 0 else -np.inf, np.inf)
+        dimensions[given] = UncertainQuantity(given, mean, sd, 0.0 if mean > 0 else -np.inf, np.inf)
     return list(dimensions.values())
 
 
@@ -203,26 +205,31 @@ def _spread_between_tests(fit: Identification, nuisance: Nuisance) -> float:
 
 def _stated_tolerances(predictor: Predictor) -> list[tuple[str, float]]:
     """(kind, relative standard deviation) of dimensions as a specimen states them."""
-    return [*getattr(predictor, "tolerances", {}).items()]
+    return [(d.names[-1], d.tolerance) for d in dimensions_of(predictor) if d.tolerance > 0.0]
+
+
+def _has_tolerance(kind: str) -> bool:
+    return kind in TOLERANCE_KINDS or is_length_nuisance(kind)
 
 
 def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[History], predictor: Predictor) -> None:
     """FitError for a tolerance of what no test has, or that is no standard deviation."""
     for kind, sd in tolerances.items():
-        if kind not in TOLERANCE_KINDS:
-            raise FitError(f"a tolerance of '{kind}' is not known; {nearest(kind, TOLERANCE_KINDS)}")
+        lengths = [name for h in histories for d in dimensions_of(predictor_for(predictor, h)) for name in d.names]
+        if kind not in (*TOLERANCE_KINDS, *lengths):
+            raise FitError(f"a tolerance of '{kind}' is not known; {nearest(kind, (*TOLERANCE_KINDS, *lengths))}")
         if not (np.isfinite(sd) and sd >= 0):
             raise FitError(f"the tolerance of '{kind}' is {sd}; give a standard deviation of zero or more, in its unit")
         if sd > LARGEST_TOLERANCES.get(kind, np.inf):
             raise FitError(
                 f"the tolerance of '{kind}' is {sd:g}; allowed are 0 to {LARGEST_TOLERANCES[kind]:g} "
-                f"({'K' if 'temperature' in kind else 'mm' if kind in LENGTH_NUISANCES else 'relative, 0.05 for 5 %'})"
+                f"({'K' if 'temperature' in kind else 'relative, 0.05 for 5 %'})"
             )
         if not any(supports_nuisance(predictor_for(predictor, h), kind) for h in histories):
             raise FitError(f"the tolerance of '{kind}' means nothing to the specimens of these tests; leave it out")
-        for history in histories if kind == "thickness" else ():
+        for history in histories if is_length_nuisance(kind) else ():
             own = predictor_for(predictor, history)
-            length = prior_mean(Nuisance("thickness"), history, own) if supports_nuisance(own, kind) else np.inf
+            length = prior_mean(Nuisance(kind), history, own) if supports_nuisance(own, kind) else np.inf
             if sd > LARGEST_OF_LENGTH * length:
                 raise FitError(
                     f"the tolerance of '{kind}' is {sd:g} mm, of test '{history.name}' with {length:g} mm; at most "
@@ -230,7 +237,9 @@ def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[Histor
                 )
 
 
-def dimension_draws(dimensions: Sequence[Dimension], draws: LawDraws, rng: np.random.Generator) -> dict[str, Floats]:
+def dimension_draws(
+    dimensions: Sequence[UncertainQuantity], draws: LawDraws, rng: np.random.Generator
+) -> dict[str, Floats]:
     """{kind: (draws, 1)} as predictors take them."""
     values = {}
     for one in dimensions:

@@ -22,7 +22,7 @@ from scipy.special import logsumexp
 from scipy.stats import chi2
 
 from creepkit.arrays import Floats, Ints
-from creepkit.forecasts.draws import Dimension, covariance_root, systematic
+from creepkit.forecasts.draws import UncertainQuantity, covariance_root, systematic
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
@@ -111,19 +111,16 @@ class LinearForecast:
     white: Floats
     outputs: Ints
     names: tuple[str, ...]
-    own: tuple[Dimension, ...]
-    dimensions: tuple[Dimension, ...]
+    own: tuple[UncertainQuantity, ...]
+    dimensions: tuple[UncertainQuantity, ...]
     log_scale: float
 
     @classmethod
     def of_test(
-        cls, fit: Identification, predictor: Predictor, history: History, dimensions: Sequence[Dimension]
+        cls, fit: Identification, predictor: Predictor, history: History, dimensions: Sequence[UncertainQuantity]
     ) -> LinearForecast:
         """The linear forecast of a measured test by one law."""
-        kinds = tuple(
-            Nuisance(d.kind, mean=d.mean, sd=d.sd if d.sd > 0 else EXACTLY_KNOWN)  # type: ignore[arg-type]
-            for d in dimensions
-        )
+        kinds = tuple(Nuisance(d.kind, mean=d.mean, sd=d.sd if d.sd > 0 else EXACTLY_KNOWN) for d in dimensions)
         if RUPTURE_OUTPUT not in fit.noise_model.outputs:  # nothing is known of how lives scatter beside rates
             history = replace(history, rupture_time=None, unruptured=False)
         settings = replace(fit.settings, nuisances=kinds)
@@ -264,7 +261,7 @@ class LinearForecast:
 
 
 def score_test(
-    laws: Sequence[tuple[Identification, float, Sequence[Dimension]]],
+    laws: Sequence[tuple[Identification, float, Sequence[UncertainQuantity]]],
     predictor: Predictor,
     history: History,
     inside: Mapping[str, float],

@@ -26,6 +26,7 @@ from creepkit.records import (
     SupportsSearchTolerance,
     TimesToStrain,
     checked_prediction,
+    is_length_nuisance,
     kind_and_start,
 )
 
@@ -225,10 +226,14 @@ RELATIVE_STEP = 1e-4
 
 
 NUISANCE_STEPS = {
-    **{"thickness": 1e-3, "window": 1e-2, "modulus": 1e-3, "temperature": 0.1},
+    **{"modulus": 1e-3, "temperature": 0.1},
     **{"temperature step": 1.0, "temperature drift": 1.0, "rate step": 0.02, "rate drift": 0.02, "load step": 5e-3},
 }
-"""mm, mm, relative, K, K, K, ln, ln, relative: of central differences, well above the error of a solver's steps."""
+"""relative, K, K, K, ln, ln, relative: of central differences, well above the error of a solver's steps."""
+
+
+LENGTH_STEP = 2e-3
+"""The same for lengths, relative."""
 
 
 def predict_with_sensitivities(
@@ -244,7 +249,7 @@ def predict_with_sensitivities(
     if not (numeric or kinds):
         return prediction
     steps = RELATIVE_STEP * np.maximum(np.abs(theta), 1.0) if numeric else np.zeros(0)
-    nuisance_steps = [NUISANCE_STEPS[kind_and_start(key)[0]] for key in kinds]
+    nuisance_steps = [_nuisance_step(key, nuisances[key]) for key in kinds]
     points, shifted_nuisances = _difference_points(theta, steps, nuisances, kinds, nuisance_steps)
     batch = predict(predictor, law, points, histories, nuisances=shifted_nuisances)
     count = len(points) // 2
@@ -258,6 +263,12 @@ def predict_with_sensitivities(
         jacobian=prediction.jacobian if jacobian is None else jacobian[None],
         nuisance_jacobian={**prediction.nuisance_jacobian, **nuisance_jacobian},
     )
+
+
+def _nuisance_step(key: str, values: Floats) -> float:
+    """The step of central differences in a nuisance; values : (1, tests), of a length in mm."""
+    kind = kind_and_start(key)[0]
+    return LENGTH_STEP * float(np.max(np.abs(values))) if is_length_nuisance(kind) else NUISANCE_STEPS[kind]
 
 
 def _difference_points(

@@ -30,7 +30,7 @@ from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.inverse.unmodelled_effects import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
-from creepkit.records import SIMULATED_NUISANCES, History, Nuisance, Prediction, Predictor
+from creepkit.records import History, Nuisance, Prediction, Predictor
 from creepkit.registry.arguments import check_histories, resolve_predictors
 
 if TYPE_CHECKING:
@@ -286,7 +286,7 @@ class Identification(Presentable):
 
         values: dict[str, Floats] = {}
         for n in self.settings.nuisances:
-            if n.kind in SIMULATED_NUISANCES:  # groups of tests with a nuisance each: zero where it is another's
+            if n.is_simulated:  # groups of tests with a nuisance each: zero where it is another's
                 values[n.key] = values.get(n.key, 0.0) + np.array([[of(n, h) for h in histories]])
         return values
 

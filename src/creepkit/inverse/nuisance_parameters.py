@@ -1,7 +1,7 @@
 """Explicit nuisance parameters of tests, estimated beside the parameters of the law under Gaussian priors.
 
-Each is of one test, of one alloy, or of all tests or a group of them: thickness, window, modulus, temperature, and what
-the rig did during the tests (steps and drifts of temperature, rate and load).
+Each is of one test, of one alloy, or of all tests or a group of them: a length of the test piece, modulus, temperature,
+and what the rig did during the tests (steps and drifts of temperature, rate and load).
 """
 
 from __future__ import annotations
@@ -17,30 +17,37 @@ from creepkit.inverse.composite_predictor import predictor_for, supports_nuisanc
 from creepkit.inverse.noise_model import Residuals
 from creepkit.language import CreepLaw, temperature
 from creepkit.records import (
-    LENGTH_NUISANCES,
     SCALABLE_LOADS,
-    SIMULATED_NUISANCES,
     STEP_NUISANCES,
     History,
     Nuisance,
     Predictor,
+    dimension_named,
     drift_duration,
     nuisance_key,
 )
 
 INITIAL_PRIOR_SD = {
-    **{"thickness": 0.03, "window": 0.3, "modulus": 0.05, "temperature": 5.0},
+    **{"modulus": 0.05, "temperature": 5.0},
     **{"temperature step": 10.0, "temperature drift": 5.0, "rate step": 0.3, "rate drift": 0.3, "load step": 0.05},
 }
-"""Where the estimate of a prior standard deviation begins: mm, mm, relative, K, K, K, ln, ln, relative."""
+"""Where the estimate of a prior standard deviation begins: relative, K, K, K, ln, ln, relative."""
+
+
+INITIAL_PRIOR_SD_OF_LENGTH = 0.06
+"""The same of a length, relative to its mean."""
 
 
 LIMITS = {
-    **{"thickness": (0.3, 3.0), "window": (0.3, 3.0), "modulus": (-0.7, 2.0), "temperature": (-150.0, 150.0)},
+    **{"modulus": (-0.7, 2.0), "temperature": (-150.0, 150.0)},
     **{"temperature step": (-150.0, 150.0), "temperature drift": (-150.0, 150.0), "load step": (-0.7, 2.0)},
     **{"rate step": (-5.0, 5.0), "rate drift": (-5.0, 5.0)},
 }
-"""Limits of nuisance parameters; thickness and window as multiples of their mean."""
+"""Limits of nuisance parameters."""
+
+
+LIMITS_OF_LENGTH = (0.3, 3.0)
+"""Limits of lengths, as multiples of their mean."""
 
 
 SMALLEST_PRIOR_SD = 1e-3
@@ -73,7 +80,7 @@ class NuisanceParameters:
         """One for each test, alloy, group or all tests that it applies to and whose predictor knows the kind."""
         parameters: list[tuple[Nuisance, str]] = []
         test_index: dict[str, Ints] = {}
-        for nuisance in (n for n in nuisances if n.kind in SIMULATED_NUISANCES):
+        for nuisance in (n for n in nuisances if n.is_simulated):
             offered = [_takes_effect(nuisance, h, predictor) for h in histories]
             named = any(nuisance.applies_to(h.name) for h in histories)
             if named and not any(offered):
@@ -105,7 +112,7 @@ class NuisanceParameters:
             tuple(m for _, m in parameters),
             test_index,
             np.array(means, float),
-            np.array([INITIAL_PRIOR_SD[n.kind] if n.sd is None else n.sd for n in nuisance_of_parameter], float),
+            np.array([initial_prior_sd(n, mean) for n, mean in zip(nuisance_of_parameter, means, strict=True)], float),
             np.array([low for low, _ in limits], float),
             np.array([high for _, high in limits], float),
         )
@@ -157,7 +164,8 @@ class NuisanceParameters:
             if nuisance.sd is None:
                 mask = np.array([n is nuisance for n in self.nuisances])
                 estimated_sd = np.sqrt(np.mean((e - self.mean)[mask] ** 2 + variance[mask]))
-                sd[mask] = max(float(estimated_sd), SMALLEST_PRIOR_SD * INITIAL_PRIOR_SD[nuisance.kind])
+                least = SMALLEST_PRIOR_SD * initial_prior_sd(replace(nuisance, sd=None), float(self.mean[mask][0]))
+                sd[mask] = max(float(estimated_sd), least)
         return replace(self, sd=sd)
 
 
@@ -201,25 +209,33 @@ def check_nuisance_law(nuisances: Sequence[Nuisance], law: CreepLaw) -> None:
 
 
 def prior_mean(nuisance: Nuisance, history: History | None, using: Predictor) -> float:
-    """The prior mean of a test's nuisance parameter; of a thickness, by default, that which the test states.
+    """The prior mean of a test's nuisance parameter; of a length, by default, that which the test states.
 
     mm for lengths; the geometry of the history takes precedence over that of the specimen.
     """
-    if nuisance.kind != "thickness" or nuisance.mean > 0 or history is None:
+    if not nuisance.is_length or nuisance.mean > 0 or history is None:
         return nuisance.mean
-    predictor = predictor_for(using, history)
-    geometry = getattr(getattr(predictor, "specimen", predictor), "geometry", None)
-    stated = history.geometry.get("apex_thickness", getattr(geometry, "apex_thickness", None))
-    if stated is None:
-        problem = f"nuisance 'thickness' has no mean, and test '{history.name}' states no apex_thickness"
+    length = dimension_named(predictor_for(using, history), nuisance.kind)
+    if length is None:
+        problem = (
+            f"nuisance '{nuisance.kind}' has no mean, and the specimen of test '{history.name}' has no such length"
+        )
         raise FitError(f"{problem}; give mean=")
-    return float(stated)
+    return float(history.geometry.get(length.name, length.default))
+
+
+def initial_prior_sd(nuisance: Nuisance, mean: float) -> float:
+    """The prior standard deviation of a nuisance parameter, or where its estimate begins; mean : of the prior."""
+    if nuisance.sd is not None:
+        return nuisance.sd
+    return INITIAL_PRIOR_SD_OF_LENGTH * abs(mean) if nuisance.is_length else INITIAL_PRIOR_SD[nuisance.kind]
 
 
 def _bounds_of(nuisance: Nuisance, mean: float) -> tuple[float, float]:
-    low, high = LIMITS[nuisance.kind]
-    if nuisance.kind in LENGTH_NUISANCES:
-        low, high = low * mean, high * mean
+    if nuisance.is_length:
+        low, high = (factor * mean for factor in LIMITS_OF_LENGTH)
+    else:
+        low, high = LIMITS[nuisance.kind]
     return max(low, nuisance.bounds[0]), min(high, nuisance.bounds[1])
 
 

@@ -14,11 +14,7 @@ from typing import Literal
 import numpy as np
 
 from creepkit.errors import FitError, nearest
-from creepkit.records import LENGTH_NUISANCES, SIMULATED_NUISANCES, Nuisance
-
-GROUPED_NUISANCES = tuple(kind for kind in SIMULATED_NUISANCES if kind not in LENGTH_NUISANCES)
-"""Kinds that some tests may have and others not: deviations, which are zero elsewhere."""
-
+from creepkit.records import Nuisance
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 
@@ -137,18 +133,18 @@ def _check_nuisance(nuisance: Nuisance) -> None:
     n, finite = nuisance, nuisance.sd is None or np.isfinite(nuisance.sd)
     if n.output and n.kind != "offset":
         raise FitError(f"nuisance '{n.kind}' acts on a whole test: it has no output, found output='{n.output}'")
-    if n.tests and n.kind not in GROUPED_NUISANCES:
+    if n.tests and (n.is_length or not n.is_simulated):
         raise FitError(f"nuisance '{n.kind}' belongs to every test; leave out tests=, which deviations alone can have")
-    if n.kind not in SIMULATED_NUISANCES:
+    if not n.is_simulated:
         if n.mean != 0 or np.isfinite(n.bounds).any() or n.scope != "test" or not finite:
             raise FitError(
                 f"nuisance {n} is not known to this identification: Nuisance('offset') and Nuisance('rate') are one "
                 "for each test, about zero, with sd= a finite number or None to estimate it"
             )
         return
-    if n.kind == "thickness" and n.mean == 0 and n.scope == "test":
+    if n.is_length and n.mean == 0 and n.scope == "test":  # the mean is then what each test states
         return
-    if n.kind in LENGTH_NUISANCES and not (np.isfinite(n.mean) and n.mean > 0):
+    if n.is_length and not (np.isfinite(n.mean) and n.mean > 0):
         raise FitError(
             f"nuisance '{n.kind}' is a length in mm and needs its prior mean, such as mean=0.4935; found {n.mean:g}"
         )

@@ -195,7 +195,7 @@ def _dimension(
     ]
     if not all(tolerances):
         return []
-    nominal = np.array([prior_mean(Nuisance(kind), h, problem.predictor) for h in histories])  # type: ignore[arg-type]
+    nominal = np.array([prior_mean(Nuisance(kind), h, problem.predictor) for h in histories])
     nuisances = {**problem.nuisance_parameters.predictor_values(x[count:]), kind: nominal[None]}
     theta = problem.coordinates.theta(x[:count])
     prediction = predict_with_sensitivities(problem.predictor, problem.law, theta, histories, nuisances)

@@ -17,14 +17,11 @@ from creepkit.readers.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATUR
 from creepkit.readers.text_tables import Frames, SourceText
 from creepkit.readers.vocabulary import (
     COMPONENT_LOADING_KINDS,
-    LENGTH,
     LOADING_KINDS,
     SPECIMEN_NAME_PATTERN,
     STRAIN_LOADING_KINDS,
     TEXT_KEYS,
-    TIME,
     HeaderVocabulary,
-    QuantityKind,
     split_unit,
 )
 from creepkit.records import (
@@ -37,6 +34,7 @@ from creepkit.records import (
     StressSteps,
     constant_stress,
 )
+from creepkit.records.quantities import LENGTH, TIME, QuantityKind
 
 _ALLOWED_COMBINATIONS = (
     "give one of stress, stress_steps, stress_program, or stress_1 with stress_2 and jump_time (the same for pressure, "

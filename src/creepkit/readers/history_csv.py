@@ -30,8 +30,9 @@ from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history
 from creepkit.readers.text_tables import peek_columns, read_table
-from creepkit.readers.vocabulary import LENGTH, SPECIMEN_NAME_PATTERN, HeaderVocabulary, QuantityKind
+from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary
 from creepkit.records import History, PointLoading, PressureJump, Program, RecordedLoading, StrainSteps, StressSteps
+from creepkit.records.quantities import LENGTH, QuantityKind
 
 
 @dataclass(frozen=True)

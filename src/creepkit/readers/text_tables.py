@@ -16,7 +16,8 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest
 from creepkit.files.reading import FileKind, read_bytes, read_text
-from creepkit.readers.vocabulary import HeaderVocabulary, QuantityKind, split_unit
+from creepkit.readers.vocabulary import HeaderVocabulary, split_unit
+from creepkit.records.quantities import QuantityKind
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 

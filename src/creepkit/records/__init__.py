@@ -1,6 +1,6 @@
 """The records that the public functions take and return. Frozen; MPa, mm, s, K throughout."""
 
-from creepkit.records.history import EVERY_FRAME, ZERO_CELSIUS, History, output_unit
+from creepkit.records.history import EVERY_FRAME, History
 from creepkit.records.interfaces import (
     Exporter,
     Predictor,
@@ -10,6 +10,23 @@ from creepkit.records.interfaces import (
     SupportsRefinement,
     SupportsRupturePrediction,
     SupportsSearchTolerance,
+)
+from creepkit.records.known_specimens import (
+    all_dimensions,
+    check_geometry,
+    check_load,
+    dimension_named,
+    dimensions_of,
+    find_specimens_by,
+    growing_output,
+    known_specimens,
+    load_named,
+    load_unit,
+    loads_of,
+    output_named,
+    output_unit,
+    outputs_of,
+    specimen_of,
 )
 from creepkit.records.law_with_values import LawWithValues, Units
 from creepkit.records.loading import (
@@ -21,21 +38,24 @@ from creepkit.records.loading import (
     RecordedLoading,
     StrainSteps,
     StressSteps,
+    constant_load,
     constant_strain,
     constant_stress,
+    load_steps,
 )
 from creepkit.records.nuisance_programs import SCALABLE_LOADS, STEP_DURATION, drift_duration, with_program_nuisances
 from creepkit.records.prediction import (
-    LENGTH_NUISANCES,
+    COVARIANCE_NUISANCES,
+    GENERAL_NUISANCES,
     PROGRAM_NUISANCES,
     RATE_NUISANCES,
-    SIMULATED_NUISANCES,
     STEP_NUISANCES,
     Nuisance,
     NuisanceValues,
     Prediction,
     Status,
     TimesToStrain,
+    is_length_nuisance,
     kind_and_start,
     nuisance_key,
 )
@@ -47,30 +67,37 @@ from creepkit.records.prediction_assembly import (
     unpredicted,
 )
 from creepkit.records.prediction_checks import checked_prediction
+from creepkit.records.quantities import QUANTITIES, ZERO_CELSIUS, QuantityKind, unit_of
+from creepkit.records.specimen_record import Dimension, Load, Output
 
 __all__ = [
+    "COVARIANCE_NUISANCES",
     "EVERY_FRAME",
-    "LENGTH_NUISANCES",
+    "GENERAL_NUISANCES",
     "PROGRAM_NUISANCES",
+    "QUANTITIES",
     "RATE_NUISANCES",
     "SCALABLE_LOADS",
-    "SIMULATED_NUISANCES",
     "STEP_DURATION",
     "STEP_NUISANCES",
     "TENSOR_COMPONENTS",
     "ZERO_CELSIUS",
+    "Dimension",
     "Exporter",
     "History",
     "HistoryPrediction",
     "LawWithValues",
+    "Load",
     "Loading",
     "Nuisance",
     "NuisanceValues",
+    "Output",
     "PointLoading",
     "Prediction",
     "Predictor",
     "PressureJump",
     "Program",
+    "QuantityKind",
     "Reader",
     "RecordedLoading",
     "Specimen",
@@ -83,16 +110,34 @@ __all__ = [
     "SupportsSearchTolerance",
     "TimesToStrain",
     "Units",
+    "all_dimensions",
     "assemble_prediction",
     "broadcast_candidates",
+    "check_geometry",
+    "check_load",
     "check_nuisances",
     "checked_prediction",
+    "constant_load",
     "constant_strain",
     "constant_stress",
+    "dimension_named",
+    "dimensions_of",
     "drift_duration",
+    "find_specimens_by",
+    "growing_output",
+    "is_length_nuisance",
     "kind_and_start",
+    "known_specimens",
+    "load_named",
+    "load_steps",
+    "load_unit",
+    "loads_of",
     "nuisance_key",
+    "output_named",
     "output_unit",
+    "outputs_of",
+    "specimen_of",
+    "unit_of",
     "unpredicted",
     "with_program_nuisances",
 ]

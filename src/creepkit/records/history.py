@@ -11,13 +11,12 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError
+from creepkit.records.known_specimens import load_unit
 from creepkit.records.loading import Loading, Program, loading_text
+from creepkit.records.quantities import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
-
-
-ZERO_CELSIUS = 273.15
 
 
 RUPTURE_TIME_TOLERANCE = 0.01
@@ -182,16 +181,7 @@ class History:
         """The nominal condition in words, '850 C, 43 MPa': what leave-one-condition-out holds out."""
         celsius = self.temperature_program().values - ZERO_CELSIUS
         temperature_text = f"{celsius[0]:.0f}" if np.ptp(celsius) < 0.5 else f"{celsius[0]:.0f} to {celsius[-1]:.0f}"
-        return f"{temperature_text} C, {loading_text(self.loading)}"
-
-
-OUTPUT_UNITS = {"amplitude": "mm", "width": "mm"}
-"""Units of outputs that are no strains, numbers, or stresses."""
-
-
-def output_unit(output: str) -> str:
-    """The unit of an output, "" for a number without one."""
-    return "MPa" if output.startswith("stress") else OUTPUT_UNITS.get(output, "")
+        return f"{temperature_text} C, {loading_text(self.loading, load_unit(self))}"
 
 
 def _rebuild(kind: type[History], state: dict[str, Any]) -> History:

@@ -13,8 +13,8 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats, frozen
 from creepkit.errors import SolveError
 
-Quantity: TypeAlias = Literal["stress", "pressure", "strain", "components"]
-"""What a loading prescribes."""
+Quantity: TypeAlias = str
+"""What a loading prescribes: the name of a load that a specimen takes, such as "stress", "pressure" or "force"."""
 
 
 @dataclass(frozen=True)
@@ -183,8 +183,8 @@ class PressureJump:
 class RecordedLoading:
     """A loading known as a program over time: a recorded column, or ramps that no simpler record describes.
 
-    quantity : "stress" or "pressure", MPa, or "strain", total.
-    control : as in StressSteps; without meaning for a pressure or a strain.
+    quantity : name of a load of the specimen, such as "pressure" or "force", in its unit.
+    control : as in StressSteps; without meaning for another load than a stress.
     """
 
     record: Program
@@ -192,12 +192,36 @@ class RecordedLoading:
     control: Literal["load", "stress"] = "load"
 
     def __post_init__(self) -> None:
-        if self.quantity not in ("stress", "pressure", "strain"):
-            raise SolveError(f"a loading of {self.quantity} is no single program; allowed are stress, pressure, strain")
+        if self.quantity == "components":
+            raise SolveError("a loading of components is no single program; use PointLoading")
 
     def program(self) -> Program:
         """Stress, pressure or total strain over time."""
         return self.record
+
+
+def constant_load(quantity: Quantity, value: float, ramp: float = 0.0) -> RecordedLoading:
+    """A load, in its unit, held from time zero, or from the end of a ramp (s) on: constant_load("force", 250.0)."""
+    return load_steps(quantity, [(0.0, value)], ramp)
+
+
+def load_steps(quantity: Quantity, steps: Sequence[tuple[float, float]], ramp: float = 0.0) -> RecordedLoading:
+    """A load by steps: load_steps("force", [(0, 100), (3600, 120)]) is 100 N, then 120 N from one hour on.
+
+    steps : (time in s, value in the unit of the load). ramp : s, in which each value is reached; 0 is at once.
+    """
+    pairs = [(float(t), float(value)) for t, value in steps]
+    starts = [t for t, _ in pairs]
+    if not pairs or starts[0] != 0.0 or any(b <= a for a, b in pairwise(starts)):
+        raise SolveError(f"steps of {quantity} must start at time 0 and follow one another in time")
+    shortest = min([b - a for a, b in pairwise(starts)], default=np.inf)
+    if not 0.0 <= ramp < min(shortest, np.inf):
+        raise SolveError(f"ramp is {ramp:g} s; it must not be negative nor outlast a step ({shortest:g} s)")
+    if ramp == 0.0:
+        return RecordedLoading(Program.steps(pairs), quantity)
+    values = [0.0, *(value for _, value in pairs)]
+    times = np.array([t for start in starts for t in (start, start + ramp)])
+    return RecordedLoading(Program(times, np.array([v for pair in pairwise(values) for v in pair])), quantity)
 
 
 TENSOR_COMPONENTS = ("11", "22", "33", "12", "23", "13")
@@ -257,15 +281,20 @@ def _as_program(given: ComponentHistory) -> Program:
     return Program.constant(given)
 
 
-def loading_text(loading: Loading) -> str:
-    """What is imposed, as people say it: '43 MPa', '60 to 95 MPa', 'strain 0.002', '11 100 MPa, 12 40 MPa'."""
+def loading_text(loading: Loading, unit: str = "MPa") -> str:
+    """What is imposed, as people say it: '43 MPa', '60 to 95 MPa', 'strain 0.002', '11 100 MPa, 12 40 MPa'.
+
+    unit : of the load.
+    """
     if isinstance(loading, PointLoading):
         parts = [f"{name} {_levels_text(p)} MPa" for name, p in loading.stress.items()]
         return ", ".join(parts + [f"strain {name} {_levels_text(p)}" for name, p in loading.strain.items()])
     program = loading.program()
-    if loading.quantity == "strain":
-        return f"strain {_levels_text(program)}"
-    return f"{program.values.max():g} MPa" if loading.quantity == "pressure" else f"{_levels_text(program)} MPa"
+    if not unit:
+        return f"{loading.quantity} {_levels_text(program)}"
+    if program.values[0] == 0.0 and program.times.size > 1:  # after a ramp, the load that was held is its largest
+        return f"{program.values.max():g} {unit}"
+    return f"{_levels_text(program)} {unit}"
 
 
 def _levels_text(program: Program) -> str:

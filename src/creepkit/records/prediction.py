@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError, nearest
+from creepkit.records.known_specimens import all_dimensions
 
 NuisanceValues: TypeAlias = Mapping[str, Floats]
 """{key: (candidates or 1, tests)}: the value of an explicit nuisance in each test; the key is its kind, of a step with
@@ -100,19 +101,8 @@ class Prediction:
         return np.asarray(self.values[candidate, test, : int(self.lengths[test])])
 
 
-NuisanceKind: TypeAlias = Literal[
-    "offset",
-    "rate",
-    "thickness",
-    "modulus",
-    "temperature",
-    "window",
-    "temperature step",
-    "temperature drift",
-    "rate step",
-    "rate drift",
-    "load step",
-]
+NuisanceKind: TypeAlias = str
+"""What a nuisance parameter is of: one of GENERAL_NUISANCES, or a length of a test piece."""
 
 
 PROGRAM_NUISANCES: tuple[NuisanceKind, ...] = ("temperature step", "temperature drift", "load step")
@@ -127,19 +117,18 @@ STEP_NUISANCES: tuple[NuisanceKind, ...] = ("temperature step", "rate step", "lo
 """Kinds that begin at a time of the test."""
 
 
-SIMULATED_NUISANCES: tuple[NuisanceKind, ...] = (
-    "thickness",
+COVARIANCE_NUISANCES: tuple[NuisanceKind, ...] = ("offset", "rate")
+"""Kinds that only enter the covariance of residuals; all others change the simulation."""
+
+
+GENERAL_NUISANCES: tuple[NuisanceKind, ...] = (
+    *COVARIANCE_NUISANCES,
     "modulus",
     "temperature",
-    "window",
     *PROGRAM_NUISANCES,
     *RATE_NUISANCES,
 )
-"""Kinds that change the simulation; "offset" and "rate" only enter the covariance of its residuals."""
-
-
-LENGTH_NUISANCES: tuple[NuisanceKind, ...] = ("thickness", "window")
-"""Kinds that are lengths in themselves, so that their prior mean is one too; the others are deviations, about zero."""
+"""Kinds that every experiment may have; beside them each has the lengths of its test piece."""
 
 
 @dataclass(frozen=True)
@@ -147,18 +136,18 @@ class Nuisance:
     """A nuisance parameter: something unknown about a test that is not part of the law, with its prior.
 
     kind : "offset" (added to an output, in its unit), "rate" (ln of a factor on this test's creep rate: heat-to-heat
-        scatter), "thickness" (the apex thickness itself, mm), "window" (the radius within which the profile was
-        observed, mm), "modulus" (relative change of Young's modulus: 0.05 makes it 5 % stiffer) or "temperature"
-        (K above what the history says). What the rig did during the test: "temperature step" (K, from `start` on),
+        scatter), "modulus" (relative change of Young's modulus: 0.05 makes it 5 % stiffer), "temperature" (K above what
+        the history says), or a length of the test piece itself, mm, such as "thickness" of a
+        dimple. What the rig did during the test: "temperature step" (K, from `start` on),
         "temperature drift" (K gained linearly from the start of the test to its last used frame), "rate step" (ln of a
         factor on every rate of the law, from `start` on), "rate drift" (such a factor's ln, gained linearly over the
         test) or "load step" (relative change of stress or pressure, from `start` on).
     scope : one nuisance parameter for each "test", each "alloy", or for "all" tests together.
     output : to which output an offset belongs; "" stands for each output having its own.
     mean, sd : Gaussian prior, in the unit of the kind; sd = inf leaves it free, sd = None lets the fit estimate the
-        spread. A thickness and a window are lengths, and so is their mean: `Nuisance("thickness", mean=0.4935,
-        sd=0.027)` says what was measured on such plates and replaces what histories and specimen say; without a mean
-        a test's thickness is about what its history (or the specimen) says.
+        spread. The mean of a length is one too: `Nuisance("thickness", mean=0.4935, sd=0.027)` says what was measured
+        on such plates and replaces what histories and specimen say; without a mean a test's length is about what its
+        history (or the specimen) says.
     bounds : hard limits, in the same unit.
     start : s, when a step begins.
     tests : names of the tests that it applies to; () stands for all. The other tests have a deviation of zero, or one
@@ -175,8 +164,9 @@ class Nuisance:
     tests: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.kind not in get_args(NuisanceKind):
-            raise SolveError(f"nuisance '{self.kind}' is not known; {nearest(self.kind, get_args(NuisanceKind))}")
+        if self.kind not in GENERAL_NUISANCES and self.kind not in all_dimensions():
+            known = (*GENERAL_NUISANCES, *all_dimensions())
+            raise SolveError(f"nuisance '{self.kind}' is not known; {nearest(str(self.kind), known)}")
         if self.scope not in (scopes := ("test", "alloy", "all")):
             raise SolveError(
                 f"nuisance '{self.kind}': scope '{self.scope}' is not known; {nearest(self.scope, scopes)}"
@@ -202,9 +192,24 @@ class Nuisance:
         """What values and derivatives are filed under: the kind, of a step with its start, 'rate step@3600'."""
         return nuisance_key(self.kind, self.start)
 
+    @property
+    def is_simulated(self) -> bool:
+        """Whether it changes the simulation, not only the covariance of residuals."""
+        return self.kind not in COVARIANCE_NUISANCES
+
+    @property
+    def is_length(self) -> bool:
+        """Whether it is a length in itself, so that its prior mean is one too; others are deviations, about zero."""
+        return is_length_nuisance(self.kind)
+
     def applies_to(self, test: str) -> bool:
         """Whether a test, by name, has this nuisance."""
         return not self.tests or test in self.tests
+
+
+def is_length_nuisance(kind: str) -> bool:
+    """Whether nuisance parameters of a kind are lengths of test pieces."""
+    return kind not in GENERAL_NUISANCES
 
 
 def nuisance_key(kind: str, start: float = 0.0) -> str:

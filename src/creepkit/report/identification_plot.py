@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.dataset.dataset import OUTPUT_UNITS
 from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, noise_standard_deviation, usable_frames
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
+from creepkit.records import output_unit
 from creepkit.report.condition_colours import (
     MOST_NAMED_TESTS,
     condition_groups,
@@ -122,7 +122,7 @@ def unit_of(output: str) -> str:
     """The unit in which an output is drawn."""
     if output in LOGARITHMIC_OUTPUTS:
         return "%"
-    return OUTPUT_UNITS.get(output, "MPa" if output.startswith("stress") else "")
+    return output_unit(output)
 
 
 def axis_label(output: str) -> str:

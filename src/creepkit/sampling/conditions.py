@@ -17,8 +17,7 @@ import numpy as np
 from creepkit.arrays import Floats, frozen
 from creepkit.errors import DatasetError, nearest
 from creepkit.language import Elastic
-from creepkit.records import History, PressureJump, Specimen, StressSteps
-from creepkit.records.history import ZERO_CELSIUS
+from creepkit.records import ZERO_CELSIUS, History, PressureJump, Specimen, StressSteps
 
 PAPER_INTERVAL, PAPER_END = 150.0, 43200.0
 """s; Materials and Methods of the paper: 289 frames from 0 to 12 h."""

@@ -15,9 +15,10 @@ from creepkit.errors import SolveError
 from creepkit.records import (
     History,
     HistoryPrediction,
+    Load,
     NuisanceValues,
+    Output,
     Prediction,
-    Program,
     Status,
     assemble_prediction,
     broadcast_candidates,
@@ -25,10 +26,11 @@ from creepkit.records import (
 )
 from creepkit.specimens.run import Run, run_from_outputs
 from creepkit.specimens.settings_checks import check_number, check_whole_number
+from creepkit.specimens.test_piece import BASIC_NUISANCES, warmer_and_stiffer
 
 if TYPE_CHECKING:
     from creepkit.integration import Integration, PointTest
-    from creepkit.language import CreepLaw, Elastic
+    from creepkit.language import CreepLaw
 
 
 STEPS_PER_BREAKPOINT = 20
@@ -39,7 +41,7 @@ SEARCH_TOLERANCE = 1e-3
 """Tolerance of the integration in a global search; creep of bars scatters by a thousand times as much."""
 
 
-NUISANCES = ("temperature", "modulus")
+NUISANCES = BASIC_NUISANCES
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,8 @@ class Bar:
 
     name: ClassVar[str]
     title: ClassVar[str]
-    outputs: ClassVar[tuple[str, ...]]
+    outputs: ClassVar[tuple[Output, ...]]
+    loads: ClassVar[tuple[Load, ...]]
     nuisances: ClassVar[tuple[str, ...]] = NUISANCES
     """Kinds of explicit nuisances that predict() understands."""
 
@@ -252,16 +255,8 @@ def _perturbed_histories(histories: Sequence[History], nuisances: Mapping[str, F
     """Histories that are so many K warmer, with moduli larger by these shares."""
     zeros = np.zeros(len(histories))
     temperature_changes, modulus_changes = nuisances.get("temperature", zeros), nuisances.get("modulus", zeros)
-    changed = []
-    for history, T, share in zip(histories, temperature_changes, modulus_changes, strict=True):
-        program = history.temperature_program()
-        elastic = None if history.elastic is None else _with_modulus_change(history.elastic, float(share))
-        changed.append(history.replace(temperature=Program(program.times, program.values + T), elastic=elastic))
-    return changed
-
-
-def _with_modulus_change(elastic: Elastic, share: float) -> Elastic:
-    return replace(elastic, E=elastic.E * (1.0 + share))
+    changes = zip(histories, temperature_changes, modulus_changes, strict=True)
+    return [warmer_and_stiffer(history, float(T), float(share)) for history, T, share in changes]
 
 
 def _concatenated(parts: Sequence[Prediction]) -> Prediction:

@@ -23,7 +23,9 @@ from creepkit.records import (
     TENSOR_COMPONENTS,
     History,
     HistoryPrediction,
+    Load,
     NuisanceValues,
+    Output,
     PointLoading,
     Prediction,
     Specimen,
@@ -40,7 +42,11 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
 
-OUTPUTS = ("strain", *(f"strain_{c}" for c in TENSOR_COMPONENTS), *(f"stress_{c}" for c in TENSOR_COMPONENTS))
+OUTPUTS = (
+    Output("strain", "strain", "equivalent creep strain", logarithmic=True, visible=2e-4),
+    *(Output(f"strain_{c}", "strain", f"strain {c}", grows=False) for c in TENSOR_COMPONENTS),
+    *(Output(f"stress_{c}", "signed stress", f"stress {c}", grows=False) for c in TENSOR_COMPONENTS),
+)
 
 
 DIFFERENCE_STEP = 1e-3
@@ -66,7 +72,8 @@ class MaterialPoint:
 
     name: ClassVar[str] = "point"
     title: ClassVar[str] = "Material point under prescribed stresses and strains of any components"
-    outputs: ClassVar[tuple[str, ...]] = OUTPUTS
+    outputs: ClassVar[tuple[Output, ...]] = OUTPUTS
+    loads: ClassVar[tuple[Load, ...]] = (Load("components", "number"),)
     nuisances: ClassVar[tuple[str, ...]] = NUISANCES
     """Kinds of explicit nuisances that predict() understands."""
 

@@ -13,13 +13,14 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import CreepkitError, SolveError
-from creepkit.records import History, Prediction, Status
+from creepkit.records import History, Load, Prediction, Status
 from creepkit.records.prediction_assembly import (
     HistoryPrediction,
     assemble_prediction,
     broadcast_candidates,
     check_nuisances,
 )
+from creepkit.specimens.test_piece import TestPiece
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
@@ -38,19 +39,19 @@ class OneTest:
     end_time: float = float("nan")
 
 
-class PerTest(ABC):
+class PerTest(TestPiece, ABC):
     """Predicts by a function of one candidate in one test: a beam of fibres, a formula, another program.
 
-    A subclass states `name`, `title` and `outputs`, the first the one that grows with creep; `nuisances`, the kinds
-    that one() takes (none by default); and `workers`, how many tests are predicted at once by threads: more than one
-    where one() waits for another program. Batches, padding and errors are done here, sensitivities by differences where
-    they are asked for.
+    A subclass states `name`, `title` and `outputs`, the first the one that grows with creep; `loads`, what can be
+    imposed; and `workers`, how many tests are predicted at once by threads: more than one where one() waits for another
+    program. A subclass that is a frozen dataclass has lengths, by fields that are `dimension()`. Batches, padding,
+    lengths, nuisance parameters and errors are done here, sensitivities by differences where they are asked for.
     """
 
     name: str
     title: str
     outputs: tuple[str, ...]
-    nuisances: tuple[str, ...] = ()
+    loads: tuple[Load, ...] = ()
     workers: int = 1
 
     @abstractmethod
@@ -59,7 +60,8 @@ class PerTest(ABC):
     ) -> Mapping[str, ArrayLike] | OneTest:
         """{output: (times,)} at the times of the history, in the output's unit; a OneTest where it ends before.
 
-        values : {parameter: value} in the law's units. nuisances : {kind: value} of this test.
+        values : {parameter: value} in the law's units. nuisances : {kind: value} of this test; the lengths of the test
+        piece, and the temperature and modulus of the history, are already as they say.
         SolveError where these values cannot be solved for: the candidate then counts as one that did not converge.
         """
 
@@ -105,7 +107,8 @@ class PerTest(ABC):
         """Outputs (times, outputs), status, end and reason of one candidate; errors name test, values and line."""
         end = float(history.times[-1])
         try:
-            found = self.one(law, values, history, nuisances)
+            piece, tested = self.of_test(history, nuisances)
+            found = piece.one(law, values, tested, nuisances)
         except SolveError as error:
             return np.full((history.times.size, len(self.outputs)), np.nan), Status.NOT_CONVERGED, 0.0, str(error)
         except CreepkitError as error:

@@ -8,8 +8,10 @@ becomes ln(1 + strain). The stress must not fall below zero: compression after a
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -18,7 +20,7 @@ from creepkit import integration
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
-from creepkit.records import History, Program, Specimen
+from creepkit.records import History, Load, Output, Program, Specimen
 from creepkit.specimens.bar import Bar, isothermal_elasticity
 
 if TYPE_CHECKING:
@@ -35,7 +37,11 @@ class Relaxation(Bar):
 
     name: ClassVar[str] = "relaxation"
     title: ClassVar[str] = "Uniaxial tension under held total strain, or steps and ramps of it"
-    outputs: ClassVar[tuple[str, ...]] = ("stress",)
+    outputs: ClassVar[tuple[Output, ...]] = (Output("stress", "stress", grows=False),)
+    loads: ClassVar[tuple[Load, ...]] = (Load("strain", "strain", "total strain"),)
+    conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
+        {"strain": (5e-4, 5e-3), "modulus": (50e3, 300e3)}
+    )
 
     def point_test(self, history: History) -> PointTest:
         """The elastic stress of the total strain, the modulus, and the temperature over time."""

@@ -7,9 +7,10 @@ predicted too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -18,7 +19,7 @@ from creepkit import integration
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
-from creepkit.records import History, Prediction, Specimen, Status, TimesToStrain
+from creepkit.records import History, Load, Output, Prediction, Specimen, Status, TimesToStrain
 from creepkit.specimens.bar import Bar, elastic_strain, observed_strain
 
 if TYPE_CHECKING:
@@ -32,7 +33,10 @@ class Uniaxial(Bar):
 
     name: ClassVar[str] = "uniaxial"
     title: ClassVar[str] = "Uniaxial tension under steps of stress or load"
-    outputs: ClassVar[tuple[str, ...]] = ("strain",)
+    outputs: ClassVar[tuple[Output, ...]] = (Output("strain", "strain", logarithmic=True, visible=2e-4),)
+    loads: ClassVar[tuple[Load, ...]] = (Load("stress", "stress"),)
+    conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({"stress": (40.0, 300.0)})
+    """Stresses, MPa, of the paper's dimple of 0.5 mm under its pressures, about 12.5 times them."""
 
     def point_test(self, history: History) -> PointTest:
         """The stress and the temperature over time."""

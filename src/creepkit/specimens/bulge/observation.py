@@ -18,13 +18,18 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats, frozen
 from creepkit.errors import FitError, SolveError, nearest
 from creepkit.fem.mesh import SurfaceInterpolation, checked_surface_radii, surface_interpolation_with_slopes
+from creepkit.records import Output
 
 if TYPE_CHECKING:  # heavy, and a list of specimens needs none of it
     from creepkit.fem.time_interpolation import TimeInterpolation
     from creepkit.specimens.bulge.gaussian_fit import GaussianFit
 
-OBSERVED = ("amplitude", "width", "shape")
-"""Columns of what is observed: D_amp in mm, S_d in mm, S_p."""
+OBSERVED = (
+    Output("amplitude", "length", noise=0.0015, weight=0.99, visible=0.02),
+    Output("width", "length", grows=False, noise=0.02, weight=0.005),
+    Output("shape", "number", grows=False, noise=0.02, weight=0.005),
+)
+"""Columns of what is observed: D_amp in mm, S_d in mm, S_p. Noise as measured on real dimples; the paper's weights."""
 
 
 Form = Literal["profile", "field"]

@@ -11,13 +11,17 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
-from creepkit.records import History
-from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.records import Dimension, History, Load
+from creepkit.specimens.bulge.geometry import LENGTH_RANGE, DimpleGeometry
 from creepkit.specimens.bulge.observation import Observation
 from creepkit.specimens.settings_checks import check_number, check_whole_number, is_whole_number
 
 if TYPE_CHECKING:
     from creepkit.fem.mesh import Mesh
+
+
+_LENGTHS: dict[str, dict[str, Any]] = {"apex_thickness": {"tolerance": 0.02, "alias": "thickness"}}
+"""What is known of a length beside its value: a thickness is measured to some 0.01 mm."""
 
 
 _RANGES = {
@@ -54,11 +58,14 @@ class BulgeSettings:
     max_steps: int = 1000
     threads: int | None = None
 
-    nuisances: ClassVar[tuple[str, ...]] = ("thickness", "modulus", "temperature", "window")
+    nuisances: ClassVar[tuple[str, ...]] = (*("thickness", "modulus", "temperature", "window"), *DimpleGeometry.lengths)
     """Kinds of explicit nuisances that predict() understands."""
 
-    tolerances: ClassVar[Mapping[str, float]] = MappingProxyType({"thickness": 0.02})
-    """Relative standard deviation of a length that nobody measured better: a thickness is measured to some 0.01 mm."""
+    loads: ClassVar[tuple[Load, ...]] = (Load("pressure", "pressure"),)
+    conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
+        {"pressure": (3.0, 25.0), "modulus": (50e3, 300e3)}
+    )
+    """The paper's ranges, MPa."""
 
     def __post_init__(self) -> None:
         for name, (low, high) in _RANGES.items():
@@ -81,6 +88,23 @@ class BulgeSettings:
         if geometry_changes:
             changes["geometry"] = changes.get("geometry", self.geometry).replace(**geometry_changes)
         return replace(self, **changes)
+
+    @property
+    def dimensions(self) -> tuple[Dimension, ...]:
+        """The lengths of the dimple, and the window within which it is observed."""
+        lengths = tuple(
+            Dimension(name, getattr(self.geometry, name), LENGTH_RANGE, **_LENGTHS.get(name, {}))
+            for name in DimpleGeometry.lengths
+        )
+        return (*lengths, Dimension("window", self.observation.window, LENGTH_RANGE, of_piece=False))
+
+    def growth_per_strain(self, history: History) -> float:
+        """mm of amplitude for each unit of reference strain: 42.3 (t/0.5 mm)^-0.486 for the default.
+
+        Fitted to simulations of the default dimple with Norton's law, n from 1 to 8, t from 0.44 to 0.60 mm.
+        """
+        thickness = history.geometry.get("apex_thickness", self.geometry.apex_thickness) / 0.5
+        return float(42.3 * (self.geometry.cavity_radius / 7.5) ** 1.486 * thickness**-0.486)
 
     def reference_stress(self, history: History) -> Floats:
         """Reference von Mises stress of each pressure level, (levels,) MPa: 12.5 P (t/0.5 mm)^-1.15 for the default.

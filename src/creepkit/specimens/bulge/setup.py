@@ -13,7 +13,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.simulation import LoadHistory
-from creepkit.records import History, Program, with_program_nuisances
+from creepkit.records import History, Program, check_geometry, with_program_nuisances
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import Observation
 
@@ -48,6 +48,7 @@ def set_up_test(specimen: BulgeSettings, history: History, nuisances: Mapping[st
         raise SolveError(
             f"{where}: a bulge specimen is loaded by pressure, found {history.loading.quantity}; use PressureJump"
         )
+    check_geometry(specimen, history.geometry, where)
     if history.times[-1] <= 0.0:
         raise SolveError(f"{where}: the last time is 0 s, where the load only begins; ask for a time after it")
     if history.elastic is None:
@@ -59,8 +60,9 @@ def set_up_test(specimen: BulgeSettings, history: History, nuisances: Mapping[st
         raise SolveError(f"{where}: the pressure is zero throughout; a bulge test needs one above zero")
     geometry = _geometry(specimen, history, nuisances)
     operator = Observation.from_text(history.operator) if history.operator else specimen.observation
-    if "window" in nuisances:
-        operator = operator.replace(window=float(nuisances["window"]))
+    window = nuisances.get("window", history.geometry.get("window"))
+    if window is not None:
+        operator = operator.replace(window=float(window))
     temperature = history.temperature_program()
     temperature = Program(temperature.times, temperature.values + nuisances.get("temperature", 0.0))
     modulus = modulus_program(history.elastic, temperature, 1.0 + nuisances.get("modulus", 0.0), where)
@@ -108,6 +110,9 @@ def _model_of_mesh(specimen: BulgeSettings) -> FiniteElementModel:
 def _geometry(specimen: BulgeSettings, history: History, nuisances: Mapping[str, float]) -> DimpleGeometry:
     """The specimen's geometry, with what was measured of this test and then what is assumed of it."""
     changes = {name: value for name, value in history.geometry.items() if name in DimpleGeometry.lengths}
+    if "thickness" in nuisances and "apex_thickness" in nuisances:
+        raise SolveError("'thickness' and 'apex_thickness' are the same nuisance parameter; keep one of them")
+    changes |= {name: float(value) for name, value in nuisances.items() if name in DimpleGeometry.lengths}
     if "thickness" in nuisances:
         changes["apex_thickness"] = float(nuisances["thickness"])
     if not changes:

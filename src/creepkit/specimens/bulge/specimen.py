@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from creepkit.arrays import Floats
 from creepkit.hookspecs import hookimpl
-from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Prediction, Predictor, Specimen
+from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Output, Prediction, Predictor, Specimen
 from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.bulge.settings import BulgeSettings
 
@@ -28,7 +28,7 @@ class Bulge(BulgeSettings):
 
     name: str = field(default="bulge", init=False)
     title: str = field(default="Bulge test of a dimple under gas pressure, by finite elements", init=False)
-    outputs: tuple[str, ...] = field(default=OBSERVED, init=False)
+    outputs: tuple[Output, ...] = field(default=OBSERVED, init=False)
 
     program_nuisances: ClassVar[tuple[str, ...]] = PROGRAM_NUISANCES
     """Kinds of nuisances of a history's programs that predict() differentiates itself."""

@@ -1,0 +1,141 @@
+"""What the registered specimens say of themselves, for layers below the registry and for those that have a name only.
+
+The registry states here, when it is imported, how a specimen is found by name; nothing else is kept here.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Protocol
+
+from creepkit.errors import SolveError, nearest
+from creepkit.records.specimen_record import Dimension, Load, Output
+
+Registered = Any
+"""A registered specimen; the interfaces of specimens and histories stand above this module."""
+
+
+class StatedTest(Protocol):
+    """What is read of a history here."""
+
+    @property
+    def specimen(self) -> str: ...  # noqa: D102
+    @property
+    def outputs(self) -> Mapping[str, Any]: ...  # noqa: D102
+    @property
+    def loading(self) -> Any: ...  # noqa: D102
+    @property
+    def origin(self) -> str: ...  # noqa: D102
+
+
+SpecimenSource = Callable[[], Mapping[str, Registered]]
+
+
+_sources: list[SpecimenSource] = []
+
+
+def find_specimens_by(source: SpecimenSource) -> None:
+    """State how the registered specimens, {name: specimen}, are had; the last source counts."""
+    _sources[:] = [source]
+
+
+def known_specimens() -> Mapping[str, Registered]:
+    """{name: specimen} of all that are registered."""
+    if not _sources:
+        importlib.import_module("creepkit.registry")  # which states how; a layer above, so not imported by name
+    return _sources[0]()
+
+
+def specimen_of(history: StatedTest) -> Registered | None:
+    """The registered specimen that a history names; None where there is none of this name."""
+    return known_specimens().get(history.specimen)
+
+
+def outputs_of(predictor: object) -> tuple[Output, ...]:
+    """The outputs of a predictor; those of which it gives the names alone are numbers."""
+    stated = getattr(predictor, "outputs", ())
+    own = getattr(getattr(predictor, "specimen", None), "outputs", ())
+    known = {name: output for name in own if isinstance(output := name, Output)}
+    return tuple(o if isinstance(o, Output) else known.get(o, Output(o)) for o in stated)
+
+
+def loads_of(predictor: object) -> tuple[Load, ...]:
+    """The loads that a specimen, or a predictor that stands for one, takes; () where it does not say."""
+    return tuple(getattr(_specimen_behind(predictor), "loads", ()))
+
+
+def dimensions_of(predictor: object) -> tuple[Dimension, ...]:
+    """The lengths of a specimen's test piece, with its own as defaults; () where it does not say."""
+    return tuple(getattr(_specimen_behind(predictor), "dimensions", ()))
+
+
+def _specimen_behind(predictor: object) -> object:
+    return getattr(predictor, "specimen", predictor)
+
+
+def dimension_named(predictor: object, name: str) -> Dimension | None:
+    """The length of a specimen's test piece of this name or alias; None where it has none."""
+    return next((d for d in dimensions_of(predictor) if name in d.names), None)
+
+
+def output_named(name: str, specimen: str = "") -> Output:
+    """What is known of an output: from the specimen of that name, else from any that has such an output.
+
+    An output that no registered specimen has is a number.
+    """
+    known = known_specimens()
+    own = [known[specimen]] if specimen in known else []
+    for candidate in (*own, *known.values()):
+        for output in outputs_of(candidate):
+            if output == name:
+                return output
+    return Output(name)
+
+
+def output_unit(output: str, specimen: str = "") -> str:
+    """The unit of an output, "" for a number without one."""
+    return output_named(output, specimen).unit
+
+
+def growing_output(history: StatedTest) -> str:
+    """The output of a history that shows creep best: the first that grows with it, else the first; "" for none."""
+    stated = outputs_of(specimen_of(history))
+    grows = [o for o in stated if o.grows and o in history.outputs]
+    return str(next(iter([*grows, *history.outputs]), ""))
+
+
+def load_named(quantity: str, specimen: str = "") -> Load | None:
+    """What is known of a load: from the specimen of that name, else from any that takes such a load."""
+    known = known_specimens()
+    own = [known[specimen]] if specimen in known else []
+    return next((load for one in (*own, *known.values()) for load in loads_of(one) if load.name == quantity), None)
+
+
+def load_unit(history: StatedTest) -> str:
+    """The unit of what is imposed in a test, MPa where no specimen says."""
+    load = load_named(history.loading.quantity, history.specimen)
+    return "MPa" if load is None else load.unit
+
+
+def all_dimensions() -> dict[str, Dimension]:
+    """{name or alias: length} over all registered specimens."""
+    return {name: d for one in known_specimens().values() for d in dimensions_of(one) for name in d.names}
+
+
+def check_load(predictor: object, history: StatedTest) -> None:
+    """SolveError unless a specimen takes the load of a history."""
+    loads = loads_of(predictor)
+    if not loads or history.loading.quantity in (load.name for load in loads):
+        return
+    name = getattr(_specimen_behind(predictor), "name", type(predictor).__name__)
+    allowed = " or ".join(f"{load.name} ({load.unit})" if load.unit else load.name for load in loads)
+    raise SolveError(f"{history.origin}: specimen '{name}' is loaded by {allowed}, found {history.loading.quantity}")
+
+
+def check_geometry(predictor: object, names: Iterable[str], where: str) -> None:
+    """SolveError for a length that the test piece of a specimen does not have."""
+    known = [d.name for d in dimensions_of(predictor)]
+    for name in names:
+        if known and name not in known:
+            raise SolveError(f"{where}: its test piece has no length '{name}'; {nearest(name, known)}")

@@ -1,0 +1,163 @@
+"""Quantities and their units: how a number that is written in some unit becomes creepkit's own, MPa, mm, s, K, N."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from creepkit.errors import HistoryError
+
+ZERO_CELSIUS = 273.15
+
+
+@dataclass(frozen=True)
+class UnitConversion:
+    """How a number in some unit becomes creepkit's own: factor * number + shift."""
+
+    factor: float
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class QuantityKind:
+    """A kind of quantity: the unit suffixes it may carry (creepkit's own first) and the values that make sense.
+
+    low, high : the values, in creepkit's unit, that bound the sensible ones; both excluded when `open`.
+    """
+
+    name: str
+    units: Mapping[str, UnitConversion]
+    low: float = -1e30
+    high: float = 1e30
+    open_interval: bool = False
+
+    def unit(self, suffix: str, location: str, name: str) -> UnitConversion:
+        """Return the unit that a suffix means; `name` and `place` say in the error what was read and where."""
+        if suffix not in self.units:
+            raise HistoryError(
+                f"{location}: {self._unit_error(name, suffix)}; allowed: {self._spellings(name, suffix)}"
+            )
+        return self.units[suffix]
+
+    def convert(self, number: float, suffix: str, location: str, name: str) -> float:
+        """Return `number` in creepkit's unit."""
+        unit = self.unit(suffix, location, name)
+        value = unit.factor * number + unit.offset
+        is_inside = self.low < value < self.high if self.open_interval else self.low <= value <= self.high
+        if not (math.isfinite(value) and is_inside):
+            raise HistoryError(f"{location}: '{name}' is {number:g}; a {self.name} must lie {self.range_text}")
+        return value
+
+    @property
+    def range_text(self) -> str:
+        """The sensible values in words."""
+        unit = next(iter(self.units))
+        template = ("above {} and below {}" if self.open_interval else "from {} to {}").format(
+            f"{self.low:g}", f"{self.high:g}"
+        )
+        return f"{template} {unit}".rstrip()
+
+    def standard_deviation(self) -> QuantityKind:
+        """The kind of a standard deviation of this quantity: same units, above zero."""
+        units = {suffix: UnitConversion(unit.factor) for suffix, unit in self.units.items()}
+        return replace(self, name=f"standard deviation of a {self.name}", units=units, low=0.0, open_interval=True)
+
+    def _unit_error(self, name: str, suffix: str) -> str:
+        return f"the unit '{suffix}' of '{name}' is not understood" if suffix else f"'{name}' has no unit"
+
+    def _spellings(self, name: str, suffix: str) -> str:
+        if not name.endswith(suffix):  # the unit stood apart from the name
+            return ", ".join(self.units)
+        stem = name.removesuffix(suffix).rstrip("_")
+        return ", ".join(f"{stem}_{unit}" if unit else stem for unit in self.units)
+
+
+TIME = QuantityKind(
+    "time",
+    {"s": UnitConversion(1.0), "min": UnitConversion(60.0), "h": UnitConversion(3600.0), "d": UnitConversion(86400.0)},
+    low=0.0,
+)
+
+
+LENGTH = QuantityKind("length", {"mm": UnitConversion(1.0), "um": UnitConversion(1e-3), "m": UnitConversion(1e3)})
+
+
+STRAIN = QuantityKind("strain", {"": UnitConversion(1.0), "pct": UnitConversion(1e-2), "percent": UnitConversion(1e-2)})
+
+
+NUMBER = QuantityKind("number", {"": UnitConversion(1.0)})
+
+
+STRESS = QuantityKind(
+    "stress",
+    {
+        "MPa": UnitConversion(1.0),
+        "kPa": UnitConversion(1e-3),
+        "GPa": UnitConversion(1e3),
+        "bar": UnitConversion(0.1),
+        "ksi": UnitConversion(6.894757293168361),
+    },
+    low=0.0,
+    high=1e5,
+)
+
+
+SIGNED_STRESS = replace(STRESS, low=-1e5)
+
+
+MODULUS = QuantityKind(
+    "modulus",
+    {"MPa": UnitConversion(1.0), "GPa": UnitConversion(1e3), "ksi": UnitConversion(6.894757293168361)},
+    0.0,
+    1e8,
+    open_interval=True,
+)
+
+
+POISSON = QuantityKind("Poisson's ratio", NUMBER.units, low=-1.0, high=0.5, open_interval=True)
+
+
+TEMPERATURE = QuantityKind(
+    "temperature",
+    {"K": UnitConversion(1.0), "C": UnitConversion(1.0, ZERO_CELSIUS)},
+    low=0.0,
+    high=1e4,
+    open_interval=True,
+)
+
+
+FLAG = QuantityKind("flag", NUMBER.units, low=0.0, high=1.0)
+
+
+FORCE = QuantityKind(
+    "force", {"N": UnitConversion(1.0), "kN": UnitConversion(1e3), "lbf": UnitConversion(4.4482216152605)}
+)
+
+
+MOMENT = QuantityKind("moment", {"Nmm": UnitConversion(1.0), "Nm": UnitConversion(1e3)})
+
+
+ANGLE = QuantityKind("angle", {"rad": UnitConversion(1.0), "deg": UnitConversion(math.pi / 180.0)})
+
+
+QUANTITIES: Mapping[str, QuantityKind] = MappingProxyType(
+    {
+        **{"strain": STRAIN, "number": NUMBER, "length": LENGTH, "stress": STRESS, "pressure": STRESS},
+        **{
+            "signed stress": SIGNED_STRESS,
+            "force": FORCE,
+            "moment": MOMENT,
+            "angle": ANGLE,
+            "temperature": TEMPERATURE,
+            "time": TIME,
+        },
+    }
+)
+"""{name: kind} of what the outputs and loads of a specimen may be; creepkit's own unit is the first of each kind."""
+
+
+def unit_of(quantity: str) -> str:
+    """creepkit's own unit of a quantity, "" for a number without one."""
+    return next(iter(QUANTITIES[quantity].units))

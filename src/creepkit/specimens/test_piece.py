@@ -1,0 +1,101 @@
+"""TestPiece: a specimen as a frozen dataclass whose fields are the lengths of its test piece and its settings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import Field, field, replace
+from typing import Any, Self
+
+from creepkit.errors import SolveError, nearest
+from creepkit.records import Dimension, History, Program, check_geometry, check_load, dimension_named
+
+BASIC_NUISANCES = ("temperature", "modulus")
+"""Kinds that every test piece follows: they change the history itself."""
+
+
+def dimension(
+    default: float,
+    bounds: tuple[float, float] = (1e-3, 1e4),
+    *,
+    tolerance: float = 0.0,
+    long_name: str = "",
+    alias: str = "",
+) -> Any:
+    """A field of a TestPiece that is a length of it, mm; see records.Dimension.
+
+    The name of the field is a key of history files, an option of the command line and a nuisance parameter.
+    """
+    return field(
+        default=default,
+        metadata={"dimension": {"bounds": bounds, "tolerance": tolerance, "long_name": long_name, "alias": alias}},
+    )
+
+
+class TestPiece:
+    """A specimen whose subclasses are frozen dataclasses; what `dimension()` marks are its lengths.
+
+    `self.span` in its methods is the length of the test at hand: what the test states, or a nuisance parameter that is
+    being estimated, takes the place of the default.
+    """
+
+    __test__ = False  # not a test case, whatever its name says to pytest
+
+    name: str
+
+    @property
+    def dimensions(self) -> tuple[Dimension, ...]:
+        """The lengths of the test piece, with its own values as defaults."""
+        marked = (f for f in _fields_of(self) if "dimension" in f.metadata)
+        return tuple(Dimension(f.name, float(getattr(self, f.name)), **f.metadata["dimension"]) for f in marked)
+
+    @property
+    def nuisances(self) -> tuple[str, ...]:
+        """Kinds of explicit nuisances that predict() understands: lengths, temperature and modulus."""
+        return (*(name for d in self.dimensions for name in d.names), *BASIC_NUISANCES)
+
+    def replace(self, **changes: Any) -> Self:
+        """The same specimen with some fields changed."""
+        known = {f.name for f in _fields_of(self) if f.init}
+        if not known:
+            raise SolveError(f"specimen '{self.name}' has no fields to replace; make its class a frozen dataclass")
+        for name in changes:
+            if name not in known:
+                raise SolveError(f"specimen '{self.name}' has no field '{name}'; {nearest(name, known)}")
+        changed: Self = replace(self, **changes)  # type: ignore[type-var]
+        for each in changed.dimensions:  # which refuse a default outside their bounds
+            each.checked(each.default, f"specimen '{self.name}'")
+        return changed
+
+    def of_test(self, history: History, nuisances: Mapping[str, float]) -> tuple[Self, History]:
+        """The test piece and the history of one test, as that test and its nuisances {kind: value} say.
+
+        SolveError for a load that the specimen does not take, and for a length that it does not have.
+        """
+        check_load(self, history)
+        check_geometry(self, history.geometry, history.origin)
+        lengths = {name: self._length(name, value, history) for name, value in history.geometry.items()}
+        for kind, value in nuisances.items():
+            known = dimension_named(self, kind)
+            if known is not None:
+                lengths[known.name] = self._length(kind, value, history)
+        piece = self.replace(**lengths) if lengths and self.dimensions else self
+        return piece, warmer_and_stiffer(history, nuisances.get("temperature", 0.0), nuisances.get("modulus", 0.0))
+
+    def _length(self, name: str, value: float, history: History) -> float:
+        known = dimension_named(self, name)
+        return value if known is None else known.checked(value, history.origin)
+
+
+def _fields_of(record: object) -> tuple[Field[Any], ...]:
+    """The fields of a dataclass; () of another class."""
+    return tuple(getattr(type(record), "__dataclass_fields__", {}).values())
+
+
+def warmer_and_stiffer(history: History, temperature_change: float, modulus_change: float) -> History:
+    """A history that is so many K warmer, its modulus larger by that share."""
+    if temperature_change == 0.0 and modulus_change == 0.0:
+        return history
+    program, elastic = history.temperature_program(), history.elastic
+    if elastic is not None:
+        elastic = replace(elastic, E=elastic.E * (1.0 + modulus_change))
+    return history.replace(temperature=Program(program.times, program.values + temperature_change), elastic=elastic)
