@@ -84,8 +84,10 @@ class NuisanceParameters:
             offered = [_takes_effect(nuisance, h, predictor) for h in histories]
             named = any(nuisance.applies_to(h.name) for h in histories)
             if named and not any(offered):
+                allowed = {k for h in histories for k in getattr(predictor_for(predictor, h), "nuisances", ())}
                 raise FitError(
-                    f"nuisance '{nuisance.key}' means nothing to the predictor of these histories; leave it out"
+                    f"nuisance '{nuisance.key}' means nothing to the predictor of these histories; leave it out, or "
+                    f"take another: {nearest(nuisance.kind, sorted(allowed))}"
                 )
             owners_of_tests = [owner_of(nuisance, h) for h in histories]
             distinct_owners = list(dict.fromkeys(m for m, k in zip(owners_of_tests, offered, strict=True) if k))

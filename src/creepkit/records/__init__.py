@@ -26,6 +26,7 @@ from creepkit.records.known_specimens import (
     output_named,
     output_unit,
     outputs_of,
+    remember_specimen,
     specimen_of,
 )
 from creepkit.records.law_with_values import LawWithValues, Units
@@ -136,6 +137,7 @@ __all__ = [
     "output_named",
     "output_unit",
     "outputs_of",
+    "remember_specimen",
     "specimen_of",
     "unit_of",
     "unpredicted",

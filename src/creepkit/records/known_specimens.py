@@ -40,11 +40,22 @@ def find_specimens_by(source: SpecimenSource) -> None:
     _sources[:] = [source]
 
 
+_used: dict[str, Registered] = {}
+
+
+def remember_specimen(predictor: object) -> None:
+    """Keep what a specimen says of itself that was given to a public function and that no plugin registered."""
+    specimen = _specimen_behind(predictor)
+    name = getattr(specimen, "name", None)
+    if isinstance(name, str) and hasattr(specimen, "outputs"):
+        _used[name] = specimen
+
+
 def known_specimens() -> Mapping[str, Registered]:
-    """{name: specimen} of all that are registered."""
+    """{name: specimen} of all that are registered, and of others that were used in this process."""
     if not _sources:
         importlib.import_module("creepkit.registry")  # which states how; a layer above, so not imported by name
-    return _sources[0]()
+    return {**_used, **_sources[0]()}
 
 
 def specimen_of(history: StatedTest) -> Registered | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from enum import IntEnum
 from typing import Literal, TypeAlias
 
@@ -12,6 +13,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError, nearest
 from creepkit.records.known_specimens import all_dimensions
+from creepkit.records.specimen_record import NAME_PATTERN
 
 NuisanceValues: TypeAlias = Mapping[str, Floats]
 """{key: (candidates or 1, tests)}: the value of an explicit nuisance in each test; the key is its kind, of a step with
@@ -131,6 +133,10 @@ GENERAL_NUISANCES: tuple[NuisanceKind, ...] = (
 """Kinds that every experiment may have; beside them each has the lengths of its test piece."""
 
 
+CLOSE_SPELLING = 0.8
+"""Similarity above which an unknown kind is a misspelt one."""
+
+
 @dataclass(frozen=True)
 class Nuisance:
     """A nuisance parameter: something unknown about a test that is not part of the law, with its prior.
@@ -164,9 +170,7 @@ class Nuisance:
     tests: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.kind not in GENERAL_NUISANCES and self.kind not in all_dimensions():
-            known = (*GENERAL_NUISANCES, *all_dimensions())
-            raise SolveError(f"nuisance '{self.kind}' is not known; {nearest(str(self.kind), known)}")
+        _check_kind(self.kind)
         if self.scope not in (scopes := ("test", "alloy", "all")):
             raise SolveError(
                 f"nuisance '{self.kind}': scope '{self.scope}' is not known; {nearest(self.scope, scopes)}"
@@ -205,6 +209,14 @@ class Nuisance:
     def applies_to(self, test: str) -> bool:
         """Whether a test, by name, has this nuisance."""
         return not self.tests or test in self.tests
+
+
+def _check_kind(kind: str) -> None:
+    """SolveError for what is neither a general kind nor can be a length; a specimen may be known only later."""
+    known = (*GENERAL_NUISANCES, *all_dimensions())
+    misspelt = get_close_matches(str(kind), known, 1, cutoff=CLOSE_SPELLING)
+    if kind not in known and (misspelt or not (isinstance(kind, str) and NAME_PATTERN.fullmatch(kind))):
+        raise SolveError(f"nuisance '{kind}' is not known; {nearest(str(kind), known)}")
 
 
 def is_length_nuisance(kind: str) -> bool:

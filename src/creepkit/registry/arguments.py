@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from creepkit.errors import FitError, LawError, SolveError
 from creepkit.readers import reading
-from creepkit.records import History, Predictor
+from creepkit.records import History, Predictor, remember_specimen
 from creepkit.registry.plugin_registry import default_registry
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def resolve_predictor(predictor: Predictor | str) -> Predictor:
         return default_registry().specimen(predictor)
     if not hasattr(predictor, "predict"):
         raise SolveError(f"a specimen, its name or another predictor is needed, found {type(predictor).__name__}")
+    remember_specimen(predictor)
     return predictor
 
 
