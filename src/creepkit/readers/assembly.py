@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +17,7 @@ from creepkit.readers.conditions import (
     read_temperature,
 )
 from creepkit.readers.text_tables import Frames, SourceText, TextTable, column_means, read_frames
-from creepkit.readers.vocabulary import IDENTIFIABLE_SPECIMENS, SPECIMEN_OUTPUTS, HeaderVocabulary
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records import History
 
 if TYPE_CHECKING:
@@ -40,14 +40,15 @@ def assemble_history(
     columns in `skipped_columns`; source : what the history says of its origin.
     """
     conditions = StatedConditions(entries, vocabulary, location)
-    frames = read_frames(table, vocabulary, skipped_columns)
+    frames = read_frames(table, vocabulary, conditions.terms, skipped_columns)
     columns = table.location(table.columns_line)
-    specimen, outputs = _specimen_and_outputs(conditions, frames, vocabulary, columns)
+    loading = read_loading(conditions, frames)
+    specimen, outputs = _specimen_and_outputs(conditions, frames, loading.quantity, columns)
     strain_measure = conditions.take_choice(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
     elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required="strain" in outputs)
-    loading, temperature = read_loading(conditions, frames), read_temperature(conditions, frames)
+    temperature = read_temperature(conditions, frames)
     used = _used_frames(conditions, frames)
     rupture_time, unruptured = _end_of_test(conditions, frames, used)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
@@ -80,28 +81,32 @@ def _merge_label(frames: Frames) -> dict[str, str]:
 
 
 def _specimen_and_outputs(
-    conditions: StatedConditions, frames: Frames, vocabulary: HeaderVocabulary, location: str
+    conditions: StatedConditions, frames: Frames, load: str, location: str
 ) -> tuple[str, dict[str, Floats]]:
-    """The specimen, as named or as its outputs identify it, and its outputs."""
-    stated_specimen = conditions.take_text("specimen")
-    identifiable = {
-        name: outputs
-        for name, outputs in vocabulary.outputs.items()
-        if name in IDENTIFIABLE_SPECIMENS or name not in SPECIMEN_OUTPUTS
-    }
-    candidates = (
-        {stated_specimen: vocabulary.outputs[stated_specimen]}
-        if stated_specimen in vocabulary.outputs and stated_specimen not in identifiable
-        else identifiable
-    )
-    present = [name for name, outputs in candidates.items() if outputs.keys() & frames.values.keys()]
-    if len(present) != 1 or (stated_specimen in vocabulary.outputs and stated_specimen != present[0]):
-        description = f"outputs of {' and '.join(present)}" if present else "no output"
-        wanted = f"those of {stated_specimen}" if stated_specimen in vocabulary.outputs else "those of one specimen"
-        known = "; ".join(f"{', '.join(outputs)} ({name})" for name, outputs in vocabulary.outputs.items())
-        raise HistoryError(f"{location}: missing column: the columns hold {description}, {wanted} are needed: {known}")
-    outputs = {name: frames.values[name] for name in vocabulary.outputs[present[0]] if name in frames.values}
-    return stated_specimen or present[0], outputs
+    """The specimen, as named or as outputs and load identify it, and its outputs."""
+    named, terms = conditions.take_text("specimen"), conditions.terms
+    present = terms.specimens_with(frames.values)
+    if named in terms.outputs:
+        chosen = [named] if named in present else []
+    else:
+        chosen = [name for name in present if load in terms.loads.get(name, [load])] or present
+    if len(chosen) != 1:
+        raise _unidentified(named, present if named in terms.outputs else chosen, terms, location)
+    outputs = {name: frames.values[name] for name in terms.outputs[chosen[0]] if name in frames.values}
+    return named or chosen[0], outputs
+
+
+def _unidentified(named: str, present: Sequence[str], terms: Terms, location: str) -> HistoryError:
+    """Why it is not known which specimen was tested."""
+    description = f"outputs of {' and '.join(present)}" if present else "no output"
+    if named in terms.outputs:
+        known = f"{', '.join(terms.outputs[named])} ({named})"
+        return HistoryError(
+            f"{location}: missing column: the columns hold {description}, those of {named} are needed: {known}"
+        )
+    known = "; ".join(f"{', '.join(outputs)} ({name})" for name, outputs in terms.outputs.items())
+    advice = f"name one, such as '# specimen: {present[0]}'" if present else "those of one specimen are needed"
+    return HistoryError(f"{location}: missing column: the columns hold {description}, {advice}: {known}")
 
 
 def _refuse_unread_columns(frames: Frames, read_columns: Collection[str], location: str) -> None:

@@ -17,29 +17,24 @@ from creepkit.readers.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATUR
 from creepkit.readers.text_tables import Frames, SourceText
 from creepkit.readers.vocabulary import (
     COMPONENT_LOADING_KINDS,
-    LOADING_KINDS,
     SPECIMEN_NAME_PATTERN,
-    STRAIN_LOADING_KINDS,
-    TEXT_KEYS,
     HeaderVocabulary,
+    Terms,
     split_unit,
 )
-from creepkit.records import (
-    Loading,
-    PointLoading,
-    PressureJump,
-    Program,
-    RecordedLoading,
-    StrainSteps,
-    StressSteps,
-    constant_stress,
-)
-from creepkit.records.quantities import LENGTH, TIME, QuantityKind
+from creepkit.records import Jump, Loading, PointLoading, Program, loading_of
+from creepkit.records.quantities import LENGTH, TEMPERATURE, TIME, QuantityKind
 
 _ALLOWED_COMBINATIONS = (
-    "give one of stress, stress_steps, stress_program, or stress_1 with stress_2 and jump_time (the same for pressure, "
-    "there with ramp)"
+    "give one of stress, stress_steps, stress_program, or stress_1 with stress_2 and jump_time (the same for other "
+    "loads; with ramp for a pressure)"
 )
+
+
+_PROGRAM_FORMS = ("steps", "program")
+
+
+_LOADING_SUFFIXES = ("", "_1", *(f"_{form}" for form in _PROGRAM_FORMS))
 
 
 END_OF_TEST_TERMS = ("ruptured", "stopped")
@@ -70,7 +65,9 @@ class StatedConditions:
         self.labels: dict[str, str] = {}
         self.stated: dict[str, Program] = {}
         self._vocabulary = vocabulary
-        self._kinds = vocabulary.condition_kinds
+        self.terms = vocabulary.terms(_stated_specimen(entries, vocabulary))
+        self._kinds = self.terms.condition_kinds
+        self._text_keys = self.terms.text_keys
         self._end_of_test_terms = {**{word: word for word in END_OF_TEST_TERMS}, **vocabulary.end_of_test_terms}
         self._numbers: dict[str, StatedNumber] = {}
         self._texts: dict[str, SourceText] = {}
@@ -150,9 +147,12 @@ class StatedConditions:
                 SourceText(self._end_of_test_terms.get(entry.text, entry.text), entry.location),
                 entry.location,
             )
-        elif name in TEXT_KEYS and (name != "specimen" or SPECIMEN_NAME_PATTERN.fullmatch(entry.text)):
+        elif name in self._text_keys and (name != "specimen" or SPECIMEN_NAME_PATTERN.fullmatch(entry.text)):
             _put_once(self._texts, name, entry, entry.location)
             self._locations[name] = entry.location
+        elif dimension := _dimension_with_unit(name, self.terms.dimensions):
+            value = LENGTH.convert(entry.number(key), dimension[1], entry.location, key)
+            _put_once(self.geometry, dimension[0], value, entry.location)
         elif result is None:
             _put_once(self.labels, name, entry.text, entry.location)
         else:
@@ -164,6 +164,18 @@ class StatedConditions:
         kind = self._kinds[quantity]
         kind.unit(suffix, entry.location, key)
         return StatedNumber(kind.convert(entry.number(key), suffix, entry.location, key), key, entry.location)
+
+
+def _stated_specimen(entries: Mapping[str, SourceText], vocabulary: HeaderVocabulary) -> str:
+    """The specimen that a file names, "" where it names none."""
+    named = [e.text for key, e in entries.items() if vocabulary.synonyms.get(key, key) == "specimen"]
+    return named[0] if named else ""
+
+
+def _dimension_with_unit(name: str, dimensions: Mapping[str, str]) -> tuple[str, str] | None:
+    """A length of a test piece and its unit, where a key is one, such as `apex_thickness_mm`."""
+    base, _, suffix = name.rpartition("_")
+    return (dimensions[base], suffix) if base in dimensions and suffix in LENGTH.units else None
 
 
 @contextmanager
@@ -206,15 +218,6 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, location: str) -> 
     return TIME.convert(time, parts[1], location, key), kind.convert(value, parts[3], location, key)
 
 
-_LOADING_SUFFIXES = ("", "_1", "_steps", "_program")
-
-
-_LOADING_ADVICE = (
-    "write stress_MPa for a uniaxial test, strain_steps for a relaxation test, or pressure_1_MPa, pressure_2_MPa and "
-    "jump_time_h for a bulge test"
-)
-
-
 def read_temperature(conditions: StatedConditions, frames: Frames) -> float | Program:
     """The temperature, K."""
     result = _stated_loading(conditions, frames, "temperature")
@@ -224,16 +227,55 @@ def read_temperature(conditions: StatedConditions, frames: Frames) -> float | Pr
 
 
 def read_loading(conditions: StatedConditions, frames: Frames) -> Loading:
-    """The loading: by stress where a stress is given, else by pressure; MPa."""
-    quantities = ("stress", "pressure", "strain", *COMPONENT_LOADING_KINDS)
+    """The loading: by components, by what has steps and programs alone, else by the first load that is stated."""
+    terms, load_kinds = conditions.terms, conditions.terms.load_kinds
+    quantities = (*load_kinds, *COMPONENT_LOADING_KINDS)
     with errors_located_at(
         conditions.location_of(*(f"{quantity}{form}" for quantity in quantities for form in _LOADING_SUFFIXES))
     ):
-        loading = _component_loading(conditions) or _strain_loading(conditions)
-        loading = loading or _stress_loading(conditions, frames) or _pressure_loading(conditions, frames)
+        loading = _component_loading(conditions)
+        likely = {load for one in conditions.terms.specimens_with(frames.values) for load in terms.loads.get(one, ())}
+        for name in sorted(load_kinds, key=lambda name: (name in terms.number_kinds, name not in likely)):
+            loading = loading or _loading_by(name, conditions, frames)
     if loading is None:
-        raise conditions.missing_error("loading (neither stress nor pressure)", _LOADING_ADVICE)
+        stated = sorted(likely) or [*load_kinds]
+        wanted = " or ".join(name for name in stated if name in load_kinds)
+        raise conditions.missing_error(f"loading (no {wanted})", _loading_advice(terms, stated))
     return loading
+
+
+def _loading_advice(terms: Terms, loads: Sequence[str]) -> str:
+    """What to write, for each of these loads."""
+    forms = []
+    for name in (load for load in loads if load in terms.load_kinds):
+        unit = next(iter(terms.load_kinds[name].units))
+        forms.append(
+            f"{name}_{unit}, {name}_steps, or {name}_1_{unit}, {name}_2_{unit} and jump_time_h"
+            if unit
+            else f"{name}_steps"
+        )
+    return f"write {'; or '.join(forms)}"
+
+
+def _loading_by(quantity: str, conditions: StatedConditions, frames: Frames) -> Loading | None:
+    """The loading by one quantity, if it is stated."""
+    kind = conditions.terms.load_kinds[quantity]
+    if quantity not in conditions.terms.number_kinds:
+        value: float | TimeValuePairs | Program | Jump | None = _steps_or_program(conditions, quantity, kind)
+    else:
+        value = _stated_loading(conditions, frames, quantity)
+    value = _step_change(conditions, quantity) if value is None else value
+    return None if value is None else _loading_of(conditions, quantity, value, float(frames.times[-1]))
+
+
+def _loading_of(
+    conditions: StatedConditions, quantity: str, value: float | TimeValuePairs | Program | Jump, end: float
+) -> Loading:
+    control: Literal["load", "stress"] = "load"
+    if quantity == "stress" and _control(conditions) == "stress":
+        control = "stress"
+    ramp = None if isinstance(value, (Program, tuple)) else conditions.take_number("ramp")
+    return loading_of(quantity, value, control=control, ramp=None if ramp is None else ramp.value, end=end)
 
 
 def _component_loading(conditions: StatedConditions) -> Loading | None:
@@ -247,14 +289,6 @@ def _component_loading(conditions: StatedConditions) -> Loading | None:
     return PointLoading(**programs) if programs["stress"] or programs["strain"] else None
 
 
-def _strain_loading(conditions: StatedConditions) -> Loading | None:
-    """The total strain of a bar."""
-    result = _steps_or_program(conditions, "strain", STRAIN_LOADING_KINDS["strain"])
-    if result is None:
-        return None
-    return StrainSteps(result) if isinstance(result, tuple) else RecordedLoading(result, "strain")
-
-
 def _steps_or_program(
     conditions: StatedConditions, quantity: str, kind: QuantityKind
 ) -> TimeValuePairs | Program | None:
@@ -265,46 +299,18 @@ def _steps_or_program(
     return steps if breakpoints is None else Program(*np.array(breakpoints).T)
 
 
-def _stress_loading(conditions: StatedConditions, frames: Frames) -> Loading | None:
-    result = _stated_loading(conditions, frames, "stress")
-    jump = None if result is not None else _step_change(conditions, "stress")
-    if jump is not None:
-        first, second, time = jump
-        result = ((0.0, first), (time, second))
-    if result is None:
-        return None
-    control: Literal["load", "stress"] = "stress" if _control(conditions) == "stress" else "load"
-    if isinstance(result, Program):
-        return RecordedLoading(result, "stress", control)
-    return StressSteps(result, control) if isinstance(result, tuple) else constant_stress(result, control)
-
-
-def _pressure_loading(conditions: StatedConditions, frames: Frames) -> Loading | None:
-    result = _stated_loading(conditions, frames, "pressure")
-    if isinstance(result, (Program, tuple)):
-        program = Program.steps(result) if isinstance(result, tuple) else result
-        return RecordedLoading(program, "pressure")
-    jump = _step_change(conditions, "pressure") if result is None else (result, result, float(frames.times[-1]))
-    return None if jump is None else _pressure_jump(conditions, jump)
-
-
-def _pressure_jump(conditions: StatedConditions, jump: tuple[float, float, float]) -> PressureJump:
-    ramp = conditions.take_number("ramp")
-    return PressureJump(*jump) if ramp is None else PressureJump(*jump, ramp=ramp.value)
-
-
 def _control(conditions: StatedConditions) -> str:
     return conditions.take_choice("control", ("load", "stress"), required=True)
 
 
-def _step_change(conditions: StatedConditions, quantity: str) -> tuple[float, float, float] | None:
+def _step_change(conditions: StatedConditions, quantity: str) -> Jump | None:
     """First value, second value and time of the change, when all three are given."""
     names = (f"{quantity}_1", f"{quantity}_2", "jump_time")
     first = conditions.take_number(names[0])
     if first is None:
         return None
     second, time = (_required_number(conditions, name, first) for name in names[1:])
-    return first.value, second.value, time.value
+    return Jump(first.value, second.value, time.value)
 
 
 def _required_number(conditions: StatedConditions, name: str, companion: StatedNumber) -> StatedNumber:
@@ -323,7 +329,7 @@ def _stated_loading(
 
     A column that differs from what is stated beside it is what was recorded, and is used; the rest is kept as stated.
     """
-    kind = LOADING_KINDS[quantity]
+    kind = TEMPERATURE if quantity == "temperature" else conditions.terms.load_kinds[quantity]
     number = conditions.take_number(quantity)
     steps = conditions.take_pairs(f"{quantity}_steps", kind)
     breakpoints = conditions.take_pairs(f"{quantity}_program", kind)
@@ -344,19 +350,12 @@ def _stated_loading(
         return stated
     if stated is None:
         jump = _step_change(conditions, quantity) if quantity != "temperature" else None
-        stated = None if jump is None else _jump_program(conditions, quantity, jump)
+        stated = None if jump is None else _loading_of(conditions, quantity, jump, jump.time).program()
     if stated is not None:
         conditions.stated[quantity] = _as_program(stated)
     is_temperature = quantity == "temperature"
     tolerance = TEMPERATURE_RECORD_TOLERANCE if is_temperature else LOAD_RECORD_TOLERANCE * float(column.max())
     return float(column[0]) if np.ptp(column) == 0.0 else recorded_program(frames.times, column, tolerance)
-
-
-def _jump_program(conditions: StatedConditions, quantity: str, jump: tuple[float, float, float]) -> Program:
-    """The program of a load that was stated as two values and the time between them."""
-    if quantity == "pressure":
-        return _pressure_jump(conditions, jump).program()
-    return Program.steps(((0.0, jump[0]), (jump[2], jump[1])))
 
 
 def _as_program(stated: float | TimeValuePairs | Program) -> Program:

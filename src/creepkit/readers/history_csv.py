@@ -19,7 +19,7 @@ beside it is kept for the check of data quality. `_sd` names a standard deviatio
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -30,9 +30,18 @@ from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history
 from creepkit.readers.text_tables import peek_columns, read_table
-from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary
-from creepkit.records import History, PointLoading, PressureJump, Program, RecordedLoading, StrainSteps, StressSteps
-from creepkit.records.quantities import LENGTH, QuantityKind
+from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
+from creepkit.records import (
+    History,
+    PointLoading,
+    PressureJump,
+    Program,
+    RecordedLoading,
+    StrainSteps,
+    StressSteps,
+    load_unit,
+)
+from creepkit.records.quantities import LENGTH
 
 
 @dataclass(frozen=True)
@@ -76,7 +85,7 @@ def history_text(history: History) -> str:
     """The text of the CSV file of a history; HistoryError when it could not be read back."""
     if history.times.size < 2:
         raise HistoryError(f"history '{history.name}' has one frame; at least two can be written and read back")
-    columns = dict(_frame_columns(history, HeaderVocabulary().output_kinds()))
+    columns = dict(_frame_columns(history, HeaderVocabulary().terms(history.specimen)))
     for name, values in columns.items():
         if not np.isfinite(values).all():
             raise HistoryError(f"history '{history.name}': '{name}' holds a number that is not finite; drop that frame")
@@ -96,8 +105,9 @@ def _header_lines(history: History) -> Iterator[tuple[str, str]]:
         yield "alloy", history.alloy
     yield from _loading_lines(history)
     yield from _temperature_lines(history)
-    units = {"temperature": "K"}
-    yield from ((f"stated_{q}_program", _program_text(p, units.get(q, "MPa"))) for q, p in history.stated.items())
+    for quantity, program in history.stated.items():
+        unit = "K" if quantity == "temperature" else load_unit(history)
+        yield f"stated_{quantity}_program", _program_text(program, unit)
     yield from _elastic_lines(history)
     yield "strain_measure", history.strain_measure
     yield "includes_elastic", "yes" if history.includes_elastic else "no"
@@ -134,7 +144,7 @@ def _loading_lines(history: History) -> Iterator[tuple[str, str]]:
     elif loading.quantity == "strain":
         yield "strain_program", _program_text(loading.program(), "")
     else:
-        yield f"{loading.quantity}_program", _program_text(loading.program(), "MPa")
+        yield f"{loading.quantity}_program", _program_text(loading.program(), load_unit(history))
     if loading.quantity == "stress":
         yield "control", loading.control if isinstance(loading, (StressSteps, RecordedLoading)) else "load"
 
@@ -161,13 +171,17 @@ def _elastic_lines(history: History) -> Iterator[tuple[str, str]]:
     yield "poisson", _number_text(float(elastic.nu))
 
 
-def _frame_columns(history: History, kinds: Mapping[str, QuantityKind]) -> Iterator[tuple[str, Floats]]:
+def _frame_columns(history: History, terms: Terms) -> Iterator[tuple[str, Floats]]:
     yield "time_s", history.times
+    kinds = {**terms.output_kinds(), **terms.own_outputs}
     standard_deviations = {f"{name}_sd": values for name, values in history.standard_deviation.items()}
     for name, values in {**history.outputs, **standard_deviations}.items():
         kind = kinds.get(name.removesuffix("_sd"))
         if kind is None:
-            raise HistoryError(f"history '{history.name}': no unit is known for '{name}'; known: {', '.join(kinds)}")
+            raise HistoryError(
+                f"history '{history.name}': no unit is known for '{name}', for no registered specimen has such an "
+                f"output; known: {', '.join(kinds)}"
+            )
         unit = next(iter(kind.units))
         yield f"{name}_{unit}" if unit else name, values
     used = np.asarray(history.used)

@@ -16,7 +16,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest
 from creepkit.files.reading import FileKind, read_bytes, read_text
-from creepkit.readers.vocabulary import HeaderVocabulary, split_unit
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records.quantities import QuantityKind
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -175,9 +175,11 @@ class Frames:
         return f"{self.path}:{self.lines[frame]}"
 
 
-def read_frames(table: TextTable, vocabulary: HeaderVocabulary, skipped_columns: Collection[str] = ()) -> Frames:
+def read_frames(
+    table: TextTable, vocabulary: HeaderVocabulary, terms: Terms, skipped_columns: Collection[str] = ()
+) -> Frames:
     """Read the frames in a table, except the columns in `skip` and those that are averaged to labels."""
-    kinds = vocabulary.column_kinds
+    kinds = terms.column_kinds
     ignored = {*skipped_columns, *(name for names in vocabulary.averaged_columns.values() for name in names)}
     values: dict[str, Floats] = {}
     for name in table.columns:

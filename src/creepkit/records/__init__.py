@@ -32,6 +32,7 @@ from creepkit.records.known_specimens import (
 from creepkit.records.law_with_values import LawWithValues, Units
 from creepkit.records.loading import (
     TENSOR_COMPONENTS,
+    Jump,
     Loading,
     PointLoading,
     PressureJump,
@@ -43,6 +44,7 @@ from creepkit.records.loading import (
     constant_strain,
     constant_stress,
     load_steps,
+    loading_of,
 )
 from creepkit.records.nuisance_programs import SCALABLE_LOADS, STEP_DURATION, drift_duration, with_program_nuisances
 from creepkit.records.prediction import (
@@ -87,6 +89,7 @@ __all__ = [
     "Exporter",
     "History",
     "HistoryPrediction",
+    "Jump",
     "LawWithValues",
     "Load",
     "Loading",
@@ -132,6 +135,7 @@ __all__ = [
     "load_named",
     "load_steps",
     "load_unit",
+    "loading_of",
     "loads_of",
     "nuisance_key",
     "output_named",

@@ -205,6 +205,46 @@ def constant_load(quantity: Quantity, value: float, ramp: float = 0.0) -> Record
     return load_steps(quantity, [(0.0, value)], ramp)
 
 
+@dataclass(frozen=True)
+class Jump:
+    """Two levels of a load, and when the second begins, s."""
+
+    first: float
+    second: float
+    time: float
+
+
+def loading_of(
+    quantity: Quantity,
+    value: float | Sequence[tuple[float, float]] | Program | Jump,
+    *,
+    control: Literal["load", "stress"] = "load",
+    ramp: float | None = None,
+    end: float = np.inf,
+) -> Loading:
+    """The loading by a quantity that is stated by a number, steps, a program or a jump.
+
+    control : of a stress, as in StressSteps. ramp : s, in which each level is reached; by default that of a pressure is
+    PressureJump's own, and others are imposed at once. end : s, when the test ends.
+    """
+    if isinstance(value, Program):
+        return RecordedLoading(value, quantity, control)
+    if quantity == "pressure" and not isinstance(value, Sequence):
+        jump = value if isinstance(value, Jump) else Jump(value, value, end)
+        given = {} if ramp is None else {"ramp": ramp}
+        return PressureJump(jump.first, jump.second, jump.time, **given)
+    steps: tuple[tuple[float, float], ...]
+    if isinstance(value, Jump):
+        steps = ((0.0, value.first), (value.time, value.second))
+    else:
+        steps = tuple((t, v) for t, v in value) if isinstance(value, Sequence) else ((0.0, value),)
+    if quantity == "stress":
+        return StressSteps(steps, control)
+    if quantity == "strain":
+        return StrainSteps(steps, ramp or 0.0)
+    return load_steps(quantity, steps, ramp or 0.0)
+
+
 def load_steps(quantity: Quantity, steps: Sequence[tuple[float, float]], ramp: float = 0.0) -> RecordedLoading:
     """A load by steps: load_steps("force", [(0, 100), (3600, 120)]) is 100 N, then 120 N from one hour on.
 

@@ -19,8 +19,8 @@ CASES = {
     "one time": (HEAD + "time_s,strain\n1,0\n1,1\n", "x.csv:4: only one frame in time"),
     "no time": (HEAD + "strain\n0\n1\n", "x.csv:3: missing column: no time among strain; name one time_s, time_min"),
     "no output": (HEAD + "time_s,temperature_C\n0,850\n1,850\n", "x.csv:3: missing column: the columns hold no output"),
-    "two specimens": (HEAD + "time_s,strain,shape\n0,0,2\n1,0,2\n", "x.csv:3: .* outputs of uniaxial and bulge, those"),
-    "other specimen": (HEAD + "# specimen: bulge\n" + BODY, "x.csv:4: .* outputs of uniaxial, those of bulge are"),
+    "two specimens": (HEAD + "time_s,strain,shape\n0,0,2\n1,0,2\n", "x.csv:3: a column of shape has no meaning beside strain, stress"),
+    "other specimen": (HEAD + "# specimen: bulge\n" + BODY, "x.csv:4: .* outputs of point and uniaxial, those of bulge are"),
     "unknown column": (
         HEAD + "time_s,strian\n0,0\n1,0\n",
         "x.csv:3: column 'strian' is not understood; did you mean 'strain'",
@@ -63,7 +63,7 @@ CASES = {
     "nameless column": (HEAD + "time_s,,strain\n0,0,0\n", "x.csv:3: a column has no name"),
     "no loading": (
         "# temperature_C: 850\n# stres_MPa: 60\n" + BODY,
-        r"x.csv: no loading \(neither stress nor pressure\) \(keys not understood: stres_MPa\); write stress_MPa",
+        r"x.csv: no loading \(no .*stress\) \(keys not understood: stres_MPa\); write .*stress_MPa, stress_steps",
     ),
     "no temperature": ("# stress_MPa: 60\n" + BODY, "x.csv: no temperature; write temperature_C or temperature_K"),
     "negative stress": (

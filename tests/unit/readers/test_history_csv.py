@@ -43,7 +43,7 @@ def test_uniaxial_test_in_laboratory_units(read):
 
 def test_what_was_not_said_is_assumed_and_recorded(read):
     history = read(CREEP + "time_s,strain\n0,0\n1,0.1\n")
-    assert history.labels == {"assumed": "strain_measure engineering, includes_elastic no, control load"}
+    assert history.labels == {"assumed": "control load, strain_measure engineering, includes_elastic no"}
     assert (history.strain_measure, history.includes_elastic) == ("engineering", False)
     assert history.loading.control == "load"
 
