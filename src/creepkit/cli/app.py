@@ -33,6 +33,7 @@ from creepkit.cli import (
     sweep,
     train,
 )
+from creepkit.cli.described_test import TestCommand
 from creepkit.cli.identification_options import CommandWithDefaults
 from creepkit.errors import CreepkitError, PluginError
 
@@ -100,8 +101,12 @@ COMMANDS: dict[str, Callable[..., None]] = {
 }
 
 
+TEST_COMMANDS = ("simulate", "predict")
+"""Commands whose options describe a test, of any specimen."""
+
+
 for name, command in COMMANDS.items():
-    app.command(name, cls=CommandWithDefaults)(command)
+    app.command(name, cls=TestCommand if name in TEST_COMMANDS else CommandWithDefaults)(command)
 
 
 def _print_version(requested: bool) -> None:

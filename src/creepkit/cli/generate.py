@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.options import BULGE
 from creepkit.report.terminal import ProgressBar
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ def command(
     to: Annotated[Path | None, typer.Option(help="HDF5 file to write; its shards lie in FILE.parts.")] = None,
     samples: Annotated[int | None, typer.Option(min=1, help="Accepted samples wanted.")] = None,
     draws: Annotated[int | None, typer.Option(min=1, help="Or draws, whatever becomes of them.")] = None,
-    specimen: Annotated[str, typer.Option(help="bulge or uniaxial; see 'creepkit specimens'.")] = BULGE,
+    specimen: Annotated[str, typer.Option(help="bulge or uniaxial; see 'creepkit specimens'.")] = "bulge",
     domain: Annotated[
         str | None, typer.Option(help="conditioned (the default; most samples creep visibly) or paper.")
     ] = None,

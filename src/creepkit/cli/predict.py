@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit.cli.described_test import further_options
 from creepkit.cli.options import parse_numbers
 from creepkit.cli.planned_test import (
     ControlOption,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 
 def command(
+    ctx: typer.Context,
     fit: Annotated[Path, typer.Argument(metavar="FIT.json", help="A saved identification, or a ranking.json.")],
     tests: Annotated[
         list[str] | None, typer.Argument(metavar="[TESTS]...", help="Measured files, folders or patterns.")
@@ -86,11 +88,12 @@ def command(
         "control": control,
         "ramp": ramp,
     }
-    others = {"specimen": specimen, "temperature_c": temperature_c, "label": label}
+    others = {"specimen": specimen, "temperature_c": temperature_c, "label": label, **further_options(ctx)}
     given = [name for name, value in {**described, **others}.items() if value not in (None, [])]
     if end_h is not None:
         temperature = _temperature(source, temperature_c)
-        planned = planned_test(TestOptions(end_h, temperature, specimen, **described))  # type: ignore[arg-type]
+        options = TestOptions(end_h, specimen, **described, context=ctx)  # type: ignore[arg-type]
+        planned = planned_test(options, temperature)
         histories.append(planned.replace(labels=dict(_label(text) for text in label or ())))
     elif given:
         option = f"--{given[0].replace('_', '-')}"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.cli.options import BULGE, UNIAXIAL, check_file, check_options, parse_loading, parse_numbers
+from creepkit.cli.options import check_file, parse_numbers
 from creepkit.cli.planned_test import (
     ControlOption,
     GeometryOption,
@@ -17,20 +18,19 @@ from creepkit.cli.planned_test import (
     RampOption,
     StrainOption,
     StressOption,
-    check_duration,
-    check_modulus,
+    TestOptions,
+    described_test,
     parse_temperature,
-    with_geometry,
 )
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
     from creepkit.language import CreepLaw
-    from creepkit.records import History, Program
+    from creepkit.records import History, Program, Specimen
 
 
-DEFAULT_FRAMES, DEFAULT_INTERVAL = 200, 150.0
-"""Frames of a bar; s between those of a dimple, as its cameras take them."""
+DEFAULT_FRAMES = 200
+"""Of a specimen that does not say how long a frame takes."""
 
 
 MOST_FRAMES = 1_000_000
@@ -38,12 +38,14 @@ MOST_FRAMES = 1_000_000
 
 
 def command(
+    ctx: typer.Context,
     law: Annotated[str, typer.Argument(metavar="LAW", help="Name of a law.")],
     value: Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="A parameter's value.")],
     end_h: Annotated[float, typer.Option(help="End of the test, h.")],
     specimen: Annotated[
-        str, typer.Option(help="uniaxial, relaxation, point, bulge or a plugin's; see 'creepkit specimens'.")
-    ] = UNIAXIAL,
+        str | None,
+        typer.Option(help="bulge, point, relaxation, uniaxial or a plugin's; by default one that takes the load."),
+    ] = None,
     stress: StressOption = None,
     strain: StrainOption = None,
     pressure: PressureOption = None,
@@ -54,48 +56,44 @@ def command(
     geometry: GeometryOption = None,
     control: ControlOption = None,
     ramp: RampOption = None,
-    points: Annotated[int | None, typer.Option(min=2, help="Number of frames; 200 of a bar.")] = None,
-    every: Annotated[float | None, typer.Option(help="Or s from frame to frame; 150 of a dimple.")] = None,
+    points: Annotated[int | None, typer.Option(min=2, help="Number of frames; 200 of most specimens.")] = None,
+    every: Annotated[float | None, typer.Option(help="Or s from frame to frame; 150 of a bulge.")] = None,
     to: Annotated[Path | None, typer.Option(help="CSV file to write; by default it is printed.")] = None,
-    picture: Annotated[
-        Path | None, typer.Option(help="Picture of the dimple's section at the end, coloured by stress.")
-    ] = None,
+    picture: Annotated[Path | None, typer.Option(help="Picture of the section at the end, coloured by stress.")] = None,
 ) -> None:
-    """Simulate a test of a bar, a material point or a dimple."""
+    """Simulate a test of a bar, a dimple or another specimen.
+
+    Loads and lengths of a specimen are options of their names, such as --force or --outer-radius; 'creepkit specimens
+    NAME' lists them.
+    """
     import creepkit as ck
     from creepkit.errors import SolveError
     from creepkit.language import Elastic
 
-    specimen_record = ck.specimen(specimen)
-    load_options = {
-        "--stress": stress,
-        "--strain": strain,
-        "--pressure": pressure,
-        "--control": control,
-        "--ramp": ramp,
-    }
-    check_options(specimen, {**load_options, "--geometry": geometry, "--picture": picture})
     chosen = ck.law(law)
-    check_duration(end_h)
-    times = _frame_times(3600.0 * end_h, points, every, specimen)
-    loading = parse_loading(specimen, stress, strain, pressure, control, ramp, float(times[-1]))
+    test = described_test(
+        TestOptions(end_h, specimen, stress, strain, pressure, modulus_gpa, geometry, control, ramp, ctx)
+    )
+    times = _frame_times(3600.0 * end_h, points, every, test.specimen)
+    if picture is not None and not hasattr(test.specimen, "draws_section"):
+        raise SolveError(f"--picture: specimen '{test.specimen.name}' has no section to draw; leave it out")
     if picture is not None:
         from creepkit.report.figures import check_figure_target
 
         check_figure_target(picture, SolveError)
     if to is not None:
         check_file("--to", to)
-    check_modulus(specimen, modulus_gpa, strain)
     run = ck.simulate(
         chosen,
-        with_geometry(specimen_record, geometry),
+        test.specimen.replace(**test.lengths) if test.lengths else test.specimen,  # type: ignore[attr-defined]
         parse_numbers(value, "--set", "n=5.2"),
-        loading=loading,
+        loading=test.loading,
         times=times,
         temperature=_temperature_of(chosen, temperature_c),
         elastic=None if modulus_gpa is None else Elastic(1e3 * modulus_gpa),
         name=chosen.name if to is None else to.stem,
     )
+    run = replace(run, geometry={**run.geometry, **test.lengths})
     if run.reason:
         typer.echo(f"the test ended at {run.end_time / 3600:.4g} h: {run.reason}; the history ends there", err=True)
     if picture is not None:
@@ -126,7 +124,7 @@ def _write_history(run: History, to: Path | None) -> None:
         typer.echo(f"wrote {to}: {run.times.size} frames to {run.times[-1] / 3600:.4g} h")
 
 
-def _frame_times(end: float, points: int | None, every: float | None, specimen: str) -> Floats:
+def _frame_times(end: float, points: int | None, every: float | None, specimen: Specimen) -> Floats:
     """The frames, s, the last one at the end."""
     import numpy as np
 
@@ -134,8 +132,8 @@ def _frame_times(end: float, points: int | None, every: float | None, specimen: 
 
     if points is not None and every is not None:
         raise SolveError("--points and --every both say when frames are taken; give one of them")
-    if points is None and every is None and specimen == BULGE:
-        every = DEFAULT_INTERVAL
+    if points is None and every is None:
+        every = getattr(specimen, "frame_interval", None)
     if points is not None and points > MOST_FRAMES:
         raise SolveError(f"--points {points} are too many frames; allowed are 2 to {MOST_FRAMES}")
     if every is None:

@@ -1,4 +1,4 @@
-"""`creepkit specimens`: what can be simulated and identified from, with its outputs."""
+"""`creepkit specimens`: what can be simulated and identified from, with its outputs, loads and lengths."""
 
 from __future__ import annotations
 
@@ -6,11 +6,18 @@ from typing import Annotated
 
 import typer
 
-from creepkit.report.catalogue import print_specimens
+from creepkit.report.catalogue import print_specimen, print_specimens
 
 
-def command(as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False) -> None:
-    """List the specimens, and what is observed of each."""
+def command(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="A specimen to show in full.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """List the specimens, or show one in full."""
     from creepkit.registry import default_registry
 
-    print_specimens(default_registry().specimens(), as_json)
+    if name is None:
+        print_specimens(default_registry().specimens(), as_json)
+    else:
+        default_registry().specimen(name)  # which says what is wrong with a name
+        print_specimen(default_registry().specimens()[name], as_json)

@@ -149,4 +149,4 @@ def check_geometry(predictor: object, names: Iterable[str], where: str) -> None:
     known = [d.name for d in dimensions_of(predictor)]
     for name in names:
         if known and name not in known:
-            raise SolveError(f"{where}: its test piece has no length '{name}'; {nearest(name, known)}")
+            raise SolveError(f"{where}: no length of the test piece is called '{name}'; {nearest(name, known)}")

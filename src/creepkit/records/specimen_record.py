@@ -90,15 +90,19 @@ class Output(str):
 class Load:
     """What can be imposed on a test piece: `Load("force", "force")`, `Load("pressure", "pressure")`.
 
-    quantity : as that of an output; it decides the unit. long_name : what people call it.
+    quantity : as that of an output; it decides the unit. long_name : what people call it. ramp : s, in which it is
+    reached where a planned test does not say.
     """
 
     name: str
     quantity: str
     long_name: str = ""
+    ramp: float = 0.0
 
     def __post_init__(self) -> None:
         _check_name("load", self.name)
+        if not 0.0 <= self.ramp < math.inf:
+            raise SolveError(f"load '{self.name}': ramp is {self.ramp!r}; allowed is a time of 0 s or more")
         _check_quantity(f"load '{self.name}'", self.quantity)
         object.__setattr__(self, "long_name", self.long_name or self.name.replace("_", " "))
 

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from creepkit.records import dimensions_of, loads_of, outputs_of
 from creepkit.report.terminal import print_json, print_table
 
 if TYPE_CHECKING:
@@ -81,13 +82,44 @@ def print_specimens(registered: Mapping[str, Registered[Specimen]], as_json: boo
     print_table(f"{len(rows)} specimens", ("name", "title", "outputs"), rows)
 
 
+def print_specimen(entry: Registered[Specimen], as_json: bool) -> None:
+    """Print all that a specimen says of itself; loads and lengths with their options of the command line."""
+    if as_json:
+        print_json(_specimen_to_json(entry))
+        return
+    specimen = entry.value
+    print(f"{specimen.name}: {specimen.title}\n  from {entry.provenance}")
+    outputs = [(o, o.unit, o.long_name, "" if o.noise is None else f"{o.noise:g}") for o in outputs_of(specimen)]
+    print_table("outputs", ("name", "unit", "what it is", "noise"), outputs)
+    loads = [(load.name, load.unit, load.long_name, _option(load.name)) for load in loads_of(specimen)]
+    print_table("loads", ("name", "unit", "what it is", "option"), loads)
+    lengths = [
+        (d.name, f"{d.default:g}", f"{100 * d.tolerance:g} %" if d.tolerance else "", d.long_name, _option(d.name))
+        for d in dimensions_of(specimen)
+    ]
+    if lengths:
+        print_table("lengths, mm", ("name", "default", "tolerance", "what it is", "option"), lengths)
+    print(f"nuisance parameters: {', '.join(_nuisances_of(specimen))}")
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _nuisances_of(specimen: Specimen) -> list[str]:
+    return list(getattr(specimen, "nuisances", ()))
+
+
 def _specimen_to_json(entry: Registered[Specimen]) -> dict[str, Any]:
     specimen = entry.value
     return {
         "name": specimen.name,
         "title": specimen.title,
         "outputs": list(specimen.outputs),
-        "nuisances": list(getattr(specimen, "nuisances", ())),
+        "units": {o: o.unit for o in outputs_of(specimen)},
+        "loads": {load.name: load.unit for load in loads_of(specimen)},
+        "lengths_mm": {d.name: d.default for d in dimensions_of(specimen)},
+        "nuisances": _nuisances_of(specimen),
         "provenance": str(entry.provenance),
     }
 

@@ -301,22 +301,28 @@ def test_a_point_is_loaded_by_components() -> None:
             (*DIMPLE, "--pressure", "8", "--control", "load"),
             "--control belongs to --specimen uniaxial, found --specimen bulge",
         ),
-        ((*NORTON, "--pressure", "8"), "--pressure belongs to --specimen bulge, found --specimen uniaxial"),
+        (
+            (*NORTON, "--specimen", "uniaxial", "--pressure", "8"),
+            "--pressure belongs to --specimen bulge, found --specimen uniaxial",
+        ),
         (
             (*NORTON, "--stress", "8", "--picture", "x.png"),
-            "--picture belongs to --specimen bulge, found --specimen uniaxial",
+            "--picture: specimen 'uniaxial' has no section to draw; leave it out",
         ),
         ((*NORTON, "--specimen", "cube"), "there is no specimen 'cube': known: bulge, point, relaxation, uniaxial"),
-        (NORTON, "a bar needs a stress: give --stress, such as 100, or --specimen bulge with --pressure"),
-        ((*NORTON, "--specimen", "relaxation"), "a bar in relaxation needs a strain: give --strain, such as 0.002"),
-        ((*NORTON, "--specimen", "relaxation", "--strain", "0.001"), "a prescribed strain needs a modulus"),
+        (NORTON, "specimen 'uniaxial' needs a stress: give --stress, such as 100, or 7200:120 for a later"),
+        ((*NORTON, "--specimen", "relaxation"), "specimen 'relaxation' needs a strain: give --strain, such as 0.002"),
+        ((*NORTON, "--specimen", "relaxation", "--strain", "0.001"), "'relaxation' needs a modulus"),
         (
             (*NORTON, "--stress", "80", "--ramp", "5"),
-            "--ramp belongs to --specimen relaxation, found --specimen uniaxial",
+            "--ramp belongs to --specimen bulge or relaxation, found --specimen uniaxial",
         ),
-        ((*NORTON, "--specimen", "point"), "a material point needs a component: give --stress 11=100"),
+        ((*NORTON, "--specimen", "point"), "specimen 'point' needs a component: give --stress 11=100"),
         ((*NORTON, "--specimen", "point", "--stress", "80"), "--stress 80: name the component of a material point"),
-        ((*NORTON, "--stress", "11=80"), "11=80 names a component, which --specimen uniaxial has not; give --specimen"),
+        (
+            (*NORTON, "--specimen", "uniaxial", "--stress", "11=80"),
+            "11=80 names a component, which --specimen uniaxial has not; give --specimen",
+        ),
         (
             (*NORTON, "--stress", "80", "--temperature-c", "1800:500"),
             "--temperature-c 1800:500: nothing is said of the time before; give the first one from 0 s on",
@@ -325,10 +331,10 @@ def test_a_point_is_loaded_by_components() -> None:
             (*NORTON, "--specimen", "point", "--stress", "21=80"),
             "no component '21' to load; allowed are 11, 22, 33, 12, 23, 13",
         ),
-        (DIMPLE, "a dimple needs a pressure: give --pressure, such as 8, or 7200:10 for a later step"),
+        (DIMPLE, "specimen 'bulge' needs a pressure: give --pressure, such as 9, or 7200:10.8 for a later step"),
         (
             (*NORTON, "--specimen", "bulge", "--pressure", "8"),
-            "a dimple needs a modulus: give --modulus-gpa, such as 150",
+            "specimen 'bulge' needs a modulus: give --modulus-gpa, such as 150",
         ),
         ((*DIMPLE, "--pressure", "8", "--set", "n=4"), "--set n=4: n is given twice; keep one of them"),
         ((*DIMPLE, "--pressure", "-8"), "--pressure -8: the first pressure starts at 0 s, none is negative, and each"),
@@ -336,7 +342,7 @@ def test_a_point_is_loaded_by_components() -> None:
         ((*DIMPLE, "--pressure", "high"), "--pressure high: write a number, or SECONDS:NUMBER for a later step"),
         (
             (*DIMPLE, "--pressure", "8", "--geometry", "thickness=1"),
-            "--geometry: no length is called 'thickness'; did you mean 'apex_thickness'?",
+            "--geometry: no length of the test piece is called 'thickness'; did you mean 'apex_thickness'?",
         ),
         (
             (*DIMPLE, "--pressure", "8", "--geometry", "apex_thickness"),

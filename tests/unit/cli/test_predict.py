@@ -62,7 +62,7 @@ def test_targets_of_a_dimple(saved):
         ([], "there is no test to forecast"),
         (["--stress", "80"], "--stress describes a planned test, which needs an end"),
         (["--stress", "80", "--end-h", "100"], "the fitted tests were made at 1023 to 1123 K: give --temperature-c"),
-        (["--pressure", "8", "--end-h", "1", "--temperature-c", "800"], "a dimple needs a modulus"),
+        (["--pressure", "8", "--end-h", "1", "--temperature-c", "800"], "'bulge' needs a modulus"),
         (["--stress", "80", "--end-h", "1", "--temperature-c", "800", "--target", "strain=x"], "write OUTPUT=NUMBER"),
         (["--stress", "80", "--end-h", "1", "--temperature-c", "800", "--level", "2"], "level is 2"),
         (["--stress", "80", "--end-h", "-1", "--temperature-c", "800"], "is not a time above zero"),

@@ -19,8 +19,14 @@ CASES = {
     "one time": (HEAD + "time_s,strain\n1,0\n1,1\n", "x.csv:4: only one frame in time"),
     "no time": (HEAD + "strain\n0\n1\n", "x.csv:3: missing column: no time among strain; name one time_s, time_min"),
     "no output": (HEAD + "time_s,temperature_C\n0,850\n1,850\n", "x.csv:3: missing column: the columns hold no output"),
-    "two specimens": (HEAD + "time_s,strain,shape\n0,0,2\n1,0,2\n", "x.csv:3: a column of shape has no meaning beside strain, stress"),
-    "other specimen": (HEAD + "# specimen: bulge\n" + BODY, "x.csv:4: .* outputs of point and uniaxial, those of bulge are"),
+    "two specimens": (
+        HEAD + "time_s,strain,shape\n0,0,2\n1,0,2\n",
+        "x.csv:3: a column of shape has no meaning beside strain, stress",
+    ),
+    "other specimen": (
+        HEAD + "# specimen: bulge\n" + BODY,
+        "x.csv:4: .* outputs of point and uniaxial, those of bulge are",
+    ),
     "unknown column": (
         HEAD + "time_s,strian\n0,0\n1,0\n",
         "x.csv:3: column 'strian' is not understood; did you mean 'strain'",

@@ -61,11 +61,14 @@ class BulgeSettings:
     nuisances: ClassVar[tuple[str, ...]] = (*("thickness", "modulus", "temperature", "window"), *DimpleGeometry.lengths)
     """Kinds of explicit nuisances that predict() understands."""
 
-    loads: ClassVar[tuple[Load, ...]] = (Load("pressure", "pressure"),)
+    loads: ClassVar[tuple[Load, ...]] = (Load("pressure", "pressure", "gas pressure", ramp=5.0),)
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {"pressure": (3.0, 25.0), "modulus": (50e3, 300e3)}
     )
     """The paper's ranges, MPa."""
+
+    frame_interval: ClassVar[float] = 150.0
+    """s between frames of a planned test, as the paper's cameras took them."""
 
     def __post_init__(self) -> None:
         for name, (low, high) in _RANGES.items():

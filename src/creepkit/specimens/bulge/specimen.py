@@ -30,6 +30,9 @@ class Bulge(BulgeSettings):
     title: str = field(default="Bulge test of a dimple under gas pressure, by finite elements", init=False)
     outputs: tuple[Output, ...] = field(default=OBSERVED, init=False)
 
+    draws_section: ClassVar[bool] = True
+    """Whether its runs can draw their section."""
+
     program_nuisances: ClassVar[tuple[str, ...]] = PROGRAM_NUISANCES
     """Kinds of nuisances of a history's programs that predict() differentiates itself."""
 
