@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from creepkit.records import forget_unregistered
 from creepkit.registry import default_registry
 from helpers.compilers import compiler_or_skip, skipped_without_need
 
@@ -30,6 +31,7 @@ def gxx() -> str:
 def plugin_files_of_one_test_alone() -> Iterator[None]:
     """What a test loads by `load_plugin` or `--plugin` is gone with it: tests run in any order, in any process."""
     yield
+    forget_unregistered()
     if any(plugin.provenance.origin.endswith(".py") for plugin in default_registry().plugins()):
         default_registry.cache_clear()
 

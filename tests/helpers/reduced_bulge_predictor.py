@@ -7,13 +7,14 @@ and so on, read as numbers of a test problem, not as truth). Width and shape are
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
 from creepkit.errors import SolveError
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Elastic
-from creepkit.records import History, Prediction, PressureJump
+from creepkit.records import Dimension, History, Prediction, PressureJump
 
 END = 4 * 3600.0
 GRID = np.concatenate([[0.0], np.geomspace(60.0, 1200.0, 8), np.linspace(1800.0, END, 22)])
@@ -52,6 +53,17 @@ class OneDegree:
     name: str = "one-degree"
     outputs: tuple[str, ...] = ("amplitude", "width", "shape")
     nuisances: tuple[str, ...] = ("thickness", "modulus", "temperature", "window")
+
+    dimensions: ClassVar = (Dimension("apex_thickness", 0.5, alias="thickness"), Dimension("window", 7.5))
+
+    def reference_stress(self, history: History) -> np.ndarray:
+        """(levels,) MPa, of each pressure."""
+        levels = np.unique(history.loading.program().values)
+        return 12.5 * levels[levels > 0]
+
+    def growth_per_strain(self, history: History) -> float:
+        """mm of amplitude for a unit of strain."""
+        return 30.0
 
     def __post_init__(self) -> None:
         if self.stand_in:

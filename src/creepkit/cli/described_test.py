@@ -181,7 +181,7 @@ def _load(
 ) -> Loading:
     """One load by steps; its ramp is the load's own where none is given."""
     from creepkit.errors import SolveError
-    from creepkit.records import Jump, StressSteps, loading_of
+    from creepkit.records import StressSteps, TwoLevels, loading_of
 
     option = f"--{name.replace('_', '-')}"
     steps = parse_steps(texts, option)
@@ -200,7 +200,7 @@ def _load(
         )
     if given and len(steps) <= 2 and min(values) > 0.0 and (len(steps) == 1 or starts[1] > given):
         time = starts[1] if len(steps) == 2 else max(end, 2 * given)
-        return loading_of(name, Jump(values[0], values[-1], time), ramp=given, end=end)
+        return loading_of(name, TwoLevels(values[0], values[-1], time), ramp=given, end=end)
     return loading_of(name, steps, ramp=given, end=end)
 
 

@@ -121,14 +121,14 @@ def _test_pieces(rig: Rig, base: History) -> Iterator[tuple[tuple[dict[str, floa
         yield from (((({},) * k), "" if k == 1 else f"{k} specimens") for k in sorted({1, count}))
         return
     for name, values in rig.dimensions.items():
-        label = "dimple" if base.loading.quantity == "pressure" else name.replace("_", " ")
+        label = name.replace("_", " ")
         for value in values:
-            yield ({name: value},), f"a {label} of {value:.3g} mm"
+            yield ({name: value},), f"a test piece of {label} {value:.3g} mm"
         for count in sorted({min(rig.tests_per_run, 2), rig.tests_per_run} - {1}):
             chosen = [values[k] for k in np.linspace(0, len(values) - 1, min(count, len(values))).round().astype(int)]
             chosen = [chosen[k % len(chosen)] for k in range(count)]
             thicknesses = ", ".join(f"{v:.3g}" for v in chosen[:-1]) + f" and {chosen[-1]:.3g}"
-            yield tuple({name: value} for value in chosen), f"{count} {label}s of {thicknesses} mm"
+            yield tuple({name: value} for value in chosen), f"{count} test pieces of {label} {thicknesses} mm"
 
 
 def _levels(rig: Rig) -> list[float]:
@@ -235,7 +235,7 @@ def _variations(rig: Rig, base: History, made_levels: Floats, exponent: float) -
         for value in values:
             changed = replace(base, geometry={**base.geometry, name: value})
             if abs(value / base.geometry.get(name, rig.dimensions[name][len(values) // 2]) - 1.0) > 1e-3:
-                text = f"a {'dimple' if base.loading.quantity == 'pressure' else name} of {value:.3g} mm"
+                text = f"a test piece of {name.replace('_', ' ')} {value:.3g} mm"
                 yield _like(changed, f"{text} under the same loading", end, rig)
 
 

@@ -14,6 +14,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
+from creepkit.records import dimensions_of
 
 
 def check_arguments(goal: object, budget: object, seed: object) -> None:
@@ -50,13 +51,11 @@ def check_dimensions(rig: Rig, fit: Identification) -> None:
     assert fit.predictor is not None
     history = next(h for h in fit.histories if h.specimen == rig.specimen)
     predictor = predictor_for(fit.predictor, history)
-    geometry = getattr(getattr(predictor, "specimen", predictor), "geometry", None)
-    known = getattr(geometry, "__dataclass_fields__", None)
+    known = [d.name for d in dimensions_of(predictor)]
     for name in rig.dimensions:
-        if name not in history.geometry and known is not None and name not in known:
-            raise FitError(f"a test piece of '{rig.specimen}' has no dimension '{name}'; it has {', '.join(known)}")
-        if known is None and name not in history.geometry:
-            raise FitError(f"a test piece of '{rig.specimen}' has no dimension '{name}'")
+        if name not in history.geometry and name not in known:
+            listed = f"; it has {', '.join(known)}" if known else ""
+            raise FitError(f"a test piece of '{rig.specimen}' has no dimension '{name}'{listed}")
 
 
 def edges_of(chosen: CandidateTest, considered: Sequence[CandidateTest], rigs: Mapping[str, Rig]) -> list[str]:

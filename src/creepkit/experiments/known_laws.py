@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import norm, qmc
 
 from creepkit.arrays import Floats
-from creepkit.inverse.composite_predictor import reduced_order_model_of
+from creepkit.inverse.composite_predictor import predictor_for, reduced_order_model_of
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
@@ -25,10 +25,7 @@ from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.selection.challenges import AlteredLaw
 from creepkit.inverse.variance_components import scaled_inverse
-from creepkit.records import History, Predictor
-
-STATED_THICKNESS = "apex_thickness"
-"""The length that the nuisance parameter "thickness" is of."""
+from creepkit.records import History, Predictor, dimension_named
 
 
 def predictor_of(fit: Identification) -> Predictor:
@@ -197,10 +194,12 @@ def nuisances_of_planned(law: KnownLaw, planned: Sequence[History], *, of_made: 
     nuisances = NuisanceParameters.from_histories(law.fit.settings.nuisances, [*made, *planned], measured.predictor)
     spread = {n.kind: n.prior_sd for n in law.fit.nuisances}
     mean, sd = nuisances.mean.copy(), nuisances.sd.copy()
-    stated = {h.name: h.geometry[STATED_THICKNESS] for h in planned if STATED_THICKNESS in h.geometry}
+    by_name = {h.name: h for h in planned}
     for k, (n, owner) in enumerate(zip(nuisances.nuisances, nuisances.owners, strict=True)):
         sd[k] = spread.get(n.kind, sd[k])
-        mean[k] = stated.get(owner, mean[k]) if n.kind == "thickness" and n.scope == "test" else mean[k]
+        if n.is_length and n.scope == "test" and owner in by_name:
+            length = dimension_named(predictor_for(measured.predictor, by_name[owner]), n.kind)
+            mean[k] = by_name[owner].geometry.get(length.name, mean[k]) if length is not None else mean[k]
     first = 0 if of_made else len(made)
     index = {key: positions[first:] for key, positions in nuisances.test_index.items()}
     return replace(nuisances, mean=mean, sd=sd, test_index=index)

@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predictor_for
-from creepkit.records import History, Predictor
+from creepkit.records import History, Predictor, dimension_named, dimensions_of, load_unit
 
 LOWER_LEVEL, HIGHER_LEVEL, EXTENSION = 0.7, 1.4, 2.0
 """Where nothing is said of a rig: its least and greatest level over those of the tests that were made, and its longest
@@ -26,11 +26,8 @@ LARGEST_GROWTH = 2.0
 """Largest leading output of a planned test over the largest that was measured: a law is not trusted much further."""
 
 
-VARIED_DIMENSION = "apex_thickness"
-"""The length of a test piece that is varied where nothing is said, by THICKNESS_RATIOS."""
-
-
-THICKNESS_RATIOS = (0.9, 1.0, 1.1)
+VARIED_RATIOS = (0.9, 1.0, 1.1)
+"""By which a length is varied where nothing is said; the one that is known least exactly."""
 
 
 ROUNDED_TEMPERATURE = 5.0
@@ -41,7 +38,7 @@ ROUNDED_TEMPERATURE = 5.0
 class Rig:
     """What the equipment can do with one kind of specimen.
 
-    specimen : its name, as histories have it. levels : (least, greatest) load: MPa of pressure or stress, or a strain.
+    specimen : its name, as histories have it. levels : (least, greatest) load, in its unit.
     longest_hours : h, the longest test. temperatures : K, at which tests can be made.
     dimensions : {length: values in mm} of test pieces that can be made, such as {"apex_thickness": (0.44, 0.5, 0.58)}.
     tests_per_run : test pieces that the oven takes at once, under one load and temperature. setup_hours : h, of the
@@ -115,7 +112,7 @@ class Rig:
         """Why this rig cannot make a planned test, in a sentence; "" where it can."""
         levels = history.loading.program().values
         positive = levels[levels > 0]
-        unit = "" if history.loading.quantity == "strain" else " MPa"
+        unit = f" {load_unit(history)}".rstrip()
         if positive.size and (positive.max() > 1.0001 * self.levels[1] or positive.min() < 0.9999 * self.levels[0]):
             outside = positive.max() if positive.max() > 1.0001 * self.levels[1] else positive.min()
             return f"{outside:.3g}{unit} is outside the rig's {self.levels[0]:.3g} to {self.levels[1]:.3g}{unit}"
@@ -173,16 +170,14 @@ def _largest_output(history: History, predictor: Predictor) -> float:
 
 
 def _dimensions(tests: Sequence[History], predictor: Predictor) -> dict[str, tuple[float, ...]]:
-    """The thicknesses of the tests, where they or the specimen state one; a single one is varied."""
-    predictors = [predictor_for(predictor, h) for h in tests]
-    specimens = [getattr(p, "specimen", p) for p in predictors]
-    nominal = [getattr(getattr(p, "geometry", None), VARIED_DIMENSION, None) for p in specimens]
-    stated = [h.geometry.get(VARIED_DIMENSION, own) for h, own in zip(tests, nominal, strict=True)]
-    values = sorted({round(float(v), 4) for v in stated if v is not None})
-    if not values:
+    """The length of the tests that is known least exactly, as they or the specimen state it; a single one is varied."""
+    known = max(dimensions_of(predictor_for(predictor, tests[0])), key=lambda d: d.tolerance, default=None)
+    if known is None or known.tolerance == 0.0:
         return {}
-    return {VARIED_DIMENSION: tuple(round(r * values[0], 4) for r in THICKNESS_RATIOS) if len(values) == 1 else
-            tuple(values)}  # fmt: skip
+    own = [dimension_named(predictor_for(predictor, h), known.name) or known for h in tests]
+    values = sorted({round(float(h.geometry.get(d.name, d.default)), 4) for h, d in zip(tests, own, strict=True)})
+    varied = [round(r * values[0], 4) for r in VARIED_RATIOS] if len(values) == 1 else values
+    return {known.name: tuple(varied)}
 
 
 MOST_VALUES = 20

@@ -24,6 +24,7 @@ from creepkit.records import (
     History,
     Nuisance,
     Predictor,
+    all_dimensions,
     dimensions_of,
     is_length_nuisance,
 )
@@ -215,9 +216,10 @@ def _has_tolerance(kind: str) -> bool:
 def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[History], predictor: Predictor) -> None:
     """FitError for a tolerance of what no test has, or that is no standard deviation."""
     for kind, sd in tolerances.items():
-        lengths = [name for h in histories for d in dimensions_of(predictor_for(predictor, h)) for name in d.names]
-        if kind not in (*TOLERANCE_KINDS, *lengths):
-            raise FitError(f"a tolerance of '{kind}' is not known; {nearest(kind, (*TOLERANCE_KINDS, *lengths))}")
+        own = {name for h in histories for d in dimensions_of(predictor_for(predictor, h)) for name in d.names}
+        known = sorted({*TOLERANCE_KINDS, *own, *all_dimensions()})
+        if kind not in known:
+            raise FitError(f"a tolerance of '{kind}' is not known; {nearest(kind, known)}")
         if not (np.isfinite(sd) and sd >= 0):
             raise FitError(f"the tolerance of '{kind}' is {sd}; give a standard deviation of zero or more, in its unit")
         if sd > LARGEST_TOLERANCES.get(kind, np.inf):

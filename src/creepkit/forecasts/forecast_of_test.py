@@ -34,10 +34,10 @@ from creepkit.forecasts.variance_shares import (
 )
 from creepkit.inverse.extrapolation import extrapolation_text
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT, usable_frames
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, usable_frames
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
-from creepkit.records import ZERO_CELSIUS, History, Predictor, output_unit
+from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, is_logarithmic, output_unit
 
 
 def forecast_test(
@@ -186,7 +186,7 @@ def _targets_of_curves(
     shifted = target - offset_draws(fit, name, count, rng)
     transform = band_transform(fit, history, name, at_times(best.central, history.times).of(name)[0])
     slow = np.sqrt(known.drift**2 + discrepancy_variance(fit, name, transform)) * rng.standard_normal(count)
-    if name in LOGARITHMIC_OUTPUTS:
+    if is_logarithmic(name):
         return np.asarray(shifted * np.exp(-slow))
     return np.asarray(shifted - float(getattr(transform, "scale", 1.0)) * slow)
 
@@ -252,7 +252,8 @@ def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, O
         if variance > 0:
             parts[SOURCES[level]] = f"{100 * np.sqrt(variance):.2g} % of the rate"
     for dimension in best.dimensions:
-        parts[dimension.kind] = f"{dimension.mean:.4g} ± {dimension.sd:.2g} {UNITS.get(dimension.kind, '')}".strip()
+        unit = "mm" if is_length_nuisance(dimension.kind) else UNITS.get(dimension.kind, "")
+        parts[dimension.kind] = f"{dimension.mean:.4g} ± {dimension.sd:.2g} {unit}".strip()
     for name in outputs:
         known, unit = fit.noise_model.outputs.get(name), output_unit(name)
         if known is None:
@@ -277,7 +278,7 @@ NEARBY = {"stress": 0.01, "temperature": 0.002, "time": 0.1, "strain": 0.1}
 """Relative distances beyond the fitted ranges within which nothing is said of them."""
 
 
-UNITS = {"thickness": "mm", "window": "mm", "temperature": "K", "temperature drift": "K"}
+UNITS = {"temperature": "K", "temperature drift": "K"}
 """Of dimensions; others are relative."""
 
 

@@ -13,9 +13,9 @@ from creepkit.forecasts.results import CHOICE_OF_LAW, LAW, MISFIT, NOISE, NUMERI
 from creepkit.forecasts.simulation import at_times
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import OutputNoise, components_fixed_by_priors
-from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH, LOGARITHMIC_OUTPUTS, RELATIVE_DISCREPANCY_UNIT
+from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH, RELATIVE_DISCREPANCY_UNIT
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform, OutputTransform
-from creepkit.records import History
+from creepkit.records import History, is_logarithmic
 
 SMALLEST_STRAIN_RATIO = 1e-3
 """Floor of the logarithmic scale of a strain in a band, over its largest value."""
@@ -32,7 +32,7 @@ COMPARED_STRAIN_RATIO = 1e-2
 def band_transform(fit: Identification, history: History, name: str, central: Floats) -> OutputTransform:
     """The scale on which an output is banded: logarithmic for a strain; central : (times,) in the output's unit."""
     largest = float(np.nanmax(np.abs(central), initial=0.0))
-    if name in LOGARITHMIC_OUTPUTS:
+    if is_logarithmic(name):
         known = fit.noise_model.outputs.get(name)
         noise = max(float(np.median(frame_noise_of(fit, history, name))), 0.0 if known is None else known.offset)
         return LogTransform(max(SMALLEST_STRAIN_RATIO * largest, NOISES_IN_FLOOR * noise, 1e-14))
@@ -70,7 +70,7 @@ def noise_in_output(
     frame = frame_noise_of(fit, history, name)
     if known is None:
         return np.zeros((times.size, 0)), np.abs(slope * frame)
-    logarithmic = name in LOGARITHMIC_OUTPUTS
+    logarithmic = is_logarithmic(name)
     coordinate = (
         np.log(np.maximum(times, 1e-9 * times[-1]))
         if logarithmic
@@ -144,7 +144,7 @@ def discrepancy_variance(fit: Identification, name: str, transform: OutputTransf
     known = fit.noise_model.outputs.get(name)
     if known is None:
         return 0.0
-    logarithmic = name in LOGARITHMIC_OUTPUTS
+    logarithmic = is_logarithmic(name)
     unit = RELATIVE_DISCREPANCY_UNIT if logarithmic else known.noise / float(getattr(transform, "scale", 1.0))
     return float((fit.noise_model.discrepancy * unit) ** 2)
 

@@ -31,7 +31,7 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.unmodelled_effects import UnmodelledEffect, with_random_effects
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution
-from creepkit.records import History, output_unit
+from creepkit.records import History, is_logarithmic, output_unit
 
 SIGNIFICANCE = 0.003
 """p-value below which a law does not explain the tests: three standard deviations of a normal one."""
@@ -341,11 +341,11 @@ def _freedom(linear: LinearisedProblem, solution: LinearSolution) -> float:
 
 def _correlation(noise_model: NoiseModel) -> float:
     from creepkit.inverse.noise_model import NEGLIGIBLE_DISCREPANCY
-    from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH, LOGARITHMIC_OUTPUTS
+    from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
 
     if not noise_model.discrepancy > NEGLIGIBLE_DISCREPANCY:
         return float("nan")
-    decades = any(name in LOGARITHMIC_OUTPUTS for name in noise_model.outputs)
+    decades = any(is_logarithmic(name) for name in noise_model.outputs)
     return noise_model.discrepancy_length / (1.0 if decades else LINEAR_COORDINATE_LENGTH)
 
 

@@ -12,9 +12,9 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs
 from creepkit.inverse.noise_model import Residuals
-from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, noise_standard_deviation, usable_frames
+from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.records import History, Prediction
+from creepkit.records import History, Prediction, is_logarithmic
 
 
 def relative_squared_error(
@@ -177,9 +177,7 @@ def test_fits(
     offsets, log_factors = random_effects
     observations = problem.observations
     ratios = _log_ratios(problem, residuals, np.take_along_axis(offsets, observations.output_index, axis=1))
-    logarithmic = (
-        observations.per_observation([float(name in LOGARITHMIC_OUTPUTS) for name in observations.outputs]) > 0
-    )
+    logarithmic = observations.per_observation([float(is_logarithmic(name)) for name in observations.outputs]) > 0
     test_fits = []
     for k, history in enumerate(histories):
         test_ratios = ratios[k][np.isfinite(ratios[k])]
@@ -231,7 +229,7 @@ def _log_ratios(problem: LeastSquaresProblem, residuals: Residuals, offset: Floa
     observations = problem.observations
     floor = observations.per_observation(
         [
-            s.floor if n in LOGARITHMIC_OUTPUTS else np.inf
+            s.floor if is_logarithmic(n) else np.inf
             for n, s in zip(observations.outputs, observations.transforms, strict=True)
         ]
     )

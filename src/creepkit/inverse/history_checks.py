@@ -9,12 +9,12 @@ import numpy as np
 from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs, predictor_for
-from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, ObservationVector, frames_with_data
+from creepkit.inverse.observation_vector import ObservationVector, frames_with_data
 from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.quality import check_rig, exclude_suspect_frames
-from creepkit.records import History, Predictor
+from creepkit.records import History, Predictor, is_logarithmic, output_named
 
 SUSPECT_LABEL = "suspect"
 """Label of a history that says which of its frames were left out, and why."""
@@ -54,7 +54,7 @@ def check_creep(observations: ObservationVector, histories: Sequence[History]) -
     """Some strain must rise above the floor of its transform, or some other output grow beyond its noise."""
     for position, (name, transform) in enumerate(zip(observations.outputs, observations.transforms, strict=True)):
         mask = observations.leading_output & (observations.output_index == position)
-        if name in LOGARITHMIC_OUTPUTS:
+        if is_logarithmic(name):
             if (mask & (observations.values > 2 * transform.floor)).any():
                 return
             continue
@@ -76,8 +76,11 @@ def check_creep(observations: ObservationVector, histories: Sequence[History]) -
 
 
 def _creeps_under_load(history: History, output: str) -> bool:
-    """Whether a bulge test grows while its pressure is held: a jump of pressure alone moves it elastically."""
-    return history.loading.quantity != "pressure" or detect_creep(history, output).shows_creep
+    """Whether an output grows while the load is held: a jump of the load alone moves it elastically.
+
+    An output that falls with creep is not judged.
+    """
+    return not output_named(output, history.specimen).grows or detect_creep(history, output).shows_creep
 
 
 def check_histories(law: CreepLaw, histories: Sequence[History], predictor: Predictor) -> None:

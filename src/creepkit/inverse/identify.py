@@ -59,11 +59,11 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     restricted_covariance,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.unmodelled_effects import CHECKED_DIMENSIONS, unmodelled_effects, unmodelled_note
+from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note
 from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
 from creepkit.language import CreepLaw
-from creepkit.records import History, Nuisance, Predictor
+from creepkit.records import History, Nuisance, Predictor, is_length_nuisance
 
 MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 """How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
@@ -283,7 +283,7 @@ def _result(
         x,
         residuals,
         noise_model,
-        [effect.residual_change for effect in unmodelled if effect.kind in CHECKED_DIMENSIONS],
+        [effect.residual_change for effect in unmodelled if is_length_nuisance(effect.kind)],
     )
     prediction = predict(
         problem.predictor,

@@ -16,11 +16,7 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
 from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform, NegativeLogTransform, OutputTransform
-from creepkit.records import History, Prediction, Predictor
-
-LOGARITHMIC_OUTPUTS = ("strain",)
-"""Outputs that span decades."""
-
+from creepkit.records import History, Prediction, Predictor, is_logarithmic
 
 RUPTURE_OUTPUT = "rupture"
 """The output of tests that were followed to rupture: the rupture time, s. It has no frames of its own."""
@@ -30,11 +26,7 @@ def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
     """The transform of one output of these histories, all of which have it."""
     if output == RUPTURE_OUTPUT:
         return NegativeLogTransform()
-    return (
-        log_transform_for(histories, output)
-        if output in LOGARITHMIC_OUTPUTS
-        else linear_transform_for(histories, output)
-    )
+    return log_transform_for(histories, output) if is_logarithmic(output) else linear_transform_for(histories, output)
 
 
 def log_transform_for(histories: Sequence[History], output: str) -> LogTransform:
@@ -223,7 +215,7 @@ class ObservationVector:
                 continue
             self.values[k, columns], self.times[k, columns] = history.outputs[name][frames], history.times[frames]
             noise = noise_levels[k, name][frames]
-            if name not in LOGARITHMIC_OUTPUTS or name in history.standard_deviation:
+            if not is_logarithmic(name) or name in history.standard_deviation:
                 typical_noise = self.noise[position]
                 self.relative_noise[k, columns] = (
                     np.where(noise > 0, noise, typical_noise) / typical_noise if typical_noise > 0 else 1.0
@@ -258,11 +250,11 @@ class ObservationVector:
             0.0
             if name == RUPTURE_OUTPUT
             else RELATIVE_DISCREPANCY_UNIT
-            if name in LOGARITHMIC_OUTPUTS
+            if is_logarithmic(name)
             else max(float(noise), SMALLEST_NOISE * transform.floor) / transform.scale  # type: ignore[attr-defined]
             for name, noise, transform in zip(self.outputs, self.noise, self.transforms, strict=True)
         ]
-        logarithmic = self.per_observation([float(name in LOGARITHMIC_OUTPUTS) for name in self.outputs]) > 0
+        logarithmic = self.per_observation([float(is_logarithmic(name)) for name in self.outputs]) > 0
         return self.per_observation(units) * np.where(logarithmic, 1.0, self.relative_noise)
 
     @property
@@ -275,7 +267,7 @@ class ObservationVector:
         """(tests, observations) -, ln t where the transform is logarithmic, else 5 t / last time."""
         last_times = np.where(self.present, self.times, 0.0).max(axis=1, keepdims=True)
         logarithmic = (
-            self.per_observation([float(name in (*LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT)) for name in self.outputs]) > 0
+            self.per_observation([float(name == RUPTURE_OUTPUT or is_logarithmic(name)) for name in self.outputs]) > 0
         )
         return np.where(
             logarithmic, self.log_times, LINEAR_COORDINATE_LENGTH * self.times / np.maximum(last_times, 1e-300)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, arrhenius, temperature
-from creepkit.records import ZERO_CELSIUS, History, Predictor
+from creepkit.records import ZERO_CELSIUS, History, Predictor, growing_output, is_logarithmic, specimen_of
 
 LOAD_TOLERANCE = 0.02
 """Relative change of a load within which it is held."""
@@ -80,50 +81,52 @@ def _load_holds(history: History, used: Bools) -> Iterator[Ints]:
             start = k
 
 
-STRESS_PER_PRESSURE = 12.5
-
-
-AMPLITUDE_PER_STRAIN = 30.0
-"""mm."""
-
-
 def reference_stresses(history: History, predictor: Predictor | None = None) -> Floats:
     """(stresses,) MPa, the reference stresses of a test."""
-    reference_stress = (
-        None if predictor is None else getattr(predictor_for(predictor, history), "reference_stress", None)
-    )
+    reference_stress = _stated(history, predictor, "reference_stress")
     loads = history.loading.program().values
     if reference_stress is not None:
         return np.atleast_1d(np.asarray(reference_stress(history), float))
-    if history.loading.quantity == "stress":
-        return loads
-    return STRESS_PER_PRESSURE * np.unique(loads[loads > 0])
+    return loads if history.loading.quantity == "stress" else np.unique(loads[loads > 0])
+
+
+def _stated(history: History, predictor: Predictor | None, method: str) -> Callable[[History], Any] | None:
+    """What the predictor of a test says of it by a method, else what the specimen that the test names says."""
+    own = None if predictor is None else predictor_for(predictor, history)
+    candidates = (own, getattr(own, "specimen", None), specimen_of(history))
+    return next((getattr(one, method) for one in candidates if hasattr(one, method)), None)
+
+
+def growth_per_strain(history: History, predictor: Predictor | None = None) -> float:
+    """By how much the leading output grows for each unit of reference strain, in its unit; 1 where nothing says so."""
+    stated = _stated(history, predictor, "growth_per_strain")
+    return 1.0 if stated is None else float(stated(history))
 
 
 def reference_end_strain(history: History, predictor: Predictor | None = None) -> float:
     """The largest strain that a test reached, estimated from its outputs; the predictor may state it."""
-    reference_strain = (
-        None if predictor is None else getattr(predictor_for(predictor, history), "reference_strain", None)
-    )
+    reference_strain = _stated(history, predictor, "reference_strain")
     if reference_strain is not None:
         return max(float(reference_strain(history)), 1e-7)
-    if "strain" in history.outputs:
-        return max(float(np.max(history.outputs["strain"][usable_frames(history, "strain")], initial=0.0)), 1e-7)
-    return max(_output_increase(history)[0] / AMPLITUDE_PER_STRAIN, 1e-7)
+    output = growing_output(history)
+    if is_logarithmic(output):
+        return max(float(np.max(history.outputs[output][usable_frames(history, output)], initial=0.0)), 1e-7)
+    return max(_output_increase(history)[0] / growth_per_strain(history, predictor), 1e-7)
 
 
 def median_log_strain_rate(histories: Sequence[History], predictor: Predictor | None = None) -> float:
     """Median over tests of ln(strain / time), in 1/s."""
     log_rates = []
     for history in histories:
-        if predictor is not None and hasattr(predictor_for(predictor, history), "reference_strain"):
+        output = growing_output(history)
+        if _stated(history, predictor, "reference_strain") is not None:
             strain, time = reference_end_strain(history, predictor), float(history.times[history.used][-1])
-        elif "strain" in history.outputs:
-            last = int(np.flatnonzero(usable_frames(history, "strain"))[-1])
-            strain, time = float(history.outputs["strain"][last]), float(history.times[last])
+        elif is_logarithmic(output):
+            last = int(np.flatnonzero(usable_frames(history, output))[-1])
+            strain, time = float(history.outputs[output][last]), float(history.times[last])
         else:
             increase, time = _output_increase(history)
-            strain = increase / AMPLITUDE_PER_STRAIN
+            strain = increase / growth_per_strain(history, predictor)
         log_rates.append(np.log(max(strain, 1e-9) / time))
     return float(np.median(log_rates))
 
@@ -135,7 +138,7 @@ def median_log_inverse_duration(histories: Sequence[History]) -> float:
 
 def _output_increase(history: History) -> tuple[float, float]:
     """Increase of the leading output between the first and last usable frame, in its unit, and the time, s."""
-    output = "amplitude" if "amplitude" in history.outputs else next(iter(history.outputs))
+    output = growing_output(history)
     used = np.flatnonzero(usable_frames(history, output))
     values, times = history.outputs[output][used], history.times[used]
     if used.size < 2:

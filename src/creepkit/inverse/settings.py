@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -29,10 +28,6 @@ SUSPECT_FRAMES = ("exclude", "keep")
 
 
 OutputWeights = Literal["noise", "likelihood", "equal", "paper"] | Mapping[str, float]
-
-
-PAPER_WEIGHTS = MappingProxyType({"amplitude": 0.99, "width": 0.005, "shape": 0.005})
-"""The paper's weighted loss for measured histories, Eq. (S3): 0.99 on D_amp; how the rest is split is not said."""
 
 
 @dataclass(frozen=True)
@@ -117,8 +112,7 @@ def _check_weights(weights: OutputWeights) -> None:
     if isinstance(weights, str):
         if weights not in WEIGHTINGS:
             raise FitError(
-                f'weights is "{weights}"; allowed are {", ".join(WEIGHTINGS)} and a mapping such as '
-                '{"amplitude": 0.99}'
+                f'weights is "{weights}"; allowed are {", ".join(WEIGHTINGS)} and a mapping such as {{"strain": 0.99}}'
             )
         return
     invalid = [f"{name}: {value!r}" for name, value in weights.items() if not (np.isfinite(value) and value > 0)]

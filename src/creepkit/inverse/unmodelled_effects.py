@@ -27,7 +27,7 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.quantities import gradient, log_rate
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import CreepLaw, strain, temperature, time
-from creepkit.records import History, Nuisance, Program, output_unit
+from creepkit.records import Dimension, History, Nuisance, Program, dimension_named, dimensions_of, output_unit
 
 OFFSET_IN_NOISES = 3.0
 """Size of an offset that nobody models, in noises of a frame."""
@@ -54,10 +54,6 @@ NOTEWORTHY_CHANGE = 0.01
 
 LIKE_HARDENING = 0.8
 """Correlation from which on a drift looks like hardening."""
-
-
-CHECKED_DIMENSIONS = ("thickness",)
-"""Nuisance parameters that are checked where the predictor states a tolerance of theirs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +92,9 @@ def unmodelled_effects(
     """The effects that no nuisance parameter of the problem stands for; x : (unknowns,) its optimum."""
     kinds = {n.kind for n in problem.settings.nuisances}
     changes: list[tuple[str, float, str, Floats]] = []
-    for kind in (k for k in CHECKED_DIMENSIONS if k not in kinds):
-        changes += _dimension(problem, x, linear, kind)
+    for dimension in tolerated_dimensions(problem):
+        if kinds.isdisjoint(dimension.names):
+            changes += _dimension(problem, x, linear, dimension.names[-1])
     if "offset" not in kinds:
         changes += _offset(problem, linear)
     drifting_kinds = {DRIFT, "rate drift"}
@@ -120,6 +117,13 @@ def unmodelled_effects(
         likeness = _likeness_of_hardening(problem, x, linear, factor, change) if kind == DRIFT else (np.nan, np.nan)
         effects.append(UnmodelledEffect(kind, size, unit, rate_change, size * likeness[0], likeness[1], change))
     return tuple(effects)
+
+
+def tolerated_dimensions(problem: LeastSquaresProblem) -> list[Dimension]:
+    """The lengths of the test pieces that their specimens know to a tolerance only, each once."""
+    predictors = [predictor_for(problem.predictor, h) for h in problem.histories]
+    lengths = {d.name: d for p in predictors for d in dimensions_of(p) if d.tolerance > 0.0}
+    return list(lengths.values())
 
 
 def unmodelled_note(effects: Sequence[UnmodelledEffect]) -> tuple[str, ...]:
@@ -188,8 +192,9 @@ def _dimension(
     """A length of the test pieces that is known to its tolerance only."""
     histories, count = problem.histories, problem.parameter_count
     tolerances = [
-        getattr(predictor_for(problem.predictor, h), "tolerances", {}).get(kind, 0.0)
-        if supports_nuisance(predictor_for(problem.predictor, h), kind)
+        length.tolerance
+        if (length := dimension_named(predictor_for(problem.predictor, h), kind)) is not None
+        and supports_nuisance(predictor_for(problem.predictor, h), kind)
         else 0.0
         for h in histories
     ]

@@ -22,9 +22,9 @@ from creepkit.inverse.noise_model import (
     initial_sd,
     initial_working_noise,
 )
-from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT, SMALLEST_NOISE, ObservationVector
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, SMALLEST_NOISE, ObservationVector
 from creepkit.inverse.output_transforms import LinearTransform
-from creepkit.inverse.settings import PAPER_WEIGHTS, IdentificationSettings
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.variance_components import (
     LONGEST_DRIFT,
     LinearisedProblem,
@@ -32,6 +32,7 @@ from creepkit.inverse.variance_components import (
     log_noise_prior,
     restricted_log_likelihood,
 )
+from creepkit.records import is_logarithmic, output_named
 
 STUDENT_FREEDOM = 4.0
 """Degrees of freedom of Student's t for whole tests; the usual choice where tails are unknown (Lange et al. 1989)."""
@@ -86,7 +87,7 @@ class WorkingNoiseEstimator:
         if settings.weights == "equal":
             self.relative_sd = _relative_standard_deviations(dict.fromkeys(observations.outputs, 1.0), observations)
         elif settings.weights == "paper":
-            self.relative_sd = _relative_standard_deviations(PAPER_WEIGHTS, observations)
+            self.relative_sd = _relative_standard_deviations(_paper_weights(observations), observations)
         elif not isinstance(settings.weights, str):
             self.relative_sd = _relative_standard_deviations(settings.weights, observations)
 
@@ -129,7 +130,7 @@ class WorkingNoiseEstimator:
             self.observations.outputs, self.observations.transforms, self.observations.noise, strict=True
         ):
             offset = initial_sd(nuisances, "offset", scale.floor, name)
-            misfit = INITIAL_RUPTURE_SD if name == RUPTURE_OUTPUT else 0.03 if name in LOGARITHMIC_OUTPUTS else 0.0
+            misfit = INITIAL_RUPTURE_SD if name == RUPTURE_OUTPUT else 0.03 if is_logarithmic(name) else 0.0
             by_output[name] = OutputNoise(max(float(noise), SMALLEST_NOISE * scale.floor), misfit, offset)
         rate_nuisances = [n for n in nuisances if n.kind == "rate" and (n.sd is not None or tests >= MINIMUM_TESTS)]
         units = self.observations.discrepancy_unit[self.observations.present & self.observations.leading_output]
@@ -256,6 +257,18 @@ def with_rupture_weight(working: NoiseModel, observations: ObservationVector) ->
         observations.followed_to_rupture.sum()
     )
     return working.with_output(RUPTURE_OUTPUT, misfit=working[RUPTURE_OUTPUT].misfit / float(np.sqrt(frames)))
+
+
+def _paper_weights(observations: ObservationVector) -> dict[str, float]:
+    """The weights of the paper's loss for measured histories, Eq. (S3), as specimens state them of their outputs."""
+    stated = {name: output_named(name).weight for name in observations.outputs}
+    weights = {name: weight for name, weight in stated.items() if weight is not None}
+    if not weights:
+        raise FitError(
+            f'weights="paper" is the loss of bulge tests; none is known for {", ".join(observations.outputs)}; give '
+            "weights by output"
+        )
+    return weights
 
 
 def _relative_standard_deviations(weights: Mapping[str, float], observations: ObservationVector) -> dict[str, float]:

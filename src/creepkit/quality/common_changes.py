@@ -15,9 +15,9 @@ from scipy.special import chdtrc
 
 from creepkit.arrays import Floats
 from creepkit.quality.comparison import duplicate_tests
-from creepkit.quality.frames import FEWEST_FRAMES, creep_output, load_segments
+from creepkit.quality.frames import FEWEST_FRAMES, load_segments
 from creepkit.quality.smooth_curve import RateStep, SmoothCurve, robust_spread, smooth_curve
-from creepkit.records import History
+from creepkit.records import History, growing_output
 
 CHANGE_THRESHOLD = 6.0
 """Combined score from which a change of rate is reported. Normal numbers at 100 times reach 5 once in 20,000 plates;
@@ -156,7 +156,7 @@ def _tests_together(histories: Sequence[History]) -> list[list[int]]:
 
 
 def _same_clock(one: History, two: History) -> bool:
-    if (one.specimen, creep_output(one)) != (two.specimen, creep_output(two)):
+    if (one.specimen, growing_output(one)) != (two.specimen, growing_output(two)):
         return False
     a, b = (h.times[h.used] for h in (one, two))
     end = min(a[-1], b[-1])
@@ -169,7 +169,7 @@ def _parts(history: History) -> list[tuple[Floats, Floats, float]]:
     """Times, values and start (s) of the parts of a test under one load."""
     segments = load_segments(history)
     starts = [float(history.times[segments[k - 1].frames[-1]]) if k else 0.0 for k in range(len(segments))]
-    values = history.outputs.get(creep_output(history), np.zeros(0))
+    values = history.outputs.get(growing_output(history), np.zeros(0))
     return [
         (history.times[s.frames], values[s.frames], start)
         for s, start in zip(segments, starts, strict=True)

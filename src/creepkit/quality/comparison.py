@@ -9,8 +9,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.language import CreepLaw, Param, parameters, stress
-from creepkit.quality.frames import creep_output, load_segments, noise_standard_deviation
-from creepkit.records import ZERO_CELSIUS, History, Predictor, Program, checked_prediction
+from creepkit.quality.frames import load_segments, noise_standard_deviation
+from creepkit.records import ZERO_CELSIUS, History, Predictor, Program, checked_prediction, growing_output, output_named
 
 
 def duplicate_tests(
@@ -45,10 +45,15 @@ REPLICATE_TEMPERATURE_TOLERANCE = 3.0
 """K between replicates; at 400 kJ/mol and 800 C it changes rates by 13 %."""
 
 
-REPLICATE_FACTOR = {"amplitude": 1.6, "strain": 3.0}
-"""Between the creep of replicates. Dimples: three standard deviations of 2^0.5 times 11 %, which is what thicknesses
-that scatter by 5.5 % do to a deflection. Bars: rates scatter by a factor of two, and products and environments differ.
-"""
+REPLICATE_FACTOR, LOGARITHMIC_REPLICATE_FACTOR = 1.6, 3.0
+"""Between the creep of replicates. Deflections: three standard deviations of 2^0.5 times 11 %, which is what
+thicknesses that scatter by 5.5 % do to that of a dimple. Strains of bars, compared by their logarithms: rates scatter
+by a factor of two, and products and environments differ."""
+
+
+def _replicate_factor(history: History) -> float:
+    logarithmic = output_named(growing_output(history), history.specimen).logarithmic
+    return LOGARITHMIC_REPLICATE_FACTOR if logarithmic else REPLICATE_FACTOR
 
 
 _COMPARISON_FRACTIONS = np.linspace(0.2, 1.0, 9)
@@ -112,7 +117,7 @@ def replicate_deviations(histories: Sequence[History]) -> dict[int, str]:
         if abs(one.mean_temperature - two.mean_temperature) > REPLICATE_TEMPERATURE_TOLERANCE or end is None:
             continue
         ratio = _creep_ratio(one, two, end)
-        if max(ratio, 1.0 / ratio) < REPLICATE_FACTOR.get(creep_output(one), max(REPLICATE_FACTOR.values())):
+        if max(ratio, 1.0 / ratio) < _replicate_factor(one):
             continue
         for k, other in _deviating_tests(histories, a, b, end):
             creep_of_test, creep_of_replicate = (_creep_increment(histories[j], end) for j in (k, other))
@@ -183,7 +188,7 @@ def first_frame_deviations(histories: Sequence[History], specimen: Predictor) ->
     """{test: reason}: first frames that are not where the elastic specimen would be, in tests that creep slowly."""
     results: dict[int, str] = {}
     for k, history in enumerate(histories):
-        segments, output = load_segments(history), creep_output(history)
+        segments, output = load_segments(history), growing_output(history)
         if not segments or segments[0].frames.size < _FIRST_FRAMES or history.elastic is None:
             continue
         elastic = _elastic_value(history, int(segments[0].frames[0]), specimen, output)
@@ -285,7 +290,7 @@ def _creep_ratio(one: History, two: History, end: float) -> float:
 
 def _same_loading_until(one: History, two: History) -> float | None:
     """Until when two tests of one kind were loaded alike, s; None for too short a time."""
-    if (one.specimen, one.alloy, creep_output(one)) != (two.specimen, two.alloy, creep_output(two)):
+    if (one.specimen, one.alloy, growing_output(one)) != (two.specimen, two.alloy, growing_output(two)):
         return None
     end = min(_last_used_time(one), _last_used_time(two))
     a, b = one.loading.program(), two.loading.program()
@@ -307,7 +312,7 @@ def _last_used_time(history: History) -> float:
 
 def _creep_increment(history: History, end: float) -> float:
     """Growth of the leading output from the first used frame to a time; 0 if it is not known."""
-    y = history.outputs.get(creep_output(history), np.full(history.times.size, np.nan))
+    y = history.outputs.get(growing_output(history), np.full(history.times.size, np.nan))
     usable = history.used & np.isfinite(y) & (history.times > 0)
     if usable.sum() < 2 or _last_used_time(history) < end * (1 - 1e-9):
         return 0.0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.records import History
+from creepkit.records import History, growing_output, output_named
 
 OUTLIER_THRESHOLD = 6.0
 """Robust standard deviations by which a single frame must differ from its neighbours: 2 in 1e9 of Gaussian noise do."""
@@ -73,18 +73,14 @@ class LoadSegment(NamedTuple):
     is_first: bool
 
 
-def creep_output(history: History) -> str:
-    """The output that grows with creep."""
-    return next((name for name in ("strain", "amplitude") if name in history.outputs), next(iter(history.outputs), ""))
-
-
-GROWING_OUTPUTS = ("strain", "amplitude")
-"""Outputs that grow with creep under a load; the stress of a relaxing bar falls, and should."""
+def grows(history: History) -> bool:
+    """Whether the leading output grows with creep under a load; the stress of a relaxing bar falls, and should."""
+    return output_named(growing_output(history), history.specimen).grows if history.outputs else False
 
 
 def unloading_frames(history: History) -> Iterator[FlaggedFrames]:
     """Frames after the end of the test, and a sudden fall in its last used frames."""
-    if creep_output(history) not in GROWING_OUTPUTS:
+    if not grows(history):
         return
     usable = np.flatnonzero(history.used & _has_value(history))
     later_frames = np.flatnonzero(~history.used)
@@ -99,7 +95,7 @@ def unloading_frames(history: History) -> Iterator[FlaggedFrames]:
 
 
 def _unloaded_end(history: History, frames: Ints) -> Iterator[FlaggedFrames]:
-    t, y = history.times[frames], history.outputs[creep_output(history)][frames]
+    t, y = history.times[frames], history.outputs[growing_output(history)][frames]
     sigma = noise_standard_deviation(t, y)
     for count in range(min(MOST_UNLOADING_FRAMES, frames.size - FEWEST_FRAMES), 0, -1):
         before = slice(max(frames.size - count - END_FIT_FRAMES, 0), frames.size - count)
@@ -136,12 +132,12 @@ def decreasing_frames(history: History) -> Iterator[FlaggedFrames]:
     They begin at the highest frame; after a raise of the load with the raise, for whatever makes a dimple or a bar fall
     under a larger load was there from then on.
     """
-    if creep_output(history) not in GROWING_OUTPUTS:
+    if not grows(history):
         return
     for segment in load_segments(history):
         if segment.frames.size < FEWEST_FRAMES or not segment.load_increased:
             continue
-        t, y = history.times[segment.frames], history.outputs[creep_output(history)][segment.frames]
+        t, y = history.times[segment.frames], history.outputs[growing_output(history)][segment.frames]
         smoothed = _running_median(y)
         highest = int(np.argmax(smoothed))
         decrease = float(smoothed[highest] - smoothed[highest:].min())
@@ -161,7 +157,7 @@ def decreasing_frames(history: History) -> Iterator[FlaggedFrames]:
 def outlier_frames(history: History) -> Iterator[FlaggedFrames]:
     """Single frames that miss the cubic through their four neighbours, largest first."""
     for segment in load_segments(history):
-        frames, values = segment.frames, history.outputs[creep_output(history)]
+        frames, values = segment.frames, history.outputs[growing_output(history)]
         sigma = (
             noise_standard_deviation(history.times[frames], values[frames]) if frames.size >= FEWEST_FRAMES else np.inf
         )
@@ -267,12 +263,11 @@ def _running_median(values: Floats, width: int = 5) -> Floats:
 
 def _has_value(history: History) -> Bools:
     """(frames,) where the leading output has a number."""
-    name = creep_output(history)
+    name = growing_output(history)
     return np.isfinite(history.outputs[name]) if name else np.zeros(history.times.size, bool)
 
 
 def _difference_text(history: History, value: float) -> str:
     """A difference of the leading output in words."""
-    return (
-        f"{1e3 * value:.3g} um" if creep_output(history) == "amplitude" else f"{value:.2g} of {creep_output(history)}"
-    )
+    output = output_named(growing_output(history), history.specimen)
+    return f"{1e3 * value:.3g} um" if output.unit == "mm" else f"{value:.2g} {output.unit}".strip() + f" of {output}"

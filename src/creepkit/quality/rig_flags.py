@@ -9,8 +9,8 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.quality.common_changes import CommonRateChange, Jump
 from creepkit.quality.flags import QualityFlag
-from creepkit.quality.frames import LOAD_TOLERANCE, TEMPERATURE_TOLERANCE, creep_output
-from creepkit.records import History
+from creepkit.quality.frames import LOAD_TOLERANCE, TEMPERATURE_TOLERANCE
+from creepkit.records import History, growing_output, output_named
 
 ACTIVATION_ENERGY = 400e3
 """J/mol, with which a factor of the rate is put as a step of temperature unless another one is given."""
@@ -49,7 +49,7 @@ def rate_change_flag(histories: Sequence[History], change: CommonRateChange, act
     one = histories[change.shown[0]]
     if change.has_jump:
         step_text = (
-            f"its {creep_output(one)} steps with it by {_size_text(one, change.jump)}, as with a step of the load"
+            f"its {growing_output(one)} steps with it by {_size_text(one, change.jump)}, as with a step of the load"
         )
         nuisances = '"load step"'
     else:
@@ -95,7 +95,7 @@ def jump_flags(histories: Sequence[History], jumps: Sequence[Jump]) -> Iterator[
             tuple(sizes),
             "jump",
             (),
-            f"{creep_output(histories[first.test])} steps by {', '.join(texts)} from {first.previous_time:g} s to "
+            f"{growing_output(histories[first.test])} steps by {', '.join(texts)} from {first.previous_time:g} s to "
             f"{first.time:g} s, though the load does not",
             time=first.time,
             earliest=max(j.previous_time for j in together),
@@ -160,4 +160,5 @@ def _kelvin_text(kelvin: Floats) -> str:
 
 
 def _size_text(history: History, value: float) -> str:
-    return f"{value:.2g} mm" if creep_output(history) == "amplitude" else f"{value:.2g} of {creep_output(history)}"
+    output = output_named(growing_output(history), history.specimen)
+    return f"{value:.2g} {output.unit}" if output.unit else f"{value:.2g} of {output}"

@@ -22,7 +22,7 @@ from creepkit.readers.vocabulary import (
     Terms,
     split_unit,
 )
-from creepkit.records import Jump, Loading, PointLoading, Program, loading_of
+from creepkit.records import Loading, PointLoading, Program, TwoLevels, loading_of
 from creepkit.records.quantities import LENGTH, TEMPERATURE, TIME, QuantityKind
 
 _ALLOWED_COMBINATIONS = (
@@ -261,7 +261,7 @@ def _loading_by(quantity: str, conditions: StatedConditions, frames: Frames) -> 
     """The loading by one quantity, if it is stated."""
     kind = conditions.terms.load_kinds[quantity]
     if quantity not in conditions.terms.number_kinds:
-        value: float | TimeValuePairs | Program | Jump | None = _steps_or_program(conditions, quantity, kind)
+        value: float | TimeValuePairs | Program | TwoLevels | None = _steps_or_program(conditions, quantity, kind)
     else:
         value = _stated_loading(conditions, frames, quantity)
     value = _step_change(conditions, quantity) if value is None else value
@@ -269,7 +269,7 @@ def _loading_by(quantity: str, conditions: StatedConditions, frames: Frames) -> 
 
 
 def _loading_of(
-    conditions: StatedConditions, quantity: str, value: float | TimeValuePairs | Program | Jump, end: float
+    conditions: StatedConditions, quantity: str, value: float | TimeValuePairs | Program | TwoLevels, end: float
 ) -> Loading:
     control: Literal["load", "stress"] = "load"
     if quantity == "stress" and _control(conditions) == "stress":
@@ -303,14 +303,14 @@ def _control(conditions: StatedConditions) -> str:
     return conditions.take_choice("control", ("load", "stress"), required=True)
 
 
-def _step_change(conditions: StatedConditions, quantity: str) -> Jump | None:
+def _step_change(conditions: StatedConditions, quantity: str) -> TwoLevels | None:
     """First value, second value and time of the change, when all three are given."""
     names = (f"{quantity}_1", f"{quantity}_2", "jump_time")
     first = conditions.take_number(names[0])
     if first is None:
         return None
     second, time = (_required_number(conditions, name, first) for name in names[1:])
-    return Jump(first.value, second.value, time.value)
+    return TwoLevels(first.value, second.value, time.value)
 
 
 def _required_number(conditions: StatedConditions, name: str, companion: StatedNumber) -> StatedNumber:

@@ -1,12 +1,9 @@
-"""What the registered specimens say of themselves, for layers below the registry and for those that have a name only.
-
-The registry states here, when it is imported, how a specimen is found by name; nothing else is kept here.
-"""
+"""What specimens say of themselves, for layers below the registry and for those that know a name only."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
 from creepkit.errors import SolveError, nearest
@@ -29,17 +26,6 @@ class StatedTest(Protocol):
     def origin(self) -> str: ...  # noqa: D102
 
 
-SpecimenSource = Callable[[], Mapping[str, Registered]]
-
-
-_sources: list[SpecimenSource] = []
-
-
-def find_specimens_by(source: SpecimenSource) -> None:
-    """State how the registered specimens, {name: specimen}, are had; the last source counts."""
-    _sources[:] = [source]
-
-
 _used: dict[str, Registered] = {}
 
 
@@ -51,11 +37,19 @@ def remember_specimen(predictor: object) -> None:
         _used[name] = specimen
 
 
+def forget_unregistered() -> None:
+    """Forget the specimens that no plugin registered."""
+    _used.clear()
+
+
 def known_specimens() -> Mapping[str, Registered]:
-    """{name: specimen} of all that are registered, and of others that were used in this process."""
-    if not _sources:
-        importlib.import_module("creepkit.registry")  # which states how; a layer above, so not imported by name
-    return {**_used, **_sources[0]()}
+    """{name: specimen} of all that are registered, and after them of others that were used in this process.
+
+    The registry is a layer above this one; it is asked here alone, and when a name is looked up, not on import.
+    """
+    registry = importlib.import_module("creepkit.registry").default_registry()
+    registered = {name: entry.value for name, entry in registry.specimens().items()}
+    return registered | {name: one for name, one in _used.items() if name not in registered}
 
 
 def specimen_of(history: StatedTest) -> Registered | None:
@@ -107,6 +101,11 @@ def output_named(name: str, specimen: str = "") -> Output:
 def output_unit(output: str, specimen: str = "") -> str:
     """The unit of an output, "" for a number without one."""
     return output_named(output, specimen).unit
+
+
+def is_logarithmic(output: str) -> bool:
+    """Whether tests scatter, and are compared, by the logarithm of an output."""
+    return output_named(output).logarithmic
 
 
 def growing_output(history: StatedTest) -> str:

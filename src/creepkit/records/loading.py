@@ -206,7 +206,7 @@ def constant_load(quantity: Quantity, value: float, ramp: float = 0.0) -> Record
 
 
 @dataclass(frozen=True)
-class Jump:
+class TwoLevels:
     """Two levels of a load, and when the second begins, s."""
 
     first: float
@@ -216,7 +216,7 @@ class Jump:
 
 def loading_of(
     quantity: Quantity,
-    value: float | Sequence[tuple[float, float]] | Program | Jump,
+    value: float | Sequence[tuple[float, float]] | Program | TwoLevels,
     *,
     control: Literal["load", "stress"] = "load",
     ramp: float | None = None,
@@ -230,11 +230,11 @@ def loading_of(
     if isinstance(value, Program):
         return RecordedLoading(value, quantity, control)
     if quantity == "pressure" and not isinstance(value, Sequence):
-        jump = value if isinstance(value, Jump) else Jump(value, value, end)
+        jump = value if isinstance(value, TwoLevels) else TwoLevels(value, value, end)
         given = {} if ramp is None else {"ramp": ramp}
         return PressureJump(jump.first, jump.second, jump.time, **given)
     steps: tuple[tuple[float, float], ...]
-    if isinstance(value, Jump):
+    if isinstance(value, TwoLevels):
         steps = ((0.0, value.first), (value.time, value.second))
     else:
         steps = tuple((t, v) for t, v in value) if isinstance(value, Sequence) else ((0.0, value),)

@@ -19,7 +19,6 @@ import pluggy
 
 from creepkit import hookspecs
 from creepkit.errors import PluginError, nearest
-from creepkit.records.known_specimens import find_specimens_by
 from creepkit.registry import plugin_sources
 from creepkit.registry.plugin_sources import ContributionKind, Provenance
 
@@ -263,13 +262,6 @@ def default_registry() -> Registry:
 
 
 default_registry()  # made with the module, while there is one thread
-
-
-def _default_specimens() -> dict[str, Specimen]:
-    return {name: registered.value for name, registered in default_registry().specimens().items()}
-
-
-find_specimens_by(_default_specimens)
 
 
 def _merged_contributions(

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from creepkit.records import dimensions_of, loads_of, outputs_of
 from creepkit.report.terminal import print_json, print_table
 
 if TYPE_CHECKING:
@@ -87,6 +86,8 @@ def print_specimen(entry: Registered[Specimen], as_json: bool) -> None:
     if as_json:
         print_json(_specimen_to_json(entry))
         return
+    from creepkit.records import dimensions_of, loads_of, outputs_of  # heavy, and a list of laws needs none of it
+
     specimen = entry.value
     print(f"{specimen.name}: {specimen.title}\n  from {entry.provenance}")
     outputs = [(o, o.unit, o.long_name, "" if o.noise is None else f"{o.noise:g}") for o in outputs_of(specimen)]
@@ -111,6 +112,8 @@ def _nuisances_of(specimen: Specimen) -> list[str]:
 
 
 def _specimen_to_json(entry: Registered[Specimen]) -> dict[str, Any]:
+    from creepkit.records import dimensions_of, loads_of, outputs_of
+
     specimen = entry.value
     return {
         "name": specimen.name,

@@ -9,6 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.experiments.planned_design import kind_of_reason, precision_text
+from creepkit.records import load_unit
 from creepkit.report.figures import empty_figure, save_figure, wrapped
 from creepkit.report.terminal import print_table
 
@@ -241,5 +242,6 @@ def _is_constant(test: PlannedTest) -> bool:
 def _load_label(design: Design) -> str:
     if not design.tests:
         return "load"
-    quantity = design.tests[0].histories[0].loading.quantity
-    return "strain" if quantity == "strain" else f"first {quantity}, MPa"
+    first = design.tests[0].histories[0]
+    unit = load_unit(first)
+    return f"first {first.loading.quantity}, {unit}" if unit else first.loading.quantity

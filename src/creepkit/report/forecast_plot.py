@@ -9,7 +9,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, usable_frames
+from creepkit.inverse.observation_vector import usable_frames
+from creepkit.records import is_logarithmic
 from creepkit.report.figures import empty_figure, save_figure, set_range, wrapped
 from creepkit.report.identification_plot import axis_label
 from creepkit.report.load_programs import SECONDS_PER_HOUR
@@ -91,12 +92,12 @@ def forecast_figure(forecast: Forecast, path: str | Path | None = None) -> Figur
 
 
 def _scaled(one: OutputForecast) -> float:
-    return 100.0 if one.output in LOGARITHMIC_OUTPUTS else 1.0
+    return 100.0 if is_logarithmic(one.output) else 1.0
 
 
 def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, *, first: bool) -> None:
     """The curve, pointwise and simultaneous bands, the measured points, and intervals of times."""
-    factor, logarithmic = _scaled(one), one.output in LOGARITHMIC_OUTPUTS
+    factor, logarithmic = _scaled(one), is_logarithmic(one.output)
     history, positive = test.history, one.times > 0
     hours = one.times[positive] / SECONDS_PER_HOUR
     curve = factor * one.value[positive]
@@ -191,7 +192,7 @@ def _draw_shares(axes: Axes, above: Axes, one: OutputForecast, parts: dict[str, 
     if hours.size:
         stacked = np.stack([100 * values[positive] for values in one.shares.values()])
         axes.stackplot(hours, stacked, colors=[parts.get(part, UNNAMED) for part in one.shares], lw=0)
-        logarithmic = one.output in LOGARITHMIC_OUTPUTS
+        logarithmic = is_logarithmic(one.output)
         upper = above.get_xlim()
         axes.set_xscale("log" if logarithmic else "linear")
         set_range(axes, "x", *upper, logarithmic=logarithmic, most=6)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, noise_standard_deviation, usable_frames
+from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
-from creepkit.records import output_unit
+from creepkit.records import is_logarithmic, output_unit
 from creepkit.report.condition_colours import (
     MOST_NAMED_TESTS,
     condition_groups,
@@ -94,7 +94,7 @@ def curve_of_test(fit: Identification, curves: FittedCurves, test: int, output: 
     hours, measured = history.times[used] / SECONDS_PER_HOUR, history.outputs[output][used]
     noise = noise_standard_deviation(history, output)[used]
     identified, half_width = identified[used], half_width[used]
-    if output not in LOGARITHMIC_OUTPUTS:
+    if not is_logarithmic(output):
         sd = np.where(noise > 0, noise, np.nan)
         every = np.isfinite(sd)
         residuals = (measured - identified) / sd
@@ -120,7 +120,7 @@ def curve_of_test(fit: Identification, curves: FittedCurves, test: int, output: 
 
 def unit_of(output: str) -> str:
     """The unit in which an output is drawn."""
-    if output in LOGARITHMIC_OUTPUTS:
+    if is_logarithmic(output):
         return "%"
     return output_unit(output)
 
@@ -310,7 +310,7 @@ def set_curve_ranges(panels: Sequence[Axes], drawn: Sequence[TestCurve], output:
     values = values[np.isfinite(values)]
     largest = float(values.max(initial=0.0))
     for axes in panels:
-        if output in LOGARITHMIC_OUTPUTS and largest > 0:
+        if is_logarithmic(output) and largest > 0:
             lowest = max(float(values[values > 0].min()), SHOWN_STRAIN_RATIO * largest)
             set_range(axes, "y", lowest, 1.1 * largest, logarithmic=True)
         else:
@@ -321,7 +321,7 @@ def set_curve_ranges(panels: Sequence[Axes], drawn: Sequence[TestCurve], output:
 
 def _set_time_range(axes: Axes, hours: Floats, output: str) -> None:
     """Logarithmic where creep spans decades of time: strains, and stresses that relax."""
-    logarithmic = output in LOGARITHMIC_OUTPUTS or output.startswith("stress")
+    logarithmic = is_logarithmic(output) or output.startswith("stress")
     set_range(axes, "x", float(hours.min()) if logarithmic else 0.0, float(hours.max()), logarithmic=logarithmic)
 
 
@@ -356,7 +356,7 @@ def _draw_residuals(
     if every.size:
         _set_time_range(axes, np.concatenate(hours), output)
     name = output.replace("_", " ")
-    measure = f"100 ln (measured / identified {name}), ≈ %" if output in LOGARITHMIC_OUTPUTS else f"{name},\nnoise sd"
+    measure = f"100 ln (measured / identified {name}), ≈ %" if is_logarithmic(output) else f"{name},\nnoise sd"
     axes.set(xlabel="time, h", ylabel=measure)
     axes.set_title(_residual_title(fit, output, noise, output == fit.tests[tests[0]].outputs[0].output), fontsize=9)
     axes.grid(alpha=0.25)
@@ -364,7 +364,7 @@ def _draw_residuals(
 
 def _residual_title(fit: Identification, output: str, noise: float, first: bool) -> str:
     """Reduced chi-square, and what the grey band is."""
-    if output in LOGARITHMIC_OUTPUTS:
+    if is_logarithmic(output):
         return f"measured less identified, rms {fit.rms:.3g} of ln strain\ngrey: ±2 sd of frame noise (±{noise:.2g} %)"
     sizes = [one.noise for m in fit.tests for one in m.outputs if one.output == output]
     unit = unit_of(output)

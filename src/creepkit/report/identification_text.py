@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.language.printing import expression_text, state_equations
-from creepkit.records import kind_and_start
+from creepkit.records import is_length_nuisance, is_logarithmic, kind_and_start, output_unit
 
 if TYPE_CHECKING:
     from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
@@ -25,7 +25,6 @@ LISTED_RUPTURES = 15
 
 
 UNITS = {
-    **{"amplitude": "mm", "width": "mm", "thickness": "mm", "window": "mm"},
     **{"rate step": "in ln", "rate drift": "in ln", "modulus": "relative", "load step": "relative"},
     **{"temperature": "K", "temperature step": "K", "temperature drift": "K"},
 }
@@ -84,10 +83,11 @@ def _tests(count: int) -> str:
 
 
 def _strains(fit: Identification) -> list[str]:
-    if "strain" not in fit.noise_model.outputs:
+    name = logarithmic_output(fit)
+    if not name:
         return []
-    noise = fit.noise_model["strain"]
-    tests = [m for m in fit.tests if m.outputs and m.outputs[0].output == "strain"]
+    noise = fit.noise_model[name]
+    tests = [m for m in fit.tests if m.outputs and m.outputs[0].output == name]
     return [
         f"  {_tests(len(tests))}, {sum(m.frames for m in tests)} frames: {_rms_label(fit)} {fit.rms:.3g}",
         f"  scatter (one sd): rate between tests {100 * fit.noise_model.rate:.0f} %, "
@@ -96,9 +96,14 @@ def _strains(fit: Identification) -> list[str]:
     ]
 
 
+def logarithmic_output(fit: Identification) -> str:
+    """The output of a fit that is compared by its logarithm, such as the strain of bars; "" where there is none."""
+    return next((name for name in fit.noise_model.outputs if is_logarithmic(name)), "")
+
+
 def _discrepancy_of_strain(fit: Identification) -> float:
     """Per cent of strain: model discrepancy, drift and independent misfit together."""
-    components = fit.noise_model["strain"]
+    components = fit.noise_model[logarithmic_output(fit)]
     return 100 * math.hypot(
         RELATIVE_DISCREPANCY_UNIT * fit.noise_model.discrepancy, components.drift, components.misfit
     )
@@ -147,15 +152,15 @@ def _linear_outputs(fit: Identification) -> list[str]:
     """Errors of outputs that are compared as they are, over all used frames of all tests."""
     lines = []
     for name, e in fit.errors.items():
-        if name in ("strain", RUPTURE_OUTPUT):
+        if name == RUPTURE_OUTPUT or is_logarithmic(name):
             continue
-        unit, s = f" {UNITS[name]}" if name in UNITS else "", fit.noise_model[name]
+        unit, s = f" {output_unit(name)}" if output_unit(name) else "", fit.noise_model[name]
         rms = f"rms {e.mean_squared_error**0.5:.3g}{unit} ({100 * e.relative_rms_error:.2g} %)"
         lines.append(
             f"  {name}: relative squared error {e.relative_squared_error:.3g}, {rms}, noise {s.noise:.2g}{unit}, "
             f"offsets {s.offset:.2g}{unit}, reduced chi-square {e.chi_square:.3g}"
         )
-    if lines and "strain" not in fit.errors:
+    if lines and not logarithmic_output(fit):
         count = _tests(len(fit.tests))
         lines.append(f"  {count}; scatter of the rate between tests (one sd) {100 * fit.noise_model.rate:.0f} %")
     return lines
@@ -163,7 +168,7 @@ def _linear_outputs(fit: Identification) -> list[str]:
 
 def _table(fit: Identification) -> list[str]:
     """One line a test: its error, its offset and weight, and what was found of its nuisances."""
-    linear_output_tests = [m for m in fit.tests if m.outputs and m.outputs[0].output != "strain"]
+    linear_output_tests = [m for m in fit.tests if m.outputs and not is_logarithmic(m.outputs[0].output)]
     estimates_by_owner = {(n.key, n.owner): n for n in fit.nuisances if n.scope == "test"}
     kinds = list(dict.fromkeys(n.key for n in fit.nuisances if n.scope == "test"))
     if not (linear_output_tests or kinds):
@@ -205,7 +210,8 @@ def _plus_minus(n: NuisanceEstimate) -> str:
 
 def _unit(key: str) -> str:
     kind = kind_and_start(key)[0]
-    return f", {UNITS[kind]}" if kind in UNITS else ""
+    unit = "mm" if is_length_nuisance(kind) else UNITS.get(kind, "")
+    return f", {unit}" if unit else ""
 
 
 def identification_comments(fit: Identification) -> list[str]:
@@ -220,11 +226,12 @@ def identification_comments(fit: Identification) -> list[str]:
     )
     lines.append(f"valid within the tests: {', '.join(covered)}")
     rate_scatter = f"rates of single tests scatter by {100 * fit.noise_model.rate:.0f} % (one sd)"
-    errors_text = [f"rms of ln strain {fit.rms:.3g}"] if "strain" in fit.errors else []
+    logarithmic = logarithmic_output(fit)
+    errors_text = [f"rms of ln {logarithmic} {fit.rms:.3g}"] if logarithmic in fit.errors else []
     errors_text += [
         f"relative squared error of {name} {e.relative_squared_error:.3g}"
         for name, e in fit.errors.items()
-        if name != "strain"
+        if name != logarithmic
     ]
     adequacy_text = [] if fit.adequacy is None else [f"the law {fit.adequacy}"]
     return [*lines, "; ".join([*errors_text, rate_scatter]), *adequacy_text, *fit.notes]

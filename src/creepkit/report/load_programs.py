@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.inverse.observation_vector import frames_with_data
 from creepkit.inverse.reference_conditions import LOAD_TOLERANCE
-from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program
+from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program, load_unit
 
 SECONDS_PER_HOUR = 3600.0
 
@@ -39,9 +39,10 @@ def load_text(history: History) -> str:
     if isinstance(loading, PointLoading):
         parts = [f"stress {name} {_level_text(p, last, ' MPa')}" for name, p in loading.stress.items()]
         return ", ".join(parts + [f"strain {name} {_level_text(p, last, '')}" for name, p in loading.strain.items()])
-    if loading.quantity == "strain":
-        return f"strain {_level_text(loading.program(), last, '')}"
-    return _level_text(loading.program(), last, " MPa")
+    unit = load_unit(history)
+    if not unit:
+        return f"{loading.quantity} {_level_text(loading.program(), last, '')}"
+    return _level_text(loading.program(), last, f" {unit}")
 
 
 def _level_text(program: Program, last: float, unit: str) -> str:

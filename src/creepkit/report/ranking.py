@@ -65,14 +65,20 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
         print(f"wrote {path}")
 
 
+def _is_logarithmic(output: str) -> bool:
+    from creepkit.records import is_logarithmic  # heavy, and the help of the command line needs none of it
+
+    return is_logarithmic(output)
+
+
 def _misfit_columns(fit: Identification) -> tuple[str, ...]:
     output = next(iter(fit.errors))
-    return ("rms ln strain" if output == "strain" else f"error of {output}", "test to test")
+    return (f"rms ln {output}" if _is_logarithmic(output) else f"error of {output}", "test to test")
 
 
 def _misfit_cells(fit: Identification) -> tuple[str, ...]:
     output = next(iter(fit.errors))
-    misfit = f"{fit.rms:.3f}" if output == "strain" else f"{fit.errors[output].relative_squared_error:.3g}"
+    misfit = f"{fit.rms:.3f}" if _is_logarithmic(output) else f"{fit.errors[output].relative_squared_error:.3g}"
     return misfit, f"{100 * fit.noise_model.rate:.0f} %"
 
 
@@ -95,7 +101,7 @@ def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]
 def _fit_to_json(fit: Identification) -> dict[str, Any]:
     return {
         "law": fit.law.name,
-        **({"rms_ln_strain": fit.rms} if "strain" in fit.errors else {}),
+        **{f"rms_ln_{name}": fit.rms for name in fit.errors if _is_logarithmic(name)},
         "errors": dict(fit.errors),
         "parameters": {
             e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}

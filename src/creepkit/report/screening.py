@@ -11,6 +11,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.observation_vector import usable_frames
+from creepkit.records import growing_output, output_named, specimen_of
 from creepkit.report.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
 from creepkit.report.terminal import print_json, print_table
 from creepkit.screening.files import COMPARISON_STRESS, confirmation_text, result_columns
@@ -84,26 +85,23 @@ def _failure_text(alloy: str, failure: str) -> str:
     return failure if f"'{alloy}'" in failure else f"alloy '{alloy}': {failure}"
 
 
-PLOT_RADII = (0.0, 2.0, 4.0)
-"""mm, those of Fig. 7a."""
+def plotted_series(test: History, outputs: Mapping[str, Floats]) -> dict[str, Floats]:
+    """What is drawn of a test: {title: (frames,)}, what its specimen says, else the output that shows creep.
 
-
-PROFILE_OUTPUTS = ("amplitude", "width", "shape")
-
-
-def profile_displacement(outputs: Mapping[str, Floats], radius: float) -> Floats:
-    """D exp(-(r / S)^p), (frames,) mm; NaN where width or shape is not above zero or was not observed.
-
-    outputs : {name: (frames,)}, "amplitude" and "width" in mm, "shape". radius : mm.
+    outputs : {name: (frames,)} in the units of the specimen.
     """
-    amplitude = np.asarray(outputs["amplitude"], float)
-    if radius == 0.0:
-        return amplitude
-    not_observed = np.full(amplitude.shape, np.nan)
-    width, shape = (np.asarray(outputs.get(name, not_observed), float) for name in ("width", "shape"))
-    valid = (width > 0) & (shape > 0)
-    ratio = np.where(valid, radius / np.where(valid, width, 1.0), np.nan)
-    return np.asarray(amplitude * np.exp(-(ratio ** np.where(valid, shape, 1.0))))
+    stated = getattr(specimen_of(test), "plotted_series", None)
+    if stated is not None:
+        return dict(stated(outputs))
+    output = output_named(growing_output(test), test.specimen)
+    return {output.label: np.asarray(outputs[output], float)} if output in outputs else {}
+
+
+def _quantity_label(tests: Sequence[History]) -> str:
+    """The quantity that is drawn, and its unit."""
+    output = output_named(growing_output(tests[0]), tests[0].specimen)
+    quantity = "displacement" if output.quantity == "length" else output.long_name
+    return f"{quantity}, {output.unit}" if output.unit else quantity
 
 
 MISFIT_MEASURES = (
@@ -207,26 +205,20 @@ def plot_histories(plate: ScreeningResult, results: list[AlloyResult]) -> Figure
     panels = figure.subplots(1, len(shown_results), squeeze=False)[0]
     for axes, (name, result) in zip(panels, shown_results.items(), strict=True):
         test = plate.histories[result.alloy][0]
-        _plot_displacements(axes, test, result.predicted[test.name])
+        _plot_series(axes, test, result.predicted[test.name])
         axes.set_title(f"{result.alloy}, {name}: {result.best.law.name}", fontsize=9)
-    panels[0].set_ylabel("displacement, mm")
+    panels[0].set_ylabel(_quantity_label(plate.histories[results[0].alloy]))
     place_legend_below(figure, panels[0], title="measured (dots), identified (lines)")
     return figure
 
 
-def _plot_displacements(axes: Axes, test: History, predicted: PredictedOutputs) -> None:
-    profile_outputs = {name: row for name, row in predicted.items() if name in PROFILE_OUTPUTS}
-    for k, radius in enumerate(PLOT_RADII):
-        if radius > 0 and len(profile_outputs) < len(PROFILE_OUTPUTS):
-            continue
-        hours = test.times / SECONDS_PER_HOUR
-        axes.plot(
-            hours[test.used], profile_displacement(test.outputs, radius)[test.used], ".", ms=2, color=f"C{k}", alpha=0.4
-        )
-        axes.plot(
-            hours, profile_displacement(profile_outputs, radius), "-", lw=1.2, color=f"C{k}", label=f"r = {radius:g} mm"
-        )
-    drawn = np.concatenate([line.get_ydata() for line in axes.lines])
+def _plot_series(axes: Axes, test: History, predicted: PredictedOutputs) -> None:
+    measured, hours = plotted_series(test, test.outputs), test.times / SECONDS_PER_HOUR
+    for k, (title, values) in enumerate(plotted_series(test, predicted).items()):
+        if title in measured:
+            axes.plot(hours[test.used], measured[title][test.used], ".", ms=2, color=f"C{k}", alpha=0.4)
+            axes.plot(hours, values, "-", lw=1.2, color=f"C{k}", label=title)
+    drawn = np.concatenate([np.zeros(1), *(line.get_ydata() for line in axes.lines)])
     set_range(axes, "y", 0.0, float(np.nanmax(drawn, initial=1e-9)))
     set_range(axes, "x", 0.0, float(test.times[-1]) / SECONDS_PER_HOUR, most=6)
     axes.set(xlabel="time, h")
@@ -234,15 +226,16 @@ def _plot_displacements(axes: Axes, test: History, predicted: PredictedOutputs) 
 
 
 def plot_screening(plate: ScreeningResult, folder: Path) -> list[Path]:
-    """Write histories.png and parity.png (bulge tests), misfit.png (with a dense law) and laws.png; their paths."""
+    """Write histories.png and parity.png, misfit.png (with a dense law) and laws.png; their paths."""
     if not plate.identified:
         raise FitError("no alloy of this plate has a law, so there is nothing to draw; see Plate.failed")
-    bulge_results = [a for a in plate.identified if any("amplitude" in rows for rows in a.predicted.values())]
+    first = plate.histories[plate.identified[0].alloy][0].specimen  # one quantity on the axes: tests of one specimen
+    shown = [a for a in plate.identified if plate.histories[a.alloy][0].specimen == first]
     dense_results = [a for a in plate.identified if a.dense_fit is not None]
     figures = {"laws.png": plot_law_fractions(plate)}
-    if bulge_results:
-        figures["parity.png"] = _plot_parity(plate, bulge_results)
-        figures["histories.png"] = plot_histories(plate, bulge_results)
+    if any(_pairs(plate, result) for result in shown):
+        figures["parity.png"] = _plot_parity(plate, shown)
+        figures["histories.png"] = plot_histories(plate, shown)
     if dense_results:
         figures["misfit.png"] = plot_misfits(plate, dense_results)
     make_folder(folder, FitError)
@@ -252,54 +245,53 @@ def plot_screening(plate: ScreeningResult, folder: Path) -> list[Path]:
 
 
 def _plot_parity(plate: ScreeningResult, results: list[AlloyResult]) -> Figure:
-    """Identified against measured displacement at three radii, and their difference (Fig. 7a, of all alloys)."""
-    figure = empty_figure(3.7 * len(PLOT_RADII), 5.6)
-    panels = figure.subplots(2, len(PLOT_RADII), height_ratios=(2.2, 1.0), sharex="col")
+    """Identified against measured, of each series that is drawn, and their difference (Fig. 7a, of all alloys)."""
+    pairs = {result.alloy: _pairs(plate, result) for result in results}
+    titles = list(dict.fromkeys(title for series in pairs.values() for title in series))
+    figure = empty_figure(3.7 * max(len(titles), 2), 5.6)
+    panels = figure.subplots(2, len(titles), height_ratios=(2.2, 1.0), sharex="col", squeeze=False)
     colours, labels = class_colours(plate), LegendLabels()
-    for (upper, lower), radius in zip(panels.T, PLOT_RADII, strict=True):
+    quantity = _quantity_label(plate.histories[results[0].alloy])
+    for k, ((upper, lower), title) in enumerate(zip(panels.T, titles, strict=True)):
         errors, axis_limit = [np.zeros(0)], 0.0
         for result in results:
             name = plate.class_of(result.alloy)
-            for measured, predicted in _displacement_pairs(plate, result, radius):
+            for measured, predicted in pairs[result.alloy].get(title, ()):
                 upper.plot(measured, predicted, ".", ms=2, color=colours[name], alpha=0.6, label=labels.first_use(name))
-                lower.plot(measured, 1e3 * (predicted - measured), ".", ms=1.5, color=colours[name], alpha=0.5)
+                lower.plot(measured, predicted - measured, ".", ms=1.5, color=colours[name], alpha=0.5)
                 errors.append(predicted - measured)
                 axis_limit = max(axis_limit, float(measured.max()), float(predicted.max()))
-        _finish_parity(upper, lower, radius, np.concatenate(errors), 1.05 * axis_limit or 1.0)
+        _finish_parity(upper, lower, title, np.concatenate(errors), 1.05 * axis_limit or 1.0)
+        lower.set(xlabel=f"measured {quantity}")
+        if k == 0:
+            upper.set_ylabel(f"identified {quantity}")
+            lower.set_ylabel("difference")
     figure.legend(loc="outside lower center", ncols=6, fontsize=8, markerscale=4)
     return figure
 
 
-def _displacement_pairs(plate: ScreeningResult, result: AlloyResult, radius: float) -> list[tuple[Any, Any]]:
-    """Measured and identified displacement of each test that has what the radius needs, (frames,) mm."""
-    pairs = []
+def _pairs(plate: ScreeningResult, result: AlloyResult) -> dict[str, list[tuple[Any, Any]]]:
+    """{title: measured and identified values (frames,) of each test that has them}, where both are numbers."""
+    pairs: dict[str, list[tuple[Any, Any]]] = {}
     for test in plate.histories[result.alloy]:
-        predicted_outputs = result.predicted.get(test.name, {})
-        if "amplitude" not in predicted_outputs or (radius > 0 and not set(PROFILE_OUTPUTS) <= set(predicted_outputs)):
-            continue
-        used = usable_frames(test, "amplitude")
-        measured, predicted = (
-            profile_displacement(test.outputs, radius)[used],
-            profile_displacement(predicted_outputs, radius)[used],
-        )
-        finite = np.isfinite(measured) & np.isfinite(predicted)
-        pairs.append((measured[finite], predicted[finite]))
-    return [pair for pair in pairs if pair[0].size]
+        predicted, measured = (plotted_series(test, o) for o in (result.predicted.get(test.name, {}), test.outputs))
+        used = usable_frames(test, growing_output(test))
+        for title in predicted.keys() & measured.keys():
+            finite = used & np.isfinite(measured[title]) & np.isfinite(predicted[title])
+            if finite.any():
+                pairs.setdefault(title, []).append((measured[title][finite], predicted[title][finite]))
+    return dict(sorted(pairs.items()))
 
 
-def _finish_parity(upper: Axes, lower: Axes, radius: float, errors: Any, axis_limit: float) -> None:
+def _finish_parity(upper: Axes, lower: Axes, title: str, errors: Any, axis_limit: float) -> None:
     set_range(upper, "y", 0.0, axis_limit, most=6)
     set_range(upper, "x", 0.0, axis_limit, most=6)
     upper.plot([0, axis_limit], [0, axis_limit], "k-", lw=0.7, alpha=0.6)
     lower.axhline(0, color="black", lw=0.7, alpha=0.6)
-    rms = f", rms {1e3 * float(np.sqrt(np.mean(errors**2))):.2g} um" if errors.size else ": not observed"
-    upper.set_title(f"r = {radius:g} mm{rms}", fontsize=10)
-    lower.set(xlabel="measured displacement, mm")
+    rms = f", rms {float(np.sqrt(np.mean(errors**2))):.2g}" if errors.size else ": not observed"
+    upper.set_title(f"{title}{rms}", fontsize=10)
     for axes in (upper, lower):
         axes.grid(alpha=0.25)
-    if radius == PLOT_RADII[0]:
-        upper.set_ylabel("identified displacement, mm")
-        lower.set_ylabel("difference, um")
 
 
 def print_screening(plate: ScreeningResult, written: list[Path], as_json: bool) -> None:

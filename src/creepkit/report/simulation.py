@@ -10,7 +10,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, SIDES, outline, shape_functions
-from creepkit.records import Status
+from creepkit.records import Status, output_named
 from creepkit.report.figures import empty_figure, save_figure, set_range
 
 if TYPE_CHECKING:
@@ -72,10 +72,10 @@ def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
     """Amplitude, width, shape and pressure over time, one below the other."""
     figure = empty_figure(6.4, 6.6)
     panels = figure.subplots(4, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0, 0.8))
-    hours, units = run.times / 3600.0, {"amplitude": ", mm", "width": ", mm"}
+    hours = run.times / 3600.0
     for axes, (name, values) in zip(panels, run.outputs.items(), strict=False):
         axes.plot(hours, values, lw=1.5, color="tab:blue")
-        axes.set_ylabel(f"{name}{units.get(name, '')}")
+        axes.set_ylabel(output_named(name, run.specimen).label)
     program = run.setup.load_history.pressure
     inside = program.times[program.times < run.end_time]
     knots = np.unique(np.concatenate([inside, [0.0, run.end_time]]))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.errors import SurrogateError
+from creepkit.records import output_named
 from creepkit.report.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
 from creepkit.surrogates.evaluation import PredictionComparison, evaluate, worst_histories
 from creepkit.surrogates.recipe import SurrogateMetadata
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
     from creepkit.surrogates.surrogate import Surrogate
     from creepkit.surrogates.training import SizeStudyResult
-
-
-OUTPUT_LABELS = {"amplitude": "amplitude, mm", "width": "width, mm", "shape": "shape", "strain": "strain"}
 
 
 MOST_POINTS = 4000
@@ -74,7 +72,7 @@ def parity_figure(comparison: PredictionComparison, times: Sequence[float], path
         true, predicted = comparison.at_time(time)
         for k, (axes, name) in enumerate(zip(row, comparison.outputs, strict=True)):
             _draw_parity(axes, true[:, k], predicted[:, k])
-            axes.set_title(f"{OUTPUT_LABELS.get(name, name)} at {time:g} s", fontsize=9)
+            axes.set_title(f"{output_named(name).label} at {time:g} s", fontsize=9)
     for axes in panels[-1]:
         axes.set_xlabel("simulated")
     for axes in panels[:, 0]:
@@ -119,7 +117,7 @@ def worst_samples_figure(comparison: PredictionComparison, path: str | Path | No
     name = comparison.outputs[0]
     for axes in panels[3:]:
         axes.set_xlabel("time, h", fontsize=9)
-    figure.supylabel(OUTPUT_LABELS.get(name, name), fontsize=10)
+    figure.supylabel(output_named(name).label, fontsize=10)
     return save_figure(figure, path, SurrogateError)
 
 

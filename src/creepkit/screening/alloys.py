@@ -21,10 +21,9 @@ import numpy as np
 
 from creepkit.errors import FitError, HistoryError, nearest
 from creepkit.inverse.composite_predictor import CompositePredictor, predictor_for
-from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS
 from creepkit.inverse.reference_conditions import detect_creep, distinct_loads
 from creepkit.readers.text_tables import SourceText, TextTable, read_table
-from creepkit.records import History, Predictor
+from creepkit.records import History, Predictor, is_logarithmic
 
 
 @dataclass(frozen=True)
@@ -91,9 +90,7 @@ def _check_specimens(alloy: Alloy, predictor: Predictor) -> None:
 
 
 def _check_creep(alloy: Alloy, creep_outputs: Sequence[tuple[History, str]]) -> None:
-    detections = [
-        (output, detect_creep(test, output)) for test, output in creep_outputs if output not in LOGARITHMIC_OUTPUTS
-    ]
+    detections = [(output, detect_creep(test, output)) for test, output in creep_outputs if not is_logarithmic(output)]
     if not detections or len(detections) < len(alloy.tests) or any(g.shows_creep for _, g in detections):
         return
     output, largest = max(detections, key=lambda pair: pair[1].increase)

@@ -24,7 +24,7 @@ from creepkit.errors import SolveError
 from creepkit.files.writing import write_text
 from creepkit.language import Elastic
 from creepkit.readers.history_csv import write_history
-from creepkit.records import History, PressureJump, Status
+from creepkit.records import History, PressureJump, Status, output_named
 from creepkit.screening.alloys import Compositions, atomic_percent
 
 BASE_ALLOYS = {
@@ -67,10 +67,6 @@ LAW_PROBABILITIES = {"Fe-rich": (0.8, 0.1, 0.1), "Co-rich": (0.0, 0.5, 0.5)}
 
 THICKNESS_MEAN_SD, MIN_THICKNESS = (0.4935, 0.027), 0.44
 """mm: mean and standard deviation of the apex of 25 measured dimples; thinner than the last burst in such a test."""
-
-
-OUTPUT_SD = {"amplitude": 0.0015, "width": 0.02, "shape": 0.02}
-"""mm, mm, 1: standard deviations measured on real dimples."""
 
 
 LOADING, TIMES = PressureJump(P1=8, P2=10, Tj=7200), np.arange(60.0, 4 * 3600 + 1, 60.0)
@@ -193,7 +189,9 @@ def _with_noise(
 ) -> History:
     """The plan with noisy outputs."""
     outputs = {
-        name: exact_outputs[:, k] + rng.normal(0.0, OUTPUT_SD[name], len(exact_outputs)) for k, name in enumerate(names)
+        name: exact_outputs[:, k]
+        + rng.normal(0.0, output_named(name, planned_test.specimen).noise or 0.0, len(exact_outputs))
+        for k, name in enumerate(names)
     }
     return replace(planned_test, outputs={name: np.round(row, 6) for name, row in outputs.items()})
 

@@ -48,8 +48,8 @@ def test_a_grid_holds_levels_changes_durations_and_dimples():
     assert max(c.hours for c in found) == pytest.approx(13.0)  # and an hour to set it up
     assert {len(c.histories) for c in found} == {1, 2, 3}
     assert all(c.histories[0].outputs == {} for c in found)
-    assert any("a dimple of 0.44 mm at 4 MPa" in c.description for c in found)
-    assert any("3 dimples of 0.44, 0.5 and 0.58 mm" in c.description for c in found)
+    assert any("a test piece of apex thickness 0.44 mm at 4 MPa" in c.description for c in found)
+    assert any("3 test pieces of apex thickness 0.44, 0.5 and 0.58 mm" in c.description for c in found)
     assert len({c.description for c in found}) == len(found)
     short = grid_of_rig(rig, dimple(), budget=4.0)
     assert max(c.hours for c in short) == pytest.approx(4.0)

@@ -74,7 +74,8 @@ def test_the_numbers_file_holds_tests_and_covariances(plate, tmp_path):
 
 
 def test_pictures_are_drawn_of_what_there_is(plate, tmp_path):
-    assert [path.name for path in plate.plot(tmp_path / "pictures")] == ["laws.png", "misfit.png"]
+    names = [path.name for path in plate.plot(tmp_path / "pictures")]
+    assert names == ["histories.png", "laws.png", "misfit.png", "parity.png"]
     plate["X"].best.plot(tmp_path / "X.png")
     assert (tmp_path / "X.png").stat().st_size > 10_000
 

@@ -19,10 +19,10 @@ from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.observation_vector import selected_frames, usable_frames
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import AMPLITUDE_PER_STRAIN, reference_end_strain, reference_stresses
+from creepkit.inverse.reference_conditions import growth_per_strain, reference_end_strain, reference_stresses
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw
-from creepkit.records import History, Predictor
+from creepkit.records import History, Predictor, growing_output, is_logarithmic, output_named
 
 STRESS_FACTORS = (0.5, 0.8, 1.0, 1.3)
 
@@ -93,13 +93,13 @@ def strain_history(history: History, predictor: Predictor | None) -> Floats:
     """(frames,) - creep strain of the test, estimated from its outputs; never decreasing, never zero."""
     times, final_strain = history.times, reference_end_strain(history, predictor)
     lower_limit = MIN_STRAIN_FRACTION * final_strain * times / times[-1]
-    for output, scale in (("strain", 1.0), ("amplitude", AMPLITUDE_PER_STRAIN)):
-        if output in history.outputs and usable_frames(history, output).sum() > 1:
-            is_used = usable_frames(history, output)
-            measured = np.interp(times, times[is_used], history.outputs[output][is_used])
-            start = measured[is_used][0] if output == "amplitude" else 0.0
-            lower_limit = np.maximum(lower_limit, np.minimum((measured - start) / scale, final_strain))
-            break
+    output = growing_output(history)
+    is_used = usable_frames(history, output) if output else np.zeros(times.size, bool)
+    if is_used.sum() > 1 and output_named(output, history.specimen).grows:
+        measured = np.interp(times, times[is_used], history.outputs[output][is_used])
+        start = 0.0 if is_logarithmic(output) else measured[is_used][0]
+        scale = 1.0 if is_logarithmic(output) else growth_per_strain(history, predictor)
+        lower_limit = np.maximum(lower_limit, np.minimum((measured - start) / scale, final_strain))
     else:
         lower_limit = final_strain * times / times[-1]
     return np.asarray(np.maximum.accumulate(np.maximum(lower_limit, 1e-12)))

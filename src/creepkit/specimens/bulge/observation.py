@@ -8,6 +8,7 @@ is unknown.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from numbers import Real
@@ -30,6 +31,25 @@ OBSERVED = (
     Output("shape", "number", grows=False, noise=0.02, weight=0.005),
 )
 """Columns of what is observed: D_amp in mm, S_d in mm, S_p. Noise as measured on real dimples; the paper's weights."""
+
+
+PLOT_RADII = (0.0, 2.0, 4.0)
+"""mm, those of the paper's Fig. 7a."""
+
+
+def profile_displacement(outputs: Mapping[str, Floats], radius: float) -> Floats:
+    """D exp(-(r / S)^p), (frames,) mm; NaN where width or shape is not above zero or was not observed.
+
+    outputs : {name: (frames,)}, "amplitude" and "width" in mm, "shape". radius : mm.
+    """
+    amplitude = np.asarray(outputs["amplitude"], float)
+    if radius == 0.0:
+        return amplitude
+    not_observed = np.full(amplitude.shape, np.nan)
+    width, shape = (np.asarray(outputs.get(name, not_observed), float) for name in ("width", "shape"))
+    valid = (width > 0) & (shape > 0)
+    ratio = np.where(valid, radius / np.where(valid, width, 1.0), np.nan)
+    return np.asarray(amplitude * np.exp(-(ratio ** np.where(valid, shape, 1.0))))
 
 
 Form = Literal["profile", "field"]

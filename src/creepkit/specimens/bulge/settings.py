@@ -13,7 +13,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
 from creepkit.records import Dimension, History, Load
 from creepkit.specimens.bulge.geometry import LENGTH_RANGE, DimpleGeometry
-from creepkit.specimens.bulge.observation import Observation
+from creepkit.specimens.bulge.observation import PLOT_RADII, Observation, profile_displacement
 from creepkit.specimens.settings_checks import check_number, check_whole_number, is_whole_number
 
 if TYPE_CHECKING:
@@ -100,6 +100,16 @@ class BulgeSettings:
             for name in DimpleGeometry.lengths
         )
         return (*lengths, Dimension("window", self.observation.window, LENGTH_RANGE, of_piece=False))
+
+    def plotted_series(self, outputs: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Displacements of the top at the radii of the paper's Fig. 7a, {title: (frames,)} mm.
+
+        outputs : {name: (frames,)} amplitude, width (mm) and shape; without the last two, the middle alone.
+        """
+        if "amplitude" not in outputs:
+            return {}
+        radii = PLOT_RADII if {"width", "shape"} <= outputs.keys() else PLOT_RADII[:1]
+        return {f"r = {radius:g} mm": profile_displacement(outputs, radius) for radius in radii}
 
     def growth_per_strain(self, history: History) -> float:
         """mm of amplitude for each unit of reference strain: 42.3 (t/0.5 mm)^-0.486 for the default.
