@@ -216,8 +216,8 @@ def _has_tolerance(kind: str) -> bool:
 def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[History], predictor: Predictor) -> None:
     """FitError for a tolerance of what no test has, or that is no standard deviation."""
     for kind, sd in tolerances.items():
-        own = {name for h in histories for d in dimensions_of(predictor_for(predictor, h)) for name in d.names}
-        known = sorted({*TOLERANCE_KINDS, *own, *all_dimensions()})
+        lengths = {name for h in histories for d in dimensions_of(predictor_for(predictor, h)) for name in d.names}
+        known = sorted({*TOLERANCE_KINDS, *lengths, *all_dimensions()})
         if kind not in known:
             raise FitError(f"a tolerance of '{kind}' is not known; {nearest(kind, known)}")
         if not (np.isfinite(sd) and sd >= 0):
