@@ -248,12 +248,14 @@ def predict_with_sensitivities(
     kinds = [kind for kind in nuisances if kind not in prediction.nuisance_jacobian]
     if not (numeric or kinds):
         return prediction
-    steps = RELATIVE_STEP * np.maximum(np.abs(theta), 1.0) if numeric else np.zeros(0)
+    on = np.isfinite(theta)  # a coefficient that is off stays off, and has a derivative of zero
+    steps = RELATIVE_STEP * np.maximum(np.abs(np.where(on, theta, 0.0)), 1.0) if numeric else np.zeros(0)
     nuisance_steps = [_nuisance_step(key, nuisances[key]) for key in kinds]
     points, shifted_nuisances = _difference_points(theta, steps, nuisances, kinds, nuisance_steps)
     batch = predict(predictor, law, points, histories, nuisances=shifted_nuisances)
     count = len(points) // 2
-    differences = batch.values[:count] - batch.values[count:]
+    with np.errstate(invalid="ignore"):  # of values that are not finite, whose derivatives are NaN
+        differences = batch.values[:count] - batch.values[count:]
     jacobian = np.moveaxis(differences[: steps.size], 0, -1) / (2 * steps) if numeric else None
     nuisance_jacobian = {
         kind: differences[steps.size + k][None] / (2 * nuisance_steps[k]) for k, kind in enumerate(kinds)
@@ -278,7 +280,8 @@ def _difference_points(
     count = steps.size + len(kinds)
     points = np.tile(theta, (2 * count, 1))
     for sign, offset in ((1.0, 0), (-1.0, count)):
-        points[offset : offset + steps.size] += sign * np.eye(steps.size, theta.size) * steps[:, None]
+        moved = sign * np.eye(steps.size, theta.size) * steps[:, None]
+        points[offset : offset + steps.size] += np.where(np.isfinite(theta), moved, 0.0)
     shifted_nuisances = {kind: np.tile(values, (2 * count, 1)) for kind, values in nuisances.items()}
     for k, kind in enumerate(kinds):
         shifted_nuisances[kind][steps.size + k] += nuisance_steps[k]

@@ -106,8 +106,8 @@ class PerTest(TestPiece, ABC):
     ) -> tuple[Floats, Status, float, str]:
         """Outputs (times, outputs), status, end and reason of one candidate; errors name test, values and line."""
         end = float(history.times[-1])
+        piece, tested = self.of_test(history, nuisances)
         try:
-            piece, tested = self.of_test(history, nuisances)
             found = piece.one(law, values, tested, nuisances)
         except SolveError as error:
             return np.full((history.times.size, len(self.outputs)), np.nan), Status.NOT_CONVERGED, 0.0, str(error)

@@ -2,12 +2,14 @@
 
 import subprocess
 import sys
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 import creepkit as ck
 from creepkit.errors import SolveError
+from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.records import Status
 from creepkit.specimens.per_test import OneTest, PerTest
 
@@ -123,3 +125,71 @@ def test_an_author_is_told_which_test_values_and_line(given, sentence):
 def test_a_nuisance_that_one_does_not_take_is_refused():
     with pytest.raises(SolveError, match="specimen 'awk' does not know the nuisance 'thickness'"):
         Awk().predict(NORTON, NORTON.to_internal(TRUTH), plans(60.0), nuisances={"thickness": np.array([[0.5]])})
+
+
+def test_differences_leave_a_coefficient_off_that_is_off():
+    """-inf has no neighbours: its derivative is zero, and nothing is warned of."""
+    theta = NORTON.to_internal({"A": 0.0, "n": 4.0})
+    found = predict_with_sensitivities(Bar(), NORTON, theta[0], plans(60.0), {})
+    np.testing.assert_array_equal(found.jacobian, np.zeros_like(found.jacobian))
+
+
+@dataclass(frozen=True)
+class Wire(PerTest):
+    """A wire that hangs under a weight, of a length and a diameter."""
+
+    name, title = "wire", "Wire under a weight"
+    outputs = (ck.Output("elongation", "length", noise=1e-3),)
+    loads = (ck.Load("weight", "force"),)
+    gauge: float = ck.dimension(1000.0)
+    diameter: float = ck.dimension(1.0, (0.1, 10.0), tolerance=0.01)
+
+    def one(self, law, values, history, nuisances):
+        stress = history.loading.program().values[0] / (np.pi / 4 * self.diameter**2)
+        return {"elongation": values["A"] * stress ** values["n"] * history.times * self.gauge}
+
+
+def wire(**geometry):
+    return ck.History("wire", TIMES, {}, ck.constant_load("weight", 60.0), 1000.0, "wire", geometry=geometry)
+
+
+def test_a_length_is_what_the_test_states_else_its_nuisance_else_the_default():
+    theta = NORTON.to_internal(TRUTH)
+    as_built, stated = Wire().predict(NORTON, theta, [wire()]), Wire().predict(NORTON, theta, [wire(diameter=1.1)])
+    np.testing.assert_allclose(stated.values, as_built.values * 1.1**-8, rtol=1e-12)
+    given = Wire().predict(NORTON, theta, [wire(diameter=1.1)], nuisances={"diameter": np.array([[1.2]])})
+    np.testing.assert_allclose(given.values, as_built.values * 1.2**-8, rtol=1e-12)
+    changed = Wire().replace(diameter=1.2).predict(NORTON, theta, [wire()])
+    np.testing.assert_allclose(changed.values, given.values, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("test", "message"),
+    [
+        (wire(diameter=20.0), "history 'wire': diameter is 20 mm; allowed is 0.1 to 10 mm"),
+        (wire(diamter=1.1), "no length of the test piece is called 'diamter'; did you mean 'diameter'"),
+        (plans(60.0)[0].replace(specimen="wire"), "specimen 'wire' is loaded by weight .N., found stress"),
+    ],
+)
+def test_a_test_that_does_not_fit_the_piece_is_refused(test, message):
+    with pytest.raises(SolveError, match=message):
+        Wire().predict(NORTON, NORTON.to_internal(TRUTH), [test])
+
+
+def test_a_diameter_is_found_as_a_nuisance_parameter():
+    """Five wires drawn to 1 %: each diameter lies within three of its standard deviations."""
+    rng = np.random.default_rng(5)
+    tests, diameters = [], 1.0 + 0.01 * rng.standard_normal(5)
+    for k, (diameter, weight) in enumerate(zip(diameters, (40.0, 50.0, 60.0, 70.0, 80.0), strict=True)):
+        plan = wire(diameter=diameter).replace(loading=ck.constant_load("weight", weight), name=f"wire {k}")
+        exact = Wire().predict(NORTON, NORTON.to_internal(TRUTH), [plan]).of(0)[:, 0]
+        noisy = exact + 1e-3 * rng.standard_normal(TIMES.size)
+        sd = {"elongation": np.full(TIMES.size, 1e-3)}
+        tests.append(plan.replace(outputs={"elongation": noisy}, standard_deviation=sd, geometry={}))
+    nuisance = ck.Nuisance("diameter", sd=0.01)
+    fit = ck.identify("norton", tests, Wire(), starts=1, sobol_points=16, nuisances=[nuisance], weights="likelihood")
+    for estimate in fit.estimates:
+        assert estimate.low < TRUTH[estimate.name] < estimate.high
+    assert "mm" in str(fit)
+    for estimate, truth in zip(fit.nuisances, diameters, strict=True):
+        assert abs(estimate.value - truth) < 3.0 * estimate.sd
