@@ -61,9 +61,9 @@ class TestPiece:
         for name in changes:
             if name not in known:
                 raise SolveError(f"specimen '{self.name}' has no field '{name}'; {nearest(name, known)}")
+        for length in (d for d in self.dimensions if d.name in changes):
+            length.checked(changes[length.name], f"specimen '{self.name}'")
         changed: Self = replace(self, **changes)  # type: ignore[type-var]
-        for each in changed.dimensions:  # which refuse a default outside their bounds
-            each.checked(each.default, f"specimen '{self.name}'")
         return changed
 
     def of_test(self, history: History, nuisances: Mapping[str, float]) -> tuple[Self, History]:
