@@ -54,7 +54,7 @@ def remember_specimen(predictor: object) -> None:
 def known_specimens() -> Mapping[str, Registered]:
     """{name: specimen} of all that are registered, and of others that were used in this process."""
     if not _sources:
-        importlib.import_module("creepkit.registry")  # which states how; a layer above, so not imported by name
+        importlib.import_module("creepkit.registry.arguments")  # states how; a layer above, so by name
     return {**_used, **_sources[0]()}
 
 

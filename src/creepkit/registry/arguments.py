@@ -9,10 +9,19 @@ from typing import TYPE_CHECKING
 from creepkit.errors import FitError, LawError, SolveError
 from creepkit.readers import reading
 from creepkit.records import History, Predictor, remember_specimen
+from creepkit.records.known_specimens import find_specimens_by
 from creepkit.registry.plugin_registry import default_registry
 
 if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
+    from creepkit.records import Specimen
+
+
+def _registered_specimens() -> dict[str, Specimen]:
+    return {name: registered.value for name, registered in default_registry().specimens().items()}
+
+
+find_specimens_by(_registered_specimens)  # here, not with the registry, which must not wait for the records
 
 
 def resolve_law(law: CreepLaw | str) -> CreepLaw:

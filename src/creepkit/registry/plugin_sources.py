@@ -59,6 +59,35 @@ def provenance_of_file(path: Path) -> Provenance:
     return Provenance(str(path.resolve()), path.stem)
 
 
+def mentions_commands(source: EntryPoint | Path) -> bool:
+    """Whether the text of a plugin's module or file has the name of the hook for commands; nothing is imported.
+
+    So `creepkit --help` imports no plugin but those that add commands. False where the source cannot be found.
+    """
+    path = source if isinstance(source, Path) else _module_file(source.module)
+    try:
+        return path is not None and COMMANDS_HOOK.encode() in path.read_bytes()
+    except OSError:
+        return False
+
+
+def _module_file(name: str) -> Path | None:
+    """The file of a module, found as an import would find it, without importing the packages that it is in."""
+    places: Sequence[str] | None = None
+    spec = None
+    for k in range(name.count(".") + 1):
+        full_name = ".".join(name.split(".")[: k + 1])
+        finders = (finder.find_spec for finder in sys.meta_path if hasattr(finder, "find_spec"))
+        try:
+            spec = next((found for find in finders if (found := find(full_name, places)) is not None), None)
+        except Exception:  # of a finder of somebody else: then the module is not known to add commands
+            return None
+        if spec is None:
+            return None
+        places = spec.submodule_search_locations
+    return Path(spec.origin) if spec is not None and spec.has_location and spec.origin else None
+
+
 def import_entry(provenance: Provenance, entry: EntryPoint) -> object:
     """Import an installed plugin; PluginError when it raises."""
     try:
