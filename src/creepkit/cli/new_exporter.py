@@ -68,7 +68,7 @@ def command(
     name: Annotated[str, typer.Argument(help="Name of the exporter, such as 'our-code'.")],
     file: Annotated[bool, typer.Option("--file", help="One file, for --plugin and CREEPKIT_PLUGINS.")] = False,
 ) -> None:
-    """Write an exporter to start from: a law as text, as a package."""
+    """Write an exporter to start from, as a package."""
     from creepkit.registry import default_registry
 
     write_plugin(EXPORTER, name, default_registry().exporters(), one_file=file)

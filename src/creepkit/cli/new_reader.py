@@ -70,7 +70,7 @@ def command(
     name: Annotated[str, typer.Argument(help="Name of the reader, such as 'our-laboratory'.")],
     file: Annotated[bool, typer.Option("--file", help="One file, for --plugin and CREEPKIT_PLUGINS.")] = False,
 ) -> None:
-    """Write a reader to start from: of folders of CSV files, as a package."""
+    """Write a reader to start from, as a package."""
     from creepkit.registry import default_registry
 
     write_plugin(READER, name, default_registry().readers(), one_file=file)

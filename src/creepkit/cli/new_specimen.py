@@ -94,7 +94,7 @@ def command(
     name: Annotated[str, typer.Argument(help="Name of the specimen, such as 'my-beam'.")],
     file: Annotated[bool, typer.Option("--file", help="One file, for --plugin and CREEPKIT_PLUGINS.")] = False,
 ) -> None:
-    """Write a specimen to start from: one test piece, as a package."""
+    """Write a specimen to start from, as a package."""
     from creepkit.registry import default_registry
 
     write_plugin(SPECIMEN, name, default_registry().specimens(), one_file=file)
