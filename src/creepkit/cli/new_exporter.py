@@ -18,6 +18,7 @@ EXPORTER = PackageKind(
 """$title: say here which program reads the text."""
 
 from creepkit.errors import ExportError
+from creepkit.exporters.law_description import comment_lines
 from creepkit.hookspecs import hookimpl
 from creepkit.records import LawWithValues
 
@@ -36,7 +37,7 @@ class ${class_name}Exporter:
             raise ExportError(f"law '{law.name}' has internal variables, which {self.title} has not; export another")
         if not source.units.is_native:
             raise ExportError(f"{self.title} is in MPa and s; leave the units out")
-        lines = [f"# {line}" for line in (source.title, *source.notes)]
+        lines = comment_lines((source.title, *source.notes), "#")
         lines += [f"rate = {' + '.join(f'({term})' for term in law.terms.values())}"]
         lines += [f"{name} = {value!r}  # {law.table[name].unit}" for name, value in source.values.items()]
         return "\\n".join(lines) + "\\n"
