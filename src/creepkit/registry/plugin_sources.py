@@ -210,7 +210,8 @@ def check_signatures(provenance: Provenance, plugin: object) -> None:
         if unknown:
             wanted = f"({', '.join(allowed)})" if allowed else "no parameters"
             raise PluginError(
-                f"{provenance} does not fit the hooks of creepkit: {name} has the parameter '{unknown[0]}', creepkit calls it with {wanted}"
+                f"{provenance} does not fit the hooks of creepkit: {name} has the parameter '{unknown[0]}', "
+                f"creepkit calls it with {wanted}"
                 f"{hook_location(function)}"
             )
         if isgeneratorfunction(function):

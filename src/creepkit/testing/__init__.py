@@ -15,9 +15,9 @@ import numpy as np
 from creepkit.errors import CreepkitError, LawError
 from creepkit.kernels.lowering import lower
 from creepkit.language.law import CreepLaw
-from creepkit.testing import law_checks
-from creepkit.testing.law_checks import ConformanceCheck, ConformanceReport
+from creepkit.testing import law_behaviour, law_checks, law_declarations
 from creepkit.testing.parity import DERIVATIVE_TOLERANCE, VALUE_TOLERANCE
+from creepkit.testing.reports import ConformanceCheck, ConformanceReport
 from creepkit.testing.sample_points import LawSamples, draw_samples
 
 __all__ = [
@@ -36,11 +36,19 @@ _FEWEST_SAMPLES = 8
 
 
 _LAW_CHECKS: dict[str, Callable[[CreepLaw, LawSamples], Iterator[ConformanceCheck]]] = {
+    "name": law_declarations.check_name,
     "table": law_checks.check_declarations,
+    "references": law_declarations.check_references,
+    "dimensions": law_declarations.check_units,
     "printing": law_checks.check_printing,
     "signs": law_checks.check_signs,
     "finite": law_checks.check_finite,
     "monotone": law_checks.check_monotonic,
+    "continuity": law_behaviour.check_continuity,
+    "temperature": law_declarations.check_temperature,
+    "exponents of time": law_behaviour.check_time_exponents,
+    "states": law_behaviour.check_states,
+    "examples": law_declarations.check_examples,
     "parity": law_checks.check_parity,
     "torch gradients": law_checks.check_torch_gradients,
     "switches": law_checks.check_switches,
