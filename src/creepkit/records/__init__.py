@@ -71,6 +71,7 @@ from creepkit.records.prediction_assembly import (
 from creepkit.records.prediction_checks import checked_prediction
 from creepkit.records.quantities import QUANTITIES, ZERO_CELSIUS, QuantityKind, unit_of
 from creepkit.records.specimen_record import Dimension, Load, Output
+from creepkit.records.typical_history import typical_history
 
 __all__ = [
     "COVARIANCE_NUISANCES",
@@ -145,6 +146,7 @@ __all__ = [
     "predict_with",
     "remember_specimen",
     "specimen_of",
+    "typical_history",
     "unit_of",
     "unpredicted",
     "with_program_nuisances",

@@ -17,13 +17,7 @@ from creepkit.language.symbols import POINT_VARIABLES, strain, stress, time
 from creepkit.records import History, PointLoading, Status
 from creepkit.testing.law_checks import log_log_derivatives, point_text
 from creepkit.testing.reports import ConformanceCheck
-from creepkit.testing.sample_points import (
-    STRAIN_RANGE,
-    STRESS_RANGE,
-    TIME_RANGE,
-    LawSamples,
-    constraints_hold,
-)
+from creepkit.testing.sample_points import STRAIN_RANGE, STRESS_RANGE, TIME_RANGE, LawSamples, constraints_hold
 
 RAYS = 4
 """Samples whose rays are followed; each is some 10 000 evaluations of a kernel."""

@@ -26,7 +26,6 @@ from creepkit.testing.parity import (
 from creepkit.testing.reports import ConformanceCheck
 from creepkit.testing.sample_points import LawSamples, constraints_hold
 
-
 _STRESS_COLUMNS = [0, 4, 5]
 
 
@@ -174,6 +173,7 @@ def check_leading_exponent(law: CreepLaw, samples: LawSamples) -> Iterator[Confo
 
 
 def check_at_samples(name: str, law: CreepLaw, samples: LawSamples, holds: Bools) -> ConformanceCheck:
+    """Whether something holds at all samples, (samples,); if not, the first point where it does not."""
     if holds.all():
         return ConformanceCheck(name, True, f"{holds.size} points")
     first = int(np.flatnonzero(~holds)[0])
@@ -184,11 +184,13 @@ def check_at_samples(name: str, law: CreepLaw, samples: LawSamples, holds: Bools
 
 
 def point_text(law: CreepLaw, point: Floats) -> str:
+    """What a law uses of a point, (6 + states,), in words."""
     pairs = zip((*POINT_VARIABLES, *law.states), point, strict=True)
     return ", ".join(f"{s.name} {value:.4g}" for s, value in pairs if law.uses(s))
 
 
 def log_rate(kernel: ArrayKernel, samples: LawSamples) -> Floats:
+    """The ln rate at samples, (samples,)."""
     return np.asarray(kernel.internal_log_rate(*samples.arguments()), float)
 
 

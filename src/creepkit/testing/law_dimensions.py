@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from fractions import Fraction
+from itertools import pairwise
 from typing import TypeAlias
 
 import sympy
@@ -157,10 +158,11 @@ class _Analysis:
     def sum_of(self, expression: sympy.Basic, parts: list[sympy.Basic]) -> Unit:
         units = [(part, self.unit(part)) for part in parts if part != 0]
         known = [(part, unit) for part, unit in units if unit is not None]
-        for (a, first), (b, second) in zip(known, known[1:], strict=False):
+        for (a, first), (b, second) in pairwise(known):
             if not _fits(first, second):
                 raise DimensionError(
-                    f"{expression} puts {a} in {_text(first)} beside {b} in {_text(second)}; correct unit= of a parameter"
+                    f"{expression} puts {a} in {_text(first)} beside {b} in {_text(second)}; "
+                    "correct unit= of a parameter"
                 )
         flexible = [u for _, u in known if {RATIO_OF_STRESS, RATIO_OF_TIME} & set(u.powers)]
         return next(iter([*flexible, *(u for _, u in known)]), None)
@@ -229,7 +231,9 @@ def _plain_value(expression: sympy.Mul) -> float:
 
 def _is_multiple(ratio: float) -> bool:
     """Whether a ratio is 1, or a small number times or over 1, within the rounding of physical constants."""
-    return any(abs(ratio * k - 1.0) < CONSTANT_TOLERANCE or abs(ratio / k - 1.0) < CONSTANT_TOLERANCE for k in (1, 2, 3))
+    return any(
+        abs(ratio * k - 1.0) < CONSTANT_TOLERANCE or abs(ratio / k - 1.0) < CONSTANT_TOLERANCE for k in (1, 2, 3)
+    )
 
 
 def _text(unit: UnitPowers) -> str:

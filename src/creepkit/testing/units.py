@@ -66,10 +66,10 @@ def _known() -> dict[str, UnitPowers]:
 KNOWN_UNITS = _known()
 
 
-_TOKEN = re.compile(
-    r"\s*(?:(?P<number>\d+(?:\.\d+)?(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z%]+)|(?P<sign>\*\*|[*/()^.]|·))"
+_TOKEN = re.compile(r"\s*(?:(?P<number>\d+(?:\.\d+)?(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z%]+)|(?P<sign>\*\*|[*/()^.]|·))")
+_EXPONENT = re.compile(
+    r"\s*(?:\^|\*\*)\s*(?:\(\s*)?(?P<sign>[+-]?)\s*(?P<value>\d+(?:/\d+|\.\d+)?)(?:\s*\))?|(?P<bare>-?\d)(?!\d)"
 )
-_EXPONENT = re.compile(r"\s*(?:\^|\*\*)\s*(?:\(\s*)?(?P<sign>[+-]?)\s*(?P<value>\d+(?:/\d+|\.\d+)?)(?:\s*\))?|(?P<bare>-?\d)(?!\d)")
 
 
 class UnknownUnitError(ValueError):
