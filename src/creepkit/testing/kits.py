@@ -13,7 +13,6 @@ from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, 
 from creepkit.kernels.lowering import lower
 from creepkit.language import arrhenius
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import Param, parameters, stress
 from creepkit.records import Exporter, History, Predictor, Reader, Specimen, remember_specimen
 from creepkit.registry import Plugin, default_registry
 from creepkit.testing import (
@@ -30,6 +29,7 @@ from creepkit.testing.predictor_checks import PredictorCase, default_histories
 from creepkit.testing.reader_checks import ReaderCase
 from creepkit.testing.reports import ConformanceCheck, ConformanceReport, findings
 from creepkit.testing.sample_points import LawSamples, draw_samples
+from creepkit.testing.temperature_form_checks import TemperatureFormCase
 
 _FEWEST_SAMPLES = 8
 """Samples at which the constraints must hold for a verdict to mean something."""
@@ -180,32 +180,11 @@ def check_exporter(exporter: Exporter) -> ConformanceReport:
     return ConformanceReport(exporter, tuple(_all_findings(checks, case)), "exporter")
 
 
-def _check_temperature_form(named: tuple[str, Callable[..., Any]]) -> ConformanceReport:
-    """A temperature form or factor gives a law at its reference temperature what that law is without it."""
-    from creepkit.language import TemperatureFactor, TemperatureForm
-
-    name, form = named
-    A, n = parameters("A n")
-    plain = CreepLaw(
-        name="plain",
-        title="A plain law",
-        terms={"power law": A * stress**n},
-        params={A: Param("rate coefficient", (1e-40, 1e-5), "1/s", "log"), n: Param("stress exponent", (1, 8))},
-        references=("none, for a check",),
-    )
-
-    def checks() -> Iterable[ConformanceCheck]:
-        made = form(T_ref=1073.15)
-        if not isinstance(made, TemperatureForm | TemperatureFactor):
-            detail = f"it returned a {type(made).__name__}; return a TemperatureForm or a TemperatureFactor"
-            yield ConformanceCheck("form", False, detail)
-            return
-        law = plain.times(made) if isinstance(made, TemperatureFactor) else plain.with_temperature(A=made)
-        yield ConformanceCheck("form", True, type(made).__name__)
-        yield from check_law(law, samples=16).failures
-
-    subject = type("TemperatureFormCheck", (), {"name": name})()
-    return ConformanceReport(subject, tuple(findings("form", checks)), "temperature form")
+def check_temperature_form(name: str, form: Callable[..., Any]) -> ConformanceReport:
+    """Run every check on a temperature form or factor, a function of T_ref."""
+    subject = TemperatureFormCase(name, form)
+    checks = {"temperature form": TemperatureFormCase.check}
+    return ConformanceReport(subject, tuple(_all_findings(checks, subject)), "temperature form")
 
 
 _KITS: dict[str, Callable[[Any], ConformanceReport]] = {
@@ -225,7 +204,7 @@ def check_plugin(plugin: Plugin) -> list[ConformanceReport]:
         if kind in _KITS
     ]
     forms = plugin.contributions.get("temperature form", {})
-    reports += [_check_temperature_form(named) for named in forms.items()]
+    reports += [check_temperature_form(*named) for named in forms.items()]
     if not reports:
         raise PluginError(
             f"{plugin.provenance} offers no law, specimen, reader, exporter or temperature form; return one from a "
@@ -246,7 +225,7 @@ def check_named(name: str) -> list[ConformanceReport]:
     reports = [_KITS[kind](known[name].value) for kind, known in offered.items() if name in known]
     forms = registry.temperature_forms()
     if name in forms:
-        reports.append(_check_temperature_form((name, forms[name].value)))
+        reports.append(check_temperature_form(name, forms[name].value))
     return reports or [check_law(registry.law(name))]
 
 
