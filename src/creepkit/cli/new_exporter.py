@@ -13,7 +13,8 @@ EXPORTER = PackageKind(
     "exporter",
     ExportError,
     edit="text()",
-    use="creepkit export norton --to $name --set A=1e-16 --set n=5",
+    check="creepkit check $file",
+    use="creepkit check $name\ncreepkit export norton --to $name --set A=1e-16 --set n=5",
     module='''\
 """$title: say here which program reads the text."""
 
@@ -53,6 +54,11 @@ import pytest
 import creepkit as ck
 
 VALUES = {"A": 1e-16, "n": 5.0}
+
+
+def test_it_keeps_what_every_exporter_promises() -> None:
+    report = ck.check_exporter(ck.available("exporters")["$name"])
+    assert report.passed, str(report)
 
 
 def test_the_text_says_the_same_as_the_law() -> None:

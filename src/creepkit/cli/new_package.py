@@ -26,8 +26,7 @@ class PackageKind:
 
     noun : what is offered: "law". error : raised where there is one of that name already.
     module, test : text of the module, and of its test. edit : what its author edits first.
-    use : commands that use it. check : the command that checks $file, the path of the module; "" where only the test
-    does.
+    use : commands that use it. check : the command that checks $file, the path of the module.
     """
 
     noun: str
@@ -36,7 +35,7 @@ class PackageKind:
     test: str
     edit: str
     use: str
-    check: str = ""
+    check: str
 
     @property
     def commands(self) -> str:
@@ -96,8 +95,10 @@ def _write_file(kind: PackageKind, name: str) -> str:
     _check_absent(path)
     write_text(_filled(kind.module, name), path, PluginError)
     check = _filled(kind.check, name, file=str(path))
-    check = f"run '{check}', and " if check else "use "
-    return f"wrote {path}; next: edit {kind.edit}, then {check}'creepkit --plugin {path}' before any other command"
+    return (
+        f"wrote {path}; next: edit {kind.edit}, then run '{check}', "
+        f"and 'creepkit --plugin {path}' before any other command"
+    )
 
 
 def _write_package(kind: PackageKind, name: str) -> str:
@@ -118,10 +119,9 @@ def _write_package(kind: PackageKind, name: str) -> str:
         write_text(text, folder / path, PluginError)
     file = folder / f"{module}.py"
     check = _filled(kind.check, name, file=str(file))
-    check = f"run '{check}', then" if check else "then"
     return (
         f"wrote {folder}/ ({', '.join(texts)})\n"
-        f"next: edit {kind.edit} in {file}, {check} 'pip install -e ./{folder}' and 'pytest {folder}': "
+        f"next: edit {kind.edit} in {file}, run '{check}', then 'pip install -e ./{folder}' and 'pytest {folder}': "
         f"from then on every command knows the {kind.noun} '{name}'"
     )
 

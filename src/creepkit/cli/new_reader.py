@@ -13,7 +13,8 @@ READER = PackageKind(
     "reader",
     HistoryError,
     edit="the names of files and columns",
-    use="creepkit identify FOLDER --law norton",
+    check="creepkit check $file",
+    use="creepkit check $name\ncreepkit identify FOLDER --law norton",
     module='''\
 """$title: say here whose files these are, and what they hold."""
 
@@ -54,6 +55,8 @@ import creepkit as ck
 def test_numbers_arrive_in_creepkits_units(tmp_path: Path) -> None:
     (tmp_path / "tests.csv").write_text("bar,load_MPa,temperature_C,ended\\nb7,120,750,unloaded\\n")
     (tmp_path / "b7.csv").write_text("time_h,elongation_pct\\n1,0.02\\n2,0.03\\n")
+    report = ck.check_reader(ck.available("readers")["$name"], tmp_path)
+    assert report.passed, str(report)
 
     (bar,) = ck.read_histories(tmp_path, reader="$name")
 

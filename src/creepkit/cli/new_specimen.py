@@ -13,7 +13,8 @@ SPECIMEN = PackageKind(
     "specimen",
     SolveError,
     edit="its lengths, outputs and one()",
-    use="creepkit specimens",
+    check="creepkit check $file",
+    use="creepkit specimens\ncreepkit check $name",
     module='''\
 """$title: say here in one line what is loaded, and what is observed."""
 
@@ -71,6 +72,11 @@ TIMES = np.linspace(3600.0, 3.6e6, 20)
 
 def simulated(force: float) -> ck.History:
     return ck.simulate("norton", "$name", VALUES, loading=ck.constant_load("force", force), times=TIMES)
+
+
+def test_it_keeps_what_every_specimen_promises() -> None:
+    report = ck.check_specimen(ck.specimen("$name"))
+    assert report.passed, str(report)
 
 
 def test_it_is_the_closed_form_of_norton_creep_under_dead_weight() -> None:

@@ -45,6 +45,7 @@ from creepkit.records.loading import (
     load_steps,
 )
 from creepkit.records.nuisance_programs import SCALABLE_LOADS, STEP_DURATION, drift_duration, with_program_nuisances
+from creepkit.records.plugin_calls import accepts_path, call_of_plugin, exported_text, histories_in, predict_with
 from creepkit.records.prediction import (
     COVARIANCE_NUISANCES,
     GENERAL_NUISANCES,
@@ -70,6 +71,7 @@ from creepkit.records.prediction_assembly import (
 from creepkit.records.prediction_checks import checked_prediction
 from creepkit.records.quantities import QUANTITIES, ZERO_CELSIUS, QuantityKind, unit_of
 from creepkit.records.specimen_record import Dimension, Load, Output
+from creepkit.records.typical_history import typical_history
 
 __all__ = [
     "COVARIANCE_NUISANCES",
@@ -111,9 +113,11 @@ __all__ = [
     "SupportsSearchTolerance",
     "TimesToStrain",
     "Units",
+    "accepts_path",
     "all_dimensions",
     "assemble_prediction",
     "broadcast_candidates",
+    "call_of_plugin",
     "check_geometry",
     "check_load",
     "check_nuisances",
@@ -124,8 +128,10 @@ __all__ = [
     "dimension_named",
     "dimensions_of",
     "drift_duration",
+    "exported_text",
     "find_specimens_by",
     "growing_output",
+    "histories_in",
     "is_length_nuisance",
     "kind_and_start",
     "known_specimens",
@@ -137,8 +143,10 @@ __all__ = [
     "output_named",
     "output_unit",
     "outputs_of",
+    "predict_with",
     "remember_specimen",
     "specimen_of",
+    "typical_history",
     "unit_of",
     "unpredicted",
     "with_program_nuisances",

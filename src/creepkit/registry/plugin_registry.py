@@ -288,6 +288,7 @@ class Registry:
         return Plugin(provenance, contributions, commands=plugin_sources.COMMANDS_HOOK in hooks)
 
     def _register_module(self, provenance: Provenance, module: object) -> None:
+        plugin_sources.check_signatures(provenance, module)
         try:
             self._manager.register(module, str(provenance))
         except pluggy.PluginValidationError as error:

@@ -183,6 +183,28 @@ def test_a_file_without_laws_cannot_be_checked() -> None:
     assert "offers no law" in one_line(creepkit("check", "commands.py"))
 
 
+def test_a_file_that_has_the_name_of_a_law_is_not_executed() -> None:
+    Path("norton").write_text("raise SystemExit('executed')\n")
+    Path("mine").write_text("raise SystemExit('executed')\n")
+
+    result = creepkit("check", "norton")
+
+    assert result.exit_code == 0
+    assert result.stdout.startswith("norton: conforms\n")
+    assert "the file mine is not executed" in one_line(creepkit("check", "mine"))
+
+
+def test_specimens_readers_and_exporters_are_checked_by_name() -> None:
+    result = creepkit("check", "uniaxial", "csv", "code_aster")
+
+    assert result.exit_code == 0
+    assert [line for line in result.stdout.splitlines() if not line.startswith(" ")] == [
+        "uniaxial: conforms",
+        "csv: conforms",
+        "code_aster: conforms",
+    ]
+
+
 # ---- simulate ------------------------------------------------------------------------------------------------------
 
 NORTON = ("simulate", "norton", "--set", "A=5e-13", "--set", "n=3", "--end-h", "2")
