@@ -105,6 +105,10 @@ from .specimens.test_piece import TestPiece as TestPiece
 from .specimens.test_piece import dimension as dimension
 from .surrogates.parameter_gru import ParameterGru as ParameterGru
 from .surrogates.recipe import Training as Training
+from .testing import check_exporter as check_exporter
 from .testing import check_law as check_law
+from .testing import check_predictor as check_predictor
+from .testing import check_reader as check_reader
+from .testing import check_specimen as check_specimen
 
 __version__: str

@@ -50,4 +50,8 @@ def creepkit_temperature_forms() -> Mapping[str, Any]:  # type: ignore[empty-bod
 
 @hookspec
 def creepkit_commands(app: typer.Typer) -> None:
-    """Add commands to the command line."""
+    """Add commands to the command line.
+
+    `creepkit --help` lists them. It imports those plugins alone whose module has this name, creepkit_commands, in its
+    text: of an installed plugin the module of its entry point.
+    """

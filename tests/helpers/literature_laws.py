@@ -136,7 +136,7 @@ EQUATIONS = {
         {
             _WORDS["lam"]: RATE,
             _WORDS["exp_"]: POWER,
-            Q: number(1e3, 1e4),
+            Q: Param("activation temperature", bounds=(1e3, 1e4), unit="K"),
             _WORDS["x_0"]: number(-1, 0),
             _WORDS["row"]: number(0, 1),
         },

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 import creepkit as ck
-from creepkit.records import LawWithValues
 from helpers.paths import ROOT
 
 DOCS = ROOT / "docs"
@@ -89,19 +88,6 @@ def test_snippets_are_python_with_public_names(page):
         compile(block, str(page), "exec")
         unknown = set(re.findall(r"\bck\.(\w+)", block)) - public
         assert not unknown, f"creepkit has no public {', '.join(sorted(unknown))}"
-
-
-@pytest.mark.parametrize("page", sorted((DOCS / "how-to").glob("write_*.md")), ids=page_name)
-def test_plugins_of_the_how_to_guides_work(page):
-    for block in python_blocks(page):
-        space: dict[str, object] = {}
-        exec(compile(block, str(page), "exec"), space)
-        (hook,) = (value for name, value in space.items() if name.startswith("creepkit_"))
-        (contribution,) = hook()
-        assert contribution.name
-        if hasattr(contribution, "text"):
-            text = contribution.text(LawWithValues(ck.law("norton"), {"A": 1e-16, "n": 5.0}, notes=("a note",)))
-            assert text.splitlines() == ["# a note", "name,value,unit", "A,1e-16,1/s", "n,5.0,1"]
 
 
 def test_the_files_of_the_guide_are_read(tmp_path):

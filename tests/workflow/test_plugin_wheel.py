@@ -73,6 +73,9 @@ STEPS = {
     "plugins": [["plugins", "--json"]],
     "check": [["check", "soft-steel"]],
     "new-law": [["new-law", "softer-steel"]],
+    "new-specimen": [["new-specimen", "softer-beam"]],
+    "new-reader": [["new-reader", "softer-files"]],
+    "new-exporter": [["new-exporter", "softer-code"]],
     "simulate": [
         *(
             [

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, cast
 
 from creepkit import registry
 from creepkit.errors import ExportError, FitError, nearest
-from creepkit.records import History, LawWithValues, Nuisance, Predictor, Units
+from creepkit.records import History, LawWithValues, Nuisance, Predictor, Units, exported_text
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictors
 
 if TYPE_CHECKING:
@@ -256,7 +256,7 @@ def export(
         record = record.replace(notes=(*record.notes, f"taken at a temperature of {temperature:g} K")).at(temperature)
     if to is not None:
         write_export(record, exporter, to, force=force)
-    return exporter.text(record)
+    return exported_text(exporter, record)
 
 
 def law_with_values(

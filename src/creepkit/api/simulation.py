@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.errors import DatasetError, SolveError, SurrogateError
 from creepkit.language import symbols
-from creepkit.records import History, Loading, Predictor, Program, Specimen, Status, checked_prediction
+from creepkit.records import History, Loading, Predictor, Program, Specimen, Status, call_of_plugin, predict_with
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictor
 from creepkit.specimens.run import Run, Runnable, run_from_outputs, unusual_values, with_explanation
 
@@ -78,9 +78,15 @@ def simulate(
 
 def _simulated(law: CreepLaw, using: Predictor, values: Mapping[str, float], planned_test: History) -> Run:
     if isinstance(using, Runnable):
-        return using.run(law, values, planned_test)
+        runnable = using
+        return call_of_plugin(
+            lambda: runnable.run(law, values, planned_test),
+            using,
+            f"specimen '{getattr(using, 'name', type(using).__name__)}': run()",
+            SolveError,
+        )
     theta = law.to_internal(values)
-    prediction = checked_prediction(using.predict(law, theta, [planned_test]), using, [planned_test], *theta.shape)
+    prediction = predict_with(using, law, theta, [planned_test])
     status, end = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
     return run_from_outputs(Run, planned_test, prediction.outputs, prediction.of(0), status, end, prediction.reason)
 

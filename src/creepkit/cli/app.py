@@ -23,7 +23,10 @@ from creepkit.cli import (
     generate,
     identify,
     laws,
+    new_exporter,
     new_law,
+    new_reader,
+    new_specimen,
     plugins,
     predict,
     reduced_model,
@@ -41,10 +44,10 @@ from creepkit.errors import CreepkitError, PluginError
 class CommandGroup(TyperGroup):
     """The group of all commands; it asks plugins for theirs when a command is not one of creepkit's own.
 
-    Only then: asking imports every plugin, and `creepkit --help` has no time for that.
+    Only then all plugins are imported; `creepkit --help` imports those alone whose text names the hook for commands.
     """
 
-    _plugins_loaded = False
+    _plugins_asked = False
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an error of ours becomes one line on stderr and exit code 1."""
@@ -61,11 +64,33 @@ class CommandGroup(TyperGroup):
             raise typer.Exit(130) from None
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the command of this name, creepkit's own or a plugin's."""
-        if cmd_name not in self.commands and not self._plugins_loaded:
-            self._plugins_loaded = True
-            self.commands.update(_plugin_commands(own_names=set(self.commands)))
+        """Return the command of this name, creepkit's own or a plugin's; say which plugins failed where none has it."""
+        if cmd_name not in self.commands and not self._plugins_asked:
+            self._plugins_asked = True
+            added, problems = _plugin_commands(set(self.commands))
+            self.commands.update(added)
+            for problem in problems if cmd_name not in added else ():
+                typer.echo(f"creepkit: {problem}", err=True)
         return super().get_command(ctx, cmd_name)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write creepkit's own commands, those of plugins, and what is wrong with plugins that add commands."""
+        super().format_commands(ctx, formatter)
+        try:
+            _load_plugin_files(ctx.params.get("plugin"))
+            failed: tuple[str, ...] = ()
+        except PluginError as error:
+            failed = (str(error),)
+        added, problems = _plugin_commands(set(self.commands), listed_only=True)
+        shown = {name: command for name, command in sorted(added.items()) if not command.hidden}
+        if shown:
+            limit = formatter.width - 6 - max(map(len, shown))
+            with formatter.section("Commands of plugins"):
+                formatter.write_dl([(name, command.get_short_help_str(limit)) for name, command in shown.items()])
+        if failed or problems:
+            with formatter.section("Plugins that failed"):
+                for problem in (*failed, *problems):
+                    formatter.write(f"  {problem}\n")
 
 
 app = typer.Typer(
@@ -84,6 +109,9 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "plugins": plugins.command,
     "check": check.command,
     "new-law": new_law.command,
+    "new-specimen": new_specimen.command,
+    "new-reader": new_reader.command,
+    "new-exporter": new_exporter.command,
     "simulate": simulate.command,
     "reduced-model": reduced_model.command,
     "train": train.command,
@@ -121,7 +149,7 @@ def _print_version(requested: bool) -> None:
 def global_options(
     plugin: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE", help="Load this plugin file as well; may be given several times."),
+        typer.Option(metavar="FILE", is_eager=True, help="Load this plugin file as well; may be given several times."),
     ] = None,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
     version: Annotated[
@@ -142,13 +170,23 @@ def _load_plugin_files(files: list[Path] | None) -> None:
             registry.default_registry().load_file(file)
 
 
-def _plugin_commands(own_names: set[str]) -> dict[str, Any]:
-    """Return {name: command} of what plugins add; PluginError when a name is one of creepkit's own."""
+def _plugin_commands(own_names: set[str], *, listed_only: bool = False) -> tuple[dict[str, Any], list[str]]:
+    """Return {name: command} of what plugins add, and a sentence for each plugin or command that cannot be used."""
     from creepkit import registry
 
-    extra = typer.Typer()
-    registry.default_registry().add_commands(extra)
-    added = typer.main.get_group(extra).commands
-    for name in sorted(own_names & set(added)):
-        raise PluginError(f"a plugin adds the command '{name}', which creepkit has already; see 'creepkit plugins'")
-    return dict(added)
+    added: dict[str, Any] = {}
+    problems: list[str] = []
+    for plugin, app in registry.default_registry().command_lines(listed_only=listed_only):
+        try:
+            commands = typer.main.get_group(app).commands
+        except Exception as error:  # of the signature of somebody else's command
+            problems.append(f"{plugin.provenance}: its commands cannot be used: {' '.join(str(error).split())}")
+            continue
+        problems += [plugin.problem] if plugin.problem else []
+        for name, command in commands.items():
+            if name in own_names or name in added:
+                other = "creepkit" if name in own_names else "another plugin"
+                problems.append(f"{plugin.provenance} adds the command '{name}', which {other} has already; rename it")
+            else:
+                added[name] = command
+    return added, problems

@@ -1,4 +1,4 @@
-"""`creepkit check`: does a law keep the promises that every law makes?"""
+"""`creepkit check`: does what a plugin offers keep the promises that every law, specimen, reader and exporter makes?"""
 
 from __future__ import annotations
 
@@ -8,35 +8,45 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from creepkit.language import CreepLaw
+    from creepkit.testing import ConformanceReport
 
 
 def command(
-    targets: Annotated[list[str], typer.Argument(metavar="FILE|NAME...", help="Plugin files, or names of laws.")],
+    targets: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FILE.py|NAME...", help="Plugin files, or names of laws, specimens, readers or exporters."
+        ),
+    ],
 ) -> None:
-    """Check that laws keep what every law promises."""
-    from creepkit.testing import check_law
-
-    laws = [law for target in targets for law in _laws_of(target)]
-    failure_count = 0
-    for law in laws:
-        report = check_law(law)
+    """Check that laws, specimens, readers and exporters keep what every one promises."""
+    reports = [report for target in targets for report in _reports_of(target)]
+    for report in reports:
         typer.echo(str(report))
-        failure_count += not report.passed
-    if failure_count:
-        typer.echo(f"creepkit: {failure_count} of {len(laws)} laws failed the check", err=True)
+    failed = [report for report in reports if not report.passed]
+    if failed:
+        kinds = sorted({report.kind for report in reports})
+        what = f"{kinds[0]}s" if len(kinds) == 1 else "checked"
+        typer.echo(f"creepkit: {len(failed)} of {len(reports)} {what} failed the check", err=True)
         raise typer.Exit(1)
 
 
-def _laws_of(target: str) -> list[CreepLaw]:
-    """Return the laws of a plugin file, or the one law of that name."""
-    from creepkit import registry
-    from creepkit.errors import PluginError
+def _reports_of(target: str) -> list[ConformanceReport]:
+    """The reports of a plugin file, whose name ends in .py, or of what is registered under a name.
 
-    if not (target.endswith(".py") or Path(target).is_file()):
-        return [registry.default_registry().law(target)]
-    plugin = registry.default_registry().load_file(target)
-    laws = list(plugin.contributions.get("law", {}).values())
-    if not laws:
-        raise PluginError(f"{plugin.provenance} offers no law; return one from creepkit_laws")
-    return laws
+    No other file is executed: one that happens to have the name of a law is not asked for.
+    """
+    from creepkit import registry
+    from creepkit.errors import CreepkitError, PluginError
+    from creepkit.testing import check_named, check_plugin
+
+    if target.endswith(".py"):
+        return check_plugin(registry.default_registry().load_file(target))
+    try:
+        return check_named(target)
+    except CreepkitError as error:
+        if Path(target).is_file():
+            raise PluginError(
+                f"{error}; the file {target} is not executed, for only names that end in .py are those of files"
+            ) from None
+        raise

@@ -17,7 +17,7 @@ from creepkit.arrays import Ints
 from creepkit.dataset.dataset import FAILED, HOLD_TIMES, NOT_SIMULATED, Dataset, empty_columns
 from creepkit.errors import DatasetError
 from creepkit.jobs.worker_process import error_text
-from creepkit.records import Predictor, Status, SupportsReducedOrderModel
+from creepkit.records import Predictor, Status, SupportsReducedOrderModel, predict_with
 from creepkit.sampling.conditions import hold_times, planned_test
 from creepkit.sampling.criteria import CreepInEachHold, SimulationOutcome, SurvivesTime
 
@@ -51,7 +51,7 @@ def _screening_outcome(
     test = planned_test(samples.specimen, conditions, design.grid)
     hold_instants = hold_times(test)
     times = np.unique(hold_instants)
-    prediction = reduced_model.predict(samples.law, samples.theta_of(row), [test.replace(times=times)])
+    prediction = predict_with(reduced_model, samples.law, samples.theta_of(row), [test.replace(times=times)])
     outputs = prediction.of(0)
     status, end_time = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
     return SimulationOutcome(
@@ -173,7 +173,7 @@ def _simulate_sample(design: SamplingDesign, samples: Dataset, row: int) -> int:
     test = planned_test(samples.specimen, conditions, design.grid)
     hold_instants = hold_times(test)
     times = np.union1d(test.times, hold_instants)
-    prediction = samples.specimen.predict(samples.law, samples.theta_of(row), [test.replace(times=times)])
+    prediction = predict_with(samples.specimen, samples.law, samples.theta_of(row), [test.replace(times=times)])
     observed = prediction.of(0)
     outputs = np.full(samples.values.shape[1:], np.nan)
     outputs[: test.times.size] = observed[np.searchsorted(times, test.times)]

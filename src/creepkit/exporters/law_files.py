@@ -13,7 +13,7 @@ from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.files.writing import check_target, write_text
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import GAS_CONSTANT
-from creepkit.records import Exporter, LawWithValues
+from creepkit.records import Exporter, LawWithValues, exported_text
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -104,6 +104,6 @@ def write_export(source: LawWithValues, exporter: Exporter, destination: str | P
 
     force : replace a file that exists; else that is an ExportError, and the file stays.
     """
-    text, path = exporter.text(source), Path(destination)
+    text, path = exported_text(exporter, source), Path(destination)
     check_target(path, ExportError, force=force)
     return write_text(text, path, ExportError)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from creepkit.records import (
     SupportsRupturePrediction,
     SupportsSearchTolerance,
     TimesToStrain,
+    call_of_plugin,
     checked_prediction,
     is_length_nuisance,
     kind_and_start,
@@ -305,7 +307,8 @@ def predict_to_rupture(
     for predictor, tests in groups:
         group_histories = [histories[k] for k in tests]
         if isinstance(predictor, SupportsRupturePrediction):
-            prediction = predictor.predict_to_rupture(law, theta, group_histories, sensitivities=sensitivities)
+            follow = partial(predictor.predict_to_rupture, law, theta, group_histories, sensitivities=sensitivities)
+            prediction = call_of_plugin(follow, predictor, "predict_to_rupture()", SolveError)
             checked_prediction(prediction, predictor, group_histories, *theta.shape)
             group_predictions.append((tests, prediction))
         else:

@@ -29,7 +29,7 @@ from creepkit.inverse.observation_vector import usable_frames
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable
-from creepkit.records import History, Prediction, Predictor, Status
+from creepkit.records import History, Prediction, Predictor, Status, predict_with
 
 FITTED_FRACTION = 0.7
 """Of the duration of each history: the part that is fitted in cross-validation by time."""
@@ -268,7 +268,7 @@ def times_to_strain(
         h.replace(times=grid, outputs={"strain": np.zeros(grid.size)}, standard_deviation={}, includes_elastic=False)
         for (h, _), grid in zip(reached, time_grids, strict=True)
     ]
-    prediction = predictor.predict(law, law.to_internal(values), extended)
+    prediction = predict_with(predictor, law, law.to_internal(values), extended)
     predicted = [
         _crossing_time(prediction.of(k)[:, 0], grid, strain, prediction, k) for k, grid in enumerate(time_grids)
     ]

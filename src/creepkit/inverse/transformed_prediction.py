@@ -20,8 +20,8 @@ from creepkit.records import (
     Prediction,
     Predictor,
     broadcast_candidates,
-    checked_prediction,
     kind_and_start,
+    predict_with,
     with_program_nuisances,
 )
 
@@ -118,7 +118,4 @@ def plain_prediction(
     sensitivities: bool,
 ) -> Prediction:
     """The predictor's own prediction, checked; theta : (candidates, parameters) internal values."""
-    given = {"nuisances": nuisances} if nuisances else {}
-    prediction = predictor.predict(law, theta, histories, sensitivities=sensitivities, **given)
-    candidates = max(len(theta), *(len(values) for values in nuisances.values())) if nuisances else len(theta)
-    return checked_prediction(prediction, predictor, histories, candidates, theta.shape[1])
+    return predict_with(predictor, law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)

@@ -126,6 +126,7 @@ def with_temperature(law: Law, forms: Mapping[str, TemperatureForm]) -> Law:
         constraints=(*(c.xreplace(substitutions) for c in law.constraints), *sign_constraints),
         params=params,
         references=tuple(dict.fromkeys((*law.references, *(form.reference for form in forms.values())))),
+        examples=(),
     )
 
 
@@ -186,7 +187,14 @@ def _pruned(
     declared = {*params, *needed_states, *POINT_VARIABLES}
     remaining_constraints = tuple(c for c in constraints if c.free_symbols <= declared)
     return replace(
-        law, name=name, title=title, terms=terms, states=needed_states, params=params, constraints=remaining_constraints
+        law,
+        name=name,
+        title=title,
+        terms=terms,
+        states=needed_states,
+        params=params,
+        constraints=remaining_constraints,
+        examples=(),
     )
 
 

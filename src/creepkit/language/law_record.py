@@ -42,6 +42,19 @@ def symbols_used(law: LawRecord) -> set[sympy.Basic]:
     return set().union(*(e.free_symbols for e in expressions))
 
 
+def checked_examples(name: str, examples: Any) -> tuple[Mapping[str, float], ...]:
+    """The examples of a law as a tuple of read-only mappings; LawError for anything else."""
+    given = tuple(examples) if isinstance(examples, Sequence) and not isinstance(examples, str) else (examples,)
+    for example in given:
+        numbers = isinstance(example, Mapping) and all(isinstance(v, (int, float)) for v in example.values())
+        if not numbers or "rate" not in example:
+            raise LawError(
+                f"law '{name}': the example {example!r:.60} is not understood; write a tuple of examples such as "
+                '{"A": 1e-16, "n": 4, "stress": 100, "rate": 1e-8}'
+            )
+    return tuple(MappingProxyType(dict(example)) for example in given)
+
+
 def _check_names_and_titles(law: LawRecord) -> None:
     """Names and labels enter generated source, so that nothing in them may end a comment or a string."""
     for name in (law.name, *law.terms):
@@ -171,6 +184,10 @@ class LawRecord:
     states : {symbol: State}, internal variables.
     constraints : relations between parameters and point that must hold, such as n(t) >= 0.
     references : where the law was published.
+    examples : rates that were computed by hand or are in the publication, {parameter, point or state: value, "rate":
+        1/s}, in the units of the law; check_law() compares them with every kernel. Other laws made of this one have
+        none.
+    falls_with_temperature : declares that a higher temperature lowers the rate, which check_law() else refuses.
     """
 
     name: str
@@ -180,6 +197,8 @@ class LawRecord:
     states: Mapping[sympy.Symbol, State] = field(default_factory=dict)
     constraints: Sequence[Boolean] = ()
     references: Sequence[str] = ()
+    examples: Sequence[Mapping[str, float]] = ()
+    falls_with_temperature: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
@@ -202,6 +221,7 @@ class LawRecord:
         freeze(self, "constraints", tuple(self.constraints))
         references = (self.references,) if isinstance(self.references, str) else tuple(self.references)
         freeze(self, "references", references)
+        freeze(self, "examples", checked_examples(self.name, self.examples))
         validate_law(self)
 
     # ---- what the law is -------------------------------------------------------------------------------------------
@@ -336,6 +356,7 @@ class LawRecord:
     def __reduce__(self) -> tuple[Any, ...]:
         state = {f.name: getattr(self, f.name) for f in fields(self)}
         plain = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
+        plain["examples"] = tuple(dict(example) for example in self.examples)
         return _rebuild, (type(self), plain)
 
 

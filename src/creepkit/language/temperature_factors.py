@@ -73,6 +73,7 @@ def times(
         states=new_states,
         params={s: p for s, p in parameters.table().items() if s in used},
         references=tuple(dict.fromkeys((*law.references, factor.reference))),
+        examples=(),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.quality.frames import load_segments, noise_standard_deviation
-from creepkit.records import ZERO_CELSIUS, History, Predictor, Program, checked_prediction, growing_output, output_named
+from creepkit.records import ZERO_CELSIUS, History, Predictor, Program, growing_output, output_named, predict_with
 
 
 def duplicate_tests(
@@ -216,8 +216,7 @@ def _elastic_value(history: History, frame: int, specimen: Predictor, output: st
     """Output of the specimen without creep at a frame."""
     elastic_history = history.replace(times=history.times[frame : frame + 1], outputs={}, standard_deviation={})
     theta = _NO_CREEP_LAW.to_internal({"A": 0.0, "n": 1.0})
-    prediction = specimen.predict(_NO_CREEP_LAW, theta, [elastic_history])
-    result = checked_prediction(prediction, specimen, [elastic_history], *theta.shape)
+    result = predict_with(specimen, _NO_CREEP_LAW, theta, [elastic_history])
     return float(result.of(0)[0, result.outputs.index(output)])
 
 

@@ -11,7 +11,7 @@ from creepkit.errors import HistoryError, nearest
 from creepkit.hookspecs import hookimpl
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
-from creepkit.records import History, Reader
+from creepkit.records import History, Reader, accepts_path, histories_in
 
 
 @hookimpl
@@ -36,7 +36,7 @@ def read_histories(paths: PathsLike, readers: Sequence[Reader], reader: str | No
     read: dict[tuple[str, str], tuple[Path, History]] = {}
     for path in _existing_paths(paths):
         for source in _readable_paths(path, readers):
-            for history in _reader_of(source, readers).read(source):
+            for history in histories_in(_reader_of(source, readers), source):
                 read.setdefault((history.source or str(source), history.name), (source, history))
     return _with_unique_names(list(read.values()))
 
@@ -69,7 +69,7 @@ def _existing_paths(paths: PathsLike) -> list[Path]:
 
 def _readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
     """The paths to read: the path itself, or the files in a folder that no reader accepts as a whole."""
-    if path.is_file() or any(reader.accepts(path) for reader in readers):
+    if path.is_file() or any(accepts_path(reader, path) for reader in readers):
         return [path]
     if not path.is_dir():
         raise HistoryError(f"{path}: is no regular file but a device, a pipe or the like; name a file or a folder")
@@ -77,7 +77,7 @@ def _readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
         entries = sorted(path.iterdir())
     except OSError as error:
         raise HistoryError(f"{path}: the folder cannot be read ({error.strerror}); name another one") from None
-    files = [file for file in entries if file.is_file() and any(r.accepts(file) for r in readers)]
+    files = [file for file in entries if file.is_file() and any(accepts_path(r, file) for r in readers)]
     return files or [path]
 
 
@@ -85,7 +85,7 @@ def _reader_of(path: Path, readers: Sequence[Reader]) -> Reader:
     """The one reader for a path; a reader that is the only one is not asked."""
     if len(readers) == 1:
         return readers[0]
-    accepting = [reader for reader in readers if reader.accepts(path)]
+    accepting = [reader for reader in readers if accepts_path(reader, path)]
     if len(accepting) > 1:
         accepting = [reader for reader in accepting if reader is not HISTORY_CSV]
     if not accepting:

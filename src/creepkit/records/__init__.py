@@ -48,6 +48,7 @@ from creepkit.records.loading import (
     loading_of,
 )
 from creepkit.records.nuisance_programs import SCALABLE_LOADS, STEP_DURATION, drift_duration, with_program_nuisances
+from creepkit.records.plugin_calls import accepts_path, call_of_plugin, exported_text, histories_in, predict_with
 from creepkit.records.prediction import (
     COVARIANCE_NUISANCES,
     GENERAL_NUISANCES,
@@ -73,6 +74,7 @@ from creepkit.records.prediction_assembly import (
 from creepkit.records.prediction_checks import checked_prediction
 from creepkit.records.quantities import QUANTITIES, ZERO_CELSIUS, QuantityKind, unit_of
 from creepkit.records.specimen_record import Dimension, Load, Output
+from creepkit.records.typical_history import typical_history
 
 __all__ = [
     "COVARIANCE_NUISANCES",
@@ -115,9 +117,11 @@ __all__ = [
     "TimesToStrain",
     "TwoLevels",
     "Units",
+    "accepts_path",
     "all_dimensions",
     "assemble_prediction",
     "broadcast_candidates",
+    "call_of_plugin",
     "check_geometry",
     "check_load",
     "check_nuisances",
@@ -128,8 +132,10 @@ __all__ = [
     "dimension_named",
     "dimensions_of",
     "drift_duration",
+    "exported_text",
     "forget_unregistered",
     "growing_output",
+    "histories_in",
     "is_length_nuisance",
     "is_logarithmic",
     "kind_and_start",
@@ -143,8 +149,10 @@ __all__ = [
     "output_named",
     "output_unit",
     "outputs_of",
+    "predict_with",
     "remember_specimen",
     "specimen_of",
+    "typical_history",
     "unit_of",
     "unpredicted",
     "with_program_nuisances",

@@ -25,8 +25,7 @@ def checked_prediction(
 
     candidates : rows of theta, or of the nuisances where these are more.
     """
-    own_name = getattr(predictor, "name", "")
-    who = f"predictor '{own_name}'" if isinstance(own_name, str) and own_name else f"a {type(predictor).__name__}"
+    who = predictor_in_words(predictor)
     if not isinstance(prediction, Prediction):
         raise SolveError(f"{who} returned a {type(prediction).__name__} from predict(); it must return a Prediction")
     names = tuple(getattr(predictor, "outputs", ()) or prediction.outputs)
@@ -56,6 +55,12 @@ def checked_prediction(
             f"histories, {lengths}"
         )
     return prediction
+
+
+def predictor_in_words(predictor: object) -> str:
+    """What an error calls a predictor: by its name, else by its type."""
+    own_name = getattr(predictor, "name", "")
+    return f"predictor '{own_name}'" if isinstance(own_name, str) and own_name else f"a {type(predictor).__name__}"
 
 
 def _check_array(who: str, name: str, array: object, shape: tuple[int, ...], kinds: str) -> None:

@@ -23,6 +23,8 @@ from creepkit.registry import plugin_sources
 from creepkit.registry.plugin_sources import ContributionKind, Provenance
 
 if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
     import typer
 
     from creepkit.language.law import CreepLaw
@@ -92,6 +94,7 @@ class Registry:
         self._loaded = False
         self._loading_begun = False
         self._loading = threading.RLock()
+        self._being_loaded: set[Provenance] = set()
 
     # ---- what there is ---------------------------------------------------------------------------------------------
 
@@ -190,15 +193,39 @@ class Registry:
                 self._plugins[provenance] = self._register_plugin(provenance, module)
             return self._plugins[provenance]
 
-    def add_commands(self, app: typer.Typer) -> None:
-        """Let every plugin add its commands to the command line; one that raises is broken from then on."""
-        by_name = {str(plugin.provenance): plugin for plugin in self.plugins()}
+    def command_lines(self, *, listed_only: bool = False) -> list[tuple[Plugin, typer.Typer]]:
+        """Return [(plugin, a command line with its commands)]; that of a plugin that is broken is empty.
+
+        listed_only : load those plugins alone whose text has the name of the hook, as `creepkit --help` does; else all.
+        """
+        import typer
+
+        if listed_only:
+            with self._loading:
+                considered = self._load_sources(plugin_sources.mentions_commands)
+        else:
+            considered = [plugin.provenance for plugin in self.plugins()]
+        results = []
+        for provenance in considered:
+            app = typer.Typer()
+            if self._add_commands(provenance, app):
+                results.append((self._plugins[provenance], app))
+            elif self._plugins[provenance].problem:
+                results.append((self._plugins[provenance], typer.Typer()))
+        return results
+
+    def _add_commands(self, provenance: Provenance, app: typer.Typer) -> bool:
+        """Let one plugin add its commands, if it has any; it is broken from then on when it raises."""
+        plugin = self._plugins[provenance]
         for implementation in self._manager.hook.creepkit_commands.get_hookimpls():
-            plugin = by_name[implementation.plugin_name]
+            if implementation.plugin_name != str(provenance):
+                continue
             try:
                 plugin_sources.call_hook(implementation, app=app)
+                return True
             except PluginError as error:
-                self._plugins[plugin.provenance] = replace(plugin, problem=str(error))
+                self._plugins[provenance] = replace(plugin, problem=str(error))
+        return False
 
     def _load_all(self) -> None:
         """Load what is installed and what the environment names, once.
@@ -213,21 +240,34 @@ class Registry:
                 self._load_sources()
                 self._loaded = True
 
-    def _load_sources(self) -> None:
+    def _load_sources(self, wanted: Callable[[EntryPoint | Path], bool] = lambda source: True) -> list[Provenance]:
+        """Load the wanted ones of the installed plugins and of the files that the environment names.
+
+        Returns their provenances, and those of files that were loaded by name.
+        """
+        loaded = [provenance for provenance in self._plugins if Path(provenance.origin).is_absolute()]
         for provenance, entry in plugin_sources.installed_entry_points():
-            self._add_plugin(provenance, partial(plugin_sources.import_entry, provenance, entry))
+            if wanted(entry):
+                self._add_plugin(provenance, partial(plugin_sources.import_entry, provenance, entry))
+                loaded.append(provenance)
         for path in plugin_sources.plugin_files_in_environment():
             provenance = plugin_sources.provenance_of_file(path)
-            self._add_plugin(provenance, partial(plugin_sources.import_file, provenance, path))
+            if wanted(path):
+                self._add_plugin(provenance, partial(plugin_sources.import_file, provenance, path))
+                loaded.append(provenance)
+        return list(dict.fromkeys(loaded))
 
     def _add_plugin(self, provenance: Provenance, imported: Callable[[], object]) -> None:
-        """Enter a plugin, or else the reason why it cannot be used."""
-        if provenance in self._plugins:
+        """Enter a plugin, or else the reason why it cannot be used; not one that is being loaded, and asks for laws."""
+        if provenance in self._plugins or provenance in self._being_loaded:
             return
+        self._being_loaded.add(provenance)
         try:
             self._plugins[provenance] = self._register_plugin(provenance, imported())
         except PluginError as error:
             self._plugins[provenance] = Plugin(provenance, problem=str(error))
+        finally:
+            self._being_loaded.discard(provenance)
 
     def _register_plugin(self, provenance: Provenance, module: object) -> Plugin:
         """Enter a plugin whole or not at all: its hooks must exist and return what they promise."""
@@ -248,6 +288,7 @@ class Registry:
         return Plugin(provenance, contributions, commands=plugin_sources.COMMANDS_HOOK in hooks)
 
     def _register_module(self, provenance: Provenance, module: object) -> None:
+        plugin_sources.check_signatures(provenance, module)
         try:
             self._manager.register(module, str(provenance))
         except pluggy.PluginValidationError as error:

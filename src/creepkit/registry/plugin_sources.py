@@ -11,12 +11,13 @@ import importlib.util
 import os
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from inspect import isgeneratorfunction, signature
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import pluggy
@@ -57,6 +58,35 @@ def plugin_files_in_environment() -> list[Path]:
 def provenance_of_file(path: Path) -> Provenance:
     """Return the provenance of a plugin file."""
     return Provenance(str(path.resolve()), path.stem)
+
+
+def mentions_commands(source: EntryPoint | Path) -> bool:
+    """Whether the text of a plugin's module or file has the name of the hook for commands; nothing is imported.
+
+    So `creepkit --help` imports no plugin but those that add commands. False where the source cannot be found.
+    """
+    path = source if isinstance(source, Path) else _module_file(source.module)
+    try:
+        return path is not None and COMMANDS_HOOK.encode() in path.read_bytes()
+    except OSError:
+        return False
+
+
+def _module_file(name: str) -> Path | None:
+    """The file of a module, found as an import would find it, without importing the packages that it is in."""
+    places: Sequence[str] | None = None
+    spec = None
+    for k in range(name.count(".") + 1):
+        full_name = ".".join(name.split(".")[: k + 1])
+        finders = (finder.find_spec for finder in sys.meta_path if hasattr(finder, "find_spec"))
+        try:
+            spec = next((found for find in finders if (found := find(full_name, places)) is not None), None)
+        except Exception:  # of a finder of somebody else: then the module is not known to add commands
+            return None
+        if spec is None:
+            return None
+        places = spec.submodule_search_locations
+    return Path(spec.origin) if spec is not None and spec.has_location and spec.origin else None
 
 
 def import_entry(provenance: Provenance, entry: EntryPoint) -> object:
@@ -143,12 +173,25 @@ class ContributionKind:
     def named_contributions(self, returned: Any) -> list[tuple[str, Any]]:
         """Return [(name, object)] of what a hook returned; PluginError when it is not what the hook promises."""
         if not isinstance(returned, Sequence) or isinstance(returned, str):
-            raise PluginError(f"must return a list of {self.record_name} records, found {_type_text(returned)}")
-        required = getattr(import_module(self.record_module), self.record_name) if returned else object
+            raise PluginError(
+                f"must return a list of {self.record_name} records, found {_type_text(returned)}{_remedy(returned)}"
+            )
+        required: Any = getattr(import_module(self.record_module), self.record_name) if returned else object
+        contribution: Any
         for contribution in returned:
-            if isinstance(contribution, type) or not isinstance(contribution, required):
+            if isinstance(contribution, type):
                 raise PluginError(
-                    f"must return a list of {self.record_name} records, found {_type_text(contribution)} in it"
+                    f"must return a list of {self.record_name} records, found {_type_text(contribution)} in it; "
+                    f"return an instance, {contribution.__name__}()"
+                )
+            if not isinstance(contribution, required):
+                missing = _missing_members(contribution, required)
+                raise PluginError(
+                    f"must return a list of {self.record_name} records, found {_type_text(contribution)} in it{missing}"
+                )
+            if not (isinstance(contribution.name, str) and contribution.name.strip()):
+                raise PluginError(
+                    f"returned a {self.label} whose name is {contribution.name!r}; give it a short name in words"
                 )
         return [(thing.name, thing) for thing in returned]
 
@@ -184,6 +227,28 @@ TEMPERATURE_FORM = TemperatureFormKind("temperature form", "creepkit_temperature
 CONTRIBUTION_KINDS = (LAW, SPECIMEN, READER, EXPORTER, TEMPERATURE_FORM)
 
 
+def check_signatures(provenance: Provenance, plugin: object) -> None:
+    """PluginError for a hook that takes other parameters than creepkit gives it."""
+    for name, function in vars(plugin).items():
+        specified = getattr(hookspecs, name, None)
+        if not (name.startswith(HOOK_PREFIX) and isinstance(function, FunctionType) and callable(specified)):
+            continue
+        allowed = list(signature(specified).parameters)
+        found = list(signature(function).parameters.values())
+        unknown = [p.name for p in found if p.name not in allowed]
+        if unknown:
+            wanted = f"({', '.join(allowed)})" if allowed else "no parameters"
+            raise PluginError(
+                f"{provenance} does not fit the hooks of creepkit: {name} has the parameter '{unknown[0]}', "
+                f"creepkit calls it with {wanted}"
+                f"{hook_location(function)}"
+            )
+        if isgeneratorfunction(function):
+            raise PluginError(
+                f"{provenance}: {name} is a generator; return a list in the place of yield{hook_location(function)}"
+            )
+
+
 def hook_implementations(
     manager: pluggy.PluginManager, plugin: object, provenance: Provenance
 ) -> dict[str, pluggy.HookImpl]:
@@ -195,12 +260,19 @@ def hook_implementations(
     callers = manager.get_hookcallers(plugin) or []
     for caller in callers:
         if not caller.has_spec():
-            raise PluginError(f"{provenance} has an unknown hook '{caller.name}': {nearest(caller.name, known)}")
+            (unknown,) = [impl.function for impl in caller.get_hookimpls() if impl.plugin is plugin][:1]
+            raise PluginError(
+                f"{provenance} has an unknown hook '{caller.name}': {nearest(caller.name, known)}"
+                f"{hook_location(unknown)}"
+            )
     results = {c.name: impl for c in callers for impl in c.get_hookimpls() if impl.plugin is plugin}
     marked = {impl.function.__name__ for impl in results.values()}
     for name in vars(plugin):
         if name.startswith(HOOK_PREFIX) and callable(getattr(plugin, name)) and name not in marked:
-            raise PluginError(f"{provenance} has a function '{name}' without @hookimpl; add the decorator")
+            raise PluginError(
+                f"{provenance} has a function '{name}' without @hookimpl; add the decorator"
+                f"{hook_location(getattr(plugin, name))}"
+            )
     if not results:
         raise PluginError(f"{provenance} offers nothing; mark one of its functions @hookimpl ({', '.join(known)})")
     return results
@@ -208,14 +280,19 @@ def hook_implementations(
 
 def contributions_of(kind: ContributionKind, implementation: pluggy.HookImpl) -> dict[str, Any]:
     """Return {name: object} that one plugin's hook offers."""
-    returned = call_hook(implementation)
+    returned, place = call_hook(implementation), hook_location(implementation.function)
     try:
         contributions = kind.named_contributions(returned)
     except PluginError as error:
-        raise PluginError(f"{implementation.plugin_name}: {kind.hook} {error}") from None
+        raise PluginError(f"{implementation.plugin_name}: {kind.hook} {error}{place}") from None
+    except Exception as error:  # of a property of the plugin's record
+        raise PluginError(
+            f"{implementation.plugin_name}: {kind.hook} returned a record that cannot be asked its name: "
+            f"{error_text(error)}{place}"
+        ) from error
     for name, _ in contributions:
         if [other for other, _ in contributions].count(name) > 1:
-            raise PluginError(f"{implementation.plugin_name} offers the {kind.label} '{name}' twice; rename one")
+            raise PluginError(f"{implementation.plugin_name} offers the {kind.label} '{name}' twice; rename one{place}")
     return dict(contributions)
 
 
@@ -227,6 +304,30 @@ def call_hook(implementation: pluggy.HookImpl, **keywords: Any) -> Any:
     except Exception as error:
         name = implementation.function.__name__
         raise PluginError(f"{implementation.plugin_name}: {name} raised {error_text(error)}") from error
+
+
+def hook_location(function: Any) -> str:
+    """Where a function of a plugin is written, as the end of a sentence; "" where that is not known."""
+    code = getattr(function, "__code__", None)
+    return f" ({code.co_filename}, line {code.co_firstlineno})" if code is not None else ""
+
+
+def _missing_members(contribution: object, required: type) -> str:
+    """What an object lacks of an interface, as the end of a sentence."""
+    members = sorted(getattr(required, "__protocol_attrs__", ())) or [
+        name for one in required.__mro__ for name in vars(one) if getattr(one, "_is_protocol", False) and name[0] != "_"
+    ]
+    missing = [name for name in members if not hasattr(contribution, name)]
+    return f"; it has no {', '.join(missing)}" if missing else ""
+
+
+def _remedy(returned: Any) -> str:
+    """What to do about something that is no list, as the end of a sentence."""
+    if returned is None:
+        return "; add a return statement"
+    if isinstance(returned, Iterator):
+        return "; return list(...) of it"
+    return "; put it into a list" if hasattr(returned, "name") else ""
 
 
 def _type_text(thing: Any) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import mpmath
 import numpy as np
@@ -24,40 +23,8 @@ from creepkit.testing.parity import (
     MultiprecisionReference,
     largest_differences,
 )
+from creepkit.testing.reports import ConformanceCheck
 from creepkit.testing.sample_points import LawSamples, constraints_hold
-
-
-@dataclass(frozen=True)
-class ConformanceCheck:
-    """One finding: what was checked, whether it holds, and the figure or the sentence that says so."""
-
-    name: str
-    passed: bool
-    detail: str
-
-
-@dataclass(frozen=True)
-class ConformanceReport:
-    """All findings about one law."""
-
-    law: CreepLaw
-    checks: tuple[ConformanceCheck, ...]
-
-    @property
-    def passed(self) -> bool:
-        """Whether every check holds."""
-        return all(check.passed for check in self.checks)
-
-    @property
-    def failures(self) -> tuple[ConformanceCheck, ...]:
-        """The checks that do not hold."""
-        return tuple(check for check in self.checks if not check.passed)
-
-    def __str__(self) -> str:
-        lines = [f"{self.law.name}: {'conforms' if self.passed else 'does NOT conform'}"]
-        lines += [f"  {'ok  ' if c.passed else 'FAIL'} {c.name}: {c.detail}" for c in self.checks]
-        return "\n".join(lines)
-
 
 _STRESS_COLUMNS = [0, 4, 5]
 
@@ -109,7 +76,7 @@ def check_signs(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck
     for point, theta in zip(samples.points, samples.theta, strict=True):
         for label, value in zip(law.terms, exact.terms(point, theta), strict=True):
             if not (mpmath.im(value) == 0 and value >= 0):
-                description = f"term '{label}' is {mpmath.nstr(value, 4)} 1/s at {_point_text(law, point)}"
+                description = f"term '{label}' is {mpmath.nstr(value, 4)} 1/s at {point_text(law, point)}"
                 yield ConformanceCheck(
                     "no term is negative", False, f"{description}; say in constraints where the law holds"
                 )
@@ -123,16 +90,16 @@ def check_signs(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck
 def check_finite(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
     """The log rate and its derivatives are finite, at zero strain, time and stress too."""
     kernel, compiled = lower(law, "numpy"), lower(law, "compiled")
-    yield _check_at_samples("ln rate is finite", law, samples, np.abs(_log_rate(kernel, samples)) < _LARGEST_LOG_RATE)
+    yield check_at_samples("ln rate is finite", law, samples, np.abs(log_rate(kernel, samples)) < _LARGEST_LOG_RATE)
     zeros = ({"strain": 0.0}, {"time": 0.0}, {"stress": 0.0, "principal_stress": 0.0, "mean_stress": 0.0})
     for columns in (*zeros, zeros[0] | zeros[1] | zeros[2]):
         at_zero = samples.at(**columns)
         flags = [
             call_entry(compiled, "update", p[None], t)[1] for p, t in zip(at_zero.points, at_zero.theta, strict=True)
         ]
-        is_finite = np.isfinite(_log_rate(kernel, at_zero)) & (np.array(flags) == 0)
+        is_finite = np.isfinite(log_rate(kernel, at_zero)) & (np.array(flags) == 0)
         zero_names = " and ".join(name for name in columns if "_" not in name)
-        yield _check_at_samples(f"ln rate and its derivatives are finite at zero {zero_names}", law, at_zero, is_finite)
+        yield check_at_samples(f"ln rate and its derivatives are finite at zero {zero_names}", law, at_zero, is_finite)
 
 
 def check_monotonic(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
@@ -140,9 +107,9 @@ def check_monotonic(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceC
     kernel, points = lower(law, "numpy"), samples.points.copy()
     points[:, _STRESS_COLUMNS] *= 1.01
     samples_at_higher_stress = LawSamples(points, samples.theta)
-    before, after = _log_rate(kernel, samples), _log_rate(kernel, samples_at_higher_stress)
+    before, after = log_rate(kernel, samples), log_rate(kernel, samples_at_higher_stress)
     is_monotonic = after >= before - 1e-9 * np.maximum(1.0, np.abs(before))
-    yield _check_at_samples(
+    yield check_at_samples(
         "rate never falls with stress", law, samples, is_monotonic | ~constraints_hold(law, points, samples.theta)
     )
 
@@ -205,22 +172,25 @@ def check_leading_exponent(law: CreepLaw, samples: LawSamples) -> Iterator[Confo
 # ---- mechanisms ----------------------------------------------------------------------------------------------------
 
 
-def _check_at_samples(name: str, law: CreepLaw, samples: LawSamples, holds: Bools) -> ConformanceCheck:
+def check_at_samples(name: str, law: CreepLaw, samples: LawSamples, holds: Bools) -> ConformanceCheck:
+    """Whether something holds at all samples, (samples,); if not, the first point where it does not."""
     if holds.all():
         return ConformanceCheck(name, True, f"{holds.size} points")
     first = int(np.flatnonzero(~holds)[0])
     description = (
-        f"not at {int((~holds).sum())} of {holds.size} points, such as {_point_text(law, samples.points[first])}"
+        f"not at {int((~holds).sum())} of {holds.size} points, such as {point_text(law, samples.points[first])}"
     )
     return ConformanceCheck(name, False, description)
 
 
-def _point_text(law: CreepLaw, point: Floats) -> str:
+def point_text(law: CreepLaw, point: Floats) -> str:
+    """What a law uses of a point, (6 + states,), in words."""
     pairs = zip((*POINT_VARIABLES, *law.states), point, strict=True)
     return ", ".join(f"{s.name} {value:.4g}" for s, value in pairs if law.uses(s))
 
 
-def _log_rate(kernel: ArrayKernel, samples: LawSamples) -> Floats:
+def log_rate(kernel: ArrayKernel, samples: LawSamples) -> Floats:
+    """The ln rate at samples, (samples,)."""
     return np.asarray(kernel.internal_log_rate(*samples.arguments()), float)
 
 
@@ -278,12 +248,12 @@ def _check_all_terms_off(law: CreepLaw, samples: LawSamples) -> tuple[bool, str]
 
 def _leading_exponent(exact: MultiprecisionLaw, point: Floats, theta: Floats) -> float:
     """Smallest (1 + a)/(1 - b) of the terms; one that starts slower than any power, or with strain, does not lead."""
-    time_exponents, strain_exponents = (_log_log_derivatives(exact, point, theta, v) for v in (time, strain))
+    time_exponents, strain_exponents = (log_log_derivatives(exact, point, theta, v) for v in (time, strain))
     pairs = zip(time_exponents, strain_exponents, strict=True)
     return min(((1 + a) / (1 - b) for a, b in pairs if a < 1e3 and b < 1 - 1e-6), default=1.0)
 
 
-def _log_log_derivatives(exact: MultiprecisionLaw, point: Floats, theta: Floats, variable: sympy.Symbol) -> list[float]:
+def log_log_derivatives(exact: MultiprecisionLaw, point: Floats, theta: Floats, variable: sympy.Symbol) -> list[float]:
     """d(ln term)/d(ln variable) of each term; inf where a term is zero."""
     column = exact.variables.index(variable)
     up, down = point.copy(), point.copy()

@@ -141,6 +141,19 @@ class MultiprecisionReference:
             ]
         return self._rounding_sensitivity[sample]
 
+    def derivative_scale(self, sample: int, row: int, column: int) -> Any:
+        """The size of a derivative that matters: the value over its input, or over 1 for an internal logarithm.
+
+        A derivative that is a small difference, far below that size, changes nothing that is computed with it.
+        """
+        position = column - 1
+        inputs = [*self.samples.points[sample], *self.samples.theta[sample]]
+        parameters = list(self.exact.law.params.values())
+        first_parameter = len(inputs) - len(parameters)
+        is_log = position >= first_parameter and parameters[position - first_parameter].scale == "log"
+        size = 1.0 if is_log else abs(float(inputs[position]))
+        return abs(self.rows[sample][row][0]) / size if size > 0.0 else mpmath.mpf(0)
+
     def location_text(self, difference: RelativeDifference) -> str:
         """A place in words: which derivative of what, at which point."""
         exact, names = self.exact, [s.name for s in self.exact.variables]
@@ -181,11 +194,13 @@ def _recheck_difference(
     """A difference beyond the tolerance, checked again with more digits and, if wanted, for cancellation."""
     k, row, column = difference.sample, difference.row, difference.column
     exact, computed = reference.rows_at_high_precision(k)[row][column], float(table.rows[k, row, column])
-    if (
-        allow_cancellation
-        and abs(mpmath.mpf(computed) - exact) <= _ROUNDING_FACTOR * reference.rounding_sensitivity(k)[row][column]
-    ):
-        return RelativeDifference(0.0, k, row, column)
+    if allow_cancellation and np.isfinite(computed):
+        error = abs(mpmath.mpf(computed) - exact)
+        negligible = _ROUNDING_FACTOR * reference.rounding_sensitivity(k)[row][column]
+        if column > 0:
+            negligible = max(negligible, VALUE_TOLERANCE * reference.derivative_scale(k, row, column))
+        if error <= negligible:
+            return RelativeDifference(0.0, k, row, column)
     return RelativeDifference(_relative_difference(exact, computed), k, row, column)
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import sympy
@@ -66,10 +69,15 @@ def constraints_hold(law: CreepLaw, points: Floats, theta: Floats) -> Bools:
     """Where every constraint of the law holds, (samples,); points (samples, 6 + S), theta (samples, parameters)."""
     values = [np.exp(t) if p.scale == "log" else t for p, t in zip(law.params.values(), theta.T, strict=True)]
     holds = np.ones(len(points), bool)
-    for relation in law.constraints:
-        test = sympy.lambdify((*POINT_VARIABLES, *law.states, *law.params), relation, "numpy", dummify=True)
+    for test in _constraint_functions(law):
         holds &= np.asarray(test(*points.T, *values), bool)
     return holds
+
+
+@lru_cache(maxsize=64)
+def _constraint_functions(law: CreepLaw) -> tuple[Callable[..., Any], ...]:
+    arguments = (*POINT_VARIABLES, *law.states, *law.params)
+    return tuple(sympy.lambdify(arguments, relation, "numpy", dummify=True) for relation in law.constraints)
 
 
 def _to_points(law: CreepLaw, unit: Floats) -> Floats:

@@ -10,7 +10,6 @@ from time import sleep
 from typing import Any
 
 import pytest
-import typer
 
 from creepkit.errors import ExportError, HistoryError, LawError, PluginError, SolveError
 from creepkit.language import CreepLaw, TemperatureFactor, arrhenius
@@ -323,13 +322,14 @@ def test_one_module_under_two_entry_points_is_told(install: Write) -> None:
 
 def test_a_plugin_whose_commands_fail_is_told_and_the_others_add_theirs(write: Write) -> None:
     head = "from creepkit.language import hookimpl\n\n@hookimpl\ndef creepkit_commands(app):\n"
-    registry, app = Registry(), typer.Typer()
+    registry = Registry()
     registry.load_file(write("failing", head + "    app.no_such_method()\n"))
     registry.load_file(write("working", head + "    app.command('work')(lambda: None)\n"))
 
-    registry.add_commands(app)
+    apps = {plugin.provenance.name: app.registered_commands for plugin, app in registry.command_lines()}
 
-    assert [command.name for command in app.registered_commands] == ["work"]
+    assert [command.name for command in apps["working"]] == ["work"]
+    assert apps["failing"] == []
     problems = {p.provenance.name: p.problem for p in registry.plugins()}
     assert "creepkit_commands raised AttributeError" in problems["failing"]
     assert problems["working"] == ""

@@ -21,14 +21,31 @@ from creepkit.testing.parity import (
     evaluate_numpy,
     largest_differences,
 )
+from helpers.dyson_mclean import DYSON_MCLEAN
 from helpers.literature_laws import EQUATIONS, POWER, RATE, A, B, law, m, n, number, s_0, scale
 
 # ---- what passes ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", EQUATIONS)
+STEP = "step in time"
+
+
+@pytest.mark.parametrize("name", sorted({*EQUATIONS} - {STEP}))
 def test_laws_that_others_would_write_are_fit_for_every_verb(name: str) -> None:
     report = check_law(EQUATIONS[name], samples=16)
+
+    assert report.passed, str(report)
+
+
+def test_a_step_in_time_is_fit_for_all_but_that_it_jumps() -> None:
+    report = check_law(EQUATIONS[STEP], samples=16)
+
+    assert [check.name for check in report.failures] == ["rate is continuous in time"]
+
+
+def test_the_law_of_dyson_and_mclean_conforms() -> None:
+    """Its hardening rate, sinh(c s)/s, has a derivative to stress that cancels at low stress, where it is nothing."""
+    report = check_law(DYSON_MCLEAN)
 
     assert report.passed, str(report)
 

@@ -104,12 +104,12 @@ def output_sensitivities(
     loads, lengths = _loads_and_lengths(names)
     outputs, output_derivatives = setup.observation.observe_with_derivatives(setup.radii, profiles)
     output_columns = output_derivatives @ change.surface
-    output_columns[0, 1:] = output_columns[1, 1:] if len(output_columns) > 1 else 0.0
     velocities = directions.velocities.reshape(len(lengths), len(setup.model.nodes), 2)
     for k, radial_velocity in enumerate(velocities[:, setup.model.top, 0]):
         output_columns[:, :, theta.size + len(loads) + k] += setup.observation.node_derivatives(
             setup.radii, profiles, radial_velocity
         )
+    _lend_to_rest(output_columns)
     along = simulation.at(output_columns, history.times)
     nuisances = {}
     for k, name in enumerate(loads):
@@ -119,8 +119,15 @@ def output_sensitivities(
     for k, name in enumerate(lengths):
         nuisances[name] = along[..., theta.size + len(loads) + k]
     if "window" in names:
-        nuisances["window"] = simulation.at(setup.observation.window_derivatives(setup.radii, profiles), history.times)
+        window_columns = setup.observation.window_derivatives(setup.radii, profiles)
+        _lend_to_rest(window_columns)
+        nuisances["window"] = simulation.at(window_columns, history.times)
     return simulation.at(outputs, history.times), BulgeSensitivities(along[..., : theta.size], nuisances)
+
+
+def _lend_to_rest(columns: Floats) -> None:
+    """Width and shape at rest are those of the first step, and so are their derivatives, (steps, 3, ...)."""
+    columns[0, 1:] = columns[1, 1:] if len(columns) > 1 else 0.0
 
 
 def _step_time_derivative(

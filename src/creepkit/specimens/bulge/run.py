@@ -25,6 +25,7 @@ from creepkit.kernels.interface import (
     TIME,
     call_entry,
 )
+from creepkit.kernels.rate_jumps import find_rate_jump
 from creepkit.presentation import present
 from creepkit.records import History, Status
 from creepkit.specimens.bulge.finite_elements import solver_settings
@@ -74,6 +75,29 @@ def missing_rate_message(law: CompiledLaw, theta: Floats, points: Floats) -> str
     return (
         f"law has no finite creep rate, or none with derivatives, at a stress of {stress:.4g} MPa, a creep strain of "
         f"{strain:.3g}, {time:.4g} s and {temperature:.4g} K"
+    )
+
+
+def rate_jump_message(law: CompiledLaw, theta: Floats, point: Floats, stresses: tuple[float, float]) -> str:
+    """Where the creep rate jumps between two stresses, MPa, in words; empty where it does not.
+
+    theta : (parameters,) internal values. point : (6 + S,), whose stresses are replaced.
+    A point whose stress meets a jump would have to creep at a rate between the two: no implicit step finds one.
+    """
+
+    def log_rates(levels: Floats) -> Floats:
+        states = np.tile(point[POINT_SIZE:], (levels.size, 1))
+        strains = np.full(levels.size, point[STRAIN])
+        rows = uniaxial_points(levels, strains, states, float(point[TIME]), float(point[TEMPERATURE]))
+        return np.asarray(call_entry(law, "update", rows, theta)[0][:, 0])
+
+    jump = find_rate_jump(log_rates, *stresses)
+    if jump is None:
+        return ""
+    before, after = np.exp([jump.before, jump.after])
+    return (
+        f"the law's creep rate jumps from {before:.3g} to {after:.3g} 1/s at a stress of {jump.place:.4g} MPa, where "
+        "no equilibrium is found; let the branches of the law meet there, or blend them"
     )
 
 
@@ -273,4 +297,9 @@ def _rate_failure(
         theta,
         uniaxial_points(stresses, strains, states, max(simulation.end_time, 1.0), float(temperatures[-1])),
     )
+    if not reason and simulation.status is Status.NOT_CONVERGED:
+        end, temperature = simulation.end_time, float(temperatures[-1])
+        point = uniaxial_points(stresses[:1], strains[:1], states[:1], end, temperature)[0]
+        jump = rate_jump_message(kernel, theta, point, (float(stresses[0]), float(stresses[-1])))
+        reason = f"{simulation.reason}: {jump}" if jump else ""
     return (simulation.end_time, reason) if reason else None

@@ -1,0 +1,271 @@
+"""The kits: one function for each kind of thing that a plugin can offer, and one for a whole plugin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError
+from creepkit.kernels.lowering import lower
+from creepkit.language import arrhenius
+from creepkit.language.law import CreepLaw
+from creepkit.records import Exporter, History, Predictor, Reader, Specimen, remember_specimen
+from creepkit.registry import Plugin, default_registry
+from creepkit.testing import (
+    exporter_checks,
+    law_behaviour,
+    law_checks,
+    law_declarations,
+    predictor_checks,
+    reader_checks,
+    specimen_checks,
+)
+from creepkit.testing.exporter_checks import ExporterCase
+from creepkit.testing.predictor_checks import PredictorCase, default_histories
+from creepkit.testing.reader_checks import ReaderCase
+from creepkit.testing.reports import ConformanceCheck, ConformanceReport, findings
+from creepkit.testing.sample_points import LawSamples, draw_samples
+from creepkit.testing.temperature_form_checks import TemperatureFormCase
+
+_FEWEST_SAMPLES = 8
+"""Samples at which the constraints must hold for a verdict to mean something."""
+
+
+_LAW_CHECKS: dict[str, Callable[[CreepLaw, LawSamples], Iterator[ConformanceCheck]]] = {
+    "name": law_declarations.check_name,
+    "table": law_checks.check_declarations,
+    "references": law_declarations.check_references,
+    "dimensions": law_declarations.check_units,
+    "printing": law_checks.check_printing,
+    "signs": law_checks.check_signs,
+    "finite": law_checks.check_finite,
+    "monotone": law_checks.check_monotonic,
+    "continuity": law_behaviour.check_continuity,
+    "temperature": law_declarations.check_temperature,
+    "exponents of time": law_behaviour.check_time_exponents,
+    "states": law_behaviour.check_states,
+    "examples": law_declarations.check_examples,
+    "parity": law_checks.check_parity,
+    "torch gradients": law_checks.check_torch_gradients,
+    "switches": law_checks.check_switches,
+    "leading exponent": law_checks.check_leading_exponent,
+}
+
+
+def check_law(law: CreepLaw, samples: int = 64, seed: int = 0) -> ConformanceReport:
+    """Run every check on a law; never raises for a law that fails one.
+
+    samples : a power of two.
+    """
+    if not isinstance(law, CreepLaw):
+        raise LawError(f"check_law() takes a creep law, found {law!r}; ck.law(name) returns a registered one")
+    try:
+        lower(law, "numpy")
+    except CreepkitError as error:
+        return ConformanceReport(law, (ConformanceCheck("lowering", False, str(error)),))
+    sampled = draw_samples(law, samples, seed)
+    if len(sampled) < _FEWEST_SAMPLES:
+        detail = f"the constraints hold at {len(sampled)} of the samples; widen them or narrow the bounds"
+        return ConformanceReport(law, (ConformanceCheck("constraints", False, detail),))
+    results: list[ConformanceCheck] = []
+    for name, check in _LAW_CHECKS.items():
+        results += _checks_of_property(name, check, law, sampled)
+        if name == "signs" and not results[-1].passed:
+            break  # the logarithm of a negative term means nothing
+    return ConformanceReport(law, tuple(results))
+
+
+def _checks_of_property(
+    name: str, check: Callable[[CreepLaw, LawSamples], Iterator[ConformanceCheck]], law: CreepLaw, sampled: LawSamples
+) -> list[ConformanceCheck]:
+    """The findings of one promise; one that cannot even be examined is a finding too."""
+    try:
+        with np.errstate(all="ignore"):
+            return list(check(law, sampled))
+    except (CreepkitError, ArithmeticError, ValueError) as error:
+        return [ConformanceCheck(name, False, f"{type(error).__name__}: {error}")]
+
+
+def check_specimen(
+    specimen: Specimen,
+    histories: Sequence[History] | None = None,
+    *,
+    law: CreepLaw | None = None,
+    values: Mapping[str, float] | None = None,
+) -> ConformanceReport:
+    """Run every check on a specimen; what its code raises is a finding, too.
+
+    histories : tests to check it with, of different lengths; by default planned from its loads and conditions.
+    law, values : by default Norton's law with an activation energy, at a creep strain of half a per cent.
+    """
+    if isinstance(specimen, type) or not hasattr(specimen, "predict"):
+        raise SolveError(f"check_specimen() takes a specimen, found {specimen!r}; ck.specimen(name) returns one")
+    remember_specimen(specimen)
+    record = findings("name and title", lambda: specimen_checks.check_record_name(specimen, "specimen"))
+    case, problem = _case(specimen, histories, law, values, "specimen")
+    if case is None:
+        return ConformanceReport(specimen, (*record, problem), "specimen")
+    checks = {
+        "outputs": predictor_checks.check_outputs,
+        "reference stress": specimen_checks.check_reference_stress,
+        "loads": specimen_checks.check_loads,
+        **_PREDICTOR_CHECKS,
+        "lengths": specimen_checks.check_dimensions,
+    }
+    return ConformanceReport(specimen, (*record, *_all_findings(checks, case)), "specimen")
+
+
+_PREDICTOR_CHECKS: dict[str, Callable[[PredictorCase], Iterator[ConformanceCheck]]] = {
+    "shapes": predictor_checks.check_shapes,
+    "batches": predictor_checks.check_batches,
+    "sensitivities": predictor_checks.check_sensitivities,
+    "nuisances": predictor_checks.check_nuisances,
+    "related models": predictor_checks.check_related_models,
+}
+
+
+def check_predictor(
+    predictor: Predictor,
+    histories: Sequence[History] | None = None,
+    *,
+    law: CreepLaw | None = None,
+    values: Mapping[str, float] | None = None,
+) -> ConformanceReport:
+    """Run every check on a predictor, such as a surrogate or a closed form; as check_specimen(), less the record.
+
+    histories : tests that it can predict; by default those of its specimen. law, values : that it knows.
+    """
+    if isinstance(predictor, type) or not hasattr(predictor, "predict"):
+        raise SolveError(f"check_predictor() takes a predictor, found {predictor!r}; it needs a method predict()")
+    case, problem = _case(predictor, histories, law, values, "predictor")
+    if case is None:
+        return ConformanceReport(predictor, (problem,), "predictor")
+    checks = {"outputs": predictor_checks.check_outputs, **_PREDICTOR_CHECKS}
+    return ConformanceReport(predictor, tuple(_all_findings(checks, case)), "predictor")
+
+
+def check_reader(reader: Reader, path: str | Path | None = None) -> ConformanceReport:
+    """Run every check on a reader.
+
+    path : an example file or folder, whose histories must survive creepkit's own CSV files.
+    """
+    if isinstance(reader, type) or not hasattr(reader, "accepts"):
+        raise HistoryError(f"check_reader() takes a reader, found {reader!r}; it needs accepts() and read()")
+    case = ReaderCase(reader, None if path is None else Path(path))
+    checks = {
+        "name and title": lambda case: specimen_checks.check_record_name(case.reader, "reader"),
+        "foreign files": reader_checks.check_foreign_files,
+        "files of write_history()": reader_checks.check_own_files,
+        "example file": reader_checks.check_example,
+    }
+    return ConformanceReport(reader, tuple(_all_findings(checks, case)), "reader")
+
+
+def check_exporter(exporter: Exporter) -> ConformanceReport:
+    """Run every check on an exporter, with every registered law."""
+    if isinstance(exporter, type) or not hasattr(exporter, "text"):
+        raise ExportError(f"check_exporter() takes an exporter, found {exporter!r}; it needs a method text()")
+    case = ExporterCase(exporter)
+    checks = {
+        "name and title": lambda case: specimen_checks.check_record_name(case.exporter, "exporter"),
+        "suffix": exporter_checks.check_interface,
+        "text or a reason for every law": exporter_checks.check_every_law,
+        "deterministic": exporter_checks.check_determinism,
+        "notes and names": exporter_checks.check_hostile_texts,
+    }
+    return ConformanceReport(exporter, tuple(_all_findings(checks, case)), "exporter")
+
+
+def check_temperature_form(name: str, form: Callable[..., Any]) -> ConformanceReport:
+    """Run every check on a temperature form or factor, a function of T_ref."""
+    subject = TemperatureFormCase(name, form)
+    checks = {"temperature form": TemperatureFormCase.check}
+    return ConformanceReport(subject, tuple(_all_findings(checks, subject)), "temperature form")
+
+
+_KITS: dict[str, Callable[[Any], ConformanceReport]] = {
+    "law": check_law,
+    "specimen": check_specimen,
+    "reader": check_reader,
+    "exporter": check_exporter,
+}
+
+
+def check_plugin(plugin: Plugin) -> list[ConformanceReport]:
+    """Run the kit of each thing that a plugin offers; PluginError where it offers nothing that can be checked."""
+    reports = [
+        _KITS[kind](value)
+        for kind, offered in plugin.contributions.items()
+        for value in offered.values()
+        if kind in _KITS
+    ]
+    forms = plugin.contributions.get("temperature form", {})
+    reports += [check_temperature_form(*named) for named in forms.items()]
+    if not reports:
+        raise PluginError(
+            f"{plugin.provenance} offers no law, specimen, reader, exporter or temperature form; return one from a "
+            "hook such as creepkit_laws"
+        )
+    return reports
+
+
+def check_named(name: str) -> list[ConformanceReport]:
+    """Run the kits of whatever is registered under a name; LawError with the nearest name where nothing is."""
+    registry = default_registry()
+    offered: dict[str, Mapping[str, Any]] = {
+        "law": registry.laws(),
+        "specimen": registry.specimens(),
+        "reader": registry.readers(),
+        "exporter": registry.exporters(),
+    }
+    reports = [_KITS[kind](known[name].value) for kind, known in offered.items() if name in known]
+    forms = registry.temperature_forms()
+    if name in forms:
+        reports.append(check_temperature_form(name, forms[name].value))
+    return reports or [check_law(registry.law(name))]
+
+
+def _all_findings(checks: Mapping[str, Callable[[Any], Iterable[ConformanceCheck]]], case: Any) -> list[Any]:
+    return [found for name, check in checks.items() for found in findings(name, partial(check, case))]
+
+
+def _case(
+    predictor: Any,
+    histories: Sequence[History] | None,
+    law: CreepLaw | None,
+    values: Mapping[str, float] | None,
+    kind: str,
+) -> tuple[PredictorCase | None, ConformanceCheck]:
+    """What a predictor is checked with; or why there is nothing."""
+    cases: list[PredictorCase] = []
+
+    def made() -> Iterator[ConformanceCheck]:
+        tests = list(histories) if histories is not None else default_histories(predictor)
+        if len(tests) == 1:
+            tests = [*tests, tests[0].replace(name=f"{tests[0].name}, shorter", times=tests[0].times[:-1], outputs={})]
+        chosen = law or default_registry().law("norton").times(arrhenius(T_ref=1050.0))
+        given = values or (chosen.center() if law is not None else _norton_values(predictor, tests[0]))
+        cases.append(PredictorCase(predictor, chosen, chosen.to_internal(chosen.values(given)), tests, kind))
+        yield ConformanceCheck("a planned test", True, ", ".join(test.name for test in tests))
+
+    found = findings("a planned test", made)
+    return (cases[0] if cases else None), found[-1]
+
+
+TYPICAL_STRAIN = 0.005
+
+
+def _norton_values(predictor: Any, history: History) -> dict[str, float]:
+    """Of Norton's law with n = 4: a creep strain of half a per cent at the end of a test."""
+    record = getattr(predictor, "specimen", predictor)
+    level = 100.0
+    if hasattr(record, "reference_stress"):
+        found = float(np.max(record.reference_stress(history), initial=0.0))
+        level = found if 0.0 < found < np.inf else level
+    rate = TYPICAL_STRAIN / float(history.times[-1]) / level**4
+    change = 1.0 / 1050.0 - 1.0 / history.mean_temperature
+    return {"A": float(rate * np.exp(-3e5 / 8.314462618 * change)), "n": 4.0, "Q": 3e5}

@@ -1,0 +1,246 @@
+"""Dimensions of a law's rates, from the units of its parameters.
+
+In a law stress is the ratio to 1 MPa and time the ratio to 1 s, so that a stress may stand against a parameter in MPa
+or against one without a unit, and a rate comes out in 1/s or without a unit. Whole numbers up to ten and simple
+fractions have no unit; any other number may have whatever unit the law needs (a reference temperature, a modulus),
+but where an energy stands over the temperature it must be the gas constant, or Boltzmann's, in the energy's own unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from itertools import pairwise
+from typing import TypeAlias
+
+import sympy
+
+from creepkit.errors import LawError
+from creepkit.language.law import CreepLaw
+from creepkit.language.symbols import GAS_CONSTANT, mean_stress, principal_stress, strain, stress, temperature, time
+from creepkit.testing.units import (
+    AMOUNT,
+    KELVIN,
+    LENGTH,
+    NO_UNIT,
+    PRESSURE,
+    SECOND,
+    UnitPowers,
+    UnknownUnitError,
+    parse_unit,
+)
+
+RATIO_OF_STRESS, RATIO_OF_TIME = "stress", "time"
+"""Powers of stress and time themselves, each a ratio or a quantity with its unit, as the rest needs."""
+
+
+BOLTZMANN_CONSTANT = 1.380649e-23
+"""J/K, of the SI."""
+
+
+CONSTANT_TOLERANCE = 5e-3
+"""By which a rounded gas constant may differ: 8.31, 8.314."""
+
+
+FACTOR_TOLERANCE = 1e-6
+
+
+LARGEST_PLAIN_NUMBER = 10
+
+
+Unit: TypeAlias = UnitPowers | None
+"""None where the unit is not known, for numbers have any."""
+
+
+class DimensionError(LawError):
+    """Units that do not go together; its message is one sentence."""
+
+
+def check_dimensions(law: CreepLaw) -> None:
+    """DimensionError, saying which part has which unit, unless all rates of a law are consistent."""
+    units: dict[sympy.Symbol, Unit] = {strain: NO_UNIT, temperature: UnitPowers(1.0, {KELVIN: Fraction(1)})}
+    units |= {s: UnitPowers(1.0, {RATIO_OF_STRESS: Fraction(1)}) for s in (stress, principal_stress, mean_stress)}
+    units[time] = UnitPowers(1.0, {RATIO_OF_TIME: Fraction(1)})
+    declared = {symbol: param.unit for symbol, param in law.params.items()}
+    declared |= {symbol: state.unit for symbol, state in law.states.items()}
+    for symbol, text in declared.items():
+        try:
+            units[symbol] = NO_UNIT if text in ("", "-") else parse_unit(text)
+        except UnknownUnitError as error:
+            raise DimensionError(
+                f"the unit of {symbol} is not understood, {error}; write it with MPa, s, K, mm, J, mol and numbers, "
+                "such as 1/(MPa s)"
+            ) from None
+    analysis = _Analysis(units)
+    rates = {f"term '{label}'": (term, NO_UNIT) for label, term in law.terms.items()}
+    rates |= {f"rate of '{s}'": (z.rate, units[s] or NO_UNIT) for s, z in law.states.items()}
+    for place, (rate, of) in rates.items():
+        try:
+            unit = analysis.unit(rate)
+        except DimensionError as error:
+            raise DimensionError(f"{place}: {error}") from None
+        if unit is not None and not _is_rate(unit * of.power(Fraction(-1))):
+            raise DimensionError(
+                f"{place} comes out in {_text(unit)}, and must in {'' if of is NO_UNIT else f'{of} per s, '}1/s or "
+                'without a unit; correct unit= of its parameters, "1/s" for a rate coefficient'
+            )
+
+
+class _Analysis:
+    def __init__(self, units: dict[sympy.Symbol, Unit]) -> None:
+        self.units = units
+
+    def unit(self, expression: sympy.Basic) -> Unit:
+        """The unit of an expression; DimensionError where its parts do not go together."""
+        if isinstance(expression, sympy.Symbol):
+            return self.units.get(expression)
+        if isinstance(expression, sympy.Number) or expression.is_number:
+            return NO_UNIT if _is_plain(expression) else None
+        if isinstance(expression, sympy.Mul):
+            return self.product(expression)
+        if isinstance(expression, sympy.Add | sympy.Max | sympy.Min):
+            return self.sum_of(expression, list(expression.args))
+        if isinstance(expression, sympy.Piecewise):
+            for _, condition in expression.args:
+                for relation in condition.atoms(sympy.core.relational.Relational):
+                    self.sum_of(relation, list(relation.args))
+            return self.sum_of(expression, [branch for branch, _ in expression.args])
+        if isinstance(expression, sympy.Pow):
+            return self.power(expression)
+        if isinstance(expression, sympy.Abs):
+            return self.unit(expression.args[0])
+        if isinstance(expression, sympy.Heaviside | sympy.sign):
+            self.unit(expression.args[0])
+            return NO_UNIT
+        for argument in expression.args:  # of exp, log, sinh and so on
+            self.require_none(argument, f"the argument of {type(expression).__name__}")
+        return NO_UNIT
+
+    def product(self, expression: sympy.Mul) -> Unit:
+        result, known = NO_UNIT, True
+        number = 1.0
+        for factor in expression.args:
+            if factor.is_number and not _is_plain(factor):
+                number *= float(factor)
+                continue
+            unit = self.unit(factor)
+            if unit is None:
+                known = False
+            else:
+                result = result * unit
+        if not known:
+            return None
+        if number == 1.0:
+            return result
+        return self.with_constant(expression, result, abs(number) * _plain_value(expression))
+
+    def with_constant(self, expression: sympy.Mul, unit: UnitPowers, number: float) -> Unit:
+        """The unit of a product with a number; an energy over the temperature needs the right constant."""
+        for constant, amount in ((GAS_CONSTANT, Fraction(-1)), (BOLTZMANN_CONSTANT, Fraction())):
+            powers = {PRESSURE: Fraction(1), LENGTH: Fraction(3), KELVIN: Fraction(-1)} | (
+                {AMOUNT: amount} if amount else {}
+            )
+            if dict(unit.powers) == powers:
+                joules = unit.factor / 1e3
+                if _is_multiple(number * constant / joules):
+                    return NO_UNIT
+                if _is_multiple(number * constant):
+                    raise DimensionError(
+                        f"{expression} divides an energy in {joules:g} J by a constant in J; give the energy in "
+                        f"{'J/mol' if amount else 'J'}, or multiply by {joules:g}"
+                    )
+                raise DimensionError(
+                    f"{expression} divides an energy in {_text(unit)} by a number that is not "
+                    f"{constant:.5g} {'J/(mol K)' if amount else 'J/K'} in that unit"
+                )
+        return None
+
+    def sum_of(self, expression: sympy.Basic, parts: list[sympy.Basic]) -> Unit:
+        units = [(part, self.unit(part)) for part in parts if part != 0]
+        known = [(part, unit) for part, unit in units if unit is not None]
+        for (a, first), (b, second) in pairwise(known):
+            if not _fits(first, second):
+                raise DimensionError(
+                    f"{expression} puts {a} in {_text(first)} beside {b} in {_text(second)}; "
+                    "correct unit= of a parameter"
+                )
+        flexible = [u for _, u in known if {RATIO_OF_STRESS, RATIO_OF_TIME} & set(u.powers)]
+        return next(iter([*flexible, *(u for _, u in known)]), None)
+
+    def power(self, expression: sympy.Pow) -> Unit:
+        base, exponent = expression.as_base_exp()
+        self.require_none(exponent, "the exponent")
+        unit = self.unit(base)
+        if unit is None or (not unit.powers and abs(unit.factor - 1.0) < 1e-9):
+            return unit
+        if exponent.is_Rational:
+            return unit.power(Fraction(int(exponent.p), int(exponent.q)))
+        if set(unit.powers) <= {RATIO_OF_STRESS, RATIO_OF_TIME}:
+            return NO_UNIT  # a ratio
+        if _fits(unit, NO_UNIT):
+            return NO_UNIT
+        hard = {u for u in unit.powers if u not in (PRESSURE, SECOND, RATIO_OF_STRESS, RATIO_OF_TIME)}
+        if hard or abs(unit.factor - 1.0) > FACTOR_TOLERANCE:
+            raise DimensionError(
+                f"{base} in {_text(unit)} is raised to {exponent}; divide it by a reference of that unit"
+            )
+        return None  # in MPa or s, which are ratios as well
+
+    def require_none(self, expression: sympy.Basic, what: str) -> None:
+        unit = self.unit(expression)
+        if unit is not None and not _fits(unit, NO_UNIT):
+            energy = set(unit.powers) >= {PRESSURE, LENGTH, KELVIN}
+            remedy = (
+                f"divide by the gas constant, GAS_CONSTANT = {GAS_CONSTANT:.5g} J/(mol K)"
+                if energy
+                else "it must have none; correct unit= of its parameters, or divide by a reference"
+            )
+            raise DimensionError(f"{what}, {expression}, is in {_text(unit)}; {remedy}")
+
+
+def _fits(first: UnitPowers, second: UnitPowers) -> bool:
+    """Whether two units are the same, stress counting as MPa or as a ratio, time as s or as one."""
+    if abs(first.factor / second.factor - 1.0) > FACTOR_TOLERANCE:
+        return False
+    difference = dict((first * second.power(Fraction(-1))).powers)
+    for ratio, unit in ((RATIO_OF_STRESS, PRESSURE), (RATIO_OF_TIME, SECOND)):
+        as_ratio, as_unit = difference.pop(ratio, Fraction()), difference.pop(unit, Fraction())
+        if as_unit not in (0, -as_ratio):
+            return False
+    return not difference
+
+
+def _is_rate(unit: UnitPowers) -> bool:
+    return any(_fits(unit, UnitPowers(1.0, {SECOND: Fraction(power)} if power else {})) for power in (-1, 0))
+
+
+def _is_plain(number: sympy.Basic) -> bool:
+    """Whether a number is a factor of mathematics, not a quantity: 2, 1/3, sqrt(2), pi."""
+    if number.atoms(sympy.Float):
+        return any(float(number) == k / 2 for k in range(-2 * LARGEST_PLAIN_NUMBER, 2 * LARGEST_PLAIN_NUMBER + 1))
+    return all(max(abs(r.p), r.q) <= LARGEST_PLAIN_NUMBER for r in number.atoms(sympy.Rational))
+
+
+def _plain_value(expression: sympy.Mul) -> float:
+    values: Iterator[float] = (float(abs(f)) for f in expression.args if f.is_number and _is_plain(f))
+    result = 1.0
+    for value in values:
+        result *= value
+    return result
+
+
+def _is_multiple(ratio: float) -> bool:
+    """Whether a ratio is 1, or a small number times or over 1, within the rounding of physical constants."""
+    return any(
+        abs(ratio * k - 1.0) < CONSTANT_TOLERANCE or abs(ratio / k - 1.0) < CONSTANT_TOLERANCE for k in (1, 2, 3)
+    )
+
+
+def _text(unit: UnitPowers) -> str:
+    """A unit in words; powers of stress and time count as ratios."""
+    left = {u: p for u, p in unit.powers.items() if u not in (RATIO_OF_STRESS, RATIO_OF_TIME)}
+    if left.get(LENGTH) == 3 and left.get(PRESSURE) == 1:
+        rest = {u: p for u, p in left.items() if u not in (LENGTH, PRESSURE)}
+        factor = unit.factor / 1e3
+        return f"{'' if abs(factor - 1) < 1e-9 else f'{factor:g} '}J {UnitPowers(1.0, rest)}".replace(" 1", "").strip()
+    return str(UnitPowers(unit.factor, left))

@@ -1,0 +1,317 @@
+"""Faulty laws and hooks as authors write them, each in a file: `creepkit check` names the fault and the remedy."""
+
+from pathlib import Path
+
+import pytest
+
+from creepkit.errors import PluginError
+from creepkit.registry import Registry
+from creepkit.testing import check_plugin
+
+HEAD = """
+import math
+import sympy
+from creepkit.language import *
+
+A, n, m, Q, B, s_0 = parameters("A n m Q B s_0")
+w, v = states("w v")
+RATE = Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", off=0.0)
+POWER = Param("exponent", (1, 8))
+ENERGY = Param("activation energy", (1e5, 5e5), "J/mol")
+R = GAS_CONSTANT
+"""
+
+TAIL = """
+
+@hookimpl
+def creepkit_laws():
+    return [LAW]
+"""
+
+
+def law(term: str, params: str, *, name: str = "'my-law'", refs: str = "('Author (2020)',)", more: str = "") -> str:
+    """The source of a plugin with one law."""
+    return (
+        f"{HEAD}\nLAW = CreepLaw(name={name}, title='A law', terms={{'creep': {term}}}, params={{{params}}}, "
+        f"references={refs}, {more})\n{TAIL}"
+    )
+
+
+PLAIN = "A: RATE, n: POWER"
+GOOD = law("A * stress**n", PLAIN)
+ACTIVATED = "A: RATE, n: POWER, Q: ENERGY"
+FRACTION = "A: RATE, n: POWER, m: Param('share', (0.1, 0.9))"
+
+
+def damage(state: str, term: str = "A * stress**n / (1 - w)", params: str = PLAIN + ", B: RATE") -> str:
+    """A law with one internal variable w."""
+    return law(term, params, more=f"states={{w: {state}}}")
+
+
+LAWS: dict[str, tuple[str, str]] = {
+    # ---- units
+    "rate coefficient in MPa": (
+        law("A*stress**n", PLAIN.replace("RATE", "Param('a', (1, 2), 'MPa')")),
+        "comes out in MPa",
+    ),
+    "rate coefficient in 1/h": (
+        law("A*stress**n", "A: Param('a', (1e-9, 1e-5), '1/h', 'log'), n: POWER"),
+        "comes out in 0.000277778 s^-1",
+    ),
+    "rate coefficient in mm/s": (
+        law("A*stress**n", "A: Param('a', (1e-9, 1e-5), 'mm/s', 'log'), n: POWER"),
+        "must in 1/s or without a unit",
+    ),
+    "energy in kJ, constant in J": (
+        law(
+            "A*stress**n*sympy.exp(-Q/(R*temperature))", ACTIVATED.replace("ENERGY", "Param('q', (100, 500), 'kJ/mol')")
+        ),
+        "divides an energy in 1000 J by a constant in J; give the energy in J/mol, or multiply by 1000",
+    ),
+    "energy in eV, gas constant": (
+        law("A*stress**n*sympy.exp(-Q/(R*temperature))", ACTIVATED.replace("ENERGY", "Param('q', (1, 5), 'eV')")),
+        "by a number that is not 1.3806e-23 J/K",
+    ),
+    "no gas constant": (law("A*stress**n*sympy.exp(-Q/temperature)", ACTIVATED), "divide by the gas constant"),
+    "exponential of a stress in MPa": (
+        law("A*stress**n*sympy.exp(strain*B)", PLAIN + ", B: Param('b', (1, 9), 'MPa')"),
+        "the argument of exp, B*strain, is in MPa",
+    ),
+    "sine of a stress over GPa": (
+        law("A*sympy.sinh(stress/B)", "A: RATE, B: Param('b', (0.1, 9), 'GPa')"),
+        "the argument of sinh, stress/B, is in 0.001 MPa^-1",
+    ),
+    "power of a temperature": (law("A*stress**n*temperature**m", PLAIN + ", m: POWER"), "divide it by a reference"),
+    "exponent with a unit": (law("A*stress**n", "A: RATE, n: Param('n', (1, 8), 'K')"), "the exponent, n, is in K"),
+    "slope of temperature without its unit": (
+        law("A*stress**n*(1 + B*temperature)", PLAIN + ", B: Param('b', (1e-4, 1e-3))"),
+        "beside B*temperature in K",
+    ),
+    "unit of no known spelling": (
+        law("A*stress**n", "A: Param('a', (1e-9, 1e-5), 'per second', 'log'), n: POWER"),
+        "the unit of A is not understood, 'per' in 'per second'",
+    ),
+    "unit with a symbol in a power": (
+        law("A*stress**n", "A: Param('a', (1e-9, 1e-5), 'MPa^-n/s', 'log'), n: POWER"),
+        "such as 1/(MPa s)",
+    ),
+    "log scale without a unit": (
+        law("A*stress**n", "A: Param('a', (1e-9, 1e-5), scale='log'), n: POWER"),
+        "missing unit",
+    ),
+    # ---- rates
+    "negative rate": (law("A*stress**n - A", PLAIN), "negative"),
+    "negative at long times": (
+        law("A*stress**n*(1 - time*B)", PLAIN + ", B: Param('b', (1e-3, 1), '1/s', 'log')"),
+        "say in constraints where the law holds",
+    ),
+    "singular at zero stress": (law("A*sympy.exp(1/stress**2)*stress**n", PLAIN), "not at"),
+    "singular at a stress": (
+        law("A*stress**n/(1 - stress/B)**2", PLAIN + ", B: Param('b', (100, 900), 'MPa')"),
+        "FAIL",
+    ),
+    "falls with stress": (law("A*stress**(-n)", PLAIN), "rate never falls with stress"),
+    "falls beyond a peak": (law("A*stress**n*sympy.exp(-stress/50)", PLAIN), "rate never falls with stress"),
+    "overflows": (law("A*sympy.exp(sympy.exp(stress))", "A: RATE"), "ln rate is finite"),
+    "jump in stress": (
+        law("A*stress**n*sympy.Piecewise((1, stress < 100), (10, True))", PLAIN),
+        "it jumps by a factor of 10 at stress 100 MPa; let the branches meet",
+    ),
+    "branches that do not meet": (
+        law(
+            "sympy.Piecewise((A*stress**n, stress < B), (3*A*stress**n, True))",
+            PLAIN + ", B: Param('b', (50, 200), 'MPa')",
+        ),
+        "it jumps by a factor of 3 at stress",
+    ),
+    "step at a strain": (
+        law("A*stress**n*(1 + sympy.Heaviside(strain - sympy.Rational(1, 100)))", PLAIN),
+        "jumps by a factor of 2 at strain 0.01",
+    ),
+    "step at a time": (
+        law("A*stress**n*(1 + sympy.Heaviside(time - 1000))", PLAIN),
+        "jumps by a factor of 2 at time 1000 s",
+    ),
+    "gap between branches": (law("A*sympy.Piecewise((stress**n, stress < 100))", PLAIN), "write (..., True)"),
+    "time to the power -1": (
+        law("A*stress**n*time**m", PLAIN + ", m: Param('m', (-1, 0))"),
+        "goes as time^-1 at zero time with",
+    ),
+    "time to a power below -1 at a bound": (
+        law("A*stress**n*time**(m - 1)", PLAIN + ", m: Param('m', (-0.2, 1))"),
+        "narrow the bounds so that the power stays above -1",
+    ),
+    "falls with temperature": (
+        law("A*stress**n*sympy.exp(Q/(R*temperature))", ACTIVATED),
+        "check the sign of the activation energy",
+    ),
+    "function without a kernel": (law("A*stress**n*sympy.gamma(n)", PLAIN), "has no kernel"),
+    "complex number": (law("A*stress**n*sympy.I", PLAIN), "is not finite and real"),
+    "infinite number": (law("A*stress**n/sympy.Integer(0)", PLAIN), "is not finite and real"),
+    # ---- symbols, tables and texts
+    "undeclared symbol": (law("A*stress**n*B", PLAIN), "unknown symbol B"),
+    "unused parameter": (law("A*stress**n", PLAIN + ", B: RATE"), "parameter B is declared but not used"),
+    "symbol of its own for stress": (
+        law("A*sympy.Symbol('stress', positive=True)**n", PLAIN),
+        "is not a plain real one",
+    ),
+    "parameter named as a word": (
+        law("A*stress**n*time", "A: RATE, n: POWER, time: POWER"),
+        "is a word of the language",
+    ),
+    "text for a term": (law("'A*stress**n'", PLAIN), "text is never evaluated"),
+    "function for a term": (law("lambda s: s", PLAIN), "is not a sympy expression"),
+    "numpy in a term": (law("A*math.exp(stress)", PLAIN), "TypeError: Cannot convert expression to float"),
+    "name with spaces": (law("A*stress**n", PLAIN, name="'my law'"), "joined by hyphens"),
+    "name in capitals": (law("A*stress**n", PLAIN, name="'My-Law'"), "in small letters"),
+    "name that is taken": (law("2*A*stress**n", PLAIN, name="'norton'"), "'norton' is taken, by plugin 'norton'"),
+    "no name": (law("A*stress**n", PLAIN, name="''"), "a law needs a name in words"),
+    "no references": (law("A*stress**n", PLAIN, refs="()"), "missing references"),
+    "references of numbers": (law("A*stress**n", PLAIN, refs="(1983,)"), "must be one line of text"),
+    "letters of a reference": (law("A*stress**n", PLAIN, refs="tuple('Norton')"), "write a tuple of texts"),
+    "missing bounds": (law("A*stress**n", "A: RATE, n: Param('exponent')"), "bounds"),
+    "swapped bounds": (law("A*stress**n", "A: RATE, n: Param('exponent', (8, 1))"), "bounds are reversed or empty"),
+    "log scale to zero": (
+        law("A*stress**n", "A: Param('a', (0, 1), '1/s', 'log'), n: POWER"),
+        "needs bounds above zero",
+    ),
+    "unknown scale": (
+        law("A*stress**n", "A: Param('a', (1, 2), '1/s', 'logarithmic'), n: POWER"),
+        "allowed are 'linear' and 'log'",
+    ),
+    "number for a Param": (law("A*stress**n", "A: RATE, n: 5.0"), "write Param(...)"),
+    "constraints that never hold": (
+        law("A*stress**n", PLAIN, more="constraints=(n > 9,)"),
+        "the constraints hold at 0",
+    ),
+    "off that is no switch": (
+        law("A*sympy.sinh(stress/B)", "A: RATE, B: Param('b', (1, 100), 'MPa', 'log', off=0.0)"),
+        "switches",
+    ),
+    # ---- internal variables
+    "limit below the start": (
+        damage("State(0.0, B*stress, 'damage', limit=-1.0)", "A*stress**n*sympy.exp(w)"),
+        "it leaves its start, 0, away from its limit, -1",
+    ),
+    "start at the limit": (damage("State(1.0, B*stress, 'damage', limit=1.0)"), "starts at its limit"),
+    "damage that heals": (damage("State(0.0, -B*stress, 'damage', limit=0.99)"), "correct the sign of its rate"),
+    "rate of a state in another unit": (
+        damage(
+            "State(0.0, B*stress, 'oxide', unit='mm', limit=0.99)",
+            "A*stress**n*sympy.exp(w/s_0)",
+            PLAIN + ", B: RATE, s_0: Param('s', (1, 2), 'mm')",
+        ),
+        "rate of 'w' comes out in s^-1, and must in mm per s",
+    ),
+    "text for a state's rate": (damage("State(0.0, 'B*stress', 'damage')"), "is not a sympy expression"),
+    # ---- examples
+    "example with another rate": (
+        law("A*stress**n", PLAIN, more="examples=({'A': 1e-16, 'n': 4, 'stress': 100, 'rate': 2e-8},)"),
+        "1e-08 1/s, and the example states 2e-08",
+    ),
+    "example without a stress": (
+        law("A*stress**n", PLAIN, more="examples=({'A': 1e-16, 'n': 4, 'rate': 1e-8},)"),
+        "it has no stress",
+    ),
+    "example without a rate": (law("A*stress**n", PLAIN, more="examples=({'A': 1e-16},)"), "write a tuple of examples"),
+}
+WITHOUT_HOOK = GOOD.replace("@hookimpl", "")
+HOOKS: dict[str, tuple[str, str, bool]] = {
+    "misspelt": (GOOD.replace("creepkit_laws", "creepkit_law"), "did you mean 'creepkit_laws'?", True),
+    "without its decorator": (WITHOUT_HOOK, "without @hookimpl", True),
+    "with a parameter": (
+        GOOD.replace("creepkit_laws()", "creepkit_laws(registry)"),
+        "has the parameter 'registry'",
+        True,
+    ),
+    "forgot to return": (GOOD.replace("return [LAW]", "[LAW]"), "found NoneType None; add a return statement", True),
+    "a generator": (GOOD.replace("return [LAW]", "yield LAW"), "is a generator; return a list", True),
+    "an iterator": (GOOD.replace("return [LAW]", "return iter([LAW])"), "return list(...) of it", True),
+    "a law for a list": (GOOD.replace("return [LAW]", "return LAW"), "put it into a list", True),
+    "the class": (GOOD.replace("[LAW]", "[CreepLaw]"), "found the class CreepLaw in it; return an instance", True),
+    "text": (GOOD.replace("[LAW]", "'LAW'"), "must return a list of CreepLaw records, found str 'LAW'", True),
+    "twice": (GOOD.replace("[LAW]", "[LAW, LAW]"), "offers the law 'my-law' twice; rename one", True),
+    "raises": (GOOD.replace("return [LAW]", "return [LAW][7]"), "raised IndexError", True),
+    "file that raises": (GOOD + "\n1 / 0\n", "ZeroDivisionError", True),
+    "file with an error of syntax": (GOOD + "\nreturn (\n", "SyntaxError", True),
+    "nothing": ("x = 1\n", "offers nothing; mark one of its functions @hookimpl", False),
+    "an empty list": (GOOD.replace("[LAW]", "[]"), "offers no law, specimen, reader, exporter", False),
+    "a reader without read": (
+        "import creepkit as ck\nclass R:\n    name = title = 'r'\n    def accepts(self, path):\n        return False\n"
+        "@ck.hookimpl\ndef creepkit_readers():\n    return [R()]\n",
+        "it has no read",
+        True,
+    ),
+    "a specimen whose name raises": (
+        "import creepkit as ck\nclass S:\n    title = 's'\n    outputs = ('x',)\n    def predict(self): ...\n"
+        "    @property\n    def name(self):\n        raise OSError('no licence')\n"
+        "@ck.hookimpl\ndef creepkit_specimens():\n    return [S()]\n",
+        "OSError: no licence",
+        True,
+    ),
+    "an exporter without a name": (
+        "import creepkit as ck\nclass E:\n    name = None\n    title = suffix = '.e'\n    def text(self, source):\n"
+        "        return ''\n@ck.hookimpl\ndef creepkit_exporters():\n    return [E()]\n",
+        "whose name is None; give it a short name in words",
+        True,
+    ),
+    "a form that is no function": (
+        "import creepkit as ck\n@ck.hookimpl\ndef creepkit_temperature_forms():\n    return {'mine': 3}\n",
+        "must return {name: function of T_ref}, found int 3 for 'mine'",
+        True,
+    ),
+}
+
+
+def told(source: str, file: Path) -> str:
+    """What the check says of a plugin file: the error of loading it, or the findings that fail."""
+    file.write_text(source, encoding="utf-8")
+    try:
+        reports = check_plugin(Registry().load_file(file))
+    except PluginError as error:
+        return str(error)
+    failures = [check for report in reports for check in report.failures]
+    assert all("\n" not in check.detail for check in failures)
+    return " ".join(f"FAIL {check.name}: {check.detail}" for check in failures)
+
+
+def test_the_law_that_the_faults_are_put_into_conforms(tmp_path: Path) -> None:
+    assert told(GOOD, tmp_path / "good.py") == ""
+
+
+@pytest.mark.parametrize("fault", LAWS)
+def test_a_faulty_law_is_caught_with_a_sentence(fault: str, tmp_path: Path) -> None:
+    source, sentence = LAWS[fault]
+
+    message = told(source, tmp_path / "faulty.py")
+    assert sentence in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize("fault", HOOKS)
+def test_a_faulty_hook_is_caught_with_its_file(fault: str, tmp_path: Path) -> None:
+    source, sentence, has_line = HOOKS[fault]
+
+    message = told(source, tmp_path / "faulty.py")
+    assert sentence in message
+    assert "\n" not in message
+    assert not has_line or (f"{tmp_path / 'faulty.py'}, line " in message)
+
+
+def test_a_declared_anomaly_of_temperature_passes(tmp_path: Path) -> None:
+    source = law("A*stress**n*sympy.exp(Q/(R*temperature))", ACTIVATED, more="falls_with_temperature=True")
+
+    assert told(source, tmp_path / "anomaly.py") == ""
+
+
+def test_examples_that_hold_are_counted(tmp_path: Path) -> None:
+    """1e-16 * 100^4 = 1e-8."""
+    source = law("A*stress**n", PLAIN, more="examples=({'A': 1e-16, 'n': 4, 'stress': 100, 'rate': 1e-8},)")
+    file = tmp_path / "example.py"
+    file.write_text(source, encoding="utf-8")
+
+    (report,) = check_plugin(Registry().load_file(file))
+
+    (example,) = [check for check in report.checks if check.name == "example 1"]
+    assert example.passed
+    assert report.passed
