@@ -1,0 +1,357 @@
+"""Beams of fibres: sections along a span, each of many uniaxial material points, under a force or a deflection.
+
+Plane sections stay plane (Bernoulli), deflections are small, shear adds nothing, and supports give no moment. A subclass
+says where its sections are and which moment a unit of force gives them; by virtual work the same moments, integrated
+over the curvatures, give the deflection of the point where the force acts.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+
+from creepkit import integration, kernels
+from creepkit.arrays import Floats, frozen
+from creepkit.errors import SolveError
+from creepkit.integration import FibreInput, FibreModel, FibreTest, IntegrationSettings
+from creepkit.records import History, Load, NuisanceValues, Output, Prediction, Program, Status
+from creepkit.records.prediction_assembly import (
+    HistoryPrediction,
+    assemble_prediction,
+    broadcast_candidates,
+    check_nuisances,
+)
+from creepkit.specimens.run import Run, run_from_outputs
+from creepkit.specimens.test_piece import TestPiece
+from creepkit.specimens.bar import SEARCH_TOLERANCE, STEPS_PER_BREAKPOINT
+
+if TYPE_CHECKING:
+    from creepkit.kernels.interface import CompiledLaw
+    from creepkit.language import CreepLaw
+
+
+LENGTH_CHANGE = 1e-4
+"""Relative change of a length, to each side, from which the derivatives of a model's arrays are had."""
+
+
+@dataclass(frozen=True, eq=False)
+class BeamStations:
+    """The sections of a beam. moments : (stations,) mm, N mm for each N of force; lengths : (stations,) mm of beam.
+
+    A section stands for its length of the beam, all parts that are symmetric to it together.
+    """
+
+    moments: Floats
+    lengths: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "moments", frozen(np.atleast_1d(self.moments)))
+        object.__setattr__(self, "lengths", frozen(np.atleast_1d(self.lengths)))
+
+
+@dataclass(frozen=True)
+class FibreBeam(TestPiece, ABC):
+    """A beam under a force, N, observed by the deflection, mm, of the point where it acts; elastic data are needed.
+
+    stations : Gauss points along each stretch of the span over which the moment varies. fibres : in each half of the
+    height. tolerance : relative local error of a step. strain_limit : creep strain of the first fibre that breaks.
+    max_steps : cap on the steps of a section, beside STEPS_PER_BREAKPOINT for each row of its programs.
+    """
+
+    stations: int = 6
+    fibres: int = 6
+    tolerance: float = 1e-5
+    strain_limit: float = 1.0
+    max_steps: int = 2000
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    outputs: ClassVar[tuple[Output, ...]]
+    loads: ClassVar[tuple[Load, ...]]
+    relaxes: ClassVar[bool] = False
+    """Whether the deflection is prescribed and the force observed."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (("stations", 1, 100), ("fibres", 1, 100), ("max_steps", 10, 10_000_000)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or int(value) != value or not low <= value <= high:
+                raise SolveError(f"specimen '{self.name}': {name} is {value!r}; allowed are {low} to {high}")
+        for name, least, most in (("tolerance", 1e-13, 1e-2), ("strain_limit", 1e-6, 10.0)):
+            value = getattr(self, name)
+            if not least <= value <= most:
+                raise SolveError(f"specimen '{self.name}': {name} is {value!r}; allowed are {least:g} to {most:g}")
+
+    # ---- of each kind of beam -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def section(self) -> tuple[Floats, Floats]:
+        """Places, mm, and areas, mm^2, of the fibres of a section, (fibres,) each; `gauss_fibres` gives good ones."""
+
+    @abstractmethod
+    def beam_stations(self) -> BeamStations:
+        """The sections along the beam."""
+
+    # ---- of every beam --------------------------------------------------------------------------------------------
+
+    @property
+    def compliance(self) -> float:
+        """Elastic deflection for a unit of force, times the modulus, 1/mm: the sum of m^2 dx/I."""
+        _, _, inertia = self._section_moments()
+        beam = self.beam_stations()
+        return float(np.sum(beam.moments**2 * beam.lengths) / inertia)
+
+    def for_search(self) -> Self:
+        """The beam at the tolerance of a global search."""
+        return self.replace(tolerance=max(self.tolerance, SEARCH_TOLERANCE))
+
+    def refined(self) -> Self:
+        """The beam with twice the sections and fibres, at a tenth of the tolerance."""
+        return self.replace(stations=2 * self.stations, fibres=2 * self.fibres, tolerance=0.1 * self.tolerance)
+
+    def reference_stress(self, history: History) -> Floats:
+        """Stress of the section of largest moment under each level of the load, (levels,) MPa: M over its plastic modulus.
+
+        It is that of the skeletal point of a rectangle, which creep changes little: Boyle and Spence, Stress Analysis
+        for Creep (1983), chapter 3. Under a prescribed deflection that at first, without creep.
+        """
+        piece, tested = self.of_test(history, {})
+        _, plastic, _ = piece._section_moments()
+        levels = np.unique(np.abs(tested.loading.program().values))
+        levels = levels[levels > 0]
+        if self.relaxes:
+            levels = levels * piece._modulus(tested).values[0] / piece.compliance
+        return np.asarray(levels * np.max(np.abs(piece.beam_stations().moments)) / plastic)
+
+    def growth_per_strain(self, history: History) -> float:
+        """mm of deflection for a creep strain at the reference stress, or N of force lost, with curvature as M varies."""
+        piece, tested = self.of_test(history, {})
+        _, plastic, inertia = piece._section_moments()
+        beam = piece.beam_stations()
+        shape = beam.moments / np.max(np.abs(beam.moments))
+        deflection = float(np.sum(np.abs(beam.moments * shape) * beam.lengths) * plastic / inertia)
+        return deflection * float(piece._modulus(tested).values[0]) / piece.compliance if self.relaxes else deflection
+
+    def reference_strain(self, history: History) -> float:
+        """The largest creep strain at the reference stress that a test reached, as far as its output says."""
+        piece, tested = self.of_test(history, {})
+        output = self.outputs[0]
+        if output not in history.outputs:
+            return 0.0
+        elastic = piece._elastic_output(tested)
+        moved = np.abs(history.outputs[output] - elastic)[history.used]
+        return float(np.max(moved[np.isfinite(moved)], initial=0.0)) / self.growth_per_strain(history)
+
+    def predict(
+        self,
+        law: CreepLaw,
+        theta: Floats,
+        histories: Sequence[History],
+        *,
+        nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
+    ) -> Prediction:
+        """Predict the output of each history at its times, with exact derivatives; see records.Predictor.
+
+        theta : (candidates, parameters) internal values.
+        """
+        check_nuisances(nuisances or (), self.nuisances, f"specimen '{self.name}'")
+        theta, of_tests = broadcast_candidates(theta, nuisances, len(histories))
+        kernel, reasons = kernels.lower(law, "compiled"), []
+        parts = []
+        for k, history in enumerate(histories):
+            rows = []
+            for c in range(len(theta)):
+                own = {kind: float(given[c, k]) for kind, given in of_tests.items()}
+                rows.append(self._one(kernel, theta[c], history, own, sensitivities))
+            reasons += [row.reason for row in rows if row.reason]
+            slopes = np.stack([row.slopes for row in rows]) if sensitivities else None
+            count = theta.shape[1]
+            parts.append(
+                HistoryPrediction(
+                    np.stack([row.values for row in rows])[..., None],
+                    np.array([int(row.status) for row in rows], np.int64),
+                    np.array([row.end_time for row in rows]),
+                    None if slopes is None else slopes[:, :, None, :count],
+                    {} if slopes is None else {kind: slopes[:, :, None, count + a] for a, kind in enumerate(of_tests)},
+                )
+            )
+        result = assemble_prediction(parts, histories, self.outputs, len(theta))
+        return replace(result, reason=next(iter(reasons), ""))
+
+    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> Run:
+        """Run one test: what its history would show at its times, and how it ended."""
+        theta = law.to_internal(law.values(values))[0]
+        row = self._one(kernels.lower(law, "compiled"), theta, plan, {}, False)
+        return run_from_outputs(Run, plan, self.outputs, row.values[:, None], row.status, row.end_time, row.reason)
+
+    def _one(
+        self, kernel: CompiledLaw, theta: Floats, history: History, nuisances: Mapping[str, float], sensitivities: bool
+    ) -> _BeamRow:
+        """One candidate in one test, with the derivatives to its parameters and to its nuisances."""
+        piece, tested = self.of_test(history, nuisances)
+        moved = [_input(piece, kind, nuisances) for kind in nuisances] if sensitivities else []
+        breaks = tested.loading.program().times.size + tested.temperature_program().times.size - 2
+        settings = IntegrationSettings(
+            rtol=self.tolerance,
+            strain_limit=self.strain_limit,
+            max_steps=int(self.max_steps) + STEPS_PER_BREAKPOINT * breaks,
+        )
+        modulus, parts = piece._modulus(tested), _models(piece)
+        creep, slopes = np.zeros(history.times.size), np.zeros((history.times.size, theta.size + len(moved)))
+        status, end, reason = Status.COMPLETE, float(history.times[-1]), ""
+        for k, model in enumerate(parts):
+            # what the recorded sum gains where an input changes its weights is recorded too
+            weights = [model.observed, *(each.observed[k] for each in moved)]
+            test = FibreTest(
+                model.observing(np.concatenate(weights)),
+                (tested.loading.program(),),
+                tested.temperature_program(),
+                modulus,
+                history.times,
+                follows_stress=self.relaxes,
+            )
+            found = integration.integrate_fibres(
+                kernel, theta, test, settings=settings, jacobian=sensitivities, inputs=[each.inputs[k] for each in moved]
+            )
+            creep = creep + found.recorded[:, 0]
+            if found.jacobian is not None:
+                slopes = slopes + found.jacobian[:, 0]
+                slopes[:, theta.size :] += found.recorded[:, 1:]
+            if found.status is not Status.COMPLETE and (not reason or found.end_time < end):
+                status, end, reason = found.status, found.end_time, found.reason
+        values = piece._elastic_output(tested) + piece._creep_factor(tested) * creep
+        if sensitivities:
+            slopes = slopes * piece._creep_factor(tested)[:, None]
+            for a, each in enumerate(moved):
+                slopes[:, theta.size + a] += each.elastic_share * piece._elastic_output(tested)
+                slopes[:, theta.size + a] += each.factor_share * piece._creep_factor(tested) * creep
+        return _BeamRow(values, slopes, status, end, reason)
+
+    def _elastic_output(self, tested: History) -> Floats:
+        """The output without creep, (times,): mm, or N."""
+        modulus, load = self._modulus(tested).at(tested.times), tested.loading.program().at(tested.times)
+        return np.asarray(load * modulus / self.compliance if self.relaxes else load * self.compliance / modulus)
+
+    def _creep_factor(self, tested: History) -> Floats:
+        """The output for a deflection by creep, (times,): 1, or N/mm."""
+        if not self.relaxes:
+            return np.ones(tested.times.size)
+        return np.asarray(-self._modulus(tested).at(tested.times) / self.compliance)
+
+    def _section_moments(self) -> tuple[float, float, float]:
+        """Area, plastic section modulus and second moment of area, mm^2, mm^3 and mm^4."""
+        y, areas = self.section()
+        y = y - float(areas @ y) / float(areas.sum())
+        return float(areas.sum()), float(areas @ np.abs(y)), float(areas @ y**2)
+
+    def _modulus(self, tested: History) -> Program:
+        """The modulus over time, MPa; straight between the breakpoints of the temperature."""
+        if tested.elastic is None:
+            raise SolveError(
+                f"{tested.origin}: a {self.name} specimen needs elastic data, for stress spreads over its sections as "
+                "creep and elastic strain share it; set elastic=Elastic(E=150e3), in MPa"
+            )
+        program = tested.temperature_program()
+        return Program(program.times, [float(tested.elastic.at(float(T)).E) for T in program.values])
+
+
+@dataclass(frozen=True, eq=False)
+class _BeamRow:
+    """values : (times,); slopes : (times, parameters + nuisances)."""
+
+    values: Floats
+    slopes: Floats
+    status: Status
+    end_time: float
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class _BeamInput:
+    """A nuisance of a beam: what it changes in each model, in the weights recorded, and relative changes of the rest."""
+
+    inputs: tuple[FibreInput, ...]
+    observed: tuple[Floats, ...]
+    elastic_share: float
+    factor_share: float
+
+
+@lru_cache(maxsize=512)
+def _models(piece: FibreBeam) -> tuple[FibreModel, ...]:
+    """The models of fibres of a beam: one for each section under a force, one of all under a deflection.
+
+    They record the deflection by creep that the force alone would allow.
+    """
+    sections = tuple(_section_model(piece, float(m), float(dx)) for m, dx in zip(*_stations(piece), strict=True))
+    if not piece.relaxes:
+        return sections
+    # Held at its point of load, the beam springs back elastically by what creep would add: one more mode.
+    whole, compliance = FibreModel.side_by_side(sections), piece.compliance
+    strain = whole.stress / compliance
+    return (
+        FibreModel(
+            np.zeros_like(strain),
+            strain,
+            np.concatenate([whole.modes, -strain.T], axis=1),
+            np.concatenate([whole.projection, whole.observed]),
+            whole.observed,
+        ),
+    )
+
+
+def _stations(piece: FibreBeam) -> tuple[Floats, Floats]:
+    beam = piece.beam_stations()
+    if beam.moments.shape != beam.lengths.shape or beam.moments.ndim != 1 or not (beam.lengths > 0).all():
+        raise SolveError(
+            f"specimen '{piece.name}': beam_stations() gave {beam.moments.size} moments and {beam.lengths.size} lengths; "
+            "as many of both are needed, and lengths above zero"
+        )
+    return beam.moments, beam.lengths
+
+
+def _section_model(piece: FibreBeam, moment: float, length: float) -> FibreModel:
+    """A section under the force of its beam."""
+    section = FibreModel.section(*piece.section())
+    return FibreModel(
+        moment * section.stress[1:],
+        section.strain[1:],
+        section.modes,
+        section.projection,
+        moment * length * section.projection[1:],
+    )
+
+
+@lru_cache(maxsize=512)
+def _length_input(piece: FibreBeam, name: str) -> _BeamInput:
+    """A length: the arrays of a model are smooth functions of it."""
+    length = float(getattr(piece, name))
+    change = LENGTH_CHANGE * length
+    above, below = (replace(piece, **{name: length + sign * change}) for sign in (1.0, -1.0))
+    up, down = _models(above), _models(below)
+    compliance = math.log(above.compliance / below.compliance) / (2.0 * change)
+    return _BeamInput(
+        tuple(FibreInput.of_difference(a, b, 2.0 * change) for a, b in zip(up, down, strict=True)),
+        tuple((a.observed - b.observed) / (2.0 * change) for a, b in zip(up, down, strict=True)),
+        -compliance if piece.relaxes else compliance,
+        -compliance if piece.relaxes else 0.0,
+    )
+
+
+def _input(piece: FibreBeam, kind: str, nuisances: Mapping[str, float]) -> _BeamInput:
+    """What a nuisance parameter changes, at its value."""
+    models = _models(piece)
+    still = tuple(np.zeros_like(model.observed) for model in models)
+    if kind == "modulus":
+        share = 1.0 / (1.0 + nuisances[kind])
+        uniform = tuple(FibreInput.uniform(model, modulus=share) for model in models)
+        return _BeamInput(uniform, still, share if piece.relaxes else -share, share if piece.relaxes else 0.0)
+    if kind == "temperature":
+        return _BeamInput(tuple(FibreInput.uniform(model, temperature=1.0) for model in models), still, 0.0, 0.0)
+    name = next(d.name for d in piece.dimensions if kind in d.names)
+    return _length_input(piece, name)
