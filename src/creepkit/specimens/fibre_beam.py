@@ -33,11 +33,15 @@ from creepkit.specimens.bar import SEARCH_TOLERANCE, STEPS_PER_BREAKPOINT
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
-    from creepkit.language import CreepLaw
+    from creepkit.language import CreepLaw, Elastic
 
 
 LENGTH_CHANGE = 1e-4
 """Relative change of a length, to each side, from which the derivatives of a model's arrays are had."""
+
+
+MODULUS_PIECE = 25.0
+"""K, over which the modulus is taken to be a straight line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +199,7 @@ class FibreBeam(TestPiece, ABC):
     ) -> _BeamRow:
         """One candidate in one test, with the derivatives to its parameters and to its nuisances."""
         piece, tested = self.of_test(history, nuisances)
-        moved = [_input(piece, kind, nuisances) for kind in nuisances] if sensitivities else []
+        moved = [_input(piece, kind, nuisances, tested) for kind in nuisances] if sensitivities else []
         breaks = tested.loading.program().times.size + tested.temperature_program().times.size - 2
         settings = IntegrationSettings(
             rtol=self.tolerance,
@@ -257,8 +261,23 @@ class FibreBeam(TestPiece, ABC):
                 f"{tested.origin}: a {self.name} specimen needs elastic data, for stress spreads over its sections as "
                 "creep and elastic strain share it; set elastic=Elastic(E=150e3), in MPa"
             )
-        program = tested.temperature_program()
-        return Program(program.times, [float(tested.elastic.at(float(T)).E) for T in program.values])
+        return _modulus_program(tested.elastic, tested.temperature_program())
+
+
+@lru_cache(maxsize=4096)
+def _modulus_program(elastic: Elastic, temperature: Program) -> Program:
+    """The modulus over time, MPa, straight lines over no more than MODULUS_PIECE each."""
+    T, times = [temperature.values[:1]], [temperature.times[:1]]
+    varies = not isinstance(elastic.E, float)
+    for k in range(temperature.times.size - 1):
+        change = abs(float(temperature.values[k + 1] - temperature.values[k]))
+        straight = not varies or temperature.times[k + 1] == temperature.times[k]
+        pieces = 1 if straight else max(1, math.ceil(change / MODULUS_PIECE))
+        T.append(np.linspace(temperature.values[k], temperature.values[k + 1], pieces + 1)[1:])
+        times.append(np.linspace(temperature.times[k], temperature.times[k + 1], pieces + 1)[1:])
+    levels, which = np.unique(np.concatenate(T), return_inverse=True)
+    moduli = np.array([float(elastic.at(float(level)).E) for level in levels])
+    return Program(np.concatenate(times), moduli[which])
 
 
 @dataclass(frozen=True, eq=False)
@@ -343,15 +362,24 @@ def _length_input(piece: FibreBeam, name: str) -> _BeamInput:
     )
 
 
-def _input(piece: FibreBeam, kind: str, nuisances: Mapping[str, float]) -> _BeamInput:
-    """What a nuisance parameter changes, at its value."""
-    models = _models(piece)
-    still = tuple(np.zeros_like(model.observed) for model in models)
+def _input(piece: FibreBeam, kind: str, nuisances: Mapping[str, float], tested: History) -> _BeamInput:
+    """What a nuisance parameter changes, at its value, in the test as its nuisances say."""
     if kind == "modulus":
-        share = 1.0 / (1.0 + nuisances[kind])
-        uniform = tuple(FibreInput.uniform(model, modulus=share) for model in models)
-        return _BeamInput(uniform, still, share if piece.relaxes else -share, share if piece.relaxes else 0.0)
+        return _uniform_input(piece, 0.0, 1.0 / (1.0 + nuisances[kind]))
     if kind == "temperature":
-        return _BeamInput(tuple(FibreInput.uniform(model, temperature=1.0) for model in models), still, 0.0, 0.0)
-    name = next(d.name for d in piece.dimensions if kind in d.names)
-    return _length_input(piece, name)
+        T = float(np.mean(tested.temperature_program().values))  # a modulus that varies with it follows it
+        constant = tested.elastic is None or isinstance(tested.elastic.E, float)
+        low, high = (1.0, 1.0) if constant else (float(tested.elastic.at(T + s).E) for s in (-0.5, 0.5))  # type: ignore[union-attr]
+        return _uniform_input(piece, 1.0, math.log(high / low))
+    return _length_input(piece, next(d.name for d in piece.dimensions if kind in d.names))
+
+
+def _uniform_input(piece: FibreBeam, temperature: float, modulus: float) -> _BeamInput:
+    """An input that changes temperature, K, and modulus, relative, by so much for a unit of it."""
+    models = _models(piece)
+    return _BeamInput(
+        tuple(FibreInput.uniform(model, temperature, modulus) for model in models),
+        tuple(np.zeros_like(model.observed) for model in models),
+        modulus if piece.relaxes else -modulus,
+        modulus if piece.relaxes else 0.0,
+    )
