@@ -67,8 +67,7 @@ CREEPKIT_API int64_t creepkit_integrate_fibres(FibreCall* call) {
 
 // The number of fibres solved: all of them, or the index of the first without a solution; -1 when memory runs out.
 CREEPKIT_API int64_t creepkit_step_fibres(const FibreStep* step) {
-    const FibreModel model = {};
-    FibreModel sized = model;
+    FibreModel sized = {};
     sized.fibres = step->fibres;
     const int64_t S = step->states, U = 2 + S;
     Workspace memory;
@@ -81,7 +80,9 @@ CREEPKIT_API int64_t creepkit_step_fibres(const FibreStep* step) {
         double* base = work.base + i * U;
         base[0] = step->creep[i];
         base[1] = step->path[i];
-        for (int64_t j = 0; j < S; ++j) base[2 + j] = work.rows[i * work.width + POINT_SIZE + j] = step->state[i * S + j];
+        for (int64_t j = 0; j < S; ++j) {
+            base[2 + j] = work.rows[i * work.width + POINT_SIZE + j] = step->state[i * S + j];
+        }
         work.increment[i] = 1e-6;
         const double trial = step->modulus * (step->strain[i] - step->creep[i]);
         if (!solve_fibre(law, now, work, i, trial, {1e-8, 0.0})) return i;

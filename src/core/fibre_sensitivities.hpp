@@ -83,7 +83,8 @@ inline bool differentiate_modes(const FibreModel& model, const FibreStage& now, 
         double* right = work.right + r * C;
         for (int64_t q = 0; q < C; ++q) right[q] = 0.0;
         for (int64_t i = 0; i < m; ++i) {
-            const double weight = model.projection[r * m + i], creep = work.base[i * U] + work.sign[i] * work.increment[i];
+            const double weight = model.projection[r * m + i];
+            const double creep = work.base[i * U] + work.sign[i] * work.increment[i];
             const double *own = changes + i * U * C, *before = work.base_change + i * U * C;
             for (int64_t q = 0; q < C; ++q) right[q] += weight * (before[q] + work.sign[i] * own[q]);
             for (int64_t a = 0; a < model.inputs; ++a) {

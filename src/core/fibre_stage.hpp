@@ -2,9 +2,9 @@
 //
 //     sigma = sum_l load_l(t) (stress_l + E strain_l) + E (modes u - c),        u = projection c
 //
-// with c the signed creep strain of the fibres and E the modulus, MPa. Given the loads, everything but creep is linear, so
-// a section under a force and a moment has two modes, its axial strain and curvature by creep, and one whose strains are
-// prescribed has none. A fibre creeps by the law's rate at |sigma|, in the direction of its stress; the law sees the
+// with c the signed creep strain of the fibres and E the modulus, MPa. Given the loads, everything but creep is linear,
+// so a section under a force and a moment has two modes, its axial strain and curvature by creep, and one whose strains
+// are prescribed has none. A fibre creeps by the law's rate at |sigma|, in the direction of its stress; the law sees the
 // length p of the path of its creep strain. Newton's method in u rests on the tangents of the fibres' own stages.
 //
 // m fibres, r modes, L loads, S states, P parameters, A lengths and other inputs, C = P + A columns of sensitivities.

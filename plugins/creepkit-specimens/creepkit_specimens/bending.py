@@ -15,7 +15,7 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.arrays import Floats
-from creepkit.integration import gauss_fibres
+from creepkit.integration import gauss_fibres, gauss_points
 from creepkit.specimens.fibre_beam import BeamStations, FibreBeam
 
 FORCE = (ck.Load("force", "force"),)
@@ -46,8 +46,8 @@ class RectangularBeam(FibreBeam):
 
     def stretch(self, length: float, largest: float) -> tuple[Floats, Floats]:
         """Moments (stations,) mm, from 0 to the largest, mm, and lengths (stations,) mm of a stretch of the beam."""
-        x, weights = np.polynomial.legendre.leggauss(self.stations)
-        return 0.5 * (x + 1.0) * largest, 0.5 * length * weights
+        points, weights = gauss_points(self.stations)
+        return largest * points, length * weights
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,8 @@ def elastic_compliance(beam):
 def steady_rate(beam, A, n, force):
     """Deflection rate A int (M/I_n)^n m dx, m the moment of a unit force: Boyle and Spence (1983), chapter 3.
 
-    With I_n = b h^(2 + 1/n) / (2^(1 + 1/n) (2 + 1/n)) and M = m F; m = x/2 over each half of three-point bending, x over
-    a cantilever, and in four-point bending x/2 over each arm a, then a/2.
+    With I_n = b h^(2 + 1/n) / (2^(1 + 1/n) (2 + 1/n)) and M = m F; m = x/2 over each half of three-point bending, x
+    over a cantilever, and in four-point bending x/2 over each arm a, then a/2.
     """
     second = WIDTH * HEIGHT ** (2 + 1 / n) / (2 ** (1 + 1 / n) * (2 + 1 / n))
     L = beam.span
@@ -112,7 +112,7 @@ def test_linear_creep_relaxes_the_force_as_maxwell(beam):
 def test_late_relaxation_follows_the_steady_law(beam):
     """Long after: deflection rates by creep and by elastic unloading cancel, F' C = -B F^n, near the steady B.
 
-    The distribution of stress in late relaxation differs from the steady one, by which the rate is off by some per cent.
+    Stress in late relaxation is distributed otherwise than in steady creep, by which the rate is off by some per cent.
     """
     n = 5.0
     A, times = 1e-8 / 60.0**n, np.array([1e8, 1.02e8])
@@ -124,7 +124,7 @@ def test_late_relaxation_follows_the_steady_law(beam):
 
 
 def test_a_hardening_law_against_another_discretisation():
-    """Midpoint fibres and stations, LSODA: p' = A s^3 p^-0.6."""
+    """Midpoint fibres and stations, an explicit Runge-Kutta method: p' = A s^3 p^-0.6."""
     values, times = {"A": 1e-14, "n": 3.0}, np.geomspace(1e3, 1e6, 8)
     run = simulated(ThreePointBend(), {**values, "m": -0.6}, times, law="strain-hardening")
     other = three_point(values, 200.0, times, fibres=60, stations=40, strain_power=-0.6)
@@ -143,7 +143,12 @@ def test_a_step_and_a_ramp_of_force_at_changing_temperature():
 
     assert deflection[3] - deflection[2] == pytest.approx(50.0 * elastic_compliance(ThreePointBend()), rel=1e-3)
     later = ck.simulate(
-        law, ThreePointBend(), values, loading=ck.constant_load("force", 200.0), times=[1e7, 1.1e7], elastic=ELASTIC,
+        law,
+        ThreePointBend(),
+        values,
+        loading=ck.constant_load("force", 200.0),
+        times=[1e7, 1.1e7],
+        elastic=ELASTIC,
         temperature=1030.0,
     )
     faster = np.exp(-3e5 / 8.314462618 * (1 / 1030 - 1 / 1000))
@@ -170,8 +175,9 @@ def test_derivatives_are_those_of_the_output(beam, law):
 
     exact = predicted(theta, at, sensitivities=True)
     for k in range(theta.shape[1]):
-        step = 1e-4 * np.eye(theta.shape[1])[[k]]
-        change = (predicted(theta + step, at).values - predicted(theta - step, at).values) / 2e-4
+        size = 1e-4 * max(1.0, abs(theta[0, k]))
+        step = size * np.eye(theta.shape[1])[[k]]
+        change = (predicted(theta + step, at).values - predicted(theta - step, at).values) / (2 * size)
         np.testing.assert_allclose(exact.jacobian[..., k], change, rtol=1e-4, atol=1e-5 * np.abs(change).max())
     for kind, value in at.items():
         step = {"temperature": 0.02, "modulus": 1e-4}.get(kind, 1e-4 * value)
@@ -215,7 +221,7 @@ def test_each_states_its_outputs_loads_and_lengths():
 
 @LOADED
 def test_reference_stress_and_growth_describe_steady_creep(beam):
-    """The rate at the reference stress, and the growth of the deflection for it, give the steady rate, to a factor 2."""
+    """The rate at the reference stress times the growth of the deflection is the steady rate to a factor of 2."""
     run = simulated(beam, {"A": 1e-8 / 60.0**3, "n": 3.0}, [1e5])
     (stress,) = beam.reference_stress(run)
     estimated = 1e-8 / 60.0**3 * stress**3 * beam.growth_per_strain(run)
@@ -234,12 +240,12 @@ def identified(law, values, seed, **planting):
 
 @pytest.mark.parametrize("case", ["norton", "strain-hardening"])
 def test_planted_laws_are_found_within_their_intervals(case):
-    """Data of another discretisation, with noise and heights that nobody measured: 95 % intervals over four alloys.
+    """Data of another discretisation, with noise and heights that nobody measured: 95 % intervals over three alloys.
 
-    Of 2 x 4 or 3 x 4 intervals all but one hold the planted value in 94 % or 88 % of such experiments or more.
+    All but one of the 6 or 9 intervals hold the planted value in 93 % or more of such experiments.
     """
     held = []
-    for seed in range(4):
+    for seed in range(3):
         if case == "norton":
             values, planting = {"A": 1e-8 / 60.0**4, "n": 4.0}, {}
         else:

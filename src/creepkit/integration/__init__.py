@@ -18,14 +18,14 @@ if TYPE_CHECKING:
         integrate_fibres,
         step_fibres,
     )
-    from creepkit.integration.fibre_model import FibreInput, FibreModel, gauss_fibres
+    from creepkit.integration.fibre_model import FibreInput, FibreModel, gauss_fibres, gauss_points
     from creepkit.integration.step_control import IntegrationSettings
 
 
 _OF_POINTS = ["REASONS", "Integration", "IntegrationSettings", "PointTest", "integrate"]
 
 
-_OF_MODELS = ["FibreInput", "FibreModel", "gauss_fibres"]
+_OF_MODELS = ["FibreInput", "FibreModel", "gauss_fibres", "gauss_points"]
 
 
 _OF_FIBRES = ["FibreHistory", "FibreResponse", "FibreState", "FibreTest", "integrate_fibres", "step_fibres"]
@@ -43,6 +43,7 @@ __all__ = [
     "IntegrationSettings",
     "PointTest",
     "gauss_fibres",
+    "gauss_points",
     "integrate",
     "integrate_fibres",
     "step_fibres",

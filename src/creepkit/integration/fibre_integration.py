@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -68,8 +69,14 @@ class FibreTest:
 
     @property
     def segments(self) -> Floats:
-        """The programs merged, (segments, 2 + 2 (loads + 2)): start and end, s, then each program at both."""
-        return merge_programs(*self.loads, self.temperature, self.modulus, end=float(self.times[-1]))
+        """The programs merged, (segments, columns): start and end, s, then loads, temperature and modulus at both."""
+        return _merged(float(self.times[-1]), *self.loads, self.temperature, self.modulus)
+
+
+@lru_cache(maxsize=256)
+def _merged(end: float, *programs: Program) -> Floats:
+    """Segments of programs; kept, for the sections of a beam, and the evaluations of a fit, share them."""
+    return frozen(merge_programs(*programs, end=end))
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,8 +185,9 @@ def _model_structure(model: FibreModel, inputs: Sequence[FibreInput]) -> tuple[F
 
 @dataclass(frozen=True, eq=False)
 class FibreState:
-    """Where fibres are: creep : (fibres,) signed creep strains; path : (fibres,) lengths of their paths.
+    """Where fibres are.
 
+    creep : (fibres,) signed creep strains. path : (fibres,) lengths of their paths.
     state : (fibres, S) internal variables of the law.
     """
 
@@ -195,8 +203,9 @@ class FibreState:
 
 @dataclass(frozen=True, eq=False)
 class FibreResponse:
-    """Stresses after a step. stress : (fibres,) MPa; tangent : (fibres,) MPa, d(stress)/d(total strain after the step).
+    """What a step of fibres gives.
 
+    stress : (fibres,) MPa. tangent : (fibres,) MPa, d(stress)/d(total strain), both at the end of the step.
     state : the fibres after it.
     """
 

@@ -2,15 +2,16 @@
 
     sigma = sum_l load_l(t) (stress_l + E strain_l) + E (modes u - c),        u = projection c
 
-c is the signed creep strain of the fibres, tension positive, and E the modulus. Given the loads, everything but creep is
-linear: `stress` and `strain` are what a unit of each load does to the elastic model, and `modes` are the strains by which
-the model gives way to creep. A model whose total strains are prescribed has no modes.
+c is the signed creep strain of the fibres, tension positive, and E the modulus. Given the loads, everything but creep
+is linear: `stress` and `strain` are what a unit of each load does to the elastic model, and `modes` are the strains by
+which the model gives way to creep. A model whose total strains are prescribed has no modes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 
@@ -88,8 +89,10 @@ class FibreModel:
             modes[i : i + size, r : r + rank] = model.modes
             projection[r : r + rank, i : i + size] = model.projection
             i, r = i + size, r + rank
-        joined = (np.concatenate([getattr(m, name) for m in models], axis=1) for name in ("stress", "strain"))
-        return cls(*joined, modes, projection, np.concatenate([m.observed for m in models], axis=1))
+        stress, strain, observed = (
+            np.concatenate([getattr(m, name) for m in models], axis=1) for name in ("stress", "strain", "observed")
+        )
+        return cls(stress, strain, modes, projection, observed)
 
     @property
     def fibres(self) -> int:
@@ -114,7 +117,7 @@ class FibreModel:
 class FibreInput:
     """An input of a test of fibres, such as a length, by the derivatives of the model to it.
 
-    stress, strain, modes, projection : derivatives of the arrays of the model, shaped as they are.
+    stress, strain : (L, m) MPa, and strain; modes : (m, r); projection : (r, m): derivatives of those of the model.
     temperature : K, and modulus : relative change, for a unit of the input.
     """
 
@@ -134,8 +137,17 @@ class FibreInput:
     @classmethod
     def uniform(cls, model: FibreModel, temperature: float = 0.0, modulus: float = 0.0) -> FibreInput:
         """An input that changes no array of the model: a temperature, K, or a relative change of the modulus."""
-        arrays = (np.zeros_like(a) for a in (model.stress, model.strain, model.modes, model.projection))
-        return cls(*arrays, temperature=temperature, modulus=modulus)
+        stress, strain, modes, projection = (
+            np.zeros_like(a) for a in (model.stress, model.strain, model.modes, model.projection)
+        )
+        return cls(stress, strain, modes, projection, temperature, modulus)
+
+
+@lru_cache(maxsize=64)
+def gauss_points(count: int) -> tuple[Floats, Floats]:
+    """Points and weights of Gauss-Legendre quadrature from 0 to 1, (count,) each."""
+    x, weights = np.polynomial.legendre.leggauss(count)
+    return frozen(0.5 * (x + 1.0)), frozen(0.5 * weights)
 
 
 def gauss_fibres(height: float, fibres: int) -> tuple[Floats, Floats]:
@@ -143,9 +155,9 @@ def gauss_fibres(height: float, fibres: int) -> tuple[Floats, Floats]:
 
     Stresses in steady creep are powers of the distance from the neutral axis, which ends both halves.
     """
-    x, weights = np.polynomial.legendre.leggauss(fibres)
-    half = 0.25 * height * (x + 1.0)
-    return np.concatenate([-half[::-1], half]), 0.25 * height * np.concatenate([weights[::-1], weights])
+    points, weights = gauss_points(fibres)
+    half, lengths = 0.5 * height * points, 0.5 * height * weights
+    return np.concatenate([-half[::-1], half]), np.concatenate([lengths[::-1], lengths])
 
 
 def _section(places: ArrayLike, areas: ArrayLike) -> tuple[Floats, Floats]:

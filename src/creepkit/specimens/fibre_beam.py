@@ -1,8 +1,9 @@
 """Beams of fibres: sections along a span, each of many uniaxial material points, under a force or a deflection.
 
-Plane sections stay plane (Bernoulli), deflections are small, shear adds nothing, and supports give no moment. A subclass
-says where its sections are and which moment a unit of force gives them; by virtual work the same moments, integrated
-over the curvatures, give the deflection of the point where the force acts.
+Plane sections stay plane (Bernoulli), deflections are small, shear adds nothing, and supports give no moment. A
+subclass says where its sections are and which moment a unit of force gives them; by virtual work the same moments,
+integrated over the curvatures, give the deflection of the point where the force acts. The deflection includes the
+elastic one.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -27,9 +28,9 @@ from creepkit.records.prediction_assembly import (
     broadcast_candidates,
     check_nuisances,
 )
+from creepkit.specimens.bar import SEARCH_TOLERANCE, STEPS_PER_BREAKPOINT
 from creepkit.specimens.run import Run, run_from_outputs
 from creepkit.specimens.test_piece import TestPiece
-from creepkit.specimens.bar import SEARCH_TOLERANCE, STEPS_PER_BREAKPOINT
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
@@ -74,7 +75,6 @@ class FibreBeam(TestPiece, ABC):
     strain_limit: float = 1.0
     max_steps: int = 2000
 
-    name: ClassVar[str]
     title: ClassVar[str]
     outputs: ClassVar[tuple[Output, ...]]
     loads: ClassVar[tuple[Load, ...]]
@@ -119,7 +119,7 @@ class FibreBeam(TestPiece, ABC):
         return self.replace(stations=2 * self.stations, fibres=2 * self.fibres, tolerance=0.1 * self.tolerance)
 
     def reference_stress(self, history: History) -> Floats:
-        """Stress of the section of largest moment under each level of the load, (levels,) MPa: M over its plastic modulus.
+        """Stress where the moment is largest under each level of the load, (levels,) MPa: M over the plastic modulus.
 
         It is that of the skeletal point of a rectangle, which creep changes little: Boyle and Spence, Stress Analysis
         for Creep (1983), chapter 3. Under a prescribed deflection that at first, without creep.
@@ -133,7 +133,10 @@ class FibreBeam(TestPiece, ABC):
         return np.asarray(levels * np.max(np.abs(piece.beam_stations().moments)) / plastic)
 
     def growth_per_strain(self, history: History) -> float:
-        """mm of deflection for a creep strain at the reference stress, or N of force lost, with curvature as M varies."""
+        """Deflection, mm, or force lost, N, for a unit of creep strain at the reference stress.
+
+        Curvatures are taken to vary along the beam as moments do.
+        """
         piece, tested = self.of_test(history, {})
         _, plastic, inertia = piece._section_moments()
         beam = piece.beam_stations()
@@ -221,7 +224,12 @@ class FibreBeam(TestPiece, ABC):
                 follows_stress=self.relaxes,
             )
             found = integration.integrate_fibres(
-                kernel, theta, test, settings=settings, jacobian=sensitivities, inputs=[each.inputs[k] for each in moved]
+                kernel,
+                theta,
+                test,
+                settings=settings,
+                jacobian=sensitivities,
+                inputs=[each.inputs[k] for each in moved],
             )
             creep = creep + found.recorded[:, 0]
             if found.jacobian is not None:
@@ -293,7 +301,7 @@ class _BeamRow:
 
 @dataclass(frozen=True, eq=False)
 class _BeamInput:
-    """A nuisance of a beam: what it changes in each model, in the weights recorded, and relative changes of the rest."""
+    """A nuisance of a beam: what it changes in each model and in the weights recorded, and relative changes else."""
 
     inputs: tuple[FibreInput, ...]
     observed: tuple[Floats, ...]
@@ -307,7 +315,8 @@ def _models(piece: FibreBeam) -> tuple[FibreModel, ...]:
 
     They record the deflection by creep that the force alone would allow.
     """
-    sections = tuple(_section_model(piece, float(m), float(dx)) for m, dx in zip(*_stations(piece), strict=True))
+    section = FibreModel.section(*piece.section())
+    sections = tuple(_under_force(section, float(m), float(dx)) for m, dx in zip(*_stations(piece), strict=True))
     if not piece.relaxes:
         return sections
     # Held at its point of load, the beam springs back elastically by what creep would add: one more mode.
@@ -328,15 +337,14 @@ def _stations(piece: FibreBeam) -> tuple[Floats, Floats]:
     beam = piece.beam_stations()
     if beam.moments.shape != beam.lengths.shape or beam.moments.ndim != 1 or not (beam.lengths > 0).all():
         raise SolveError(
-            f"specimen '{piece.name}': beam_stations() gave {beam.moments.size} moments and {beam.lengths.size} lengths; "
-            "as many of both are needed, and lengths above zero"
+            f"specimen '{piece.name}': beam_stations() gave {beam.moments.size} moments and {beam.lengths.size} "
+            "lengths; as many of both are needed, and lengths above zero"
         )
     return beam.moments, beam.lengths
 
 
-def _section_model(piece: FibreBeam, moment: float, length: float) -> FibreModel:
-    """A section under the force of its beam."""
-    section = FibreModel.section(*piece.section())
+def _under_force(section: FibreModel, moment: float, length: float) -> FibreModel:
+    """A section that the force of its beam bends, for a length of it; it records its part of the deflection."""
     return FibreModel(
         moment * section.stress[1:],
         section.strain[1:],
@@ -351,7 +359,8 @@ def _length_input(piece: FibreBeam, name: str) -> _BeamInput:
     """A length: the arrays of a model are smooth functions of it."""
     length = float(getattr(piece, name))
     change = LENGTH_CHANGE * length
-    above, below = (replace(piece, **{name: length + sign * change}) for sign in (1.0, -1.0))
+    changes: list[dict[str, Any]] = [{name: length + sign * change} for sign in (1.0, -1.0)]
+    above, below = (replace(piece, **each) for each in changes)
     up, down = _models(above), _models(below)
     compliance = math.log(above.compliance / below.compliance) / (2.0 * change)
     return _BeamInput(
@@ -368,8 +377,7 @@ def _input(piece: FibreBeam, kind: str, nuisances: Mapping[str, float], tested: 
         return _uniform_input(piece, 0.0, 1.0 / (1.0 + nuisances[kind]))
     if kind == "temperature":
         T = float(np.mean(tested.temperature_program().values))  # a modulus that varies with it follows it
-        constant = tested.elastic is None or isinstance(tested.elastic.E, float)
-        low, high = (1.0, 1.0) if constant else (float(tested.elastic.at(T + s).E) for s in (-0.5, 0.5))  # type: ignore[union-attr]
+        low, high = (piece._modulus(tested.replace(temperature=T + s)).values[0] for s in (-0.5, 0.5))
         return _uniform_input(piece, 1.0, math.log(high / low))
     return _length_input(piece, next(d.name for d in piece.dimensions if kind in d.names))
 
