@@ -5,8 +5,8 @@
 Each planted specimen is an alloy of which five beams are tested in three-point bending at 120 to 300 N and 1000 K. The
 data come from another discretisation: 24 stations of 40 fibres by the midpoint rule in half a beam, integrated by an
 explicit Runge-Kutta method of scipy. Noise of 0.002 mm is added, and the height of each beam differs from its nominal
-4 mm by 0.5 % (one standard deviation), which the identification is not given: height is a nuisance parameter. The tables
-give the share of specimens whose 95 % interval holds the planted value, and the error of the rate at 60 MPa.
+4 mm by 0.5 % (one standard deviation), which the identification is not given: height is a nuisance parameter. The
+tables give the share of specimens whose 95 % interval holds the planted value, and the error of the rate at 60 MPa.
 """
 
 from __future__ import annotations
@@ -19,9 +19,8 @@ from measured import Page, arguments, progress
 
 import creepkit as ck
 
-PLUGIN = Path(__file__).resolve().parents[2] / "plugins" / "creepkit-specimens"
-sys.path.insert(0, str(PLUGIN))
-sys.path.insert(0, str(PLUGIN / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "plugins" / "creepkit-specimens"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "plugins" / "creepkit-specimens" / "tests"))
 from beam_tests import planted
 from creepkit_specimens.bending import ThreePointBend
 
