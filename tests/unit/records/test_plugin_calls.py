@@ -67,9 +67,7 @@ def test_a_run_that_raises() -> None:
         def run(self, law, values, plan):
             raise OSError("the other program is not there")
 
-    with pytest.raises(
-        SolveError, match=r"specimen 'broken': run\(\) raised OSError: the other program"
-    ):
+    with pytest.raises(SolveError, match=r"specimen 'broken': run\(\) raised OSError: the other program"):
         ck.simulate("norton", WithRun(), VALUES, loading=ck.constant_stress(80.0), times=TIMES)
 
 
