@@ -19,7 +19,7 @@ def command(
         ),
     ],
 ) -> None:
-    """Check that laws, specimens, readers and exporters keep what every one promises."""
+    """Check that laws, specimens, readers, exporters are fit."""
     reports = [report for target in targets for report in _reports_of(target)]
     for report in reports:
         typer.echo(str(report))

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from creepkit.errors import CreepkitError
-from creepkit.language.elastic import Elastic
 from creepkit.records.history import History
 from creepkit.records.known_specimens import loads_of
 from creepkit.records.loading import Loading, PointLoading, constant_strain, constant_stress, load_steps
@@ -37,6 +36,8 @@ def typical_history(
         a reference stress of 100 MPa, twice that for each 0.5 above the middle.
     frames : number of times; end : s, the last of them.
     """
+    from creepkit.language.elastic import Elastic
+
     record: Any = getattr(specimen, "specimen", specimen)
     loads = loads_of(record)
     chosen = next((one for one in loads if one.name == load), None) or (

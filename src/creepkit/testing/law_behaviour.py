@@ -144,7 +144,10 @@ def _short_integration(law: CreepLaw, samples: LawSamples) -> ConformanceCheck:
 
 
 def corners(law: CreepLaw, point: Floats) -> list[Floats]:
-    """Corners of the bounds at which the constraints hold, (parameters,) internal values each; 32 at most."""
+    """Corners of the bounds at which the constraints hold, (parameters,) internal values each; 32 at most.
+
+    point : (6 + states,) MPa, s and K, at which the constraints are asked.
+    """
     low, high = law.internal_bounds
     count = len(law.params)
     if 2**count <= MOST_CORNERS:

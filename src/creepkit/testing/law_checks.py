@@ -173,7 +173,7 @@ def check_leading_exponent(law: CreepLaw, samples: LawSamples) -> Iterator[Confo
 
 
 def check_at_samples(name: str, law: CreepLaw, samples: LawSamples, holds: Bools) -> ConformanceCheck:
-    """Whether something holds at all samples, (samples,); if not, the first point where it does not."""
+    """Whether something holds at all samples; if not, the first point where it does not; holds : (samples,)."""
     if holds.all():
         return ConformanceCheck(name, True, f"{holds.size} points")
     first = int(np.flatnonzero(~holds)[0])
@@ -184,7 +184,7 @@ def check_at_samples(name: str, law: CreepLaw, samples: LawSamples, holds: Bools
 
 
 def point_text(law: CreepLaw, point: Floats) -> str:
-    """What a law uses of a point, (6 + states,), in words."""
+    """What a law uses of a point, in words; point : (6 + states,) MPa, s and K."""
     pairs = zip((*POINT_VARIABLES, *law.states), point, strict=True)
     return ", ".join(f"{s.name} {value:.4g}" for s, value in pairs if law.uses(s))
 
@@ -254,7 +254,10 @@ def _leading_exponent(exact: MultiprecisionLaw, point: Floats, theta: Floats) ->
 
 
 def log_log_derivatives(exact: MultiprecisionLaw, point: Floats, theta: Floats, variable: sympy.Symbol) -> list[float]:
-    """d(ln term)/d(ln variable) of each term; inf where a term is zero."""
+    """d(ln term)/d(ln variable) of each term; inf where a term is zero.
+
+    point : (6 + states,) MPa, s and K. theta : (parameters,) internal values.
+    """
     column = exact.variables.index(variable)
     up, down = point.copy(), point.copy()
     up[column], down[column] = point[column] * (1 + 2.0**-12), point[column] * (1 - 2.0**-12)

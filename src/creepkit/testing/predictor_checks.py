@@ -68,7 +68,10 @@ class PredictorCase:
         sensitivities: bool = False,
         using: Any = None,
     ) -> Prediction:
-        """A prediction that was checked for shape; theta : (candidates, parameters)."""
+        """A prediction that was checked for shape.
+
+        theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}.
+        """
         return predict_with(
             self.predictor if using is None else using,
             self.law,
@@ -80,7 +83,10 @@ class PredictorCase:
 
 
 def largest_difference(first: Floats, second: Floats) -> float:
-    """Largest difference of values (..., outputs), relative to the largest of each output; inf where one is NaN."""
+    """Largest difference of values, relative to the largest of each output; inf where one of them is NaN.
+
+    first, second : (..., outputs), in the units of the outputs.
+    """
     if first.shape != second.shape or not np.array_equal(np.isnan(first), np.isnan(second)):
         return float("inf")
     axes = tuple(range(first.ndim - 1))
