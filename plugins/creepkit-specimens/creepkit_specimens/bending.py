@@ -104,7 +104,7 @@ class Cantilever(RectangularBeam):
 
     span: float = ck.dimension(30.0, (0.5, 5000.0), tolerance=0.002, long_name="span from the clamp to the load")
 
-    name: ClassVar[str] = "cantilever"
+    name: ClassVar[str] = "cantilever-bend"
     title: ClassVar[str] = "Cantilever under a force at its end, small deflections"
     outputs: ClassVar[tuple[ck.Output, ...]] = deflection_of("the end")
     loads: ClassVar[tuple[ck.Load, ...]] = FORCE
@@ -150,7 +150,7 @@ class FourPointBendRelaxation(FourPointBend):
 class CantileverRelaxation(Cantilever):
     """A cantilever with the deflection of its end held, in steps or ramps; its output is the force."""
 
-    name: ClassVar[str] = "cantilever-relaxation"
+    name: ClassVar[str] = "cantilever-bend-relaxation"
     title: ClassVar[str] = "Cantilever under a held deflection of its end, small deflections"
     outputs: ClassVar[tuple[ck.Output, ...]] = FORCE_OUTPUT
     loads: ClassVar[tuple[ck.Load, ...]] = DISPLACEMENT

@@ -24,7 +24,7 @@ from beam_tests import ELASTIC, E, planted, three_point
 
 WIDTH, HEIGHT = 8.0, 4.0
 INERTIA = WIDTH * HEIGHT**3 / 12
-FORCES = {"three-point-bend": 200.0, "four-point-bend": 300.0, "cantilever": 60.0}
+FORCES = {"three-point-bend": 200.0, "four-point-bend": 300.0, "cantilever-bend": 60.0}
 BEAMS = [ThreePointBend(), FourPointBend(), Cantilever()]
 HELD = [ThreePointBendRelaxation(), FourPointBendRelaxation(), CantileverRelaxation()]
 EVERY = pytest.mark.parametrize("beam", [*BEAMS, *HELD], ids=lambda beam: beam.name)
