@@ -222,7 +222,10 @@ class TotalCreepAbove:
 
 @dataclass(frozen=True)
 class FinalOutputAbove:
-    """The output that shows creep is above `threshold` at the end: criterion 5. After a burst, in the last frame before it."""
+    """The output that shows creep is above `threshold` at the end: criterion 5.
+
+    After a burst, in the last frame before it.
+    """
 
     name: str
     text: str

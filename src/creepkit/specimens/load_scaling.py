@@ -1,4 +1,4 @@
-"""LoadScaling: reference stresses and growth of thousands of tests at once, where they are powers of load and length."""
+"""LoadScaling: reference stresses and growth of many tests at once, where they are powers of load and length."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Bools, Floats
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class LoadScaling:
     exponents: tuple[float, float] = (0.0, 0.0)
     averaged: bool = False
 
-    def stresses(self, first: Floats, second: Floats, lengths: Floats, before_jump: Floats) -> Floats:
+    def stresses(self, first: Floats, second: Floats, lengths: Floats, before_jump: Bools) -> Floats:
         """(rows, times) MPa, or (rows, 1) where one stress stands for the test.
 
         first, second : (rows, 1) both levels, in the unit of the load. lengths : (rows,) mm.

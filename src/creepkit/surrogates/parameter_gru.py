@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from creepkit.errors import SurrogateError, nearest
-from creepkit.records import Specimen
+from creepkit.records import Specimen, outputs_of
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.network_evaluation import ParameterNetwork, RecurrentCell
 from creepkit.surrogates.parameter_inputs import (
-    CONSTANT_INPUTS,
     SERIES_INPUTS,
     LawInputs,
     LoadHistoryInputs,
     base_outputs,
+    constant_inputs,
     load_history_arrays,
 )
 from creepkit.surrogates.parameter_surrogate import ParameterSurrogate
@@ -38,7 +38,8 @@ class ParameterGru:
     inputs : inputs at each frame, of "load" (at the frame, all that the paper uses), "mean_load" (since the
         frame before: it tells when between two frames the load jumped), "time" and "step". () is "load" alone, and for
         grids that stretch with the test "load", "mean_load", "time" and "step".
-    target : "value" of the first output, or its "log".
+    target : "value" of the first output, its "log", or "record": the log where the specimen's record says that it is
+        compared by its logarithm.
     base : "none"; or "reduced-order": the specimen's reduced-order model predicts the first output, and the network
         corrects the logarithm of it. Derivatives are then left to differences.
     """
@@ -47,7 +48,7 @@ class ParameterGru:
     layers: int = 3
     cell: RecurrentCell = "gru"
     inputs: tuple[str, ...] = ()
-    target: Literal["value", "log"] = "value"
+    target: Literal["value", "log", "record"] = "value"
     base: Literal["none", "reduced-order"] = "none"
     training: Training = field(default_factory=Training)
 
@@ -59,7 +60,7 @@ class ParameterGru:
             value = getattr(self, name)
             if value != int(value) or not 1 <= value <= largest:
                 raise SurrogateError(f"ParameterGru: {name} is {value}; allowed are whole numbers from 1 to {largest}")
-        choices = {"cell": ("gru", "lstm"), "target": ("value", "log"), "base": ("none", "reduced-order")}
+        choices = {"cell": ("gru", "lstm"), "target": ("value", "log", "record"), "base": ("none", "reduced-order")}
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 raise SurrogateError(
@@ -92,7 +93,7 @@ class ParameterGru:
         from creepkit.surrogates.parameter_network import ParameterModule
 
         sizes = samples["constants"].shape[-1], samples["series"].shape[-1], len(data.outputs)
-        log, based = self.target == "log", self.base != "none"
+        log, based = self._learns_logarithm(data.specimen), self.base != "none"
         network = ParameterModule(sizes, self.hidden, self.layers, self.cell, logarithm=log, corrects_base=based)
         return network.with_scales(samples, train)
 
@@ -129,7 +130,7 @@ class ParameterGru:
             weights,
             (len(metadata.scaling["inputs"]), series, len(metadata.outputs)),
             (self.cell, self.hidden, self.layers),
-            logarithm=self.target == "log",
+            logarithm=self._learns_logarithm(metadata.specimen),
             corrects_base=self.base != "none",
         )
 
@@ -140,9 +141,12 @@ class ParameterGru:
         return self.inputs or (SERIES_INPUTS if relative else SERIES_INPUTS[:1])
 
     def history_inputs(self, specimen: Specimen, conditions: tuple[str, ...], relative: bool) -> LoadHistoryInputs:
-        """The inputs that tests give: which of CONSTANT_INPUTS varied in training, and the series."""
-        constants = tuple(name for name in CONSTANT_INPUTS if name in conditions)
+        """The inputs that tests give: modulus, lengths and temperature that varied in training, and the series."""
+        constants = constant_inputs(specimen, conditions)
         return LoadHistoryInputs(specimen, constants, self.series_inputs(relative), relative)
+
+    def _learns_logarithm(self, specimen: Specimen) -> bool:
+        return self.target == "log" or (self.target == "record" and outputs_of(specimen)[0].logarithmic)
 
     def _history_inputs(self, data: Dataset) -> LoadHistoryInputs:
         return self.history_inputs(data.specimen, data.condition_names, data.grid.relative)

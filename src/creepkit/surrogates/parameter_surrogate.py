@@ -43,9 +43,6 @@ from creepkit.surrogates.surrogate import (
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
-NUISANCE_OF_INPUT = {"modulus": "modulus", "apex_thickness": "thickness", "temperature": "temperature"}
-"""{input: the nuisance that changes it}."""
-
 
 @dataclass(frozen=True, eq=False)
 class NetworkQuery:
@@ -100,7 +97,7 @@ class ParameterSurrogate(Surrogate):
     @property
     def nuisances(self) -> tuple[str, ...]:  # type: ignore[override]
         """The nuisances whose inputs were varied."""
-        return tuple(NUISANCE_OF_INPUT[name] for name in self._history_inputs.constants)
+        return self._history_inputs.nuisances
 
     def outside_class(self, law: CreepLaw) -> str:
         """Why it does not predict a law, in a sentence; "" where it does."""
