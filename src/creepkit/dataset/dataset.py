@@ -79,8 +79,8 @@ class Dataset(Presentable):
     parameters : (n, P) the author's values, columns parameter_names; 0 = switched off where the law allows it.
     conditions : (n, C) in their units (MPa, s, mm, K ...); columns condition_names.
     values : (n, frames, outputs) in their units, float32, NaN after the end; all NaN where nothing was simulated.
-    hold_outputs : (n, 4, outputs) in their units, float32, at the end of the first ramp, just before the jump, at the end
-        of the second ramp and at the end of the test; NaN where the simulation ended before.
+    hold_outputs : (n, 4, outputs) in their units, float32, at the end of the first ramp, just before the jump, at the
+        end of the second ramp and at the end of the test; NaN where the simulation ended before.
     status : (n,) records.Status, or -1 where nothing was simulated. end_times : (n,) s, where the simulation ended.
     reasons : (n,) 0 accepted, k the criterion reason_names[k] that was not met first, -1 failed.
     index : (n,) row of the Sobol sequence. reason_texts : what each criterion asks.

@@ -10,6 +10,7 @@ from creepkit.records.interfaces import (
     SupportsRefinement,
     SupportsRupturePrediction,
     SupportsSearchTolerance,
+    SupportsTraining,
 )
 from creepkit.records.known_specimens import (
     all_dimensions,
@@ -109,6 +110,7 @@ __all__ = [
     "SupportsRefinement",
     "SupportsRupturePrediction",
     "SupportsSearchTolerance",
+    "SupportsTraining",
     "TimesToStrain",
     "Units",
     "all_dimensions",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
@@ -120,6 +120,23 @@ class SupportsReducedOrderModel(Predictor, Protocol):
 
     def reduced_order_model(self) -> Predictor:
         """Return the reduced-order model; it may be some per cent off and need not know derivatives."""
+        ...
+
+
+@runtime_checkable
+class SupportsTraining(Predictor, Protocol):
+    """A reduced-order model that is trained before it predicts, as one of finite elements is.
+
+    Optional attribute, looked for by name: `cubature_model()`, the fem.ReducedOrderModel whose points can be drawn.
+    """
+
+    def train(self) -> str:
+        """Train it, where that was not done before, and keep it; what it is, in a few words."""
+        ...
+
+    @property
+    def error(self) -> Mapping[str, float]:
+        """{output: standard deviation of its error}, in the output's unit, from runs that training did not see."""
         ...
 
 

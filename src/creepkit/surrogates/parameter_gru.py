@@ -41,7 +41,8 @@ class ParameterGru:
     target : "value" of the first output, its "log", or "record": the log where the specimen's record says that it is
         compared by its logarithm.
     base : "none"; or "reduced-order": the specimen's reduced-order model predicts the first output, and the network
-        corrects the logarithm of it. Derivatives are then left to differences.
+        corrects the logarithm of it; or "reference-stress": a material point at the reference stress of the specimen's
+        record does. Derivatives are then left to differences.
     """
 
     hidden: int = 128
@@ -49,7 +50,7 @@ class ParameterGru:
     cell: RecurrentCell = "gru"
     inputs: tuple[str, ...] = ()
     target: Literal["value", "log", "record"] = "value"
-    base: Literal["none", "reduced-order"] = "none"
+    base: Literal["none", "reduced-order", "reference-stress"] = "none"
     training: Training = field(default_factory=Training)
 
     kind: ClassVar[str] = "parameter-gru"
@@ -60,7 +61,11 @@ class ParameterGru:
             value = getattr(self, name)
             if value != int(value) or not 1 <= value <= largest:
                 raise SurrogateError(f"ParameterGru: {name} is {value}; allowed are whole numbers from 1 to {largest}")
-        choices = {"cell": ("gru", "lstm"), "target": ("value", "log", "record"), "base": ("none", "reduced-order")}
+        choices = {
+            "cell": ("gru", "lstm"),
+            "target": ("value", "log", "record"),
+            "base": ("none", "reduced-order", "reference-stress"),
+        }
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 raise SurrogateError(
@@ -84,7 +89,7 @@ class ParameterGru:
             "targets": np.where(mask[..., None], data.values, 0.0),
         }
         if self.base != "none":
-            arrays["base"] = base_outputs(data, progress)
+            arrays["base"] = base_outputs(data, self.base, progress)
         single = {name: np.asarray(v, np.float32) for name, v in arrays.items()}
         return {**single, "mask": mask, "domain": np.concatenate([rows, domain_rows], axis=1)}
 

@@ -311,17 +311,20 @@ def _term_coefficient(law: CreepLaw, label: str) -> str | None:
     return None
 
 
-def base_outputs(data: Dataset, progress: ProgressCallback | None = None) -> Floats:
-    """(n, frames) first output of the specimen's reduced-order model; its last value after its end."""
-    reduced_model = reduced_order_model_of(data.specimen)
-    base, theta = np.empty(data.values.shape[:2]), data.law.to_internal(data.parameters)
+def base_outputs(data: Dataset, base: str, progress: ProgressCallback | None = None) -> Floats:
+    """(n, frames) first output by the model that is corrected; its last value after its end.
+
+    base : see base_model().
+    """
+    model = base_model(data.specimen, base)
+    values, theta = np.empty(data.values.shape[:2]), data.law.to_internal(data.parameters)
     for k in range(len(data)):
         plan = data.planned_test(k).replace(times=data.times(k))
-        prediction = reduced_model.predict(data.law, theta[k : k + 1], [plan])
-        base[k] = hold_last_value(prediction.values[0, 0, :, prediction.outputs.index(data.outputs[0])])
+        prediction = model.predict(data.law, theta[k : k + 1], [plan])
+        values[k] = hold_last_value(prediction.values[0, 0, :, prediction.outputs.index(data.outputs[0])])
         if progress is not None:
             progress("base", k + 1, len(data), "")
-    return base
+    return values
 
 
 def load_history_arrays(
@@ -346,10 +349,19 @@ def load_history_arrays(
     return constants, series, domain_rows
 
 
-def reduced_order_model_of(specimen: Any) -> Any:
-    """The specimen's reduced-order model; SurrogateError where it has none."""
+def base_model(specimen: Any, base: str) -> Any:
+    """The model that a network corrects: "reduced-order", the specimen's own, or "reference-stress", of its record.
+
+    SurrogateError where the specimen has none.
+    """
+    if base == "reference-stress":
+        from creepkit.surrogates.reference_stress_model import ReferenceStressModel
+
+        return ReferenceStressModel(specimen)
     if not isinstance(specimen, SupportsReducedOrderModel):
-        raise SurrogateError(f"specimen '{specimen.name}' has no reduced-order model; use base='none'")
+        raise SurrogateError(
+            f"specimen '{specimen.name}' has no reduced-order model; use base='none' or base='reference-stress'"
+        )
     return specimen.reduced_order_model()
 
 

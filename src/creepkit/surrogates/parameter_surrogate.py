@@ -25,9 +25,9 @@ from creepkit.surrogates.network_evaluation import ParameterNetwork
 from creepkit.surrogates.parameter_inputs import (
     LawInputs,
     LoadHistoryInputs,
+    base_model,
     complete_parameters,
     hold_last_value,
-    reduced_order_model_of,
     zero_coefficients,
 )
 from creepkit.surrogates.recipe import SampleArrays, SurrogateMetadata, Weights
@@ -173,9 +173,11 @@ class ParameterSurrogate(Surrogate):
     def _base(
         self, theta: Floats, histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues
     ) -> Floats:
-        """(candidates, tests, frames) what the specimen's reduced-order model predicts of the first output."""
+        """(candidates, tests, frames) what the model that is corrected predicts of the first output."""
         tests = [h.replace(times=t, outputs={}) for h, t in zip(histories, frames, strict=True)]
-        prediction = reduced_order_model_of(self.specimen).predict(self.metadata.law, theta, tests, nuisances=nuisances)
+        prediction = base_model(self.specimen, self.recipe.base).predict(
+            self.metadata.law, theta, tests, nuisances=nuisances
+        )
         return hold_last_value(prediction.values[..., prediction.outputs.index(self.outputs[0])])
 
     # ---- outputs ---------------------------------------------------------------------------------------------------
