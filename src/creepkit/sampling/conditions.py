@@ -217,7 +217,8 @@ def condition_ranges(
 
     needs_temperature : whether the law depends on temperature, whose range must then be given.
     """
-    known, given = specimen_conditions(specimen), own_names(specimen, given)
+    known = specimen_conditions(specimen)
+    given = _both_levels(known, own_names(specimen, given))
     known.check_names(given)
     drawn = {**dict(known.defaults), **given}
     if needs_temperature and TEMPERATURE not in drawn:
@@ -237,6 +238,18 @@ def condition_ranges(
     _check_jump(known.jump, ranges[known.jump], ranges[END].low if END in ranges else grid.end)
     columns = tuple((name, ranges[name]) for name in known.names if name in ranges)
     return ConditionRanges(known.kind, known.levels, columns, end)
+
+
+def _both_levels(known: SpecimenConditions, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Ranges {condition: (...)} with that of the load, by its own name, as the range of both its levels."""
+    load, others = known.load.name, dict(given)
+    if load not in others:
+        return others
+    for level in known.levels:
+        if level in others:
+            raise DatasetError(f"the range of {load} is that of both its levels, and {level} has one as well; keep one")
+    both = others.pop(load)
+    return {**others, **dict.fromkeys(known.levels, both)}
 
 
 def condition_range(name: str, value: Any, unit: str) -> ConditionRange:

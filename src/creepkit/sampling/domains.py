@@ -354,7 +354,8 @@ def sampling_design(law: CreepLaw, specimen: Specimen, domain: str = "conditione
 
     domain : "conditioned", whose samples creep visibly, or "paper", uniform in the law's bounds.
     changes : ranges of conditions, (low, high) or a number, by the names of the specimen's data sets or the general
-        ones: force_1=(5, 20), span=(40, 60), end_time=3600; `every`, s between frames, or `grid`, a TimeGrid.
+        ones: force_1=(5, 20), span=(40, 60), end_time=3600, or force=(5, 20) of both levels of the load; `every`, s
+        between frames, or `grid`, a TimeGrid.
     """
     domains: dict[str, Callable[..., SamplingDesign]] = {"conditioned": conditioned_domain, "paper": paper_domain}
     if domain not in domains:

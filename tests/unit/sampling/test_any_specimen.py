@@ -57,14 +57,18 @@ def test_general_names_are_those_of_a_specimen_with_names_of_its_own() -> None:
         planned_test(dimple, {"modulus": 1e5, **general}, grid).loading
         == planned_test(dimple, {"modulus": 1e5, **own}, grid).loading
     )
-    designs = [sampling_design(NORTON, dimple, **{name: (5, 20)}) for name in ("P1", "pressure_1")]
+    designs = [sampling_design(NORTON, dimple, **{name: (3, 20)}) for name in ("P1", "pressure_1")]
     assert designs[0] == designs[1]
+    both = sampling_design(NORTON, dimple, pressure=(5, 20))
+    assert both == sampling_design(NORTON, dimple, P1=(5, 20), P2=(5, 20))
+    with pytest.raises(DatasetError, match="the range of pressure is that of both its levels, and P2 has one as well"):
+        sampling_design(NORTON, dimple, pressure=(5, 20), P2=20)
     with pytest.raises(DatasetError, match="'pressure_1' and 'P1' are the same one"):
         sampling_design(NORTON, dimple, P1=5, pressure_1=5)
 
 
 def test_rates_of_a_beam_lie_where_its_deflection_is_visible_and_the_test_lasts() -> None:
-    """By hand, for tests without a jump: 12 s of the reference stress."""
+    """By hand, for tests without a jump: 12 h at the reference stress."""
     design = sampling_design(NORTON, BEAM, force_1=10.0, force_2=10.0, span=(40.0, 60.0))
     draws = design.draw(0, 512, seed=2)
     stress = 0.7 * 6.0 * 10.0 * draws.condition("span") / (10.0 * 2.0**2)
