@@ -163,7 +163,15 @@ class SupportsSearchTolerance(Predictor, Protocol):
 
 @runtime_checkable
 class Specimen(Predictor, Protocol):
-    """A frozen record of a test piece: which outputs are observed, and how to predict them."""
+    """A frozen record of a test piece: which outputs are observed, and how to predict them.
+
+    Optional attributes, looked for by name, beside those of a predictor: `loads`, `dimensions`; and for data sets
+    `conditions`, {load, "modulus", "temperature", "end_time" or length: (lowest, highest)}, the default ranges, in
+    their units; `growth_per_strain(history)`, the growth or fall of the output that shows creep for each unit of creep
+    strain at the reference stress; `planned_loading(levels, jump_time)`, the loading of a test with two levels;
+    `load_scaling`, both for many tests at once, see specimens.load_scaling; `dataset_names`, {general name of a
+    condition: its own}; `surrogate_name`, that of its reduced-order model among the surrogates.
+    """
 
     @property
     def name(self) -> str:
