@@ -53,6 +53,7 @@ BENCHMARKS = {
     "neml2_model": Benchmark(1, needs="NEML2 3.1, see the program"),
     "dataset_generation_speed": Benchmark(6, (("--samples", "256"),)),
     "surrogate_accuracy": Benchmark(10, (("--samples", "150"),)),
+    "surrogate_any_specimen": Benchmark(5),
     "surrogate_speed": Benchmark(3),
     "identification_speed": Benchmark(1),
     "bending_recovery": Benchmark(15),

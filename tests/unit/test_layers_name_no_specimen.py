@@ -1,6 +1,8 @@
 """Above `specimens/` nothing names a particular specimen: what is needed of one stands in its record."""
 
 import ast
+import re
+from collections.abc import Iterator
 
 import pytest
 
@@ -9,23 +11,72 @@ from creepkit.registry import default_registry
 from helpers import source_tree
 
 PACKAGES = ("readers", "quality", "inverse", "report", "cli", "experiments", "forecasts", "screening", "discovery")
+"""No string, attribute or keyword of theirs is such a name; sentences may give one as an example."""
 
-ORDINARY_WORDS = {"point", "strain", "stress", "shape", "width"}
-"""Names of specimens and outputs that are words of mechanics and of plots as well."""
 
 ALLOWED = {
     "creepkit.cli.demo": "it shows a bulge test",
-    "creepkit.cli.planned_test": "the specimen of a test that names none",
+    "creepkit.cli.options": "what commands take where no specimen is named",
     "creepkit.screening.planted": "the paper's plate of bulge tests",
 }
 
 
+"""They read everything of a specimen from its record."""
+
+
+ORDINARY_WORDS = {"point", "shape", "strain", "stress"}
+"""Of the names below, those that mean other things as well."""
+
+
 def names_of_shipped_specimens() -> set[str]:
-    """Names of specimens, their outputs and lengths."""
-    shipped = [e.value for e in default_registry().specimens().values() if e.provenance.origin.startswith("creepkit ")]
-    assert {"bulge", "uniaxial", "relaxation", "point"} <= {one.name for one in shipped}
-    lengths = {name for one in shipped for d in dimensions_of(one) for name in d.names}
-    return {one.name for one in shipped} | {str(o) for one in shipped for o in outputs_of(one)} | lengths
+    """Names of the specimens that ship, of their outputs and lengths, and what their data sets and surrogates say."""
+    names: set[str] = set()
+    for entry in default_registry().specimens().values():
+        specimen = entry.value
+        if not type(specimen).__module__.startswith("creepkit."):
+            continue  # of a plugin
+        names |= {specimen.name, getattr(specimen, "surrogate_name", specimen.name)}
+        names |= {str(output) for output in outputs_of(specimen)}
+        names |= {name for length in dimensions_of(specimen) for name in length.names}
+        names |= set(getattr(specimen, "dataset_names", {}).values())
+    return names - ORDINARY_WORDS
+
+
+def code_words(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """(line, text) of every identifier and every string that is no docstring."""
+    docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        line = getattr(node, "lineno", 0)
+        if isinstance(node, ast.Constant):
+            if isinstance(node.value, str) and id(node) not in docstrings:
+                yield line, node.value
+            continue
+        for field in ("id", "attr", "arg", "name", "asname", "module"):
+            value = getattr(node, field, None)
+            if isinstance(value, str):
+                yield line, value
+
+
+def test_the_names_of_shipped_specimens_are_those_of_their_records() -> None:
+    assert {"bulge", "dimple", "uniaxial", "relaxation"} <= names_of_shipped_specimens()
+    assert {"amplitude", "width", "apex_thickness", "thickness", "window", "P1", "Tj"} <= names_of_shipped_specimens()
+    found = dict(code_words(ast.parse('"""bulge"""\nP1 = f(width=dimple.apex_thickness["the amplitude of"])')))
+    assert found.keys() == {2}
+
+
+@pytest.mark.parametrize("package", PACKAGES_FOR_ANY_SPECIMEN)
+def test_a_package_for_any_specimen_names_none(package: str) -> None:
+    """Also as parts of longer names, such as LEAST_WIDTH or bulge_stress."""
+    words = "|".join(sorted(map(re.escape, names_of_shipped_specimens()), key=len, reverse=True))
+    pattern = re.compile(rf"(?<![A-Za-z0-9])({words})(?![A-Za-z0-9])", re.IGNORECASE)
+    named = [
+        f"{module}:{line}: {match[0]}"
+        for module in source_tree.modules()
+        if module.split(".")[1:2] == [package]
+        for line, text in code_words(source_tree.tree(module))
+        if (match := pattern.search(text))
+    ]
+    assert named == []
 
 
 def names_used(tree: ast.AST) -> set[str]:
@@ -42,8 +93,8 @@ def names_used(tree: ast.AST) -> set[str]:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_no_specimen_output_or_length_is_named(package: str) -> None:
-    forbidden = names_of_shipped_specimens() - ORDINARY_WORDS
+def test_a_package_above_the_specimens_reads_their_records(package: str) -> None:
+    forbidden = names_of_shipped_specimens() - {"width"}  # of columns of a table as well
     named = {
         module: sorted(forbidden & names_used(ast.parse(path.read_text(encoding="utf-8"))))
         for module, path in source_tree.modules().items()

@@ -120,7 +120,7 @@ def test_ranges_of_conditions_and_what_is_left_out_can_be_said():
             "there is no sampling domain 'pandora'",
         ),
         (("generate", "nortn", "--to", "a.h5", "--samples", 9), "did you mean 'norton'"),
-        (("generate", "norton", "--specimen", "relaxation", "--to", "a.h5", "--samples", 9), "relaxation"),
+        (("generate", "norton", "--specimen", "point", "--to", "a.h5", "--samples", 9), "add the attribute conditions"),
         (("generate", "norton", "--to", "", "--samples", 9), "'.' is no name of a file"),
         (("generate", "norton", "--to", "a.h5", "--samples", 9, "--end-h", "1e9"), "at most 100000 are simulated"),
         (("generate", "norton", "--to", "a.h5", "--samples", 9, "--range", "P1"), "--range P1: write NAME=LOW:HIGH"),

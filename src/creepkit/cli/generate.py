@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from creepkit.cli.options import PAPER_SPECIMEN
 from creepkit.report.terminal import ProgressBar
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ def command(
     to: Annotated[Path | None, typer.Option(help="HDF5 file to write; its shards lie in FILE.parts.")] = None,
     samples: Annotated[int | None, typer.Option(min=1, help="Accepted samples wanted.")] = None,
     draws: Annotated[int | None, typer.Option(min=1, help="Or draws, whatever becomes of them.")] = None,
-    specimen: Annotated[str, typer.Option(help="bulge or uniaxial; see 'creepkit specimens'.")] = "bulge",
+    specimen: Annotated[str, typer.Option(help="Any specimen that says how its tests are loaded.")] = PAPER_SPECIMEN,
     domain: Annotated[
         str | None, typer.Option(help="conditioned (the default; most samples creep visibly) or paper.")
     ] = None,
@@ -31,7 +32,8 @@ def command(
         typer.Option(
             "--range",
             metavar="NAME=LOW:HIGH",
-            help="Of a condition, in MPa, s, mm, K: P1=5:20, modulus=150e3, temperature=1000:1100 ...; once for each.",
+            help="Of a condition, in its unit (MPa, s, mm, K, N): P1=5:20, force_1=10:50, modulus=150e3, "
+            "temperature=1000:1100 ...; once for each.",
         ),
     ] = None,
     unscreened: Annotated[

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from creepkit.records import Nuisance
 
 
+PAPER_SPECIMEN, DEFAULT_SPECIMEN = "bulge", "uniaxial"
+"""What a data set is made of, and what a test is of that names no specimen and whose load it takes."""
+
+
 SEARCHES = ("multi-start", "swarm", "cma-es")
 
 

@@ -17,7 +17,7 @@ from creepkit.cli.described_test import (
     specimen_for,
     specimen_options,
 )
-from creepkit.cli.options import parse_steps
+from creepkit.cli.options import DEFAULT_SPECIMEN, parse_steps
 
 if TYPE_CHECKING:
     from creepkit.records import History, Loading, Program, Specimen
@@ -121,7 +121,7 @@ def described_test(options: TestOptions) -> DescribedTest:
 
     usual = {"stress": options.stress, "strain": options.strain, "pressure": options.pressure}
     loads = {name: texts for name, texts in usual.items() if texts}
-    specimen = ck.specimen(options.specimen or specimen_for({**loads, **further_options(options.context)}, UNIAXIAL))
+    specimen = ck.specimen(options.specimen or specimen_for({**loads, **further_options(options.context)}, DEFAULT_SPECIMEN))
     further, lengths = specimen_options(specimen, options.context)
     loads |= further
     check_options(specimen, loads, options.control, options.ramp)
@@ -130,10 +130,6 @@ def described_test(options: TestOptions) -> DescribedTest:
     loading = parse_loading(specimen, loads, options.control, options.ramp, 3600.0 * options.end_h)
     check_modulus(specimen, options.modulus_gpa, loads)
     return DescribedTest(specimen, loading, lengths)
-
-
-UNIAXIAL = "uniaxial"
-"""The specimen of a test that names none and whose load it takes."""
 
 
 def planned_test(options: TestOptions, temperature: float | Program) -> History:

@@ -1,45 +1,67 @@
-"""`creepkit reduced-model`: train the reduced-order model of a bulge specimen, and say how far it errs."""
+"""`creepkit reduced-model`: train the reduced-order model of a specimen, and say how far it errs."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.options import parse_numbers
+from creepkit.cli.options import PAPER_SPECIMEN, parse_numbers
 
-UNITS = {"amplitude": " mm", "width": " mm"}
-"""Of outputs that have one."""
+if TYPE_CHECKING:
+    from creepkit.records import SupportsTraining
 
 
 def command(
-    specimen: Annotated[str, typer.Option(help="A bulge specimen.")] = "bulge",
+    specimen: Annotated[str, typer.Option(help="A specimen in finite elements.")] = PAPER_SPECIMEN,
     geometry: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=MM", help="A length of the dimple, such as apex_thickness=0.45.")
+        list[str] | None,
+        typer.Option(metavar="NAME=MM", help="A length of the test piece, such as apex_thickness=0.45."),
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Picture of its points to write.")] = None,
 ) -> None:
-    """Train the reduced-order model of a dimple.
+    """Train the reduced-order model of a test piece.
 
-    Searches begin in it. It is kept in the cache folder, so that the first identification of such a dimple finds it
-    there; some seconds.
+    Searches begin in it. It is kept in the cache folder, so that the first identification of such a test piece finds
+    it there; some seconds.
     """
     import creepkit as ck
     from creepkit.errors import SolveError
+    from creepkit.records import outputs_of
     from creepkit.report.simulation import cubature_figure
-    from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
-    from creepkit.specimens.bulge.specimen import Bulge
 
-    specimen_record = ck.specimen(specimen)
-    if not isinstance(specimen_record, Bulge):
-        raise SolveError(f"--specimen {specimen}: only a bulge has a reduced-order model; leave it out")
-    specimen_record = specimen_record.replace(**parse_numbers(geometry or [], "--geometry", "apex_thickness=0.45"))
-    predictor = BulgeReducedOrderModel(specimen_record)
-    model = predictor.reduced_model_of(predictor.own_setup())
-    typer.echo(f"{len(model.basis.modes)} modes, {len(model.basis.points)} of {model.model.weights.size} points")
-    errors = ", ".join(f"{name} {value:.2g}{UNITS.get(name, '')}" for name, value in predictor.error.items())
+    predictor = trainable_model(ck.specimen(specimen), geometry or [])
+    typer.echo(predictor.train())
+    units = {str(output): output.unit for output in outputs_of(predictor)}
+    errors = ", ".join(f"{name} {value:.2g} {units.get(name, '')}".rstrip() for name, value in predictor.error.items())
     typer.echo(f"error against its finite elements, one standard deviation over runs it was not trained on: {errors}")
     if picture is not None:
-        cubature_figure(model, picture)
+        if not hasattr(predictor, "cubature_model"):
+            raise SolveError(f"--picture: the reduced-order model of '{specimen}' has no points to draw; leave it out")
+        cubature_figure(predictor.cubature_model(), picture)
         typer.echo(f"wrote {picture}", err=True)
+
+
+def trainable_model(specimen: Any, geometry: list[str]) -> SupportsTraining:
+    """The reduced-order model of a specimen with other lengths; SolveError where it has none that is trained."""
+    from creepkit.errors import SolveError
+    from creepkit.records import SupportsReducedOrderModel, SupportsTraining, known_specimens
+
+    predictor = specimen.reduced_order_model() if isinstance(specimen, SupportsReducedOrderModel) else None
+    if not isinstance(predictor, SupportsTraining):
+        others = [
+            name
+            for name, each in known_specimens().items()
+            if isinstance(each, SupportsReducedOrderModel) and isinstance(each.reduced_order_model(), SupportsTraining)
+        ]
+        raise SolveError(
+            f"--specimen {specimen.name}: it has no reduced-order model that is trained; "
+            f"name one of those that have one: {', '.join(others)}"
+        )
+    lengths = parse_numbers(geometry, "--geometry", "apex_thickness=0.45")
+    if not lengths:
+        return predictor
+    changed = specimen.replace(**lengths).reduced_order_model()
+    assert isinstance(changed, SupportsTraining)
+    return changed

@@ -22,8 +22,10 @@ def command(
     inputs: Annotated[
         str | None, typer.Option(help="Seen at each frame: load,mean_load,time,step; by default what the grid needs.")
     ] = None,
-    target: Annotated[str | None, typer.Option(help="value, or log, of the output that grows with creep.")] = None,
-    base: Annotated[str | None, typer.Option(help="none; or reduced-order: correct the reduced-order model.")] = None,
+    target: Annotated[
+        str | None, typer.Option(help="value, or log, of the first output, or as its record says.")
+    ] = None,
+    base: Annotated[str | None, typer.Option(help="none; or correct a model: reduced-order, reference-stress.")] = None,
     epochs: Annotated[int | None, typer.Option(min=1, help="Passes over the training rows.")] = None,
     batch: Annotated[int | None, typer.Option(min=1, help="Histories in a step.")] = None,
     rate: Annotated[float | None, typer.Option(help="Rate of Adam at the beginning.")] = None,

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import DatasetError
 from creepkit.presentation import Presentable
-from creepkit.records import Status
+from creepkit.records import Status, outputs_of
 from creepkit.registry.specimen_documents import specimen_to_json
-from creepkit.sampling.conditions import CONDITION_UNITS, planned_test
+from creepkit.sampling.conditions import planned_test
+from creepkit.sampling.specimen_conditions import specimen_conditions
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
@@ -76,10 +77,10 @@ class Dataset(Presentable):
     law, specimen : what was simulated. design_document : everything that decided what was drawn.
     grid : the times of the frames. outputs : names along the last axis of values.
     parameters : (n, P) the author's values, columns parameter_names; 0 = switched off where the law allows it.
-    conditions : (n, C) MPa, s, mm, K; columns condition_names.
-    values : (n, frames, outputs) mm or strain, float32, NaN after the end; all NaN where nothing was simulated.
-    hold_outputs : (n, 4, outputs) mm or strain, float32, at the end of the first ramp, just before the jump, at the end
-        of the second ramp and at the end of the test; NaN where the simulation ended before.
+    conditions : (n, C) in their units (MPa, s, mm, K ...); columns condition_names.
+    values : (n, frames, outputs) in their units, float32, NaN after the end; all NaN where nothing was simulated.
+    hold_outputs : (n, 4, outputs) in their units, float32, at the end of the first ramp, just before the jump, at the
+        end of the second ramp and at the end of the test; NaN where the simulation ended before.
     status : (n,) records.Status, or -1 where nothing was simulated. end_times : (n,) s, where the simulation ended.
     reasons : (n,) 0 accepted, k the criterion reason_names[k] that was not met first, -1 failed.
     index : (n,) row of the Sobol sequence. reason_texts : what each criterion asks.
@@ -150,7 +151,7 @@ class Dataset(Presentable):
         return self.grid.times(end)
 
     def output(self, name: str) -> NDArray[np.float32]:
-        """(n, frames) mm or strain, one output."""
+        """(n, frames) in its unit, one output."""
         if name not in self.outputs:
             raise DatasetError(f"a data set of {self.specimen.name} has no output '{name}'; it has {self.outputs}")
         return self.values[..., self.outputs.index(name)]
@@ -246,10 +247,6 @@ def _shortened(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-OUTPUT_UNITS = {"amplitude": "mm", "width": "mm"}
-"""Units of outputs that have one."""
-
-
 def summary(data: Dataset) -> dict[str, Any]:
     """Counts, reasons, ranges and provenance of a data set, as JSON-able data; ranges are those of accepted samples."""
     accepted = data.reasons == 0
@@ -338,6 +335,7 @@ def last_values(values: Any) -> Floats:
 
 def column_units(data: Dataset) -> dict[str, str]:
     """{name: unit} of every column of `ranges`; "" of a pure number."""
+    known, stated = specimen_conditions(data.specimen), {str(o): o.unit for o in outputs_of(data.specimen)}
     units = {name: param.unit for name, param in data.law.table.items()}
-    units |= {name: CONDITION_UNITS.get(name, "") for name in data.condition_names}
-    return units | {"end of simulation": "s"} | {f"last {name}": OUTPUT_UNITS.get(name, "") for name in data.outputs}
+    units |= {name: known.unit(name) for name in data.condition_names}
+    return units | {"end of simulation": "s"} | {f"last {name}": stated.get(name, "") for name in data.outputs}

@@ -20,6 +20,7 @@ from creepkit.jobs.worker_process import error_text
 from creepkit.records import Predictor, Status, SupportsReducedOrderModel, predict_with
 from creepkit.sampling.conditions import hold_times, planned_test
 from creepkit.sampling.criteria import CreepInEachHold, SimulationOutcome, SurvivesTime
+from creepkit.sampling.specimen_conditions import creep_output
 
 if TYPE_CHECKING:
     from creepkit.records import Specimen
@@ -54,9 +55,8 @@ def _screening_outcome(
     prediction = predict_with(reduced_model, samples.law, samples.theta_of(row), [test.replace(times=times)])
     outputs = prediction.of(0)
     status, end_time = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
-    return SimulationOutcome(
-        times, outputs, outputs[np.searchsorted(times, hold_instants)], status, end_time, conditions
-    )
+    marks, shown = outputs[np.searchsorted(times, hold_instants)], creep_output(samples.specimen)
+    return SimulationOutcome(times, outputs, marks, status, end_time, conditions, shown.column, shown.falls)
 
 
 def _first_rejection(design: SamplingDesign, screening_outcome: SimulationOutcome) -> int:
@@ -181,9 +181,13 @@ def _simulate_sample(design: SamplingDesign, samples: Dataset, row: int) -> int:
     status, end_time = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
     samples.values[row], samples.hold_outputs[row] = outputs, hold_outputs
     samples.status[row], samples.end_times[row] = status, end_time
-    if status == Status.NOT_CONVERGED and not np.isfinite(observed[times > 0, 0]).any():
+    shown = creep_output(samples.specimen)
+    if status == Status.NOT_CONVERGED and not np.isfinite(observed[times > 0, shown.column]).any():
         raise SampleFailedError(f"not converged from {end_time:g} s on, with nothing to show before")
-    outcome = SimulationOutcome(test.times, outputs[: test.times.size], hold_outputs, status, end_time, conditions)
+    reached = outputs[: test.times.size]
+    outcome = SimulationOutcome(
+        test.times, reached, hold_outputs, status, end_time, conditions, shown.column, shown.falls
+    )
     return _reason_after(design, outcome)
 
 

@@ -1,14 +1,15 @@
 """Data sets as HDF5 files, readable without creepkit.
 
 Layout 1. Attributes of the file: `format` is "creepkit-dataset" and `layout` 1; `units` says "MPa, mm, s, K" of
-everything that follows; lists of strings `outputs`, `parameter_names`, `condition_names`, `reason_names` and
-`reason_texts`; JSON texts `law` (creepkit.language.law_codec), `specimen` (its name and fields), `design` (what decided
-the draws) and `provenance` (versions, seed, when, fingerprint).
+everything that follows (forces are in N, moments in N mm, angles in rad); lists of strings `outputs`,
+`parameter_names`, `condition_names`, `reason_names` and `reason_texts`; JSON texts `law` (creepkit.language.law_codec),
+`specimen` (its name and fields), `design` (what decided the draws) and `provenance` (versions, seed, when,
+fingerprint).
 
 Arrays, the first axis being the sample, in the order of the Sobol sequence, rejected and failed samples included:
 
     parameters   (n, P)                float64  the law's parameters in the author's values; 0 = switched off
-    conditions   (n, C)                float64  what the test was: modulus, P1, P2 (MPa), Tj (s) ...
+    conditions   (n, C)                float64  what the test was: modulus (MPa), levels of the load, end_time (s) ...
     values       (n, frames, outputs)  float32  NaN after the end, and where nothing was simulated; 12 binary digits
                                                 of rejected samples
     hold_outputs (n, 4, outputs)       float32  at the ends of first ramp, first hold, second ramp and test
@@ -22,7 +23,7 @@ The group `failures` has `rows` (k,) int64 and `texts` (k,): which samples faile
 
     with h5py.File("combined.h5") as f:
         good = f["reasons"][:] == 0
-        amplitude = f["values"][good][:, :, list(f.attrs["outputs"]).index("amplitude")]
+        first_output = f["values"][good][:, :, 0]  # the one of f.attrs["outputs"][0]
 """
 
 from __future__ import annotations
@@ -35,7 +36,6 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from creepkit import registry
 from creepkit.arrays import Bools
 from creepkit.dataset.dataset import COLUMNS, HOLD_TIMES, Dataset, empty_columns
 from creepkit.errors import DatasetError, LawError
@@ -44,6 +44,7 @@ from creepkit.files.json_documents import compact_json, parse_json
 from creepkit.files.reading import FileKind
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
+from creepkit.registry.arguments import specimen_by_name
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import MOST_FRAMES, TimeGrid
 
@@ -220,7 +221,7 @@ def read_header(file: h5py.File, source: str) -> Dataset:
     check_shapes(file, columns, source)
     return Dataset(
         law=_read_law(documents["law"], name_lists["parameter_names"], source),
-        specimen=specimen_from_json(documents["specimen"], source, registry.default_registry().specimen),
+        specimen=specimen_from_json(documents["specimen"], source, specimen_by_name),
         design_document=documents["design"],
         grid=_read_grid(file["time_grid"], source),
         provenance=documents["provenance"],

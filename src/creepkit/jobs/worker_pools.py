@@ -17,7 +17,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass
 from types import TracebackType
 from typing import IO, Any, Protocol
@@ -25,6 +25,7 @@ from typing import IO, Any, Protocol
 from creepkit.arrays import usable_cores
 from creepkit.errors import CreepkitError, DatasetError
 from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task
+from creepkit.registry.plugin_registry import loaded_plugin_files
 
 SHARD_ROWS = 256
 """Samples of a shard: some seconds of work, so that little is lost when a process dies."""
@@ -168,7 +169,39 @@ class ParallelExecution:
         """The workers, which run in the context that is returned."""
         if self.cluster is not None:
             return ClusterWorkers(job, self.cluster, self.workers)
+        if not can_be_sent(job):
+            process_count(self.workers)  # which refuses what is no number of them
+            return nullcontext(ThisProcess(job))
         return ProcessWorkers(job, process_count(self.workers))
+
+
+def can_be_sent(job: Job) -> bool:
+    """Whether another process can read a job: not one of a class of the main script or a notebook, or of a function."""
+    try:
+        return b"__main__" not in pickle.dumps(job)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return False
+
+
+class ThisProcess:
+    """The tasks of a job one after another in this very process, where no other can read the job."""
+
+    def __init__(self, job: ShardedJob) -> None:
+        self._job, self._submitted = job.on_one_thread(), list[int]()
+
+    @property
+    def free_slots(self) -> int:
+        """One at a time."""
+        return 1 - len(self._submitted)
+
+    def submit(self, number: int) -> None:
+        """Have a task done when results are asked for."""
+        self._submitted.append(number)
+
+    def results(self, timeout: float) -> list[TaskResult]:
+        """The result of the task that was submitted, however long it takes."""
+        numbers, self._submitted = self._submitted, []
+        return [run_task(self._job, number) for number in numbers]
 
 
 def process_count(workers: int | None, error: type[CreepkitError] = DatasetError) -> int:
@@ -210,8 +243,8 @@ class ProcessWorkers:
     """Worker processes of this machine; a context."""
 
     def __init__(self, job: Job, processes: int) -> None:
-        paths = pickle.dumps(sys.path)
-        self._setup_message = b"".join(struct.pack("!Q", len(part)) + part for part in (paths, pickle.dumps(job)))
+        parts = (pickle.dumps(sys.path), pickle.dumps(loaded_plugin_files()), pickle.dumps(job))
+        self._setup_message = b"".join(struct.pack("!Q", len(part)) + part for part in parts)
         self._size = processes
         self._processes: list[WorkerProcess] = []
         self._selector = selectors.DefaultSelector()

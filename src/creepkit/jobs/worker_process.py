@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import IO, Any, Protocol
 
 from creepkit.errors import CreepkitError
+from creepkit.registry.plugin_registry import load_plugin_file
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,8 @@ def main() -> None:
     stdin, stdout = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # whatever else is printed belongs on stderr
     sys.path[:] = _read_pickled(stdin)
+    for plugin_file in _read_pickled(stdin):  # whose classes the job may have
+        load_plugin_file(plugin_file)
     job = _read_pickled(stdin).on_one_thread()
     _write_result(stdout, {"ready": True})
     for line in stdin:

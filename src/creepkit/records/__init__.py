@@ -10,6 +10,7 @@ from creepkit.records.interfaces import (
     SupportsRefinement,
     SupportsRupturePrediction,
     SupportsSearchTolerance,
+    SupportsTraining,
 )
 from creepkit.records.known_specimens import (
     all_dimensions,
@@ -114,6 +115,7 @@ __all__ = [
     "SupportsRefinement",
     "SupportsRupturePrediction",
     "SupportsSearchTolerance",
+    "SupportsTraining",
     "TimesToStrain",
     "TwoLevels",
     "Units",

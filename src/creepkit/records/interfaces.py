@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
@@ -124,6 +124,23 @@ class SupportsReducedOrderModel(Predictor, Protocol):
 
 
 @runtime_checkable
+class SupportsTraining(Predictor, Protocol):
+    """A reduced-order model that is trained before it predicts, as one of finite elements is.
+
+    Optional attribute, looked for by name: `cubature_model()`, the fem.ReducedOrderModel whose points can be drawn.
+    """
+
+    def train(self) -> str:
+        """Train it, where that was not done before, and keep it; what it is, in a few words."""
+        ...
+
+    @property
+    def error(self) -> Mapping[str, float]:
+        """{output: standard deviation of its error}, in the output's unit, from runs that training did not see."""
+        ...
+
+
+@runtime_checkable
 class SupportsRefinement(Predictor, Protocol):
     """A predictor with an error of its own, and a more exact one of the same outputs and nuisances.
 
@@ -146,7 +163,15 @@ class SupportsSearchTolerance(Predictor, Protocol):
 
 @runtime_checkable
 class Specimen(Predictor, Protocol):
-    """A frozen record of a test piece: which outputs are observed, and how to predict them."""
+    """A frozen record of a test piece: which outputs are observed, and how to predict them.
+
+    Optional attributes, looked for by name, beside those of a predictor: `loads`, `dimensions`; and for data sets
+    `conditions`, {load, "modulus", "temperature", "end_time" or length: (lowest, highest)}, the default ranges, in
+    their units; `growth_per_strain(history)`, the growth or fall of the output that shows creep for each unit of creep
+    strain at the reference stress; `planned_loading(levels, jump_time)`, the loading of a test with two levels;
+    `load_scaling`, both for many tests at once, see specimens.load_scaling; `dataset_names`, {general name of a
+    condition: its own}; `surrogate_name`, that of its reduced-order model among the surrogates.
+    """
 
     @property
     def name(self) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from creepkit.errors import FitError, LawError, SolveError
 from creepkit.readers import reading
-from creepkit.records import History, Predictor, remember_specimen
+from creepkit.records import History, Predictor, Specimen, known_specimens, remember_specimen
 from creepkit.registry.plugin_registry import default_registry
 
 if TYPE_CHECKING:
@@ -25,6 +25,12 @@ def resolve_law(law: CreepLaw | str) -> CreepLaw:
     if not hasattr(law, "terms"):
         raise LawError(f"a creep law or its name is needed, found {type(law).__name__}")
     return law
+
+
+def specimen_by_name(name: str) -> Specimen:
+    """The registered specimen of a name, or one that was used in this process; SolveError where there is none."""
+    used: Specimen | None = known_specimens().get(name)
+    return default_registry().specimen(name) if used is None else used
 
 
 def resolve_predictor(predictor: Predictor | str) -> Predictor:

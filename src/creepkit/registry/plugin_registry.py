@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import threading
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
@@ -303,6 +304,18 @@ def default_registry() -> Registry:
 
 
 default_registry()  # made with the module, while there is one thread
+
+
+def loaded_plugin_files() -> list[str]:
+    """The plugin files that the registry of the public functions has loaded without a problem."""
+    plugins = list(default_registry()._plugins.values())
+    return [p.provenance.origin for p in plugins if p.provenance.origin.endswith(".py") and not p.problem]
+
+
+def load_plugin_file(path: str) -> None:
+    """Load a plugin file in a worker process; one that is gone is missed where something of it is needed."""
+    with suppress(PluginError):
+        default_registry().load_file(path)
 
 
 def _merged_contributions(

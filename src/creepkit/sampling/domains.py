@@ -30,12 +30,10 @@ from creepkit.sampling.coefficients import (
 from creepkit.sampling.conditions import (
     PAPER_END,
     PAPER_INTERVAL,
-    PAPER_RANGES,
     ConditionRanges,
     TimeGrid,
     condition_range,
     condition_ranges,
-    test_kind,
 )
 from creepkit.sampling.criteria import Criterion, conditioned_criteria, paper_criteria
 from creepkit.sampling.draws import (
@@ -54,6 +52,7 @@ from creepkit.sampling.rates import (
     mean_ln_rate,
     reference_stress_of,
 )
+from creepkit.sampling.specimen_conditions import END, specimen_conditions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -114,9 +113,10 @@ def uniform_in_bounds(law: CreepLaw, unit_coordinates: Floats) -> Floats:
     return np.asarray(low + unit_coordinates * (high - low))
 
 
-def default_grid(interval: float, ranges: Mapping[str, Any]) -> TimeGrid:
+def default_grid(interval: float, specimen: Specimen, ranges: Mapping[str, Any]) -> TimeGrid:
     """Frames up to the end of the longest test."""
-    return TimeGrid.every(interval, condition_range("end_time", ranges.get("end_time", PAPER_END)).high)
+    stated = {**dict(specimen_conditions(specimen).defaults), **ranges}
+    return TimeGrid.every(interval, condition_range(END, stated.get(END, PAPER_END), "s").high)
 
 
 @dataclass(frozen=True)
@@ -151,16 +151,15 @@ def paper_domain(
     screened: bool = True,
     **ranges: Any,
 ) -> PaperDomain:
-    """Return the paper's sampling domain of any law: its bounds, E 50 to 300 GPa, Tj 2 to 10 h of 12 h, P1 <= P2 from 3
-    to 25 MPa.
+    """Return the paper's sampling domain of any law: its bounds, the specimen's ranges of load and modulus, a second
+    load level not below the first, a jump at 2 to 10 h of 12 h.
 
     every : s between frames. grid : in its place, other times. screened : see PaperDomain. ranges : other ranges of
         conditions, as sampling_design() takes them.
     """
-    kind = test_kind(specimen)
-    grid = grid or default_grid(every, ranges)
-    condition_space = condition_ranges(kind, grid, ranges, PAPER_RANGES[kind], needs_temperature=law.uses(temperature))
-    return PaperDomain(law, condition_space, grid, paper_criteria(kind), reference_stress_of(specimen), screened)
+    grid = grid or default_grid(every, specimen, ranges)
+    condition_space = condition_ranges(specimen, grid, ranges, needs_temperature=law.uses(temperature))
+    return PaperDomain(law, condition_space, grid, paper_criteria(specimen), reference_stress_of(specimen), screened)
 
 
 MOST_TRIALS = 32
@@ -228,7 +227,11 @@ class ConditionedDomain(SamplingDomain):
 
     def document(self) -> dict[str, Any]:
         """Everything that decides the draws, as JSON-able data."""
-        return {**super().document(), "reference": vars(self.reference_stress), "how_many": TERM_COUNT_PROBABILITIES}
+        return {
+            **super().document(),
+            "reference": self.reference_stress.document(),
+            "how_many": TERM_COUNT_PROBABILITIES,
+        }
 
 
 def conditioned_domain(
@@ -239,14 +242,11 @@ def conditioned_domain(
     every : s between frames. grid : in its place, other times. ranges : other ranges of conditions, as
         sampling_design() takes them.
     """
-    kind = test_kind(specimen)
     term_groups(law)
-    grid = grid or default_grid(every, ranges)
-    condition_space = condition_ranges(kind, grid, ranges, PAPER_RANGES[kind], needs_temperature=law.uses(temperature))
-    reference = reference_stress_of(specimen)
-    return ConditionedDomain(
-        law, condition_space, grid, conditioned_criteria(law, kind, condition_space.end), reference
-    )
+    grid = grid or default_grid(every, specimen, ranges)
+    condition_space = condition_ranges(specimen, grid, ranges, needs_temperature=law.uses(temperature))
+    criteria = conditioned_criteria(law, specimen, condition_space.end)
+    return ConditionedDomain(law, condition_space, grid, criteria, reference_stress_of(specimen))
 
 
 DEFAULT_DRAWS = 4096
@@ -278,8 +278,8 @@ class Acceptance(Presentable):
     def useful(self) -> Bools:
         """Which of them have a useful rate, (rows,); of the others some may be useful, too.
 
-        Of Eq. (2) in the paper's sampling domain 8 % have, and 16 % of 600 simulated draws crept visibly and lasted: a
-        dimple relieves itself of stress as it deflects, and so outlasts rates above the window.
+        Of Eq. (2) in the paper's sampling domain 8 % have, and 16 % of 600 simulated draws crept visibly and lasted:
+        the paper's test piece relieves itself of stress as it deflects, and so outlasts rates above the window.
         """
         in_range = (self.log10_strains >= self.useful_strains[:, 0]) & (self.log10_strains <= self.useful_strains[:, 1])
         return np.asarray(self.kept & in_range)
@@ -322,7 +322,7 @@ class SamplingDesign(Protocol):
 
     @property
     def specimen(self) -> str:
-        """The kind of test: bulge or uniaxial."""
+        """The kind of test: the name of the specimen."""
         ...
 
     @property
@@ -353,8 +353,9 @@ def sampling_design(law: CreepLaw, specimen: Specimen, domain: str = "conditione
     """Return a design for a law and a specimen; see paper_domain() and conditioned_domain().
 
     domain : "conditioned", whose samples creep visibly, or "paper", uniform in the law's bounds.
-    changes : ranges of conditions, (low, high) or a number: P1=(5, 20), apex_thickness=(0.44, 0.6), end_time=3600;
-        `every`, s between frames, or `grid`, a TimeGrid.
+    changes : ranges of conditions, (low, high) or a number, by the names of the specimen's data sets or the general
+        ones: force_1=(5, 20), span=(40, 60), end_time=3600, or force=(5, 20) of both levels of the load; `every`, s
+        between frames, or `grid`, a TimeGrid.
     """
     domains: dict[str, Callable[..., SamplingDesign]] = {"conditioned": conditioned_domain, "paper": paper_domain}
     if domain not in domains:

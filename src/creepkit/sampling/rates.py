@@ -1,9 +1,7 @@
 """Creep rates of many parameter rows at once, and the mean rate of a test at its reference stress.
 
-Bulge test: reference stress k P with k = 14.69 (h/0.5 mm)^-1.17 for a cavity radius of 7.5 mm and apex thickness h, P
-the geometric mean of both pressures. The amplitude grows by 42.3 (h/0.5 mm)^-0.486 mm per unit of reference strain.
-Both were fitted to simulations with the Norton law, n from 1 to 8, h from 0.44 to 0.60 mm. A tensile bar has the
-stresses of its two holds.
+Reference stresses, and the growth of the output for each unit of reference strain, are the specimen's: its
+`load_scaling` for all rows at once, or its reference_stress(history) and growth_per_strain(history), test by test.
 """
 
 from __future__ import annotations
@@ -16,12 +14,23 @@ import numpy as np
 from scipy.special import logsumexp
 
 from creepkit.arrays import ArrayLike, Floats, Ints
+from creepkit.errors import DatasetError
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, time
-from creepkit.records import Specimen
-from creepkit.sampling.conditions import BULGE, LOAD_LEVELS, ROOM_TEMPERATURE, VISIBLE_CREEP, test_kind
+from creepkit.records import History, Specimen
+from creepkit.sampling.conditions import ROOM_TEMPERATURE, TimeGrid, planned_test
 from creepkit.sampling.draws import Draws
-from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.sampling.specimen_conditions import (
+    END,
+    TEMPERATURE,
+    SpecimenConditions,
+    creep_output,
+    record_of,
+    specimen_conditions,
+    stated_method,
+    tested_piece,
+)
+from creepkit.specimens.load_scaling import LoadScaling
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,68 +149,98 @@ def mean_ln_rate(law: CreepLaw, theta: Floats, points: RateEvaluationPoints, str
 
 
 LARGEST_REFERENCE_STRAIN = 0.2
-"""Largest reference strain at the end of a test; the paper's dimple is then some 2 mm deep."""
+"""Largest reference strain at the end of a test; the test piece of the paper is then some 2 mm deep."""
 
 
 @dataclass(frozen=True)
 class ReferenceStress:
     """How loads become stresses and rates.
 
-    kind : of specimen. visible_creep : mm or strain, that every sample should show. stress_per_load : reference stress
-        over load at the specimen's own `thickness` (mm; 0: it has none). creep_per_strain : mm or strain, creep per
-        unit of reference strain there. thickness_exponents : of both.
+    specimen : whose tests they are. known : their conditions. visible_creep : of the output that shows creep, in its
+        unit, that every sample should show. scaling : of all rows at once, None where the specimen is asked test by
+        test.
     """
 
-    kind: str
+    specimen: Specimen
+    known: SpecimenConditions
     visible_creep: float
-    stress_per_load: float = 1.0
-    creep_per_strain: float = 1.0
-    thickness: float = 0.0
-    thickness_exponents: tuple[float, float] = (0.0, 0.0)
+    scaling: LoadScaling | None = None
 
     def evaluation_points(self, draws: Draws, end: float) -> RateEvaluationPoints:
         """Stresses and times of each row of draws; end : s, where it is not drawn."""
-        first, second = (draws.condition(name)[:, None] for name in LOAD_LEVELS[self.kind])
-        times = POINT_FRACTIONS * draws.condition("end_time", end)[:, None]
-        if self.kind == BULGE:
-            stress = (
-                self.stress_per_load
-                * np.sqrt(first * second)
-                * self._relative_thickness(draws)[:, None] ** self.thickness_exponents[0]
-            )
+        first, second = (draws.condition(name)[:, None] for name in self.known.levels)
+        times = POINT_FRACTIONS * draws.condition(END, end)[:, None]
+        before_jump = times < draws.condition(self.known.jump)[:, None]
+        if self.scaling is not None:
+            stress = self.scaling.stresses(first, second, self._lengths(draws, self.scaling), before_jump)
         else:
-            stress = np.where(times < draws.condition("Tj")[:, None], first, second)
-        return RateEvaluationPoints(stress, times, draws.condition("temperature", ROOM_TEMPERATURE))
+            stress = np.where(before_jump, *(self._level_stresses(draws, k, end)[:, None] for k in (0, 1)))
+        return RateEvaluationPoints(stress, times, draws.condition(TEMPERATURE, ROOM_TEMPERATURE))
 
     def useful_rates(self, draws: Draws, end: float) -> tuple[Floats, Floats]:
         """log10 of the lowest and highest useful mean rate in 1/s, (rows,) each: half the visible creep, most strain.
 
-        Half, because the higher of both pressures gives more creep than their geometric mean.
+        Half, because the higher of both load levels gives more creep than their geometric mean.
         """
-        least_strain = (
-            0.5
-            * self.visible_creep
-            / (self.creep_per_strain * self._relative_thickness(draws) ** self.thickness_exponents[1])
-        )
-        end_times = draws.condition("end_time", end)
+        least_strain = 0.5 * self.visible_creep / self._growth(draws, end)
+        end_times = draws.condition(END, end)
         return np.log10(least_strain / end_times), np.log10(LARGEST_REFERENCE_STRAIN / end_times)
 
-    def _relative_thickness(self, draws: Draws) -> Floats:
-        """(rows,) thickness of each row over the specimen's own."""
-        if not self.thickness:
-            return np.ones(len(draws))
-        return draws.condition("apex_thickness", self.thickness) / self.thickness
+    def document(self) -> dict[str, Any]:
+        """What decides the rates, as JSON-able data."""
+        found = {"kind": self.known.kind, "visible_creep": self.visible_creep}
+        return found if self.scaling is None else {**found, **self.scaling.document()}
+
+    # ---- of all rows at once -----------------------------------------------------------------------------------------
+
+    def _lengths(self, draws: Draws, scaling: LoadScaling) -> Floats:
+        return draws.condition(scaling.length, scaling.nominal) if scaling.length else np.ones(len(draws))
+
+    # ---- test by test ------------------------------------------------------------------------------------------------
+
+    def _growth(self, draws: Draws, end: float) -> Floats:
+        if self.scaling is not None:
+            return self.scaling.growth(self._lengths(draws, self.scaling))
+        return np.array([self._test_growth(draws, row, end) for row in range(len(draws))])
+
+    def _test_growth(self, draws: Draws, row: int, end: float) -> float:
+        piece, test = tested_piece(self.specimen, self._held_test(draws, row, 0, end))
+        return self._positive(float(np.mean(piece.growth_per_strain(test))), "growth_per_strain")
+
+    def _level_stresses(self, draws: Draws, level: int, end: float) -> Floats:
+        """(rows,) MPa, the reference stress while one of both levels is held."""
+        stresses = []
+        for row in range(len(draws)):
+            piece, test = tested_piece(self.specimen, self._held_test(draws, row, level, end))
+            found = np.atleast_1d(np.asarray(piece.reference_stress(test), float))
+            mean = float(np.exp(np.log(found[found > 0]).mean())) if (found > 0).any() else 0.0
+            stresses.append(self._positive(mean, "reference_stress"))
+        return np.array(stresses)
+
+    def _held_test(self, draws: Draws, row: int, level: int, end: float) -> History:
+        """The test of a row, with one of both levels held throughout."""
+        conditions = dict(zip(draws.condition_names, draws.conditions[row].tolist(), strict=True))
+        held = conditions[self.known.levels[level]]
+        for name in (*self.known.levels, self.known.jump):
+            conditions.pop(name, None)
+        held_test = {**conditions, self.known.levels[0]: held, END: conditions.get(END, end)}
+        return planned_test(self.specimen, held_test, TimeGrid(np.array([0.0, 1.0]), relative=True))
+
+    def _positive(self, value: float, method: str) -> float:
+        if not 0.0 < value < np.inf:
+            raise DatasetError(
+                f"specimen '{self.known.kind}': its {method}(history) gives {value:g} for a planned test; it must give "
+                "a finite number above zero, from what is planned alone"
+            )
+        return value
 
 
 def reference_stress_of(specimen: Specimen) -> ReferenceStress:
-    """The reference of a specimen."""
-    kind = test_kind(specimen)
-    if kind != BULGE:
-        return ReferenceStress(kind, VISIBLE_CREEP[kind])
-    bulge = getattr(specimen, "specimen", specimen)
-    assert isinstance(bulge, Bulge)
-    radius, thickness = bulge.geometry.cavity_radius / 7.5, bulge.geometry.apex_thickness / 0.5
-    stress_per_load, creep_per_strain = 14.69 * (radius / thickness) ** 1.17, 42.3 * radius**1.486 * thickness**-0.486
-    return ReferenceStress(
-        kind, VISIBLE_CREEP[kind], stress_per_load, creep_per_strain, bulge.geometry.apex_thickness, (-1.17, -0.486)
-    )
+    """The reference of a specimen; DatasetError, with the attribute to add, where its record does not say it."""
+    known, visible = specimen_conditions(specimen), creep_output(specimen).visible
+    scaling: LoadScaling | None = getattr(record_of(specimen), "load_scaling", None)
+    if scaling is None:
+        stated_method(specimen, "reference_stress", "which von Mises stress, MPa, stands for a test")
+        growth = "by how much its output grows for each unit of strain at the reference stress"
+        stated_method(specimen, "growth_per_strain", growth)
+    return ReferenceStress(specimen, known, visible, scaling)

@@ -37,7 +37,7 @@ class Relaxation(Bar):
 
     name: ClassVar[str] = "relaxation"
     title: ClassVar[str] = "Uniaxial tension under held total strain, or steps and ramps of it"
-    outputs: ClassVar[tuple[Output, ...]] = (Output("stress", "stress", grows=False),)
+    outputs: ClassVar[tuple[Output, ...]] = (Output("stress", "stress", grows=False, visible=1.0),)
     loads: ClassVar[tuple[Load, ...]] = (Load("strain", "strain", "total strain"),)
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {"strain": (5e-4, 5e-3), "modulus": (50e3, 300e3)}
@@ -78,6 +78,10 @@ class Relaxation(Bar):
         levels = np.unique(point_test(history).driving.values)
         outputs = np.abs(history.outputs["stress"][history.used]) if "stress" in history.outputs else levels[levels > 0]
         return np.array([float(np.min(outputs[outputs > 0], initial=levels.max())), float(levels.max())])
+
+    def growth_per_strain(self, history: History) -> float:
+        """MPa by which the stress falls for each unit of creep strain while the total strain is held: the modulus."""
+        return float(point_test(history).stiffness)
 
     def reference_strain(self, history: History) -> float:
         """The largest creep strain that a test reached, as far as its stress says."""

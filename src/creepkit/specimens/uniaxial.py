@@ -19,8 +19,9 @@ from creepkit import integration
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
-from creepkit.records import History, Load, Output, Prediction, Specimen, Status, TimesToStrain
+from creepkit.records import History, Load, Loading, Output, Prediction, Specimen, Status, StressSteps, TimesToStrain
 from creepkit.specimens.bar import Bar, elastic_strain, observed_strain
+from creepkit.specimens.load_scaling import LoadScaling
 
 if TYPE_CHECKING:
     from creepkit.integration import Integration, PointTest
@@ -37,6 +38,19 @@ class Uniaxial(Bar):
     loads: ClassVar[tuple[Load, ...]] = (Load("stress", "stress"),)
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({"stress": (40.0, 300.0)})
     """Stresses, MPa, of the paper's dimple of 0.5 mm under its pressures, about 12.5 times them."""
+    dataset_names: ClassVar[Mapping[str, str]] = MappingProxyType({"jump_time": "Tj"})
+    """What data sets call the conditions of its tests."""
+    load_scaling: ClassVar[LoadScaling] = LoadScaling()
+    """For sampling: the reference stress is the load itself."""
+
+    def planned_loading(self, levels: tuple[float, float], jump_time: float) -> Loading:
+        """The loading of a sample of a data set: both stresses, MPa, the second from `jump_time`, s, on."""
+        first, second = levels
+        return StressSteps(((0.0, first),) if first == second else ((0.0, first), (jump_time, second)))
+
+    def growth_per_strain(self, history: History) -> float:
+        """Strain that is observed for each unit of creep strain."""
+        return 1.0
 
     def point_test(self, history: History) -> PointTest:
         """The stress and the temperature over time."""

@@ -86,8 +86,8 @@ class ApplicabilityDomain:
 
     def excess(self, rows: Floats) -> Floats:
         """By what share of its training range each input of rows (..., inputs) leaves it, likewise; negative inside."""
-        width = np.where(self.high > self.low, self.high - self.low, 1e-6 * self.scale)
-        return np.asarray(np.maximum(self.low - rows, rows - self.high) / width)
+        extent = np.where(self.high > self.low, self.high - self.low, 1e-6 * self.scale)
+        return np.asarray(np.maximum(self.low - rows, rows - self.high) / extent)
 
     def _beyond_margin(self, rows: Floats) -> Floats:
         return self.excess(rows) - self.margin

@@ -1,4 +1,4 @@
-"""Surrogates by name (reduced-order models of specimens that come with creepkit) or from a file (trained networks)."""
+"""Surrogates by name (the reduced-order models of known specimens) or from a file (trained networks)."""
 
 from __future__ import annotations
 
@@ -8,14 +8,22 @@ from typing import Any
 
 from creepkit.errors import CreepkitError, SurrogateError, nearest
 from creepkit.files.json_documents import check_keys
-from creepkit.records import Predictor, SupportsReducedOrderModel
-from creepkit.registry import default_registry
+from creepkit.records import Predictor, SupportsReducedOrderModel, known_specimens
 from creepkit.surrogates.recipe import SurrogateMetadata
 from creepkit.surrogates.surrogate import Recipe, Surrogate
 from creepkit.surrogates.weight_files import CODEC, read_weights
 
-REDUCED_ORDER_MODELS = {"dimple": "bulge"}
-"""{name of a surrogate that comes with creepkit: the registered specimen whose reduced-order model it is}."""
+
+def reduced_order_models() -> dict[str, SupportsReducedOrderModel]:
+    """{name of a surrogate: the known specimen whose reduced-order model it is}.
+
+    The name is the specimen's `surrogate_name`, by default its own.
+    """
+    return {
+        getattr(specimen, "surrogate_name", name): specimen
+        for name, specimen in known_specimens().items()
+        if isinstance(specimen, SupportsReducedOrderModel)
+    }
 
 
 SUFFIX = ".safetensors"
@@ -24,12 +32,10 @@ SUFFIX = ".safetensors"
 def surrogate_by_name(name_or_path: str | Path) -> Predictor:
     """The reduced-order model of this name, or the trained network in this file."""
     text = str(name_or_path)
-    if isinstance(name_or_path, str) and text in REDUCED_ORDER_MODELS:
-        specimen = default_registry().specimen(REDUCED_ORDER_MODELS[text])
-        assert isinstance(specimen, SupportsReducedOrderModel)
-        return specimen.reduced_order_model()
+    if isinstance(name_or_path, str) and not text.endswith(SUFFIX) and text in (named := reduced_order_models()):
+        return named[text].reduced_order_model()
     if not (text.endswith(SUFFIX) or Path(text).exists()):
-        choices = nearest(text, REDUCED_ORDER_MODELS)
+        choices = nearest(text, reduced_order_models())
         raise SurrogateError(f"no surrogate is called '{text}', and there is no such file; {choices}")
     return load_surrogate(text)
 

@@ -209,7 +209,7 @@ class ParameterNetwork:
 
         constants : (1 + directions, rows, constants). series : (frames, tests, series).
         """
-        first, (width, rows, columns) = self.layers[0], constants.shape
+        first, (variants, rows, columns) = self.layers[0], constants.shape
         constant_part = _product(constants, first.input_weights[:columns])
         constant_part[0] += first.input_bias
         series_part = _product(series, first.input_weights[columns:])
@@ -217,7 +217,7 @@ class ParameterNetwork:
         frames_of_cell: Callable[[RecurrentLayer, Floats, LayerState], Floats]
         frames_of_cell = _gru_frames if self.cell == "gru" else _lstm_frames
         state_count = 1 if self.cell == "gru" else 2
-        states = [[np.zeros((width, rows, w.hidden)) for _ in range(state_count)] for w in self.layers]
+        states = [[np.zeros((variants, rows, w.hidden)) for _ in range(state_count)] for w in self.layers]
         blocks = []
         for start in range(0, len(series), FRAMES_IN_BLOCK):
             block = series_part[start : start + FRAMES_IN_BLOCK]

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from creepkit.errors import SurrogateError, nearest
-from creepkit.records import Specimen
+from creepkit.records import Specimen, outputs_of
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.network_evaluation import ParameterNetwork, RecurrentCell
 from creepkit.surrogates.parameter_inputs import (
-    CONSTANT_INPUTS,
     SERIES_INPUTS,
     LawInputs,
     LoadHistoryInputs,
     base_outputs,
+    constant_inputs,
     load_history_arrays,
 )
 from creepkit.surrogates.parameter_surrogate import ParameterSurrogate
@@ -38,17 +38,19 @@ class ParameterGru:
     inputs : inputs at each frame, of "load" (at the frame, all that the paper uses), "mean_load" (since the
         frame before: it tells when between two frames the load jumped), "time" and "step". () is "load" alone, and for
         grids that stretch with the test "load", "mean_load", "time" and "step".
-    target : "value" of the first output, or its "log".
+    target : "value" of the first output, its "log", or "record": the log where the specimen's record says that it is
+        compared by its logarithm.
     base : "none"; or "reduced-order": the specimen's reduced-order model predicts the first output, and the network
-        corrects the logarithm of it. Derivatives are then left to differences.
+        corrects the logarithm of it; or "reference-stress": a material point at the reference stress of the specimen's
+        record does. Derivatives are then left to differences.
     """
 
     hidden: int = 128
     layers: int = 3
     cell: RecurrentCell = "gru"
     inputs: tuple[str, ...] = ()
-    target: Literal["value", "log"] = "value"
-    base: Literal["none", "reduced-order"] = "none"
+    target: Literal["value", "log", "record"] = "value"
+    base: Literal["none", "reduced-order", "reference-stress"] = "none"
     training: Training = field(default_factory=Training)
 
     kind: ClassVar[str] = "parameter-gru"
@@ -59,7 +61,11 @@ class ParameterGru:
             value = getattr(self, name)
             if value != int(value) or not 1 <= value <= largest:
                 raise SurrogateError(f"ParameterGru: {name} is {value}; allowed are whole numbers from 1 to {largest}")
-        choices = {"cell": ("gru", "lstm"), "target": ("value", "log"), "base": ("none", "reduced-order")}
+        choices = {
+            "cell": ("gru", "lstm"),
+            "target": ("value", "log", "record"),
+            "base": ("none", "reduced-order", "reference-stress"),
+        }
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 raise SurrogateError(
@@ -83,7 +89,7 @@ class ParameterGru:
             "targets": np.where(mask[..., None], data.values, 0.0),
         }
         if self.base != "none":
-            arrays["base"] = base_outputs(data, progress)
+            arrays["base"] = base_outputs(data, self.base, progress)
         single = {name: np.asarray(v, np.float32) for name, v in arrays.items()}
         return {**single, "mask": mask, "domain": np.concatenate([rows, domain_rows], axis=1)}
 
@@ -92,7 +98,7 @@ class ParameterGru:
         from creepkit.surrogates.parameter_network import ParameterModule
 
         sizes = samples["constants"].shape[-1], samples["series"].shape[-1], len(data.outputs)
-        log, based = self.target == "log", self.base != "none"
+        log, based = self._learns_logarithm(data.specimen), self.base != "none"
         network = ParameterModule(sizes, self.hidden, self.layers, self.cell, logarithm=log, corrects_base=based)
         return network.with_scales(samples, train)
 
@@ -129,7 +135,7 @@ class ParameterGru:
             weights,
             (len(metadata.scaling["inputs"]), series, len(metadata.outputs)),
             (self.cell, self.hidden, self.layers),
-            logarithm=self.target == "log",
+            logarithm=self._learns_logarithm(metadata.specimen),
             corrects_base=self.base != "none",
         )
 
@@ -140,9 +146,12 @@ class ParameterGru:
         return self.inputs or (SERIES_INPUTS if relative else SERIES_INPUTS[:1])
 
     def history_inputs(self, specimen: Specimen, conditions: tuple[str, ...], relative: bool) -> LoadHistoryInputs:
-        """The inputs that tests give: which of CONSTANT_INPUTS varied in training, and the series."""
-        constants = tuple(name for name in CONSTANT_INPUTS if name in conditions)
+        """The inputs that tests give: modulus, lengths and temperature that varied in training, and the series."""
+        constants = constant_inputs(specimen, conditions)
         return LoadHistoryInputs(specimen, constants, self.series_inputs(relative), relative)
+
+    def _learns_logarithm(self, specimen: Specimen) -> bool:
+        return self.target == "log" or (self.target == "record" and outputs_of(specimen)[0].logarithmic)
 
     def _history_inputs(self, data: Dataset) -> LoadHistoryInputs:
         return self.history_inputs(data.specimen, data.condition_names, data.grid.relative)

@@ -7,7 +7,7 @@ coefficients of these terms at zero.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
@@ -18,20 +18,31 @@ from creepkit.arrays import Floats
 from creepkit.errors import DatasetError, SurrogateError
 from creepkit.kernels.log_form import log_form
 from creepkit.language import CreepLaw
-from creepkit.records import History, Program, Specimen, SupportsReducedOrderModel
+from creepkit.records import (
+    Dimension,
+    History,
+    Program,
+    Specimen,
+    SupportsReducedOrderModel,
+    dimension_named,
+    dimensions_of,
+)
+from creepkit.sampling.specimen_conditions import MODULUS, TEMPERATURE
 from creepkit.surrogates.recipe import ProgressCallback
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
 
 
-CONSTANT_INPUTS = ("modulus", "apex_thickness", "temperature")
-"""Conditions that do not change during a test: MPa, mm, K."""
+def constant_inputs(specimen: Specimen, conditions: Sequence[str]) -> tuple[str, ...]:
+    """Those conditions of a data set that do not change during a test: modulus (MPa), lengths (mm), temperature (K)."""
+    lengths = (length.name for length in dimensions_of(specimen))
+    return tuple(name for name in (MODULUS, *lengths, TEMPERATURE) if name in conditions)
 
 
 SERIES_INPUTS = ("load", "mean_load", "time", "step")
-"""Inputs at each frame: the load there, its mean since the frame before (MPa), log10 of 1 s + the time, and of 1 s +
-the time since the frame before."""
+"""Inputs at each frame: the load there and its mean since the frame before, in its unit; log10 of 1 s + the time, and
+of 1 s + the time since the frame before."""
 
 
 TEMPERATURE_STEP = 0.1
@@ -50,8 +61,8 @@ LARGEST_TEMPERATURE_CHANGE = 1.0
 class LoadHistoryInputs:
     """Inputs that tests of one specimen give.
 
-    constants : of CONSTANT_INPUTS, those that the data set varied. series : of SERIES_INPUTS, those of the
-    recipe. relative : whether frames are at shares of a test's end.
+    constants : those of constant_inputs(), which the data set varied. series : of SERIES_INPUTS, those of the recipe.
+    relative : whether frames are at shares of a test's end.
     """
 
     specimen: Specimen
@@ -63,6 +74,11 @@ class LoadHistoryInputs:
         """(constants,) of one test."""
         return np.array([_constant_input(name, history, self.specimen) for name in self.constants])
 
+    @property
+    def nuisances(self) -> tuple[str, ...]:
+        """The nuisances that change the constants, in their order; a length goes by its alias where it has one."""
+        return tuple(_nuisance_of(name, self.specimen) for name in self.constants)
+
     def with_nuisances(
         self, history: History, nuisances: Mapping[str, Floats], count: int
     ) -> tuple[Floats, dict[str, Floats]]:
@@ -73,9 +89,11 @@ class LoadHistoryInputs:
         values = np.tile(self.constant_values(history), (count, 1))
         derivatives = {kind: np.zeros_like(values) for kind in nuisances}
         position = {name: k for k, name in enumerate(self.constants)}
-        if "thickness" in nuisances:
-            values[:, position["apex_thickness"]] = nuisances["thickness"]
-            derivatives["thickness"][:, position["apex_thickness"]] = 1.0
+        for kind, given in nuisances.items():
+            length = dimension_named(self.specimen, kind)
+            if length is not None:
+                values[:, position[length.name]] = given
+                derivatives[kind][:, position[length.name]] = 1.0
         if "temperature" in nuisances:
             temperature_change = nuisances["temperature"]
             values[:, position["temperature"]] += temperature_change
@@ -97,50 +115,58 @@ class LoadHistoryInputs:
 
     def series_values(self, history: History, times: Floats) -> Floats:
         """(frames, series) at times (frames,) s."""
-        program = history.loading.program()
+        program = imposed_program(history)
         return np.stack([_SERIES_FUNCTIONS[name](program, times) for name in self.series], axis=1)
 
     def domain_inputs(self, history: History, times: Floats) -> Floats:
         """Inputs of the applicability domain from a test, (inputs,), named by `domain_names`; times : (frames,) s.
 
-        The constants, and a thickness also where it did not vary; of the load over the frames the value at the first
-        that is loaded, the last, the mean, and how unlike one jump from the first to the last it is; and where grids
-        stretch with the test log10 of its end.
+        The constants, and lengths that differ from test piece to test piece also where they did not vary; of the load
+        over the frames the value at the first that is loaded, the last, the mean, and how unlike one jump from the
+        first to the last it is; and where grids stretch with the test log10 of its end.
         """
         load = _load_after_start(history, times)
         load_summary = [load[0], load[-1], load.mean(), _deviation_from_jump(load)]
-        fixed_thickness = [apex_thickness_of(history, self.specimen)] if self._has_fixed_thickness else []
+        fixed_lengths = [length_of(history, length) for length in self._fixed_lengths]
         end = [np.log10(times[-1])] if self.relative else []
-        return np.array([*self.constant_values(history), *fixed_thickness, *load_summary, *end])
+        return np.array([*self.constant_values(history), *fixed_lengths, *load_summary, *end])
 
     def domain_names(self, history: History) -> tuple[str, ...]:
         """Of what `domain` gives."""
         load = history.loading.quantity
         load_names = (f"first {load}", f"last {load}", f"mean {load}", f"{load} unlike one jump")
-        fixed_names = ("apex_thickness",) if self._has_fixed_thickness else ()
+        fixed_names = (length.name for length in self._fixed_lengths)
         return (*self.constants, *fixed_names, *load_names, *(("log10 end_time",) if self.relative else ()))
 
     @property
-    def _has_fixed_thickness(self) -> bool:
-        geometry = getattr(self.specimen, "geometry", None)
-        return "apex_thickness" not in self.constants and hasattr(geometry, "apex_thickness")
+    def _fixed_lengths(self) -> tuple[Dimension, ...]:
+        """Lengths that have a tolerance, and that the data set did not vary."""
+        stated = dimensions_of(self.specimen)
+        return tuple(length for length in stated if length.tolerance > 0.0 and length.name not in self.constants)
+
+
+def _nuisance_of(name: str, specimen: Specimen) -> str:
+    length = dimension_named(specimen, name)
+    return name if length is None else length.alias or length.name
 
 
 def _constant_input(name: str, history: History, specimen: Specimen) -> float:
     where = history.origin
     temperature = history.temperature_program().values
-    if name in ("modulus", "temperature") and np.ptp(temperature) > LARGEST_TEMPERATURE_CHANGE:
+    if name in (MODULUS, TEMPERATURE) and np.ptp(temperature) > LARGEST_TEMPERATURE_CHANGE:
         raise SurrogateError(
             f"{where}: its temperature goes from {temperature.min():g} to {temperature.max():g} K; the surrogate was "
             "trained at temperatures that do not change, use the specimen itself"
         )
-    if name == "temperature":
+    if name == TEMPERATURE:
         return float(temperature.mean())
-    if name == "modulus":
+    if name == MODULUS:
         if history.elastic is None:
             raise SurrogateError(f"{where}: the surrogate needs the modulus; set elastic=Elastic(E=150e3), in MPa")
         return float(history.elastic.at(float(temperature.mean())).E)
-    return apex_thickness_of(history, specimen)
+    length = dimension_named(specimen, name)
+    assert length is not None  # constant_inputs() has found it
+    return length_of(history, length)
 
 
 def _modulus_at(history: History, temperature_changes: Floats) -> Floats:
@@ -150,15 +176,22 @@ def _modulus_at(history: History, temperature_changes: Floats) -> Floats:
     return np.array([float(history.elastic.at(T + float(step)).E) for step in temperature_changes])
 
 
-def apex_thickness_of(history: History, specimen: Specimen) -> float:
-    """The apex thickness of a test, mm: its own, or the specimen's."""
-    geometry: Any = getattr(specimen, "geometry", None)
-    return float(history.geometry.get("apex_thickness", getattr(geometry, "apex_thickness", np.nan)))
+def length_of(history: History, length: Dimension) -> float:
+    """A length of a test, mm: its own, or the specimen's."""
+    return float(history.geometry.get(length.name, length.default))
+
+
+def imposed_program(history: History) -> Program:
+    """What is imposed in a test, as data sets have it: a strain is the logarithmic one."""
+    program = history.loading.program()
+    if history.loading.quantity != "strain" or history.strain_measure == "logarithmic":
+        return program
+    return Program(program.times, np.log1p(program.values))
 
 
 def _load_after_start(history: History, times: Floats) -> Floats:
-    """The load from the first frame on that is loaded, MPa."""
-    load = history.loading.program().at(times)
+    """The load from the first frame on that is loaded, in its unit."""
+    load = imposed_program(history).at(times)
     loaded = np.flatnonzero(load > 0)
     return load[loaded[0] :] if loaded.size else load
 
@@ -278,17 +311,20 @@ def _term_coefficient(law: CreepLaw, label: str) -> str | None:
     return None
 
 
-def base_outputs(data: Dataset, progress: ProgressCallback | None = None) -> Floats:
-    """(n, frames) first output of the specimen's reduced-order model; its last value after its end."""
-    reduced_model = reduced_order_model_of(data.specimen)
-    base, theta = np.empty(data.values.shape[:2]), data.law.to_internal(data.parameters)
+def base_outputs(data: Dataset, base: str, progress: ProgressCallback | None = None) -> Floats:
+    """(n, frames) first output by the model that is corrected; its last value after its end.
+
+    base : see base_model().
+    """
+    model = base_model(data.specimen, base)
+    values, theta = np.empty(data.values.shape[:2]), data.law.to_internal(data.parameters)
     for k in range(len(data)):
         plan = data.planned_test(k).replace(times=data.times(k))
-        prediction = reduced_model.predict(data.law, theta[k : k + 1], [plan])
-        base[k] = hold_last_value(prediction.values[0, 0, :, prediction.outputs.index(data.outputs[0])])
+        prediction = model.predict(data.law, theta[k : k + 1], [plan])
+        values[k] = hold_last_value(prediction.values[0, 0, :, prediction.outputs.index(data.outputs[0])])
         if progress is not None:
             progress("base", k + 1, len(data), "")
-    return base
+    return values
 
 
 def load_history_arrays(
@@ -313,10 +349,19 @@ def load_history_arrays(
     return constants, series, domain_rows
 
 
-def reduced_order_model_of(specimen: Any) -> Any:
-    """The specimen's reduced-order model; SurrogateError where it has none."""
+def base_model(specimen: Any, base: str) -> Any:
+    """The model that a network corrects: "reduced-order", the specimen's own, or "reference-stress", of its record.
+
+    SurrogateError where the specimen has none.
+    """
+    if base == "reference-stress":
+        from creepkit.surrogates.reference_stress_model import ReferenceStressModel
+
+        return ReferenceStressModel(specimen)
     if not isinstance(specimen, SupportsReducedOrderModel):
-        raise SurrogateError(f"specimen '{specimen.name}' has no reduced-order model; use base='none'")
+        raise SurrogateError(
+            f"specimen '{specimen.name}' has no reduced-order model; use base='none' or base='reference-stress'"
+        )
     return specimen.reduced_order_model()
 
 

@@ -25,9 +25,9 @@ from creepkit.surrogates.network_evaluation import ParameterNetwork
 from creepkit.surrogates.parameter_inputs import (
     LawInputs,
     LoadHistoryInputs,
+    base_model,
     complete_parameters,
     hold_last_value,
-    reduced_order_model_of,
     zero_coefficients,
 )
 from creepkit.surrogates.recipe import SampleArrays, SurrogateMetadata, Weights
@@ -42,9 +42,6 @@ from creepkit.surrogates.surrogate import (
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
-
-NUISANCE_OF_INPUT = {"modulus": "modulus", "apex_thickness": "thickness", "temperature": "temperature"}
-"""{input: the nuisance that changes it}."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +97,7 @@ class ParameterSurrogate(Surrogate):
     @property
     def nuisances(self) -> tuple[str, ...]:  # type: ignore[override]
         """The nuisances whose inputs were varied."""
-        return tuple(NUISANCE_OF_INPUT[name] for name in self._history_inputs.constants)
+        return self._history_inputs.nuisances
 
     def outside_class(self, law: CreepLaw) -> str:
         """Why it does not predict a law, in a sentence; "" where it does."""
@@ -176,9 +173,11 @@ class ParameterSurrogate(Surrogate):
     def _base(
         self, theta: Floats, histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues
     ) -> Floats:
-        """(candidates, tests, frames) what the specimen's reduced-order model predicts of the first output."""
+        """(candidates, tests, frames) what the model that is corrected predicts of the first output."""
         tests = [h.replace(times=t, outputs={}) for h, t in zip(histories, frames, strict=True)]
-        prediction = reduced_order_model_of(self.specimen).predict(self.metadata.law, theta, tests, nuisances=nuisances)
+        prediction = base_model(self.specimen, self.recipe.base).predict(
+            self.metadata.law, theta, tests, nuisances=nuisances
+        )
         return hold_last_value(prediction.values[..., prediction.outputs.index(self.outputs[0])])
 
     # ---- outputs ---------------------------------------------------------------------------------------------------

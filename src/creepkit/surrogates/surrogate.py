@@ -23,9 +23,12 @@ from creepkit.records import (
     SupportsRefinement,
     broadcast_candidates,
     check_nuisances,
+    dimension_named,
+    outputs_of,
     unpredicted,
 )
-from creepkit.sampling.conditions import TimeGrid, test_kind
+from creepkit.sampling.conditions import TimeGrid
+from creepkit.sampling.specimen_conditions import specimen_conditions
 from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, SurrogateMetadata, Training, Weights
 from creepkit.surrogates.weight_files import CODEC, write_weights
 
@@ -35,10 +38,6 @@ if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
     from creepkit.language import CreepLaw
     from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors
-
-
-CONTROLLED_QUANTITY = {"bulge": "pressure", "uniaxial": "stress"}
-"""What drives the tests of each kind of specimen."""
 
 
 RELATIVE_TOLERANCE = 1e-6
@@ -56,7 +55,7 @@ def check_applicable(
 def check_history(metadata: SurrogateMetadata, history: History) -> None:
     """SurrogateError where a history is of another kind of test than those of the training."""
     where, specimen = history.origin, metadata.specimen
-    quantity = CONTROLLED_QUANTITY[test_kind(specimen)]
+    quantity = specimen_conditions(specimen).load.name
     if history.loading.quantity != quantity:
         raise SurrogateError(f"{where}: its {history.loading.quantity} is prescribed; the surrogate knows {quantity}")
     control = getattr(history.loading, "control", None)
@@ -71,19 +70,20 @@ def check_history(metadata: SurrogateMetadata, history: History) -> None:
     observation = getattr(specimen, "observation", None)
     if observation is not None and history.operator and history.operator != str(observation):
         raise SurrogateError(f"{where}: observed by '{history.operator}'; the surrogate was trained on '{observation}'")
-    _check_lengths(where, history, getattr(specimen, "geometry", None))
+    _check_lengths(where, metadata, history)
 
 
-def _check_lengths(where: str, history: History, geometry: Any) -> None:
-    """Lengths but the apex thickness, which the applicability domain checks, must be those of the specimen."""
+def _check_lengths(where: str, metadata: SurrogateMetadata, history: History) -> None:
+    """Lengths must be those of the specimen, but for those that the applicability domain checks.
+
+    These are the lengths that were varied, and those that differ from test piece to test piece.
+    """
     for name, value in history.geometry.items():
-        trained = getattr(geometry, name, None)
-        if (
-            name != "apex_thickness"
-            and trained is not None
-            and abs(float(trained) - value) > RELATIVE_TOLERANCE * abs(float(trained))
-        ):
-            raise SurrogateError(f"{where}: {name} is {value:g} mm; the surrogate was trained on {float(trained):g} mm")
+        length = dimension_named(metadata.specimen, name)
+        if length is None or length.tolerance > 0.0 or length.name in metadata.conditions:
+            continue
+        if abs(length.default - value) > RELATIVE_TOLERANCE * length.default:
+            raise SurrogateError(f"{where}: {name} is {value:g} mm; the surrogate was trained on {length.default:g} mm")
 
 
 def prediction_frames(grid: TimeGrid, histories: Sequence[History]) -> list[Floats]:
@@ -110,18 +110,25 @@ def interpolation_weights(frames: Floats, times: Floats) -> Floats:
 
 
 def observed_outputs(specimen: Specimen, history: History, values: Floats) -> Floats:
-    """What a history's instrument shows, (candidates, times, outputs): of a bar's creep strain, its own measure.
+    """What a history's instrument shows, (candidates, times, outputs): of a creep strain, its own measure of strain.
 
     values : (candidates, times, outputs) of the network.
     """
-    observe: Any = getattr(specimen, "observed_output", None)
+    observe = _strain_method(specimen, "observed_output")
     return values if observe is None else np.asarray(observe(history, values[..., 0]))[..., None]
 
 
 def observation_derivative(specimen: Specimen, history: History, values: Floats) -> Floats:
     """Derivative of what is shown to what the network gives, values (candidates, times, outputs); of that shape."""
-    derivative: Any = getattr(specimen, "output_derivative", None)
+    derivative = _strain_method(specimen, "output_derivative")
     return np.ones_like(values) if derivative is None else np.asarray(derivative(history, values[..., 0]))[..., None]
+
+
+def _strain_method(specimen: Specimen, name: str) -> Any:
+    """A method of creep strain of a specimen whose only output is a strain; None of others, which show one thing."""
+    outputs = outputs_of(specimen)
+    only_strain = len(outputs) == 1 and outputs[0].quantity == "strain"
+    return getattr(specimen, name, None) if only_strain else None
 
 
 class Surrogate(Presentable, ABC):

@@ -246,10 +246,10 @@ def size_study(
     )
     combinations = list(product(cells, layers, hidden, counts))
     results = []
-    for k, (cell, depth, width, count) in enumerate(combinations):
+    for k, (cell, depth, size, count) in enumerate(combinations):
         settings = replace(recipe.training, samples=count)
-        variant = replace(recipe, cell=cell, layers=depth, hidden=width, training=settings)
-        path = folder / f"{cell}-{width}x{depth}-{count}.safetensors"
+        variant = replace(recipe, cell=cell, layers=depth, hidden=size, training=settings)
+        path = folder / f"{cell}-{size}x{depth}-{count}.safetensors"
         named_progress = _with_task_name(progress, f"{k + 1} of {len(combinations)}, {path.stem}")
         model = train(data, variant, to=path, seed=seed, device=device, progress=named_progress)
         results.append(_study_result(model, variant, count, path))

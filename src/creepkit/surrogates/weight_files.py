@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from creepkit import registry
 from creepkit.errors import SurrogateError
 from creepkit.files.json_documents import DocumentFormat
 from creepkit.files.reading import FileKind
@@ -15,6 +14,7 @@ from creepkit.files.safetensors_files import read_safetensors, write_safetensors
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.records import Specimen
+from creepkit.registry.arguments import specimen_by_name
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
@@ -37,7 +37,7 @@ CHECKPOINT = DocumentFormat(
 
 
 def _registered_specimen(document: Any, source: str) -> Specimen:
-    return specimen_from_json(document, source, registry.default_registry().specimen)
+    return specimen_from_json(document, source, specimen_by_name)
 
 
 CODEC = RecordCodec(

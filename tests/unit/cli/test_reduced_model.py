@@ -15,7 +15,7 @@ def test_a_model_is_trained_described_and_drawn(tmp_path):
     assert picture.stat().st_size > 10_000
 
 
-def test_only_a_dimple_has_a_reduced_order_model():
+def test_a_bar_has_no_reduced_order_model_to_train():
     said = CliRunner().invoke(app, ["reduced-model", "--specimen", "uniaxial"])
     assert said.exit_code == 1
-    assert "only a bulge has a reduced-order model" in said.output
+    assert "it has no reduced-order model that is trained; name one of those that have one: bulge" in said.output

@@ -112,8 +112,10 @@ def test_what_describes_no_test(conditions, told):
 
 
 def test_a_specimen_that_no_design_loads():
-    with pytest.raises(DatasetError, match="'relaxation'"):
-        planned_test(ck.specimen("relaxation"), TEST, GRID)
+    with pytest.raises(
+        DatasetError, match="'point' does not say between which values of its load .* add the attribute"
+    ):
+        planned_test(ck.specimen("point"), TEST, GRID)
 
 
 # ---- the paper's sampling domain -------------------------------------------------------------------------------------

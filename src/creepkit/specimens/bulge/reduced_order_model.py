@@ -134,6 +134,15 @@ class BulgeReducedOrderModel:
             refinement,
         )
 
+    def train(self) -> str:
+        """Train the model of the specimen's own dimple, and keep it on disk; its modes and points, in words."""
+        model = self.cubature_model()
+        return f"{len(model.basis.modes)} modes, {len(model.basis.points)} of {model.model.weights.size} points"
+
+    def cubature_model(self) -> ReducedOrderModel:
+        """The model of the specimen's own dimple, whose points can be drawn."""
+        return self.reduced_model_of(self.own_setup())
+
     def prediction_error(
         self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, nuisances: NuisanceValues | None = None
     ) -> Floats:

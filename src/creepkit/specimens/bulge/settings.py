@@ -11,9 +11,10 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
-from creepkit.records import Dimension, History, Load
+from creepkit.records import Dimension, History, Load, Loading, PressureJump
 from creepkit.specimens.bulge.geometry import LENGTH_RANGE, DimpleGeometry
 from creepkit.specimens.bulge.observation import PLOT_RADII, Observation, profile_displacement
+from creepkit.specimens.load_scaling import LoadScaling
 from creepkit.specimens.settings_checks import check_number, check_whole_number, is_whole_number
 
 if TYPE_CHECKING:
@@ -66,6 +67,12 @@ class BulgeSettings:
         {"pressure": (3.0, 25.0), "modulus": (50e3, 300e3)}
     )
     """The paper's ranges, MPa."""
+    dataset_names: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"pressure_1": "P1", "pressure_2": "P2", "jump_time": "Tj"}
+    )
+    """What data sets call the conditions of its tests, after the paper."""
+    surrogate_name: ClassVar[str] = "dimple"
+    """The name of its reduced-order model among the surrogates."""
 
     frame_interval: ClassVar[float] = 150.0
     """s between frames of a planned test, as the paper's cameras took them."""
@@ -110,6 +117,27 @@ class BulgeSettings:
             return {}
         radii = PLOT_RADII if {"width", "shape"} <= outputs.keys() else PLOT_RADII[:1]
         return {f"r = {radius:g} mm": profile_displacement(outputs, radius) for radius in radii}
+
+    def planned_loading(self, levels: tuple[float, float], jump_time: float) -> Loading:
+        """The loading of a sample of a data set: both pressures, MPa, the second from `jump_time`, s, on."""
+        return PressureJump(*levels, jump_time)
+
+    @property
+    def load_scaling(self) -> LoadScaling:
+        """For sampling: 14.69 P (t/0.5 mm)^-1.17, and 42.3 mm (t/0.5 mm)^-0.486 of amplitude per unit of strain.
+
+        At small deflections of a dimple of 7.5 mm cavity radius; both were fitted to simulations with the Norton law,
+        n from 1 to 8, t from 0.44 to 0.60 mm.
+        """
+        radius, own = self.geometry.cavity_radius / 7.5, self.geometry.apex_thickness
+        return LoadScaling(
+            stress_per_load=14.69 * (radius / (own / 0.5)) ** 1.17,
+            growth_per_strain=42.3 * radius**1.486 * (own / 0.5) ** -0.486,
+            length="apex_thickness",
+            nominal=own,
+            exponents=(-1.17, -0.486),
+            averaged=True,
+        )
 
     def growth_per_strain(self, history: History) -> float:
         """mm of amplitude for each unit of reference strain: 42.3 (t/0.5 mm)^-0.486 for the default.
