@@ -31,7 +31,8 @@ class Section:
     held : (nodes, 2) whether u_r and u_z are held.
     pressed : (edges, 3) element sides under the pressure of the load, which follows the deformation.
     forces : (nodes, 2) N/rad in r and z for a unit of the load, whatever the deformation.
-    planes : nodes of each face that stays plane. controlled : number of the plane that the load moves.
+    planes : nodes of each face that stays plane. controlled : number of the plane that the load moves, and
+    motion : mm of its u_z for a unit of the load.
     """
 
     nodes: Floats
@@ -43,6 +44,7 @@ class Section:
     forces: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     planes: tuple[Ints, ...] = ()
     controlled: int | None = None
+    motion: float = 1.0
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -217,11 +219,14 @@ class Section:
         """Let a side stay plane: all of it has one u_z, as where a grip or a longer body holds it. It moves freely."""
         return replace(self, planes=(*self.planes, np.unique(_side(self, side))))
 
-    def move(self, side: str) -> Self:
-        """Let the load, a displacement in mm, be u_z of a side, which stays plane; it needs a force."""
+    def move(self, side: str, by: float = 1.0) -> Self:
+        """Let the load, a displacement in mm, move a side, which stays plane; `Displacements.force` is what it needs.
+
+        by : mm of u_z of the side for a unit of the load: 0.5 in a half model whose load is the whole elongation.
+        """
         if self.controlled is not None:
             raise SolveError("the load can move one side of a section; give the others planes, forces or supports")
-        return replace(self.plane(side), controlled=len(self.planes))
+        return replace(self.plane(side), controlled=len(self.planes), motion=float(by))
 
     # ---- what it is for -------------------------------------------------------------------------------------------
 
@@ -240,7 +245,8 @@ class Section:
         """Whether two sections differ in the places of their nodes, and in the sizes of their forces, alone."""
         names = ("elements", "held", "pressed")
         same = all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
-        same &= len(self.planes) == len(other.planes) and self.controlled == other.controlled
+        same &= len(self.planes) == len(other.planes)
+        same &= (self.controlled, self.motion) == (other.controlled, other.motion)
         same &= all(np.array_equal(one, two) for one, two in zip(self.planes, other.planes, strict=False))
         return same and dict(self.points) == dict(other.points)
 

@@ -139,8 +139,10 @@ def load_history_of(specimen: AxisymmetricSettings, history: History, nuisances:
     modulus = modulus_program(tested.elastic, temperature, 1.0, where)
     poisson = float(tested.elastic.at(float(temperature.values[0])).nu)
     still, end = Program.constant(0.0), float(tested.times[-1])
-    if prepared_section(piece, tested.loading.quantity).section.controlled is not None:
-        return LoadHistory(still, temperature, modulus, end, poisson, load)
+    section = prepared_section(piece, tested.loading.quantity).section
+    if section.controlled is not None:
+        motion = Program(load.times, section.motion * load.values)
+        return LoadHistory(still, temperature, modulus, end, poisson, motion)
     return LoadHistory(load, temperature, modulus, end, poisson)
 
 
