@@ -25,7 +25,7 @@ class NotchedBar(ck.Axisymmetric):
 
     diameter: float = ck.dimension(12.0, (0.5, 500.0), tolerance=1e-3)
     notch_diameter: float = ck.dimension(8.0, (0.2, 500.0), tolerance=2e-3, long_name="diameter at the root")
-    notch_radius: float = ck.dimension(2.0, (0.05, 1000.0), tolerance=0.02, long_name="radius of the notch")
+    notch_radius: float = ck.dimension(2.5, (0.05, 1000.0), tolerance=0.02, long_name="radius of the notch")
     gauge_length: float = ck.dimension(30.0, (0.5, 2000.0), tolerance=1e-3, long_name="gauge length")
 
     name, title = "notched-bar", "Notched round bar under axial force"
@@ -71,7 +71,7 @@ class NotchedBar(ck.Axisymmetric):
         angles = np.linspace(0.0, turn, 2 * count + 1)
         root = 0.5 * self.notch_diameter + self.notch_radius * (1.0 - np.cos(angles))
         top, fan = 0.5 * self.gauge_length, self.shoulder + 0.25 * self.notch_diameter
-        ends = np.concatenate([[0.0], np.cumsum(1.3 ** np.arange(straight))])
+        ends = np.concatenate([[0.0], np.cumsum(3.0 ** np.linspace(0.0, 1.0, straight))])
         shares = np.sort(np.concatenate([ends, 0.5 * (ends[:-1] + ends[1:])]))[1:] / ends[-1]
         above = np.full(shares.size, 0.5 * self.diameter)
         surface = np.stack([root, self.notch_radius * np.sin(angles)], axis=1)
@@ -134,7 +134,9 @@ class NotchedRelaxation(NotchedBar):
         bar, _ = self.of_test(history, {})
         surface, _ = bar.profile(200, 200)
         compliance = 2.0 * np.trapezoid(1.0 / (np.pi * surface[:, 0] ** 2), surface[:, 1])
-        modulus = 150e3 if history.elastic is None else float(history.elastic.at(history.temperature_program().values[0]).E)
+        modulus = (
+            150e3 if history.elastic is None else float(history.elastic.at(history.temperature_program().values[0]).E)
+        )
         root, levels = 0.5 * bar.notch_diameter, np.unique(np.abs(history.loading.program().values))
         ratio = 2.0 * bar.notch_radius / root
         net = modulus * levels[levels > 0] / (compliance * np.pi * root**2)

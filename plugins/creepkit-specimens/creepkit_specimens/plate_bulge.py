@@ -47,9 +47,7 @@ class PlateBulge(ck.Axisymmetric):
 
     def section(self, load: str) -> ck.Section:
         """Columns of four layers, shorter towards the clamp."""
-        plate = ck.Section.rectangle(
-            (0.0, 0.0), (self.radius, self.thickness), self.columns, self.elements(4)
-        )
+        plate = ck.Section.rectangle((0.0, 0.0), (self.radius, self.thickness), self.columns, self.elements(4))
         return plate.hold("right", r=True, z=True).press("bottom")
 
     def observe(self, displacements: ck.Displacements) -> Mapping[str, np.ndarray]:

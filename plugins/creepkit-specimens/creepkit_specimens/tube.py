@@ -73,7 +73,7 @@ class Tube(ck.Axisymmetric):
         tube, _ = self.of_test(history, {})
         ratio = 1.0 - 2.0 * tube.thickness / tube.outer_diameter
         return 0.5 * math.sqrt(3.0) * tube.outer_diameter * ratio
-        
+
 
 @dataclass(frozen=True)
 class OpenTube(Tube):

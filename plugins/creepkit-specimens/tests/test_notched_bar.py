@@ -37,7 +37,9 @@ def test_without_a_notch_it_is_a_bar_under_a_dead_load(n: float) -> None:
     stress, A = 60.0, 1e-9 / 60.0**n
     end = (1.0 - np.exp(-0.2 * n)) / (n * 1e-9)
     times = np.linspace(0.1, 1.0, 8) * end
-    run = simulated(NotchedBar(**SMOOTH, tolerance=1e-3), {"A": A, "n": n}, ck.constant_load("force", stress * AREA), times)
+    run = simulated(
+        NotchedBar(**SMOOTH, tolerance=1e-3), {"A": A, "n": n}, ck.constant_load("force", stress * AREA), times
+    )
     strain = -np.log1p(-n * 1e-9 * times) / n
     np.testing.assert_allclose(run.outputs["elongation"], 20.0 * np.expm1(strain), rtol=2e-3)
     np.testing.assert_allclose(run.outputs["contraction"], -10.0 * np.expm1(-0.5 * strain), rtol=2e-3)
@@ -64,7 +66,11 @@ def test_an_imposed_elongation_needs_the_force_that_causes_it() -> None:
     pulled = simulated(NotchedBar(tolerance=2e-4), values, ramp, times[1:], elastic)
     course = Program(times, np.append(0.0, pulled.outputs["elongation"]))
     held = simulated(
-        NotchedRelaxation(tolerance=1e-3, max_steps=5000), values, ck.RecordedLoading(course, "displacement"), times[1:], elastic
+        NotchedRelaxation(tolerance=1e-3, max_steps=5000),
+        values,
+        ck.RecordedLoading(course, "displacement"),
+        times[1:],
+        elastic,
     )
     after = times[1:] > 2e4  # before, straight lines between points of a curved program are another test
     np.testing.assert_allclose(held.outputs["force"][after], 5e3, rtol=5e-3)
@@ -74,15 +80,15 @@ def test_an_imposed_elongation_needs_the_force_that_causes_it() -> None:
 
 def test_linear_creep_is_incompressible_elasticity() -> None:
     """With n = 1 rates are the displacements of an elastic bar with E = 1/A and Poisson's ratio 0.5 (Hoff 1954)."""
-    bar, force, A = NotchedBar(resolution=1e-6, tolerance=1e-3), 6000.0, 1e-12
+    bar, force, A = NotchedBar(resolution=1e-6, tolerance=1e-3, refinement=2.0), 6000.0, 1e-12
     rates = last_rates(bar, {"A": A, "n": 1.0}, force, 1e6)
     still = {"A": 1e-40, "n": 1.0}
     ends = []
-    for nu in (0.4998, 0.4999):
+    for nu in (0.49, 0.499):
         run = simulated(bar, still, ck.constant_load("force", 1e-3 * force), [1.0], ck.Elastic(E=1e5, nu=nu))
         ends.append([1e3 * 1e5 * run.outputs[name][-1] for name in bar.outputs])
-    elastic = 2.0 * np.array(ends[1]) - ends[0]
-    np.testing.assert_allclose(rates / A, elastic, rtol=2e-3)
+    elastic = (10.0 * np.array(ends[1]) - ends[0]) / 9.0  # to 0.5, at which no elastic body can be simulated
+    np.testing.assert_allclose(rates / A, elastic, rtol=1e-3)
 
 
 @pytest.mark.parametrize("n", [1.0, 3.0, 6.0])
@@ -90,8 +96,8 @@ def test_steady_creep_is_faster_than_any_plane_sections_allow(n: float) -> None:
     """Elongation rate >= F^n d^(n+1)/D^n with D the integral of A^(-1/n) e^(1+1/n) of an admissible velocity field.
 
     This follows from the minimum of the potential of rates (Hill 1956, J. Mech. Phys. Solids 5, 66). Sections that stay
-    plane have u_z' = g(z), u_r = -g r/2 and the shear strain -g' r/2; g = (a/r)^m is tried for several m. The other bound
-    is that of a bar as thick as the root throughout.
+    plane have u_z' = g(z), u_r = -g r/2 and the shear strain -g' r/2; g = (a/r)^m is tried for several m. The other
+    bound is that of a bar as thick as the root throughout.
     """
     bar, force, strength = NotchedBar(resolution=1e-6, tolerance=1e-3), 6000.0, 120.0
     A = 1e-9 / strength**n
@@ -110,12 +116,11 @@ def test_steady_creep_is_faster_than_any_plane_sections_allow(n: float) -> None:
         bounds.append(force**n * stretch ** (n + 1.0) / dissipation**n)
     least, most = max(bounds), A * (force / (16.0 * np.pi)) ** n * 30.0
     rate = last_rates(bar, {"A": A, "n": n}, force, 1e-5 * 1e9)[0]
-    print(n, least, rate, most)
     assert least < rate < most
 
 
 def test_a_notch_too_deep_is_refused() -> None:
-    with pytest.raises(ck.errors.SolveError, match="makes the notch 3 mm deep; allowed is more than 0, up to notch_radius, 2"):
+    with pytest.raises(ck.errors.SolveError, match="makes the notch 3 mm deep; allowed is more than 0, up to"):
         NotchedBar(notch_diameter=6.0)
-    with pytest.raises(ck.errors.SolveError, match="gauge_length is 10 mm; allowed is more than 12 mm"):
+    with pytest.raises(ck.errors.SolveError, match="gauge_length is 10 mm; allowed is more than 12"):
         NotchedBar(gauge_length=10.0)

@@ -10,7 +10,7 @@ from creepkit_specimens.tube import OpenTube, Tube
 
 import creepkit as ck
 
-FINE = {"tolerance": 2e-4, "threads": 1}
+FINE = {"tolerance": 5e-5, "threads": 1}
 """Steps so small that the differences in the steps that two simulations choose do not matter."""
 E_OF_T = ck.Elastic(E=150e3 - 60.0 * (ck.temperature - 1000.0))
 CASES = {
@@ -31,7 +31,7 @@ def test_derivatives_are_those_of_differences(case: str) -> None:
     The law's rate depends on temperature, so that a warmer test differs by more than its modulus.
     """
     specimen, loading, load_step = CASES[case]
-    law = ck.arrhenius(ck.law("norton"), at=1000.0) if False else ck.law("norton")
+    law = ck.law("norton").times(ck.arrhenius(1000.0, 300e3))
     plan = ck.History(
         name="plan", specimen=specimen.name, loading=loading, temperature=1000.0, elastic=E_OF_T,
         times=np.geomspace(3600.0, 2e5, 8), outputs={name: np.zeros(8) for name in specimen.outputs},
@@ -55,12 +55,12 @@ def test_derivatives_are_those_of_differences(case: str) -> None:
     for key, value in nuisances.items():
         step = STEPS.get(key, 1e-3 * value)
         up, down = (values(theta, **{key: columns[key] + s}) for s in (step, -step))
-        compare(found.nuisance_jacobian[key][0, 0], (up - down) / (2 * step), key)
+        lost = 1e-5 * np.abs(up).max(axis=0) / max(abs(value), 1.0)  # by the difference of all but equal outputs
+        compare(found.nuisance_jacobian[key][0, 0], (up - down) / (2 * step), key, lost)
 
 
-def compare(found: np.ndarray, known: np.ndarray, what: str) -> None:
-    """Each output's derivatives (times, outputs), against the largest of them."""
+def compare(found: np.ndarray, known: np.ndarray, what: str, lost=0.0) -> None:
+    """Each output's derivatives (times, outputs), against the largest of them; lost : (outputs,) what may be missed."""
     largest = np.abs(known).max(axis=0)
     error = np.abs(found - known).max(axis=0)
-    print(what, error/largest)
-    assert (error <= 2e-3 * largest).all(), what
+    assert (error <= 2e-3 * largest + lost).all(), what

@@ -50,7 +50,10 @@ def steady_velocity(inner: float, outer: float, pressure: float, A: float, n: fl
     R. W. Bailey 1935, Proc. Inst. Mech. Engrs 131, 131; a closed tube has no axial strain either.
     """
     return (
-        (np.sqrt(3.0) / 2.0) ** (n + 1) * A * (2.0 * pressure / n / ((outer / inner) ** (2.0 / n) - 1.0)) ** n * outer**2
+        (np.sqrt(3.0) / 2.0) ** (n + 1)
+        * A
+        * (2.0 * pressure / n / ((outer / inner) ** (2.0 / n) - 1.0)) ** n
+        * outer**2
     )
 
 
@@ -101,9 +104,10 @@ def test_large_strain_with_no_axial_strain(n: float) -> None:
 
 
 def test_a_viscoelastic_tube_as_code_aster() -> None:
-    """Its case ssna104a: tube of radii 1 and 2, E = 1, nu = 0.3, rate = stress, p = 1e-3 (here 1e5 times the stiffness).
+    """Its case ssna104a: tube of radii 1 and 2, E = 1, nu = 0.3, rate = stress, p = 1e-3 (here all 1e5 times that).
 
-    Its strains of 2e-3 are infinitesimal, so a hundredth of its pressure acts here. It documents 2.14498e-3 for u_r at the outer surface at t = 0.9; the formula behind it is that of a Maxwell tube.
+    Its strains of 2e-3 are infinitesimal, so a hundredth of its pressure acts here. It documents 2.14498e-3 for u_r at
+    the outer surface at t = 0.9; the formula behind it is that of a Maxwell tube.
     """
     p, nu, t = 1e-3, 0.3, np.array([1e-3, 0.1, 0.5, 0.9])
     tube = PlaneStrainTube(4.0, 1.0, tolerance=1e-4, resolution=1e-6)
@@ -115,7 +119,7 @@ def test_a_viscoelastic_tube_as_code_aster() -> None:
 
 
 def test_stresses_as_calculix() -> None:
-    """CalculiX 2.20, tube of radii 100 and 200 mm under 200 MPa, n = 5 (NAFEMS R0049, case CR4): stresses r, z, hoop."""
+    """CalculiX 2.20, radii 100 and 200 mm, 200 MPa, n = 5 (NAFEMS R0049, case CR4): stresses along r, z and the hoop."""
     calculix = {
         102.5: (-191.894, -28.349, 135.195),
         122.5: (-135.599, 16.688, 168.976),
@@ -133,5 +137,7 @@ def test_stresses_as_calculix() -> None:
 
 
 def test_a_solid_tube_is_refused() -> None:
-    with pytest.raises(ck.errors.SolveError, match="thickness is 10 mm; allowed is less than half of the outer diameter"):
+    with pytest.raises(
+        ck.errors.SolveError, match="thickness is 10 mm; allowed is less than half of the outer diameter"
+    ):
         Tube(20.0, 10.0)

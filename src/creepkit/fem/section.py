@@ -31,7 +31,7 @@ class Section:
     held : (nodes, 2) whether u_r and u_z are held.
     pressed : (edges, 3) element sides under the pressure of the load, which follows the deformation.
     forces : (nodes, 2) N/rad in r and z for a unit of the load, whatever the deformation.
-    planes : nodes of each face that stays plane. controlled : number of the plane that the load moves, and
+    planes : (nodes,) those of each face that stays plane. controlled : number of the plane that the load moves, and
     motion : mm of its u_z for a unit of the load.
     """
 
@@ -67,9 +67,10 @@ class Section:
     ) -> Self:
         """A rectangle between two corners (r, z), mm, with the sides bottom, right, top and left.
 
-        columns, layers : number of elements along r and along z, or their boundaries as shares from 0 to 1. Its corners
-        are the points bottom_left, bottom_right, top_left and top_right. The fewer layers the faster: put the longer
-        row of elements along the columns.
+        columns, layers : numbers of elements along r and along z, or (columns + 1,) and (layers + 1,) their boundaries
+            as shares from 0 to 1.
+        Its corners are the points bottom_left, bottom_right, top_left and top_right. The fewer layers the faster: put
+        the longer row of elements along the columns.
         """
         (r, z), (far_r, far_z) = corner, opposite
         along = _with_middles(_breaks(columns))
@@ -84,7 +85,7 @@ class Section:
 
         inner, outer : (2 columns + 1, 2) mm, corner and middle nodes of the element sides along each line, in turn;
             going along the inner one the outer lies to the left. Nodes between them lie on straight lines.
-        layers : number of elements across, or their boundaries as shares from 0, inner, to 1.
+        layers : number of elements across, or (layers + 1,) their boundaries as shares from 0, inner, to 1.
         The ends of the lines are the points inner_first, inner_last, outer_first and outer_last.
         """
         lines = [np.asarray(line, dtype=float) for line in (inner, outer)]
@@ -146,11 +147,13 @@ class Section:
             order, elements, new = better, place[elements], np.where(new >= 0, place[new], -1)
         number = new[number]
         outer = {tuple(edge) for edge in _outline(elements).tolist()}
-        sides = {
-            name: np.array([e for e in (*number[_side(self, name)], *number[_side(other, name) + len(self.nodes)])
-                            if tuple(e.tolist()) in outer], dtype=np.int64).reshape(-1, 3)
-            for name in {**self.sides, **other.sides}
-        }  # fmt: skip
+        sides = {}
+        for name in {**self.sides, **other.sides}:
+            given = [number[one.sides[name] + first] for one, first in ((self, 0), (other, len(self.nodes)))
+                     if name in one.sides]  # fmt: skip
+            edges = [edge for edge in np.vstack(given).tolist() if tuple(edge) in outer]
+            if edges:
+                sides[name] = np.array(edges, dtype=np.int64)
         points = {name: number[node] for name, node in self.points.items()}
         points |= {name: number[node + len(self.nodes)] for name, node in other.points.items()}
         return type(self)(both[kept][order], elements, sides, points)
