@@ -22,7 +22,7 @@ class Tube(ck.Axisymmetric):
     """
 
     outer_diameter: float = ck.dimension(20.0, (1.0, 1000.0), tolerance=1e-3, long_name="outer diameter")
-    thickness: float = ck.dimension(2.0, (0.05, 300.0), tolerance=0.02, long_name="wall thickness", alias="wall")
+    thickness: float = ck.dimension(2.0, (0.05, 300.0), tolerance=0.02, long_name="wall thickness")
     closed: bool = True
 
     name, title = "tube", "Tube under internal pressure with closed ends"

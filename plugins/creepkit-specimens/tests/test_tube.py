@@ -119,7 +119,7 @@ def test_a_viscoelastic_tube_as_code_aster() -> None:
 
 
 def test_stresses_as_calculix() -> None:
-    """CalculiX 2.20, radii 100 and 200 mm, 200 MPa, n = 5 (NAFEMS R0049, case CR4): stresses along r, z and the hoop."""
+    """CalculiX 2.20, radii 100 and 200 mm, 200 MPa, n = 5 (NAFEMS R0049, case CR4): stresses along r, z, hoop."""
     calculix = {
         102.5: (-191.894, -28.349, 135.195),
         122.5: (-135.599, 16.688, 168.976),
