@@ -256,15 +256,16 @@ class Section:
     def _nodes_of(self, name: str) -> Ints:
         if name in self.points:
             return np.array([self.points[name]])
-        return np.unique(_side(self, name, (*self.sides, *self.points)))
+        if name not in self.sides:
+            known = (*self.sides, *self.points)
+            raise SolveError(f"a section has no side or point '{name}'; {nearest(name, known)}")
+        return np.unique(self.sides[name])
 
 
-def _side(section: Section, name: str, known: tuple[str, ...] | None = None) -> Ints:
+def _side(section: Section, name: str) -> Ints:
     """The element sides (edges, 3) of a name; SolveError for an unknown one."""
     if name not in section.sides:
-        if known is None and name not in section.points:
-            raise SolveError(f"a section has no side '{name}'; {nearest(name, tuple(section.sides))}")
-        raise SolveError(f"a section has no side or point '{name}'; {nearest(name, known or tuple(section.sides))}")
+        raise SolveError(f"a section has no side '{name}'; {nearest(name, tuple(section.sides))}")
     return np.asarray(section.sides[name])
 
 
