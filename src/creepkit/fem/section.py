@@ -146,7 +146,11 @@ class Section:
         if half_bandwidth(place[elements]) < half_bandwidth(elements):
             order, elements, new = better, place[elements], np.where(new >= 0, place[new], -1)
         number = new[number]
-        outer = {tuple(edge) for edge in _outline(elements).tolist()}
+        edges_left = _outline(elements)
+        shared = np.isin(edges_left, number[len(self.nodes) :][found])
+        if (shared[:, 0] & shared[:, 2] & ~shared[:, 1]).any():
+            raise SolveError("two sections to be joined have other element sides where they meet; give them the same")
+        outer = {tuple(edge) for edge in edges_left.tolist()}
         sides = {}
         for name in {**self.sides, **other.sides}:
             given = [number[one.sides[name] + first] for one, first in ((self, 0), (other, len(self.nodes)))
