@@ -12,6 +12,9 @@ public:
         matrix = memory.doubles(2 * system.shape.numbers() + 1);
         right = memory.doubles(system.shape.rows() * padded);
         places = memory.array<int64_t>(system.model.elements * 16 * 16);
+        const bool controlled = system.model.controlled >= 0;
+        controlled_row = memory.doubles(controlled ? system.shape.size : 0);
+        controlled_right = memory.doubles(controlled ? padded : 0);
         places_known = false;
     }
 
@@ -114,6 +117,14 @@ public:
                         }
                 }
         }
+        for (int64_t row = 0; row < model.dead_forces; ++row) {
+            double* columns = right + row * padded + parameters;
+            for (int64_t d = 0; d < directions.directions; ++d)
+                columns[d] += inputs[BY_PRESSURE * directions.directions + d] * model.dead[row];
+            for (int64_t g = 0; g < directions.geometries; ++g)
+                columns[directions.directions + g] += pressure * directions.forces[g * model.size + row];
+        }
+        if (model.controlled >= 0) hold_controlled(system, directions, inputs, parameters, padded);
     }
 
     // The solutions, left in the right-hand sides; false when the tangent is singular.
@@ -153,19 +164,45 @@ public:
         }
     }
 
-    // Changes (observed, columns) of u_z of the observed nodes.
+    // Changes (observed, columns) of the observed displacements, and of the force of the controlled one.
     void write_surface(const FiniteElements& system, double* surface, int64_t columns, int64_t padded) const {
-        for (int64_t k = 0; k < system.model.observed_nodes; ++k) {
-            const int64_t equation = system.model.equations[2 * system.model.observed[k] + 1];
+        const int64_t count = system.model.observed_displacements;
+        for (int64_t k = 0; k < count; ++k) {
+            const int64_t equation = system.model.equations[system.model.observed[k]];
             for (int64_t c = 0; c < columns; ++c)
                 surface[k * columns + c] = equation >= 0 ? right[equation * padded + c] : 0.0;
+        }
+        for (int64_t c = 0; system.model.controlled >= 0 && c < columns; ++c) {
+            double total = -controlled_right[c];
+            for (int64_t j = 0; j < system.model.size; ++j) total += controlled_row[j] * right[j * padded + c];
+            surface[count * columns + c] = total;
         }
     }
 
 private:
     double *matrix = nullptr, *right = nullptr;  // lower and upper triangle and one place behind; (rows, padded)
     int64_t* places = nullptr;                   // (elements, 16, 16) of the tangent of an element, r and z in turn
+    double *controlled_row = nullptr, *controlled_right = nullptr;  // (size,), (padded,) of the controlled equation
     bool places_known = false, right_is_clear = false;
+
+    // Keep the equation of the controlled displacement, and put the change of the motion in its place.
+    void hold_controlled(const FiniteElements& system, const SensitivityDirections& directions, const double* inputs,
+                         int64_t parameters, int64_t padded) {
+        const int64_t own = system.model.controlled;
+        for (int64_t j = 0; j < system.model.size; ++j) {
+            const int64_t distance = own / EIGHT - j / EIGHT;
+            const bool inside = distance < system.shape.diagonals && -distance < system.shape.diagonals;
+            controlled_row[j] = inside ? matrix[place(system, own, j)] : 0.0;
+            if (inside) matrix[place(system, own, j)] = j == own ? 1.0 : 0.0;
+        }
+        double* columns = right + own * padded;
+        for (int64_t c = 0; c < padded; ++c) {
+            controlled_right[c] = columns[c];
+            columns[c] = 0.0;
+        }
+        for (int64_t d = 0; d < directions.directions; ++d)
+            columns[parameters + d] = inputs[BY_MOTION * directions.directions + d];
+    }
 
     void clear_right(const FiniteElements& system, int64_t padded) {
         memset(right, 0, sizeof(double) * size_t(system.shape.rows() * padded));

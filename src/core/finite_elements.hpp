@@ -44,11 +44,21 @@ public:
     void take(Workspace& memory) {
         tangent = memory.doubles(shape.numbers() + 1);
         residual = memory.doubles(shape.rows());
+        controlled_row = memory.doubles(model.controlled >= 0 ? model.size : 0);
     }
 
     int64_t point_count() const { return 4 * model.elements; }
     int64_t displacement_count() const { return 2 * model.nodes; }
-    int64_t observed_count() const { return model.observed_nodes; }
+    // Observed displacements, and the force that the controlled one needs.
+    int64_t observed_count() const { return model.observed_displacements + (model.controlled >= 0 ? 1 : 0); }
+    double reaction() const { return controlled_force; }
+
+    // What the error forces, of which `residual` has the displacements, change that force by; N/rad.
+    double reaction_error() const {
+        double total = controlled_error;
+        for (int64_t k = 0; model.controlled >= 0 && k < model.size; ++k) total -= controlled_row[k] * residual[k];
+        return fabs(total);
+    }
     Eight weights(int64_t pair) const { return load(model.weights + EIGHT * pair); }
 
     // Deformation gradient of the points of a pair of elements.
@@ -94,6 +104,8 @@ public:
             }
         }
         press<STIFF>(stage.pressure, u);
+        for (int64_t k = 0; k < model.dead_forces; ++k) residual[k] -= stage.pressure * model.dead[k];
+        if (model.controlled >= 0) hold_controlled<STIFF>();
         return POINTS_SOLVED;
     }
 
@@ -112,6 +124,9 @@ public:
             for (int i = 0; i < 5; ++i) store(P[i], stress[i] * weight);
             for (int half = 0; half < 2; ++half) add_forces(2 * pair + half, 4 * half, P);
         }
+        if (model.controlled < 0) return;
+        controlled_error = residual[model.controlled];
+        residual[model.controlled] = 0.0;
     }
 
     bool factorize() { return factorize_symmetric(shape, tangent); }
@@ -134,21 +149,41 @@ public:
             if (model.equations[k] >= 0) u[k] -= factor * residual[model.equations[k]];
     }
 
-    // Largest displacement of the observed surface, or of the whole body if none is observed, mm.
+    // Largest of the observed displacements, or of all if none is observed, mm.
     double largest_displacement(const double* u) const {
+        const int64_t count = model.observed_displacements;
         double worst = 0.0;
-        for (int64_t k = 0; k < model.observed_nodes; ++k) worst = fmax(worst, fabs(u[2 * model.observed[k] + 1]));
-        for (int64_t k = 0; model.observed_nodes == 0 && k < 2 * model.nodes; ++k) worst = fmax(worst, fabs(u[k]));
+        for (int64_t k = 0; k < count; ++k) worst = fmax(worst, fabs(u[model.observed[k]]));
+        for (int64_t k = 0; count == 0 && k < 2 * model.nodes; ++k) worst = fmax(worst, fabs(u[k]));
         return worst;
     }
 
     // Put held nodes where the motion takes them; pattern : (2 nodes,) mm for a unit of motion.
     void prescribe(const double* pattern, double motion, double* u) const {
         for (int64_t k = 0; k < 2 * model.nodes; ++k)
-            if (model.equations[k] < 0) u[k] = motion * pattern[k];
+            if (model.equations[k] < 0 || model.equations[k] == model.controlled) u[k] = motion * pattern[k];
     }
 
 private:
+    double controlled_force = 0.0;  // N/rad, that the controlled displacement needed when forces were last assembled
+    double controlled_error = 0.0;  // N/rad, of it, at fixed displacements
+    double* controlled_row = nullptr;  // (size,) its row of the tangent, without the diagonal
+
+    // Keep the force of the controlled displacement and make its equation that of no correction.
+    template <bool STIFF>
+    void hold_controlled() {
+        const int64_t own = model.controlled;
+        controlled_force = residual[own];
+        residual[own] = 0.0;
+        if (!STIFF) return;
+        for (int64_t k = 0; k < model.size; ++k) {
+            const int64_t row = k > own ? k : own, column = k > own ? own : k;
+            const bool inside = row / EIGHT - column / EIGHT < shape.diagonals;
+            controlled_row[k] = inside && k != own ? tangent[shape.place(row, column)] : 0.0;
+            if (inside) tangent[shape.place(row, column)] = k == own ? 1.0 : 0.0;
+        }
+    }
+
     static void clear(double* values, int64_t count) { memset(values, 0, sizeof(double) * size_t(count)); }
 
     // Nodal forces of an element whose points are the four lanes from `first` on; P carries the weights.
@@ -198,7 +233,8 @@ private:
                 rz += x * p[3] + y * p[4] + h * p[5];
                 zz += x * p[6] + y * p[7];
             }
-            for (int b = a; b < EIGHT; ++b) {
+            // the other half is the same, but of displacements that share an equation both halves are on the diagonal
+            for (int b = model.tied[element] ? 0 : a; b < EIGHT; ++b) {
                 tangent[places[EIGHT * a + b]] += rr[b];
                 tangent[places[128 + EIGHT * a + b]] += zz[b];
             }

@@ -79,6 +79,8 @@ public:
     int64_t point_count() const { return model.points; }
     int64_t displacement_count() const { return width; }
     int64_t observed_count() const { return model.observed; }
+    double reaction() const { return 0.0; }
+    double reaction_error() const { return 0.0; }
     Eight weights(int64_t block) const { return load(model.weights + EIGHT * block); }
 
     // Deformation gradient of eight points.

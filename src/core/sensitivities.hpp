@@ -21,15 +21,16 @@ struct SensitivityDirections {
     const double* gradients;   // (G, elements, 4, 2, 2) derivative of the nodes' velocity to r and z, 1
     const double* hoops;       // (G, elements, 4) radial velocity over the radius, 1
     const double* velocities;  // (G, 2 nodes) mm
+    const double* forces;      // (G, dead forces) N/rad, change of the dead forces of a unit of the load
 };
 
-// Derivatives of the record's rows: surface (rows, observed, C) of u_z of the observed nodes; times (rows, D) s.
+// Derivatives of the record's rows: surface (rows, observed, C) of what is observed; times (rows, D) s.
 struct SensitivityRecord {
     double *surface, *times;
 };
 
-// Rows of the changes of what the points are given: pressure, time, temperature, ln E and ln weight.
-enum InputChange { BY_PRESSURE, BY_MOMENT, BY_LOAD_TEMPERATURE, BY_STIFFNESS, BY_WEIGHT, INPUT_CHANGES };
+// Rows of the changes of what the body is given: pressure, time, temperature, ln E, ln weight and motion.
+enum InputChange { BY_PRESSURE, BY_MOMENT, BY_LOAD_TEMPERATURE, BY_STIFFNESS, BY_WEIGHT, BY_MOTION, INPUT_CHANGES };
 
 template <class System>
 class StageSensitivities {
@@ -98,7 +99,7 @@ private:
     double *point_output = nullptr, *point_response = nullptr;
     typename System::SensitivityMemory system_memory;
 
-    // Change of pressure, time, temperature, ln E and ln weight with each direction, at place `s` of segment `n`.
+    // Change of pressure, time, temperature, ln E, ln weight and motion with each direction, at place `s` of segment `n`.
     void set_inputs(const SimulationInput& input, int64_t n, double s, bool sudden) {
         constexpr double NUDGE = 1e-6;  // share of a segment's length, or start, by which its ends are moved
         const double* segment = input.segments + SEGMENT_COLUMNS * n;
@@ -127,6 +128,7 @@ private:
                 return by[first] + share * (by[last] - by[first]) + along * (segment[last] - segment[first]);
             };
             inputs[BY_PRESSURE * count + d] = total(PRESSURE, END_PRESSURE);
+            inputs[BY_MOTION * count + d] = total(MOTION, END_MOTION);
             inputs[BY_LOAD_TEMPERATURE * count + d] = total(START_TEMPERATURE, FINAL_TEMPERATURE);
             inputs[BY_STIFFNESS * count + d] = total(MODULUS, END_MODULUS) / modulus;
             inputs[BY_MOMENT * count + d] = later;

@@ -25,9 +25,10 @@ struct SolverSettings {
     double newton;            // last correction of equilibrium over the same
     double first;             // s, the first step after a change of load
     double growth;            // the time since then may grow by this factor in a step (and by `first`)
-    double deflection_limit;  // mm, displacement of the observed surface at which the body has burst
+    double deflection_limit;  // mm, observed displacement at which the body has burst
     double strain_limit;      // creep strain at which a point has burst
     int64_t max_steps;        // cap on steps, accepted and rejected
+    double least;             // mm, below which the size of displacements does not count in an error
 };
 
 // The body's load history and the law's states.
@@ -54,6 +55,7 @@ struct StepRecord {
     double* places;         // (rows, 2) where a step began and its length, in its transformed time
     int64_t* counts;        // (4,) accepted and rejected steps, equilibrium passes with and without a new tangent
     int64_t points;         // written of each row of `values` and `mises`
+    double* reactions;      // (rows,) N/rad, force of the controlled displacement
 };
 
 // Number of records, Ending, time s.

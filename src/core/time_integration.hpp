@@ -92,6 +92,8 @@ private:
     PointStates points;
     double *displacement = nullptr, *start = nullptr, *before = nullptr, *stages[STAGES] = {};
     Termination ended{};
+    double largest_reaction = 0.0;             // N/rad, so far
+    static constexpr double LEAST_SHARE = 0.01;  // of it, that errors of a reaction are measured by at least
 
     void copy(const double* from, double* to) const {
         memcpy(to, from, sizeof(double) * size_t(system.displacement_count()));
@@ -104,6 +106,9 @@ private:
         const int64_t row = ended.records, count = system.displacement_count();
         record.times[row] = time;
         record.segments[row] = segment;
+        const double reaction = system.reaction();
+        largest_reaction = fmax(largest_reaction, fabs(reaction));
+        if (record.reactions) record.reactions[row] = reaction;
         if (record.displacements) copy(displacement, record.displacements + row * count);
         if (record.mises) memcpy(record.mises + row * record.points, points.mises, sizeof(double) * size_t(record.points));
         for (int64_t k = 0; record.values && k < record.points; ++k)
@@ -152,7 +157,7 @@ private:
             const double now = fmin(1.0, done + part);
             stage.pressure = pressure + now * (target - pressure);
             system.prescribe(input.pattern, motion + now * (segment[MOTION] - motion), displacement);
-            const double newton = settings.newton * (0.01 + system.largest_displacement(displacement));
+            const double newton = settings.newton * (settings.least + system.largest_displacement(displacement));
             if (solve_equilibrium(stage, newton, 1e-3) == CONVERGED) {
                 done = now;
                 copy(displacement, start);
@@ -240,7 +245,7 @@ private:
     // Try one step from `s`; the displacement ends where the last stage does. error : over what is allowed.
     EquilibriumFlag attempt_step(const double* segment, const TimeTransformation& clock, double s, double h,
                                  const double* time_before, double& error) {
-        const double scale = 0.01 + system.largest_displacement(start), tight = fmin(1e-3, sqrt(settings.newton));
+        const double scale = settings.least + system.largest_displacement(start), tight = fmin(1e-3, sqrt(settings.newton));
         for (int i = 0; i < STAGES; ++i) {
             const TransformedTime now = transformed_time(clock, s + tableau.c[i] * h);
             const double share = tableau.a[i][i] * h;
@@ -260,6 +265,10 @@ private:
         system.error_forces(displacement, points, weights);
         system.solve();
         error = system.largest_correction() / (settings.tolerance * scale);
+        if (largest_reaction > 0.0) {
+            const double force = fabs(system.reaction()) + LEAST_SHARE * largest_reaction;
+            error = fmax(error, system.reaction_error() / (settings.tolerance * force));
+        }
         return CONVERGED;
     }
 

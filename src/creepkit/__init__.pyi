@@ -29,6 +29,7 @@ from .discovery.discover import temperature_study as temperature_study
 from .experiments.design import design as design
 from .experiments.rig import Rig as Rig
 from .fem.mesh_files import read_mesh as read_mesh
+from .fem.section import Section as Section
 from .forecasts.forecast import Forecast as Forecast
 from .forecasts.forecast import forecast as forecast
 from .hookspecs import hookimpl as hookimpl
@@ -98,6 +99,8 @@ from .sampling.conditions import TimeGrid as TimeGrid
 from .screening.planted import planted_plate as planted_plate
 from .screening.screen import ScreeningOptions as ScreeningOptions
 from .screening.screen import screen as screen
+from .specimens.axisymmetric.displacements import Displacements as Displacements
+from .specimens.axisymmetric.specimen import Axisymmetric as Axisymmetric
 from .specimens.bulge.observation import fit_field as fit_field
 from .specimens.per_test import OneTest as OneTest
 from .specimens.per_test import PerTest as PerTest

@@ -14,6 +14,10 @@ PACKAGES = ("readers", "quality", "inverse", "report", "cli", "experiments", "fo
 """No string, attribute or keyword of theirs is such a name; sentences may give one as an example."""
 
 
+PACKAGES_FOR_ANY_SPECIMEN = ("dataset", "sampling", "surrogates")
+"""No word of theirs, in names or sentences, is such a name."""
+
+
 ALLOWED = {
     "creepkit.cli.demo": "it shows a bulge test",
     "creepkit.cli.options": "what commands take where no specimen is named",

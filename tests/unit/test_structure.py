@@ -3,14 +3,8 @@
 from __future__ import annotations
 
 import ast
-import re
 from collections import defaultdict
-from collections.abc import Iterator
 
-import pytest
-
-from creepkit.records import dimensions_of, outputs_of
-from creepkit.registry import default_registry
 from helpers import source_tree
 
 MOST_LINES = 400

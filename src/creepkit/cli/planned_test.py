@@ -121,7 +121,9 @@ def described_test(options: TestOptions) -> DescribedTest:
 
     usual = {"stress": options.stress, "strain": options.strain, "pressure": options.pressure}
     loads = {name: texts for name, texts in usual.items() if texts}
-    specimen = ck.specimen(options.specimen or specimen_for({**loads, **further_options(options.context)}, DEFAULT_SPECIMEN))
+    specimen = ck.specimen(
+        options.specimen or specimen_for({**loads, **further_options(options.context)}, DEFAULT_SPECIMEN)
+    )
     further, lengths = specimen_options(specimen, options.context)
     loads |= further
     check_options(specimen, loads, options.control, options.ramp)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
-from creepkit.arrays import Floats, Ints
+from creepkit.arrays import Bools, Floats, Ints
 from creepkit.core import CoreStructure, address
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import SIDES, Mesh, discretize
@@ -20,15 +21,34 @@ TILE = 8
 
 
 @dataclass(frozen=True, eq=False)
+class AxialConstraints:
+    """Dead forces on a mesh, faces that stay plane, and what is observed.
+
+    forces : (nodes, 2) N/rad in r and z for a unit of the load, whatever the deformation; None for none.
+    planes : of each face (nodes,) that have one u_z.
+    controlled : number of the plane whose u_z is the motion of the load history; None for none.
+    observed : (observed,) displacements, 2 node + 0 for u_r or + 1 for u_z; None for u_z of the mesh's top.
+    """
+
+    forces: Floats | None = None
+    planes: tuple[Ints, ...] = ()
+    controlled: int | None = None
+    observed: Ints | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class FiniteElementModel:
     """A mesh ready to be simulated; displacements are kept as (2 nodes,) numbers, u_r and u_z in turn.
 
     nodes : (nodes, 2) mm, radius r and height z. elements : (elements, 8) nodes of each element.
     by_radius, by_height, over_radius : (elements, 4, 8) 1/mm, see fem.mesh.Discretization.
     weights : (elements, 4) mm^3, area of the section that belongs to a point, times its radius.
-    equations : (2 nodes,) number of the equation of a displacement, -1 where it is held.
+    equations : (2 nodes,) number of the equation of a displacement, -1 where it is held; one for all u_z of a plane.
     size, width : number of equations, half-bandwidth.
     pressed : (edges, 3) nodes of the sides under pressure. top : (top,) nodes of the observed surface.
+    observed : (observed,) observed displacements, 2 node + 0 for u_r or + 1 for u_z.
+    dead : (size,) N/rad on each equation for a unit of the load, or (0,).
+    controlled : number of the equation whose displacement is the motion; -1 for none.
     """
 
     nodes: Floats
@@ -42,6 +62,9 @@ class FiniteElementModel:
     width: int
     pressed: Ints
     top: Ints
+    observed: Ints
+    dead: Floats = field(default_factory=lambda: np.zeros(0))
+    controlled: int = -1
 
     entry: ClassVar[str] = "creepkit_simulate"
     """The function of the core that simulates it."""
@@ -63,15 +86,17 @@ class FiniteElementModel:
 
     @property
     def observed_count(self) -> int:
-        """Nodes of the observed surface."""
-        return self.top.size
+        """Observed displacements, and the force of a controlled one."""
+        return self.observed.size + (self.controlled >= 0)
 
     def held_motion(self, pattern: Floats | None) -> Floats:
         """Displacement of the held nodes for a unit of motion, (2 nodes,), mm.
 
-        pattern : (nodes, 2) mm, the same node by node; None for no motion.
+        pattern : (nodes, 2) mm, the same node by node; None for no motion but that of the controlled displacement.
         """
-        return np.zeros(self.equations.size) if pattern is None else np.ravel(pattern)
+        if pattern is not None:
+            return np.ravel(pattern)
+        return np.where((self.equations >= 0) & (self.equations == self.controlled), 1.0, 0.0)
 
     def displacements(self, coordinates: Floats) -> Floats:
         """Displacements of the nodes, (steps, nodes, 2), mm.
@@ -80,25 +105,38 @@ class FiniteElementModel:
         """
         return coordinates.reshape(len(coordinates), -1, 2)
 
-    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]:
+    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats, Floats]:
         """What the core needs of directions that move the nodes, for each unit of the G numbers of the geometry.
 
         Velocity gradients (G, elements, 4, 2, 2) and hoop strains (G, elements, 4) of all points, those of the copy
-        included (see CompiledModel), and velocities (G, 2 nodes) of the nodes, mm.
+        included (see CompiledModel), velocities (G, 2 nodes) of the nodes, mm, and changes (G, size or 0) of the dead
+        forces, N/rad.
         """
         padded = self.compiled.padded
         gradients, hoops = (
             np.array([padded(a) for a in values]) for values in (directions.gradients, directions.hoops)
         )
-        return gradients, hoops, directions.velocities
+        forces = np.zeros((len(gradients), self.dead.size))
+        if directions.forces is not None and self.dead.size:
+            forces = np.array([self.on_equations(each) for each in directions.forces]).reshape(forces.shape)
+        return gradients, hoops, directions.velocities, forces
+
+    def on_equations(self, forces: Floats) -> Floats:
+        """Forces (size,) on the equations, N/rad; forces : (nodes, 2) N/rad on the nodes."""
+        free = self.equations >= 0
+        return np.asarray(np.bincount(self.equations[free], np.ravel(forces)[free], self.size), dtype=float)
 
     def __getstate__(self) -> dict[str, object]:
         """All but the addresses for the core, which another process makes for itself."""
         return {name: value for name, value in self.__dict__.items() if name != "compiled"}
 
 
-def finite_element_model(mesh: Mesh) -> FiniteElementModel:
-    """Prepare a mesh; refuse one that is empty or inverted, that nothing holds or that is pressed from within."""
+def finite_element_model(mesh: Mesh, constraints: AxialConstraints | None = None) -> FiniteElementModel:
+    """Prepare a mesh; refuse one that is empty or inverted, that nothing holds or that is pressed from within.
+
+    constraints : dead forces, faces that stay plane and what is observed; without them u_z of the top is.
+    """
+    constraints = constraints or AxialConstraints()
     if not mesh.elements.size:
         raise SolveError("the mesh has no elements; give the eight nodes of each")
     at = discretize(mesh)
@@ -106,9 +144,13 @@ def finite_element_model(mesh: Mesh) -> FiniteElementModel:
     free = ~mesh.held.ravel()
     if free.all() or not mesh.held[:, 1].any():
         raise SolveError("nothing holds the mesh along its axis; hold u_z somewhere")
-    equations = np.where(free, np.cumsum(free) - 1, -1)
+    equations = _equation_numbers(free, constraints.planes)
     numbers = equations[np.stack([2 * mesh.elements, 2 * mesh.elements + 1], axis=1)]
-    return FiniteElementModel(
+    controlled = -1
+    if constraints.controlled is not None:
+        controlled = int(equations[2 * constraints.planes[constraints.controlled][0] + 1])
+    observed = 2 * mesh.top + 1 if constraints.observed is None else np.asarray(constraints.observed, dtype=np.int64)
+    model = FiniteElementModel(
         nodes=mesh.nodes,
         elements=mesh.elements,
         by_radius=at.by_radius,
@@ -116,11 +158,33 @@ def finite_element_model(mesh: Mesh) -> FiniteElementModel:
         over_radius=np.ascontiguousarray(at.over_radius),
         weights=np.ascontiguousarray(at.weights),
         equations=equations,
-        size=int(free.sum()),
+        size=int(equations.max(initial=-1)) + 1,
         width=_half_bandwidth(numbers.reshape(len(numbers), 16)),
         pressed=mesh.pressed,
         top=mesh.top,
+        observed=observed,
+        controlled=controlled,
     )
+    if constraints.forces is None or not constraints.forces.any():
+        return model
+    return replace(model, dead=model.on_equations(constraints.forces))
+
+
+def _equation_numbers(free: Bools, planes: Sequence[Ints]) -> Ints:
+    """Number of the equation of each displacement, (2 nodes,), -1 where it is held.
+
+    free : (2 nodes,) whether it is not. planes : of each face (nodes,) with one u_z, of which none may be held.
+    """
+    master = np.arange(free.size)
+    for nodes in planes:
+        axial = 2 * np.unique(nodes) + 1
+        if not free[axial].all():
+            raise SolveError("a face that stays plane has a node whose u_z is held; hold the face or let it move")
+        if (master[axial] != axial).any():
+            raise SolveError("two faces that stay plane share a node; make one face of them")
+        master[axial] = axial[0]
+    own = free & (master == np.arange(free.size))
+    return np.where(free, (np.cumsum(own) - 1)[master], -1)
 
 
 def _refuse_wrong_sides(mesh: Mesh) -> None:
@@ -144,10 +208,12 @@ class _ModelStructure(CoreStructure):
     """Mirrors FiniteElementModel of src/core/finite_element_model.hpp."""
 
     _fields_ = (
-        *((name, ctypes.c_int64) for name in ("elements", "nodes", "size", "half_bandwidth", "pressed", "observed")),
+        *((name, ctypes.c_int64) for name in (
+            "elements", "nodes", "size", "half_bandwidth", "pressed", "observed", "controlled", "dead_forces",
+        )),
         *((name, ctypes.c_void_p) for name in (
             "coordinates", "by_radius", "by_height", "over_radius", "weights", "points_first", "connectivity",
-            "equations", "places", "pressed_nodes", "pressed_places", "observed_nodes",
+            "equations", "tied", "places", "pressed_nodes", "pressed_places", "observed_displacements", "dead",
         )),
     )  # fmt: skip
 
@@ -180,15 +246,17 @@ class CompiledModel:
             "points_first": paired,
             "connectivity": connectivity,
             "equations": model.equations,
+            "tied": _shares_equation(numbers).astype(np.int64),
             "places": _places(numbers, model.size, model.width),
             "pressed_nodes": model.pressed,
             "pressed_places": _places(sides, model.size, model.width),
-            "observed_nodes": model.top,
+            "observed_displacements": model.observed,
+            "dead": model.dead,
         }
         self._kept = {name: np.ascontiguousarray(array) for name, array in self._kept.items()}
         self.structure = _ModelStructure(
-            self.elements, len(model.nodes), model.size, model.width, len(model.pressed), len(model.top),
-            *(address(array) for array in self._kept.values()),
+            self.elements, len(model.nodes), model.size, model.width, len(model.pressed), len(model.observed),
+            model.controlled, len(model.dead), *(address(array) for array in self._kept.values()),
         )  # fmt: skip
 
     def padded(self, values: Any) -> Any:
@@ -203,11 +271,21 @@ def _half_bandwidth(numbers: Ints) -> int:
     return int(np.max(np.where(high >= 0, high - low, 0), initial=0))
 
 
+def _shares_equation(numbers: Ints) -> Bools:
+    """Whether two displacements of an element have one equation, (elements,).
+
+    numbers : (elements, 2, nodes) of the equations, -1 where held.
+    """
+    ordered = np.sort(numbers.reshape(len(numbers), -1), axis=1)
+    return np.asarray(((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)).any(axis=1))
+
+
 def _places(numbers: Ints, size: int, width: int) -> Ints:
     """Places (elements, 3, nodes, nodes) of the blocks rr, rz, zz in the lower triangle in tiles.
 
     numbers : (elements, 2, nodes) of the equations, -1 where held. What belongs to held displacements goes to the place
-        behind the last. The tiles are those of banded_matrix.hpp of the core.
+        behind the last, and so does the second half of the blocks rr and zz, which is the same as the first, but where
+        two displacements share an equation. The tiles are those of banded_matrix.hpp of the core.
     """
     blocks, diagonals = -(-size // TILE), -(-width // TILE) + 1
     unused = (blocks + diagonals) * diagonals * TILE**2
@@ -216,5 +294,7 @@ def _places(numbers: Ints, size: int, width: int) -> Ints:
         one, other = numbers[:, i, :, None], numbers[:, j, None, :]
         column, row = np.minimum(one, other), np.maximum(one, other)
         tile = (column // TILE) * diagonals + row // TILE - column // TILE
-        result.append(np.where(column >= 0, tile * TILE**2 + (column % TILE) * TILE + row % TILE, unused))
+        second = np.tri(one.shape[1], k=-1, dtype=bool) & (one != other) if i == j else False
+        wanted = (column >= 0) & ~np.asarray(second)
+        result.append(np.where(wanted, tile * TILE**2 + (column % TILE) * TILE + row % TILE, unused))
     return np.stack(result, axis=1)

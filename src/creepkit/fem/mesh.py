@@ -181,6 +181,23 @@ SIDES = np.array([[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]])
 """First, middle and last node of each side of an element."""
 
 
+_SIDE_PLACES = np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0])
+
+
+SIDE_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 9.0
+"""(Gauss points,) of a side, x from -1 to 1 from its first node to its last."""
+
+
+SIDE_VALUES = np.stack(
+    [0.5 * _SIDE_PLACES * (_SIDE_PLACES - 1), 1 - _SIDE_PLACES**2, 0.5 * _SIDE_PLACES * (_SIDE_PLACES + 1)], axis=1
+)
+"""(Gauss points, nodes) shape functions of a side there."""
+
+
+SIDE_SLOPES = np.stack([_SIDE_PLACES - 0.5, -2 * _SIDE_PLACES, _SIDE_PLACES + 0.5], axis=1)
+"""(Gauss points, nodes) their derivatives to x."""
+
+
 class MeshQuality(NamedTuple):
     """The worst of each element over its corners and integration points, 1 for a rectangle and 0 for a collapsed one.
 

@@ -77,15 +77,20 @@ def renumbered(mesh: Mesh) -> Mesh:
 
 def _orders(mesh: Mesh) -> Iterator[Ints]:
     """Orders of the nodes worth trying, the present one first."""
-    from scipy.sparse import coo_array  # loaded when a file is read, not when creepkit starts
+    yield np.arange(len(mesh.nodes))
+    yield order_by_neighbours(mesh.elements, len(mesh.nodes))
+    yield np.lexsort(mesh.nodes.T[::-1])
+
+
+def order_by_neighbours(elements: Ints, count: int) -> Ints:
+    """The nodes (count,) in the order of reverse Cuthill and McKee; elements : (elements, 8) nodes of each."""
+    from scipy.sparse import coo_array  # loaded when it is needed, not when creepkit starts
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-    yield np.arange(len(mesh.nodes))
-    pairs = mesh.elements[:, :, None], mesh.elements[:, None, :]
-    rows, columns = (np.broadcast_to(pair, (len(mesh.elements), 8, 8)).ravel() for pair in pairs)
-    graph = coo_array((np.ones(rows.size), (rows, columns)), shape=(len(mesh.nodes),) * 2)
-    yield reverse_cuthill_mckee(graph.tocsr(), symmetric_mode=True).astype(np.int64)
-    yield np.lexsort(mesh.nodes.T[::-1])
+    pairs = elements[:, :, None], elements[:, None, :]
+    rows, columns = (np.broadcast_to(pair, (len(elements), 8, 8)).ravel() for pair in pairs)
+    graph = coo_array((np.ones(rows.size), (rows, columns)), shape=(count, count))
+    return np.asarray(reverse_cuthill_mckee(graph.tocsr(), symmetric_mode=True).astype(np.int64))
 
 
 def _inverse(order: Ints) -> Ints:

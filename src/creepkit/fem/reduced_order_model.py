@@ -18,6 +18,7 @@ from creepkit.arrays import Floats, Ints, frozen
 from creepkit.core import CoreStructure, address
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
+from creepkit.fem.mesh import SIDE_SLOPES, SIDE_VALUES, SIDE_WEIGHTS
 from creepkit.fem.solvable_model import SensitivityDirections
 
 BLOCK = 8
@@ -125,33 +126,20 @@ class ReducedOrderModel:
         modes = self.basis.modes
         return np.asarray(coordinates[:, : len(modes)] @ modes.reshape(len(modes), -1)).reshape(-1, *modes.shape[1:])
 
-    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]:
+    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats, Floats]:
         """What the core needs of directions that move the nodes, for each unit of the G numbers of the geometry.
 
         Velocity gradients (G, points, 2, 2) and hoop strains (G, points) of the points in whole blocks, and changes
-        (G, side points, 3) of r, dr/dx and dz/dx at the Gauss points of the pressed sides at rest, mm.
+        (G, side points, 3) of r, dr/dx and dz/dx at the Gauss points of the pressed sides at rest, mm; no dead forces.
         """
         chosen, count = self.compiled.points, len(directions.velocities)
         gradients = directions.gradients.reshape(count, self.model.weights.size, 2, 2)[:, chosen]
         hoops = directions.hoops.reshape(count, self.model.weights.size)[:, chosen]
         velocities = directions.velocities.reshape(count, *self.model.nodes.shape)
         at_sides = velocities[:, self.model.pressed]  # (G, sides, 3, 2)
-        changes = [at_sides[..., 0] @ _SIDE_VALUES.T, *(at_sides[..., i] @ _SIDE_SLOPES.T for i in (0, 1))]
-        return gradients, hoops, np.stack(changes, axis=-1).reshape(count, 3 * len(self.model.pressed), 3)
-
-
-_SIDE_PLACES = np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0])
-
-
-_SIDE_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 9.0
-
-
-_SIDE_VALUES = np.stack([0.5 * _SIDE_PLACES * (_SIDE_PLACES - 1), 1 - _SIDE_PLACES**2,
-                         0.5 * _SIDE_PLACES * (_SIDE_PLACES + 1)], axis=1)  # fmt: skip
-"""(Gauss points, nodes) of a side, and their derivatives along it."""
-
-
-_SIDE_SLOPES = np.stack([_SIDE_PLACES - 0.5, -2 * _SIDE_PLACES, _SIDE_PLACES + 0.5], axis=1)
+        changes = [at_sides[..., 0] @ SIDE_VALUES.T, *(at_sides[..., i] @ SIDE_SLOPES.T for i in (0, 1))]
+        sides = np.stack(changes, axis=-1).reshape(count, 3 * len(self.model.pressed), 3)
+        return gradients, hoops, sides, np.zeros((count, 0))
 
 
 class _ModelStructure(CoreStructure):
@@ -217,8 +205,8 @@ def _sides(model: FiniteElementModel, modes: Floats) -> tuple[Floats, Floats]:
     with each of the modes (modes, nodes, 2), mm.
     """
     at_rest, moving = model.nodes[model.pressed], np.moveaxis(modes, 0, -1)[model.pressed]  # (sides, 3, 2, modes)
-    rest = [at_rest[..., 0] @ _SIDE_VALUES.T, *(at_rest[..., i] @ _SIDE_SLOPES.T for i in (0, 1))]
-    weights = np.broadcast_to(_SIDE_WEIGHTS, rest[0].shape)
+    rest = [at_rest[..., 0] @ SIDE_VALUES.T, *(at_rest[..., i] @ SIDE_SLOPES.T for i in (0, 1))]
+    weights = np.broadcast_to(SIDE_WEIGHTS, rest[0].shape)
     parts = [np.einsum("gn,snm->sgm", shapes, moving[:, :, i])
-             for shapes in (_SIDE_VALUES, _SIDE_SLOPES) for i in (0, 1)]  # fmt: skip
+             for shapes in (SIDE_VALUES, SIDE_SLOPES) for i in (0, 1)]  # fmt: skip
     return np.stack([weights, *rest], axis=-1).reshape(-1, 4), np.stack(parts, axis=2).reshape(-1, 4, len(modes))

@@ -25,8 +25,8 @@ REASONS = {
     solver.DEFLECTION_LIMIT: "the surface reached the deflection limit",
     solver.STRAIN_LIMIT: "creep strain reached the strain limit",
     solver.STATE_LIMIT: "an internal variable reached its limit",
-    solver.LIMIT_LOAD: "no equilibrium with a larger pressure: limit load",
-    solver.LOST_CONVERGENCE: "equilibrium was lost while the pressure did not rise",
+    solver.LIMIT_LOAD: "no equilibrium with a larger load: limit load",
+    solver.LOST_CONVERGENCE: "equilibrium was lost while the load did not rise",
     solver.TOO_MANY_STEPS: "the cap on steps was reached",
     solver.LAW_FAILED: "the law gave no finite rate at a point",
     solver.SINGULAR_TANGENT: "the tangent was singular, so that there are no derivatives",
@@ -47,7 +47,8 @@ _STATUS = {
 class LoadHistory:
     """What a body goes through: programs of pressure MPa, temperature K, modulus E MPa, and motion of held nodes.
 
-    pattern : (nodes, 2) mm of displacement of the held nodes for a unit of motion; None holds them still.
+    pressure : or the load that the model's dead forces are for, in its unit.
+    pattern : (nodes, 2) mm of displacement of the held nodes for a unit of motion; None is that of the model.
     end : s. poisson : Poisson's ratio.
     """
 
@@ -69,8 +70,9 @@ class LoadHistory:
 class SurfaceSensitivities:
     """Derivatives of a simulation.
 
-    surface : (steps, top, C) mm, of u_z of the observed nodes, to the law's internal parameters, then to the directions
-        of the load program, then to the numbers of the geometry.
+    surface : (steps, observed, C) mm, of the observed displacements, to the law's internal parameters, then to the
+        directions of the load program, then to the numbers of the geometry. Where the motion controls a displacement,
+        its force in N/rad comes after the observed ones.
     times : (steps, D) s, of the times of the steps, to the directions.
     """
 
@@ -91,6 +93,7 @@ class Simulation:
     timeline : interpolation between the accepted steps.
     beta : exponent of the time transformation (see integration.time_discretisation).
     positions : (steps, 2) where each step began in its segment, and its length, in the transformed time.
+    reactions : (steps,) N/rad, force of the displacement that the motion controls; zeros where none is.
     sensitivities : if asked for.
     """
 
@@ -105,6 +108,7 @@ class Simulation:
     timeline: TimeInterpolation
     beta: float
     positions: Floats
+    reactions: Floats
     sensitivities: SurfaceSensitivities | None = None
 
     def at(self, values: Floats, times: Floats) -> Floats:
@@ -117,11 +121,13 @@ def sensitivity_directions(
     load_history: LoadHistory,
     segments: Floats | None = None,
     velocities: Sequence[tuple[GeometryDerivative, Floats]] = (),
+    forces: Floats | None = None,
 ) -> SensitivityDirections:
     """What to differentiate to beside the law's parameters.
 
     segments : (D, segments, 10) derivatives of `load_history.segments`.
     velocities : for each number of the geometry its GeometryDerivative and the velocities (nodes, 2) of the nodes, mm.
+    forces : (G, nodes, 2) N/rad, what each of them changes of the model's dead forces; None for nothing.
     """
     along = np.zeros((0, *load_history.segments.shape)) if segments is None else np.asarray(segments, dtype=float)
     points = (len(velocities), *model.weights.shape)
@@ -130,6 +136,7 @@ def sensitivity_directions(
         np.array([g.gradient for g, _ in velocities]).reshape(*points, 2, 2),
         np.array([g.hoop for g, _ in velocities]).reshape(points),
         np.array([np.ravel(v) for _, v in velocities]).reshape(len(velocities), model.equations.size),
+        forces,
     )
 
 
@@ -178,5 +185,6 @@ def simulate(
         timeline=TimeInterpolation.from_steps(record.times, record.segments, segments, beta),
         beta=beta,
         positions=record.positions,
+        reactions=record.reactions,
         sensitivities=derivatives,
     )

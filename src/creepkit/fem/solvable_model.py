@@ -17,12 +17,15 @@ class SensitivityDirections:
     gradients : (G, elements, 4, 2, 2) and
     hoops : (G, elements, 4), see fem.mesh.GeometryDerivative.
     velocities : (G, 2 nodes) mm, all three for each unit of a number of the geometry.
+    forces : (G, nodes, 2) N/rad, change of the dead forces of a unit of the load, for each unit of that number; None
+        where there are no such forces, or they stay.
     """
 
     segments: Floats
     gradients: Floats
     hoops: Floats
     velocities: Floats
+    forces: Floats | None = None
 
 
 class CompiledArrays(Protocol):
@@ -58,5 +61,9 @@ class SolvableModel(Protocol):
         coordinates : (steps, displacement_count) what the core keeps of each step.
         """
 
-    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]:
-        """Velocity gradients (G, ..., 2, 2), hoop strains (G, ...) and velocities (G, ...), as the core takes them."""
+    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats, Floats]:
+        """What the core takes of directions that move the nodes.
+
+        Velocity gradients (G, ..., 2, 2), hoop strains (G, ...), velocities (G, ...) and changes of the dead forces
+        (G, ...), for each unit of the G numbers of the geometry.
+        """

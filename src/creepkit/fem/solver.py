@@ -23,9 +23,9 @@ from creepkit.kernels.interface import CompiledLaw, Entry
 """Codes of an ending; whatever it is, the history so far is kept."""
 
 
-START, END, PRESSURE = range(3)
-"""The first columns of a segment: times s, and the pressure at its start, MPa; at its end, and temperature K, modulus
-MPa and motion of held nodes at both ends follow."""
+START, END, PRESSURE, MOTION = 0, 1, 2, 8
+"""Columns of a segment: times s, and the pressure at its start, MPa (or the load that dead forces are for, in its
+unit); at its end, and temperature K, modulus MPa and motion of held nodes at both ends follow."""
 
 
 CREEP_COMPONENTS, EQUIVALENT_STRAIN = 3, 3
@@ -35,11 +35,12 @@ CREEP_COMPONENTS, EQUIVALENT_STRAIN = 3, 3
 class SolverSettings(NamedTuple):
     """How accurately, and how far, to simulate.
 
-    tolerance : estimated error of a step's displacements over (0.01 mm + the largest of them).
+    tolerance : estimated error of a step's displacements over (0.01 mm + the largest of those that are observed).
     newton : last correction of equilibrium over the same.
     first : s, the first step after a change of load. growth : by which the time since then may grow in a step.
-    deflection_limit : mm, displacement of the observed surface at which the body has burst.
+    deflection_limit : mm, observed displacement at which the body has burst.
     strain_limit : creep strain at which a point has burst. max_steps : cap on steps, accepted and rejected.
+    least : mm, that takes the place of the 0.01 mm above.
     """
 
     tolerance: float = 1e-2
@@ -49,6 +50,7 @@ class SolverSettings(NamedTuple):
     deflection_limit: float = 3.0
     strain_limit: float = 1.0
     max_steps: int = 1000
+    least: float = 0.01
 
 
 class StepRecord(NamedTuple):
@@ -61,7 +63,8 @@ class StepRecord(NamedTuple):
     positions : (steps, 2) where a step began in its segment, and its length, in the transformed time.
     counts : (4,) accepted and rejected steps; equilibrium passes with and without a new tangent.
     code, time : how it ended, and when, s.
-    surface : (steps, top, C) mm, derivatives of u_z of the observed nodes, or None.
+    reactions : (steps,) N/rad, force of the displacement that the motion controls; zeros where none is.
+    surface : (steps, observed, C) mm, derivatives of the observed displacements, then of that force, or None.
     moments : (steps, D) s, derivatives of the times to the directions of the load program, or None.
     """
 
@@ -74,6 +77,7 @@ class StepRecord(NamedTuple):
     counts: Ints
     code: int
     time: float
+    reactions: Floats
     surface: Floats | None
     moments: Floats | None
 
@@ -99,11 +103,11 @@ def solve(
     numbers = np.zeros(rows, np.int64)
     displacements = _empty_record(rows, model.displacement_count)
     values = _empty_record(rows, points, 4 + law.states) if keep_points else None
-    mises = _empty_record(rows, points)
+    mises, reactions = _empty_record(rows, points), _empty_record(rows)
     pattern = _contiguous(program.pattern)
     record = _Record(
         rows, address(times), address(numbers), address(displacements), _optional(values), address(mises),
-        address(positions), address(counts), points,
+        address(positions), address(counts), points, address(reactions),
     )  # fmt: skip
     entries = _Law(*_entry_addresses(law), address(theta), theta.size, law.states)
     given = _Input(
@@ -132,7 +136,7 @@ def solve(
     n = ended.records
     return StepRecord(
         times[:n].copy(), numbers[:n].copy(), displacements[:n].copy(), None if values is None else values[:n].copy(),
-        mises[:n].copy(), positions[:n].copy(), counts, ended.code, ended.time,
+        mises[:n].copy(), positions[:n].copy(), counts, ended.code, ended.time, reactions[:n].copy(),
         None if surface is None else surface[:n], None if moments is None else moments[:n],
     )  # fmt: skip
 
@@ -245,21 +249,21 @@ class _Input(CoreStructure):
 class _Settings(CoreStructure):
     _fields_ = (
         ("tolerance", _REAL), ("newton", _REAL), ("first", _REAL), ("growth", _REAL), ("deflection_limit", _REAL),
-        ("strain_limit", _REAL), ("max_steps", _NUMBER),
+        ("strain_limit", _REAL), ("max_steps", _NUMBER), ("least", _REAL),
     )  # fmt: skip
 
 
 class _Record(CoreStructure):
     _fields_ = (
         ("rows", _NUMBER), ("times", _ARRAY), ("segments", _ARRAY), ("displacements", _ARRAY), ("values", _ARRAY),
-        ("mises", _ARRAY), ("places", _ARRAY), ("counts", _ARRAY), ("points", _NUMBER),
+        ("mises", _ARRAY), ("places", _ARRAY), ("counts", _ARRAY), ("points", _NUMBER), ("reactions", _ARRAY),
     )  # fmt: skip
 
 
 class _Directions(CoreStructure):
     _fields_ = (
         ("directions", _NUMBER), ("geometries", _NUMBER), ("segments", _ARRAY), ("gradients", _ARRAY),
-        ("hoops", _ARRAY), ("velocities", _ARRAY),
+        ("hoops", _ARRAY), ("velocities", _ARRAY), ("forces", _ARRAY),
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from creepkit import core
 from creepkit.arrays import ArrayLike, Floats, Ints
 from creepkit.errors import SolveError
-from creepkit.fem.solver import PRESSURE, START
+from creepkit.fem.solver import MOTION, PRESSURE, START
 from creepkit.integration.time_transformation import SMALLEST_EXPONENT
 
 OFFSET = 20.0
@@ -50,8 +50,9 @@ class TimeInterpolation:
             at_start = np.flatnonzero((segments == n) & (times == start))
             first = int(at_start[-1]) if at_start.size else int(mine[0]) - 1
             rows.append((first, int(mine[-1])))
-        # a pressure that rises from nothing gives no power of time; long after zero only the change of load matters
-        young = np.where(starts == 0.0, reached[:, PRESSURE] != 0.0, starts <= OFFSET) & (beta < 1.0)
+        # a load that rises from nothing gives no power of time; long after zero only the change of load matters
+        loaded = reached[:, [PRESSURE, MOTION]].any(axis=1)
+        young = np.where(starts == 0.0, loaded, starts <= OFFSET) & (beta < 1.0)
         exponents = np.where(young, max(beta, SMALLEST_EXPONENT), 1.0)
         return cls(np.array(times), starts, tuple(rows), np.where(young, 0.0, starts), exponents)
 

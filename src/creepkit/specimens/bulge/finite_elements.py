@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
@@ -13,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit import kernels
-from creepkit.arrays import Floats, usable_cores
+from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.mesh import GeometryDerivative, geometry_derivative
-from creepkit.fem.simulation import Simulation, SurfaceSensitivities, sensitivity_directions, simulate
+from creepkit.fem.simulation import Simulation, sensitivity_directions, simulate
 from creepkit.fem.solvable_model import SensitivityDirections, SolvableModel
 from creepkit.fem.solver import SolverSettings
 from creepkit.records import (
@@ -35,6 +34,7 @@ from creepkit.records import (
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.bulge.setup import BulgeSetup, set_up_test
+from creepkit.specimens.finite_element_tests import PROGRAM_STEPS, in_threads, step_time_derivative
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
@@ -44,10 +44,6 @@ if TYPE_CHECKING:
 
 MODULUS_TEMPERATURE_STEP = 1.0
 """K, of the central difference of the modulus to the temperature."""
-
-
-_TIME_SHIFT = 1e-3
-"""s, by which steps are moved to difference an interpolation between steps that move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +109,7 @@ def output_sensitivities(
     along = simulation.at(output_columns, history.times)
     nuisances = {}
     for k, name in enumerate(loads):
-        nuisances[name] = along[..., theta.size + k] + _step_time_derivative(
+        nuisances[name] = along[..., theta.size + k] + step_time_derivative(
             simulation, change, directions.segments, k, outputs, history.times
         )
     for k, name in enumerate(lengths):
@@ -128,20 +124,6 @@ def output_sensitivities(
 def _lend_to_rest(columns: Floats) -> None:
     """Width and shape at rest are those of the first step, and so are their derivatives, (steps, 3, ...)."""
     columns[0, 1:] = columns[1, 1:] if len(columns) > 1 else 0.0
-
-
-def _step_time_derivative(
-    simulation: Simulation, change: SurfaceSensitivities, directions: Floats, k: int, outputs: Floats, times: Floats
-) -> Floats | float:
-    """What the motion of the steps in time does to the interpolation between them."""
-    if not change.times[:, k].any() and not directions[k, :, 0].any():
-        return 0.0
-    starts = directions[k, : simulation.timeline.starts.size, 0]
-    ends = (
-        simulation.timeline.moved(s * _TIME_SHIFT * change.times[:, k], s * _TIME_SHIFT * starts) for s in (1.0, -1.0)
-    )
-    up, down = (line.interpolate(outputs, times) for line in ends)
-    return np.asarray((up - down) / (2.0 * _TIME_SHIFT))
 
 
 def _is_dimension(name: str) -> bool:
@@ -189,10 +171,6 @@ def program_directions(specimen: BulgeSettings, history: History, nuisances: Map
 
     steps = {key: PROGRAM_STEPS.get(kind_and_start(key)[0], 0.0) for key in nuisances}
     return {key: (segments(key, s) - segments(key, -s)) / (2.0 * s) for key, s in steps.items() if s}
-
-
-PROGRAM_STEPS = {"temperature step": 1.0, "temperature drift": 1.0, "load step": 1e-3}
-"""K, K and relative, of central differences of programs; without error where a program is linear in them."""
 
 
 _COLUMNS = {
@@ -281,15 +259,7 @@ def predict_bulge(
         test = tests[k] if shared or c == 0 else prepared(c, k)
         return test.simulate_and_observe(kernel, theta[c], settings)
 
-    workers = min(specimen.threads or usable_cores(), len(tasks))
-    if workers > 1:
-        pool = ThreadPoolExecutor(workers)
-        try:
-            rows = list(pool.map(run, tasks))
-        finally:
-            pool.shutdown(cancel_futures=True)  # an interrupt waits for the simulations that run, not for the others
-    else:
-        rows = [run(task) for task in tasks]
+    rows = in_threads(run, tasks, specimen.threads)
     parts = [_history_prediction(rows[k :: len(histories)]) for k in range(len(histories))]
     return assemble_prediction(parts, histories, OBSERVED, len(theta))
 

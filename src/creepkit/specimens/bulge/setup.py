@@ -16,9 +16,9 @@ from creepkit.fem.simulation import LoadHistory
 from creepkit.records import History, Program, check_geometry, with_program_nuisances
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import Observation
+from creepkit.specimens.finite_element_tests import modulus_program
 
 if TYPE_CHECKING:
-    from creepkit.language import Elastic
     from creepkit.specimens.bulge.settings import BulgeSettings
 
 
@@ -70,15 +70,6 @@ def set_up_test(specimen: BulgeSettings, history: History, nuisances: Mapping[st
     poisson = float(history.elastic.at(float(temperature.values[0])).nu)
     load_history = LoadHistory(pressure, temperature, modulus, float(history.times[-1]), poisson)
     return BulgeSetup(model, load_history, geometry, operator, specimen.refinement if specimen.mesh is None else None)
-
-
-def modulus_program(elastic: Elastic, temperature: Program, factor: float, where: str) -> Program:
-    """Young's modulus over time, MPa, a straight line where the temperature is one."""
-    moduli = {float(T): float(elastic.at(float(T)).E) for T in np.unique(temperature.values)}
-    values = np.array([factor * moduli[float(T)] for T in temperature.values])
-    if not (values > 0).all():
-        raise SolveError(f"{where}: the modulus is {values.min():g} MPa; it must be above zero")
-    return Program(temperature.times, values)
 
 
 @lru_cache(maxsize=256)

@@ -1,0 +1,125 @@
+"""Plates and shallow domes, clamped at their rim, under gas pressure from below."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import ClassVar
+
+import numpy as np
+
+import creepkit as ck
+
+LIMIT_LOAD = 4.0 / 11.26
+"""Stress of a clamped plate at its limit load over p (a/h)^2: p = 11.26 M/a^2 with M = s h^2/4 (Hopkins and Wang 1954,
+J. Mech. Phys. Solids 3, 117; a plate that yields by Tresca)."""
+
+DEFLECTION = 0.24
+"""Deflection of a thin clamped plate in steady creep by Norton's law with n = 4, for each unit of strain at the stress
+above, over a^2/h; 0.40 with n = 1 and 0.15 with n = 7."""
+
+
+def graded(count: int, last: float) -> np.ndarray:
+    """Boundaries (count + 1,) of elements from 0 to 1, lengths in a geometric series, the last `last` of the first."""
+    ends = np.concatenate([[0.0], np.cumsum(last ** np.linspace(0.0, 1.0, count))])
+    return ends / ends[-1]
+
+
+@dataclass(frozen=True)
+class PlateBulge(ck.Axisymmetric):
+    """A flat round plate, clamped at its rim over its thickness; the deflection of its middle is measured on top."""
+
+    radius: float = ck.dimension(10.0, (0.5, 500.0), tolerance=1e-3, long_name="radius to the clamp")
+    thickness: float = ck.dimension(0.5, (0.01, 100.0), tolerance=0.02)
+
+    name, title = "plate", "Flat clamped plate under gas pressure"
+    outputs = (ck.Output("deflection", "length", "deflection of the middle", noise=2e-3),)
+    loads = (ck.Load("pressure", "pressure"),)
+    conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
+        {"pressure": (0.2, 1.5), "modulus": (50e3, 300e3)}
+    )
+
+    @property
+    def columns(self) -> np.ndarray:
+        """Boundaries of columns from the middle to the clamp, near which they are of the size of the thickness."""
+        return graded(self.elements(14), 2.0 * self.thickness / self.radius)
+
+    def section(self, load: str) -> ck.Section:
+        """Columns of four layers, shorter towards the clamp."""
+        plate = ck.Section.rectangle((0.0, 0.0), (self.radius, self.thickness), self.columns, self.elements(4))
+        return plate.hold("right", r=True, z=True).press("bottom")
+
+    def observe(self, displacements: ck.Displacements) -> Mapping[str, np.ndarray]:
+        """The middle of the upper surface."""
+        return {"deflection": displacements.axial("top_left")}
+
+    def reference_stress(self, history: ck.History) -> np.ndarray:
+        """Stress at the limit load of a clamped plate for each pressure level, (levels,) MPa."""
+        plate, _ = self.of_test(history, {})
+        levels = np.unique(history.loading.program().values)
+        return LIMIT_LOAD * (plate.radius / plate.thickness) ** 2 * levels[levels > 0]
+
+    def growth_per_strain(self, history: ck.History) -> float:
+        """mm of deflection for each unit of strain at the reference stress, while it is less than the thickness."""
+        plate, _ = self.of_test(history, {})
+        return DEFLECTION * plate.radius**2 / plate.thickness
+
+
+@dataclass(frozen=True)
+class DomeBulge(PlateBulge):
+    """A shallow spherical dome of even thickness, clamped at its rim, under gas pressure on its inner side."""
+
+    rise: float = ck.dimension(2.0, (0.01, 500.0), tolerance=0.01, long_name="rise of the inner side over the rim")
+
+    name, title = "dome", "Shallow clamped dome under gas pressure"
+    conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
+        {"pressure": (1.0, 8.0), "modulus": (50e3, 300e3)}
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.rise <= self.radius:
+            raise ck.errors.SolveError(
+                f"dome specimen: rise is {self.rise:g} mm; allowed is up to the radius, {self.radius:g} mm"
+            )
+
+    @property
+    def sphere(self) -> float:
+        """Radius of the inner side, mm."""
+        return 0.5 * (self.radius**2 + self.rise**2) / self.rise
+
+    def section(self, load: str) -> ck.Section:
+        """Columns along the radii of the sphere, shorter towards the clamp."""
+        ends = self.columns
+        shares = np.sort(np.concatenate([ends, 0.5 * (ends[:-1] + ends[1:])]))
+        angles = shares * 2.0 * np.arctan(self.rise / self.radius)
+        towards = np.stack([np.sin(angles), np.cos(angles)], axis=1)
+        centre = np.array([0.0, self.rise - self.sphere])
+        dome = ck.Section.strip(
+            centre + self.sphere * towards, centre + (self.sphere + self.thickness) * towards, self.elements(4)
+        )
+        return dome.hold("last", r=True, z=True).press("inner")
+
+    def observe(self, displacements: ck.Displacements) -> Mapping[str, np.ndarray]:
+        """The middle of the outer surface."""
+        return {"deflection": displacements.axial("outer_first")}
+
+    def reference_stress(self, history: ck.History) -> np.ndarray:
+        """Membrane stress P R/(2 t) of each pressure level, (levels,) MPa."""
+        dome, _ = self.of_test(history, {})
+        levels = np.unique(history.loading.program().values)
+        return 0.5 * dome.sphere / dome.thickness * levels[levels > 0]
+
+    def growth_per_strain(self, history: ck.History) -> float:
+        """mm for each unit of reference strain: half of it strains a whole sphere; clamped at its rim it flattens less.
+
+        0.8 R was found for domes of the default rise over radius, for n from 3 to 7.
+        """
+        dome, _ = self.of_test(history, {})
+        return 0.8 * dome.sphere
+
+
+@ck.hookimpl
+def creepkit_specimens() -> list[ck.Specimen]:
+    return [PlateBulge(), DomeBulge()]

@@ -1,0 +1,1 @@
+"""Specimens that are bodies of revolution, simulated by finite elements."""
