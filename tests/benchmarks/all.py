@@ -57,6 +57,7 @@ BENCHMARKS = {
     "surrogate_speed": Benchmark(3),
     "identification_speed": Benchmark(1),
     "bending_recovery": Benchmark(15),
+    "specimen_recovery": Benchmark(25),
     "search_success": Benchmark(15, (("--specimens", "6", "--searches", "default", "cma"),)),
     "swarm_speed": Benchmark(1),
     "design_of_experiments": Benchmark(90),

@@ -13,6 +13,7 @@ from creepkit.dataset.dataset import column_units, design_name, summary, summary
 from creepkit.errors import DatasetError
 from creepkit.report.figures import empty_figure, make_folder, save_figure, set_range
 from creepkit.report.terminal import print_json
+from creepkit.sampling.specimen_conditions import specimen_conditions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -104,7 +105,7 @@ def history_figure(data: Dataset, path: str | Path | None = None, *, seed: int =
             set_range(axes, "y", float(finite.min()), float(finite.max()))
         longest = max((float(data.times(row)[-1]) for row in selected), default=3600.0)
         set_range(axes, "x", 0.0, longest / 3600.0, most=6)
-    figure.colorbar(colour_map, ax=panels, label="largest load, MPa", pad=0.01)
+    figure.colorbar(colour_map, ax=panels, label=_load_label(data), pad=0.01)
     figure.suptitle(
         f"{_dataset_title(data)}: {len(selected)} of {int((data.reasons == 0).sum())} accepted samples", fontsize=11
     )
@@ -119,9 +120,15 @@ def _random_accepted(data: Dataset, seed: int) -> Ints:
 
 
 def _largest_loads(data: Dataset) -> Floats:
-    """(n,) MPa, the larger level of each test."""
-    levels = [k for k, name in enumerate(data.condition_names) if name in ("P1", "P2", "stress_1", "stress_2")]
+    """(n,) in the unit of the load, the larger level of each test."""
+    known = specimen_conditions(data.specimen).levels
+    levels = [k for k, name in enumerate(data.condition_names) if name in known]
     return data.conditions[:, levels].max(axis=1) if levels else np.zeros(len(data))
+
+
+def _load_label(data: Dataset) -> str:
+    load = specimen_conditions(data.specimen).load
+    return f"largest {load.long_name}{_unit_label(load.unit)}"
 
 
 def _load_colours(loads: Floats) -> Any:
