@@ -28,6 +28,7 @@ struct BatchIntegration {
     IntegrationSettings settings;
     Tableau tableau;
     double* strain;            // (C, F) in: NaN
+    double* values;            // (C, F, S) in: NaN; internal variables at the output times, null unless wanted
     double* jacobian;          // (C, F, P) in: NaN; this and the other derivatives null unless wanted
     int64_t* endings;          // (C, K) codes of event_location.hpp
     double* end_times;         // (C, K) s
@@ -69,7 +70,9 @@ CREEPKIT_API int64_t creepkit_integrate_batch(const BatchIntegration* batch) {
                                     batch->time_offsets[k + 1] - time,
                                     batch->segments + 6 * segment,
                                     batch->times + time};
+            const int64_t S = batch->states;
             const PointRecord record = {batch->strain + c * F + time,
+                                        batch->values ? batch->values + (c * F + time) * S : nullptr,
                                         exact ? batch->jacobian + (c * F + time) * P : nullptr,
                                         {batch->level_offsets[k + 1] - level, batch->levels + level,
                                          batch->arrivals + c * L + level, batch->arrival_slopes + c * L + level,

@@ -39,7 +39,7 @@ struct PointTest {
 
 // What is recorded of it: strain (times,), left as it is after the end; jacobian (times, P), or null to do without.
 struct PointRecord {
-    double *strain, *jacobian;
+    double *strain, *values, *jacobian;
     LevelEvents arrivals;
 };
 
@@ -77,6 +77,9 @@ private:
         int64_t done = 0;
         for (; done < test.time_count && test.times[done] <= 0.0; ++done) {
             record.strain[done] = 0.0;
+            for (int64_t v = 1; record.values && v < work.unknowns(); ++v) {
+                record.values[done * (work.unknowns() - 1) + v - 1] = candidate.limits.initial[v - 1];
+            }
             for (int64_t p = 0; record.jacobian && p < work.parameters; ++p) {
                 record.jacobian[done * work.parameters + p] = 0.0;
             }
@@ -211,6 +214,9 @@ private:
             if (x > share * (1.0 + 1e-10)) break;
             x = x < 0.0 ? 0.0 : x > 1.0 ? 1.0 : x;
             record.strain[progress.done] = strain.at(x);
+            for (int64_t v = 1; record.values && v < work.unknowns(); ++v) {
+                record.values[progress.done * (work.unknowns() - 1) + v - 1] = work.dense(tableau, h, v).at(x);
+            }
             if (record.jacobian) {
                 dense_sensitivity(clock, tableau, work, s, h, x, 0, record.jacobian + progress.done * work.parameters);
             }

@@ -110,6 +110,7 @@ class Integration:
     level_times, level_rates : (candidates, levels) s at which strains were reached, and dp/d(ln t) there; NaN for
         levels that were not reached; tests one behind another.
     level_time_jacobian : (candidates, levels, P) or None, derivatives of ln t.
+    states : (candidates, frames, S) internal variables, NaN after an end; None unless they were to be kept.
     """
 
     strain: Floats
@@ -122,6 +123,7 @@ class Integration:
     level_times: Floats
     level_rates: Floats
     level_time_jacobian: Floats | None
+    states: Floats | None = None
 
     @property
     def status(self) -> Ints:
@@ -140,17 +142,21 @@ def integrate(
     *,
     settings: IntegrationSettings | None = None,
     jacobian: bool = False,
+    keep_states: bool = False,
     axes: Axes = UNIAXIAL,
     tableau: Tableau = SDIRK4,
 ) -> Integration:
     """Integrate every candidate over every test.
 
-    theta : (candidates, P) internal parameters. jacobian : calculate derivatives too.
+    theta : (candidates, P) internal parameters. jacobian : calculate derivatives too. keep_states : keep the internal
+    variables at the output times.
     """
     theta = np.array(theta, dtype=float, order="C", ndmin=2)
     if sentence := refusal(law, theta):
         raise SolveError(sentence)
     result, inputs = _unfilled(theta, tests, jacobian), _inputs(law, theta, tests)
+    if keep_states:
+        result["values"] = np.full((*result["strain"].shape, law.states), np.nan)
     batch = BatchStructure(
         update=law.update.address,
         sensitivity=law.sensitivity.address,
@@ -176,6 +182,7 @@ def integrate(
         level_times=result["arrivals"],
         level_rates=result["arrival_slopes"],
         level_time_jacobian=result["arrival_jacobian"] if jacobian else None,
+        states=result.get("values"),
     )
 
 

@@ -52,7 +52,10 @@ class BatchStructure(ctypes.Structure):
         ("axes", AxesStructure),
         ("settings", SettingsStructure),
         ("tableau", TableauStructure),
-        *((name, _POINTER) for name in ("strain", "jacobian", "endings", "end_times", "steps", "end_jacobian")),
+        *(
+            (name, _POINTER)
+            for name in ("strain", "values", "jacobian", "endings", "end_times", "steps", "end_jacobian")
+        ),
         *((name, _POINTER) for name in ("arrivals", "arrival_slopes", "arrival_jacobian")),
     ]
 

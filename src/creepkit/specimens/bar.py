@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar, Self
 
@@ -42,6 +42,17 @@ SEARCH_TOLERANCE = 1e-3
 
 
 NUISANCES = BASIC_NUISANCES
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BarRun(Run):
+    """A simulated bar, at the times of the run.
+
+    creep_strain : (times,) logarithmic. states : {name: (times,)} internal variables of the law.
+    """
+
+    creep_strain: Floats = field(default_factory=lambda: np.zeros(0), repr=False)
+    states: Mapping[str, Floats] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
@@ -139,13 +150,19 @@ class Bar:
             specimen=self.name,
         )
 
-    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> Run:
-        """Run one test: what its history would show at its times, and how it ended."""
-        result = self._integrate(law, law.to_internal(law.values(values)), self._tests([plan]), False)
+    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> BarRun:
+        """Run one test: what its history would show at its times, how it ended, and the states of the law."""
+        theta = law.to_internal(law.values(values))
+        result = self._integrate(law, theta, self._tests([plan]), False, keep_states=True)
         rows = self.observed_output(plan, result.of(0))[0]
         end, reason = float(result.end_times[0, 0]), integration.REASONS[int(result.terminations[0, 0])]
         reason = self.end_reason(plan, reason, rows, end)
-        return run_from_outputs(Run, plan, self.outputs, rows[:, None], Status(int(result.status[0, 0])), end, reason)
+        status = Status(int(result.status[0, 0]))
+        run = run_from_outputs(BarRun, plan, self.outputs, rows[:, None], status, end, reason)
+        reached = np.isin(plan.times, run.times)
+        assert result.states is not None
+        states = {symbol.name: result.states[0, reached, k] for k, symbol in enumerate(law.states)}
+        return replace(run, creep_strain=result.of(0)[0, reached], states=states)
 
     def _predict(self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool) -> Prediction:
         result = self._integrate(law, theta, self._tests(histories), sensitivities)
@@ -167,7 +184,15 @@ class Bar:
             parts.append(HistoryPrediction(values, result.status[:, k], result.end_times[:, k], jacobian))
         return assemble_prediction(parts, histories, self.outputs, len(result.strain))
 
-    def _integrate(self, law: CreepLaw, theta: Floats, tests: Sequence[PointTest], sensitivities: bool) -> Integration:
+    def _integrate(
+        self,
+        law: CreepLaw,
+        theta: Floats,
+        tests: Sequence[PointTest],
+        sensitivities: bool,
+        *,
+        keep_states: bool = False,
+    ) -> Integration:
         kernel = kernels.lower(law, "compiled")
         breaks = max((test.driving.times.size + test.temperature.times.size - 2 for test in tests), default=0)
         settings = integration.IntegrationSettings(
@@ -175,7 +200,9 @@ class Bar:
             strain_limit=self.strain_limit,
             max_steps=int(self.max_steps) + STEPS_PER_BREAKPOINT * breaks,
         )
-        return integration.integrate(kernel, theta, tests, settings=settings, jacobian=sensitivities)
+        return integration.integrate(
+            kernel, theta, tests, settings=settings, jacobian=sensitivities, keep_states=keep_states
+        )
 
 
 DIFFERENCE_STEPS = {"temperature": 0.1, "modulus": 1e-3}
