@@ -25,7 +25,7 @@ import creepkit as ck
 from creepkit.records import outputs_of, typical_history
 
 NAMES = (
-    *("tube", "open-tube", "notched-bar", "plate", "dome"),
+    *("tube", "open-tube", "notched-bar", "plate-bulge", "dome-bulge"),
     *("three-point-bend", "four-point-bend", "cantilever-bend"),
 )
 LEVELS = (0.3, 0.45, 0.6, 0.75)

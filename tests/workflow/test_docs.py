@@ -93,16 +93,18 @@ def test_snippets_are_python_with_public_names(page):
 def test_the_files_of_the_guide_are_read(tmp_path):
     """Each says what its head and its columns mean: nothing of it becomes a label that was not meant as one."""
     text = (DOCS / "how-to" / "write_a_test_file.md").read_text(encoding="utf-8")
-    found = []
-    for k, block in enumerate(re.findall(r"```text\n(.*?)```", text, re.S)):
+    found, blocks = [], re.findall(r"```text\n(.*?)```", text, re.S)
+    for k, block in enumerate(blocks):
         (tmp_path / f"{k}.csv").write_text(block, encoding="utf-8")
         found += ck.read_histories(tmp_path / f"{k}.csv")
-    bar, dimple = found
+    bar, dimple, beam = found
     assert set(bar.labels) == {"heat", "laboratory", "assumed"}
     assert bar.standard_deviation["strain"] == pytest.approx(2e-5)
     assert (dimple.labels, dimple.geometry) == ({}, {"apex_thickness": 0.502})
     assert dimple.standard_deviation["amplitude"] == pytest.approx(2e-3)
-    alone = "\n".join(line.rsplit(",", 3)[0] if line[0] != "#" else line for line in block.splitlines())
+    assert (beam.labels, beam.geometry) == ({}, {"height": 2.02})
+    assert beam.outputs["deflection"] == pytest.approx([0.031, 0.052])
+    alone = "\n".join(line.rsplit(",", 3)[0] if line[0] != "#" else line for line in blocks[1].splitlines())
     (tmp_path / "alone.csv").write_text(alone, encoding="utf-8")
     assert list(ck.read_histories(tmp_path / "alone.csv")[0].outputs) == ["amplitude"]
 

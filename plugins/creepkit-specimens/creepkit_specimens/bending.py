@@ -67,7 +67,7 @@ class ThreePointBend(RectangularBeam):
 
     def beam_stations(self) -> BeamStations:
         """Both halves of the span together, with M = F x/2."""
-        return BeamStations(*self.stretch(self.span, 0.25 * self.span))
+        return BeamStations(*self.stretch(self.span, 0.25 * self.span), largest=0.25 * self.span)
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Cantilever(RectangularBeam):
 
     def beam_stations(self) -> BeamStations:
         """From the load to the clamp, with M = F x."""
-        return BeamStations(*self.stretch(self.span, self.span))
+        return BeamStations(*self.stretch(self.span, self.span), largest=self.span)
 
 
 @dataclass(frozen=True)

@@ -45,8 +45,8 @@ class NotchedBar(ck.Axisymmetric):
                 f"{self.name} specimen: notch_diameter {self.notch_diameter:g} mm makes the notch {self.depth:g} mm "
                 f"deep; allowed is more than 0, up to notch_radius, {self.notch_radius:g} mm"
             )
-        if not 0.5 * self.gauge_length > self.shoulder + 0.5 * self.notch_diameter:
-            least = 2.0 * self.shoulder + self.notch_diameter
+        if not 0.5 * self.gauge_length > self.half_width + 0.5 * self.notch_diameter:
+            least = 2.0 * self.half_width + self.notch_diameter
             raise ck.errors.SolveError(
                 f"{self.name} specimen: gauge_length is {self.gauge_length:g} mm; allowed is more than {least:g} mm, "
                 "the width of the notch and the diameter at its root"
@@ -58,30 +58,30 @@ class NotchedBar(ck.Axisymmetric):
         return 0.5 * (self.diameter - self.notch_diameter)
 
     @property
-    def shoulder(self) -> float:
-        """Height over the root at which the notch ends, mm."""
+    def half_width(self) -> float:
+        """Half the width of the notch along the bar, mm: the height over the root at which it ends."""
         return float(np.sqrt(max(self.notch_radius**2 - (self.notch_radius - self.depth) ** 2, 0.0)))
 
     @property
     def constraint(self) -> float:
-        """Bridgman's factor of the root."""
+        """Mean stress of the root over the flow stress: Bridgman's factor, at most that of a bar that flows."""
         ratio = 4.0 * self.notch_radius / self.notch_diameter
-        return float((1.0 + ratio) * np.log1p(1.0 / ratio))
+        return float(min((1.0 + ratio) * np.log1p(1.0 / ratio), (self.diameter / self.notch_diameter) ** 2))
 
     def profile(self, count: int, straight: int) -> tuple[np.ndarray, np.ndarray]:
         """Ends (2 (count + straight) + 1, 2) of the column lines on the surface and on the axis, mm, from the root up.
 
         count : columns along half of the notch. straight : columns above it.
         """
-        turn = np.arctan2(self.shoulder, self.notch_radius - self.depth)
+        turn = np.arctan2(self.half_width, self.notch_radius - self.depth)
         angles = np.linspace(0.0, turn, 2 * count + 1)
         root = 0.5 * self.notch_diameter + self.notch_radius * (1.0 - np.cos(angles))
-        top, fan = 0.5 * self.gauge_length, self.shoulder + 0.25 * self.notch_diameter
+        top, fan = 0.5 * self.gauge_length, self.half_width + 0.25 * self.notch_diameter
         ends = np.concatenate([[0.0], np.cumsum(3.0 ** np.linspace(0.0, 1.0, straight))])
         shares = np.sort(np.concatenate([ends, 0.5 * (ends[:-1] + ends[1:])]))[1:] / ends[-1]
         above = np.full(shares.size, 0.5 * self.diameter)
         surface = np.stack([root, self.notch_radius * np.sin(angles)], axis=1)
-        surface = np.vstack([surface, np.stack([above, self.shoulder + (top - self.shoulder) * shares], axis=1)])
+        surface = np.vstack([surface, np.stack([above, self.half_width + (top - self.half_width) * shares], axis=1)])
         heights = np.append(fan * angles / turn, fan + (top - fan) * shares)
         return surface, np.stack([np.zeros(heights.size), heights], axis=1)
 
@@ -102,7 +102,8 @@ class NotchedBar(ck.Axisymmetric):
     def reference_stress(self, history: ck.History) -> np.ndarray:
         """Net stress over Bridgman's factor, (levels,) MPa, (1 + 2 R/a) ln(1 + a/(2 R)) with root radius a.
 
-        P. W. Bridgman, Studies in Large Plastic Flow and Fracture, 1952: mean stress over flow stress of a neck.
+        Of a shallow sharp notch it is the gross stress, which that factor would fall below. P. W. Bridgman, Studies in
+        Large Plastic Flow and Fracture, 1952: mean stress over flow stress of a neck.
         """
         bar, _ = self.of_test(history, {})
         levels = np.unique(np.abs(history.loading.program().values))
@@ -115,7 +116,7 @@ class NotchedBar(ck.Axisymmetric):
         """
         bar, _ = self.of_test(history, {})
         surface, _ = bar.profile(200, 200)
-        within = np.maximum(1.0 - surface[:, 1] / bar.shoulder, 0.0)
+        within = np.maximum(1.0 - surface[:, 1] / bar.half_width, 0.0)
         stress = bar.constraint / (1.0 + (bar.constraint - 1.0) * within)
         stress *= (0.5 * bar.notch_diameter / surface[:, 0]) ** 2
         return float(2.0 * np.trapezoid(stress**EXPONENT, surface[:, 1]))

@@ -26,7 +26,7 @@ class Tube(ck.Axisymmetric):
     closed: ClassVar[bool] = True
 
     name, title = "tube", "Tube under internal pressure with closed ends"
-    outputs = (ck.Output("growth", "length", "growth of the outer diameter", noise=1e-3),)
+    outputs = (ck.Output("diameter_growth", "length", "growth of the outer diameter", noise=1e-3),)
     loads = (ck.Load("pressure", "pressure"),)
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {"pressure": (5.0, 40.0), "modulus": (50e3, 300e3)}
@@ -56,7 +56,7 @@ class Tube(ck.Axisymmetric):
 
     def observe(self, displacements: ck.Displacements) -> Mapping[str, np.ndarray]:
         """The diameter grows by twice the displacement of the outer surface."""
-        return {"growth": 2.0 * displacements.radial("bottom_right")}
+        return {"diameter_growth": 2.0 * displacements.radial("bottom_right")}
 
     def reference_stress(self, history: ck.History) -> np.ndarray:
         """Von Mises stress of the limit load of each pressure level, (levels,) MPa: P sqrt(3)/2 / ln(b/a).

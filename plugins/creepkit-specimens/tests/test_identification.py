@@ -13,7 +13,7 @@ import creepkit as ck
 PLANTED = {"A": 3e-16, "n": 4.6}
 CASES = {
     "tube": (Tube(), "pressure", (14.0, 20.0, 26.0), "thickness", 0.02),
-    "plate": (PlateBulge(), "pressure", (0.35, 0.5, 0.7), "thickness", 0.02),
+    "plate-bulge": (PlateBulge(), "pressure", (0.35, 0.5, 0.7), "thickness", 0.02),
     "notched bar": (NotchedBar(), "force", (4000.0, 5000.0, 6500.0), "notch_radius", 0.1),
 }
 

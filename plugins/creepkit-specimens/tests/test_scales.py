@@ -14,9 +14,9 @@ PIECES = {
     "tube": (Tube(), "pressure", 20.0),
     "thick tube": (Tube(thickness=5.0), "pressure", 60.0),
     "open tube": (OpenTube(), "pressure", 20.0),
-    "plate": (PlateBulge(), "pressure", 0.5),
+    "plate-bulge": (PlateBulge(), "pressure", 0.5),
     "larger plate": (PlateBulge(radius=30.0), "pressure", 0.1),
-    "dome": (DomeBulge(), "pressure", 4.0),
+    "dome-bulge": (DomeBulge(), "pressure", 4.0),
     "notched bar": (NotchedBar(), "force", 6000.0),
     "blunt notch": (NotchedBar(notch_radius=8.0, gauge_length=40.0), "force", 6000.0),
 }

@@ -16,8 +16,8 @@ E_OF_T = ck.Elastic(E=150e3 - 60.0 * (ck.temperature - 1000.0))
 CASES = {
     "tube": (Tube(**FINE), ck.load_steps("pressure", [(0.0, 20.0), (1e5, 25.0)])),
     "open tube": (OpenTube(**FINE), ck.constant_load("pressure", 15.0, ramp=600.0)),
-    "plate": (PlateBulge(**FINE), ck.load_steps("pressure", [(0.0, 0.5), (1e5, 0.6)])),
-    "dome": (DomeBulge(**FINE), ck.constant_load("pressure", 4.0)),
+    "plate-bulge": (PlateBulge(**FINE), ck.load_steps("pressure", [(0.0, 0.5), (1e5, 0.6)])),
+    "dome-bulge": (DomeBulge(**FINE), ck.constant_load("pressure", 4.0)),
     "notched bar": (NotchedBar(**FINE), ck.constant_load("force", 5000.0)),
     "notched relaxation": (
         NotchedRelaxation(**FINE),

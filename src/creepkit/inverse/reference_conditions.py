@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
+from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, arrhenius, temperature
@@ -87,7 +88,12 @@ def reference_stresses(history: History, predictor: Predictor | None = None) -> 
     loads = history.loading.program().values
     if reference_stress is not None:
         return np.atleast_1d(np.asarray(reference_stress(history), float))
-    return loads if history.loading.quantity == "stress" else np.unique(loads[loads > 0])
+    if history.loading.quantity != "stress":
+        raise FitError(
+            f"{history.origin}: nothing says which stress a {history.loading.quantity} makes in the specimen "
+            f"'{history.specimen}', and searches begin at a stress; give it a method reference_stress(history), MPa"
+        )
+    return loads
 
 
 def _stated(history: History, predictor: Predictor | None, method: str) -> Callable[[History], Any] | None:

@@ -14,7 +14,7 @@ ZERO_CELSIUS = 273.15
 
 @dataclass(frozen=True)
 class UnitConversion:
-    """How a number in some unit becomes creepkit's own: factor * number + shift."""
+    """How a number in some unit becomes creepkit's own: factor * number + offset."""
 
     factor: float
     offset: float = 0.0
@@ -24,7 +24,7 @@ class UnitConversion:
 class QuantityKind:
     """A kind of quantity: the unit suffixes it may carry (creepkit's own first) and the values that make sense.
 
-    low, high : the values, in creepkit's unit, that bound the sensible ones; both excluded when `open`.
+    low, high : the values, in creepkit's unit, that bound the sensible ones; both excluded when `open_interval`.
     """
 
     name: str
@@ -34,7 +34,7 @@ class QuantityKind:
     open_interval: bool = False
 
     def unit(self, suffix: str, location: str, name: str) -> UnitConversion:
-        """Return the unit that a suffix means; `name` and `place` say in the error what was read and where."""
+        """Return the unit that a suffix means; `name` and `location` say in the error what was read and where."""
         if suffix not in self.units:
             raise HistoryError(
                 f"{location}: {self._unit_error(name, suffix)}; allowed: {self._spellings(name, suffix)}"

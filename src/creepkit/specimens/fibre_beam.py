@@ -1,6 +1,7 @@
 """Beams of fibres: sections along a span, each of many uniaxial material points, under a force or a deflection.
 
-Plane sections stay plane (Bernoulli), deflections are small, shear adds nothing, and supports give no moment. A
+Plane sections stay plane (Bernoulli), deflections are small, shear and thermal expansion are left out, and supports
+give no moment. A change of temperature changes creep and the modulus alone. A
 subclass says where its sections are and which moment a unit of force gives them; by virtual work the same moments,
 integrated over the curvatures, give the deflection of the point where the force acts. The deflection includes the
 elastic one.
@@ -49,13 +50,17 @@ MODULUS_PIECE = 25.0
 class BeamStations:
     """The sections of a beam. moments : (stations,) mm, N mm for each N of force; lengths : (stations,) mm of beam.
 
-    A section stands for its length of the beam, all parts that are symmetric to it together.
+    A section stands for its length of the beam, all parts that are symmetric to it together. largest : mm, the largest
+    moment of the beam for each N, which no station need have; by default that of the stations.
     """
 
     moments: Floats
     lengths: Floats
+    largest: float = 0.0
 
     def __post_init__(self) -> None:
+        if not self.largest:
+            object.__setattr__(self, "largest", float(np.max(np.abs(self.moments))))
         object.__setattr__(self, "moments", frozen(np.atleast_1d(self.moments)))
         object.__setattr__(self, "lengths", frozen(np.atleast_1d(self.lengths)))
 
@@ -106,7 +111,7 @@ class FibreBeam(TestPiece, ABC):
     @property
     def compliance(self) -> float:
         """Elastic deflection for a unit of force, times the modulus, 1/mm: the sum of m^2 dx/I."""
-        _, _, inertia = self._section_moments()
+        _, inertia = self._section_moments()
         beam = self.beam_stations()
         return float(np.sum(beam.moments**2 * beam.lengths) / inertia)
 
@@ -125,12 +130,12 @@ class FibreBeam(TestPiece, ABC):
         for Creep (1983), chapter 3. Under a prescribed deflection that at first, without creep.
         """
         piece, tested = self.of_test(history, {})
-        _, plastic, _ = piece._section_moments()
+        plastic, _ = piece._section_moments()
         levels = np.unique(np.abs(tested.loading.program().values))
         levels = levels[levels > 0]
         if self.relaxes:
             levels = levels * piece._modulus(tested).values[0] / piece.compliance
-        return np.asarray(levels * np.max(np.abs(piece.beam_stations().moments)) / plastic)
+        return np.asarray(levels * piece.beam_stations().largest / plastic)
 
     def growth_per_strain(self, history: History) -> float:
         """Deflection, mm, or force lost, N, for a unit of creep strain at the reference stress.
@@ -138,9 +143,9 @@ class FibreBeam(TestPiece, ABC):
         Curvatures are taken to vary along the beam as moments do.
         """
         piece, tested = self.of_test(history, {})
-        _, plastic, inertia = piece._section_moments()
+        plastic, inertia = piece._section_moments()
         beam = piece.beam_stations()
-        shape = beam.moments / np.max(np.abs(beam.moments))
+        shape = beam.moments / beam.largest
         deflection = float(np.sum(np.abs(beam.moments * shape) * beam.lengths) * plastic / inertia)
         return deflection * float(piece._modulus(tested).values[0]) / piece.compliance if self.relaxes else deflection
 
@@ -256,11 +261,11 @@ class FibreBeam(TestPiece, ABC):
             return np.ones(tested.times.size)
         return np.asarray(-self._modulus(tested).at(tested.times) / self.compliance)
 
-    def _section_moments(self) -> tuple[float, float, float]:
-        """Area, plastic section modulus and second moment of area, mm^2, mm^3 and mm^4."""
+    def _section_moments(self) -> tuple[float, float]:
+        """Plastic section modulus and second moment of area, mm^3 and mm^4."""
         y, areas = self.section()
         y = y - float(areas @ y) / float(areas.sum())
-        return float(areas.sum()), float(areas @ np.abs(y)), float(areas @ y**2)
+        return float(areas @ np.abs(y)), float(areas @ y**2)
 
     def _modulus(self, tested: History) -> Program:
         """The modulus over time, MPa; straight between the breakpoints of the temperature."""

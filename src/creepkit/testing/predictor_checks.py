@@ -23,6 +23,10 @@ STEPPING = 2e-3
 """By which values may differ that were integrated in other steps, relative as SAME."""
 
 
+STEPPING_NOISE = 3e-5
+"""Of the largest value of an output: by so much neighbouring runs with steps of their own may differ at random."""
+
+
 SENSITIVITY_TOLERANCE = 0.02
 """Of the largest derivative; beside it, what two steps of the difference disagree by."""
 
@@ -216,7 +220,7 @@ def _excess(derivative: Floats, values: Floats, step: float) -> float:
     error = np.nanmax(np.abs(derivative - narrow), axis=0, initial=0.0)
     doubt = np.nanmax(np.abs(narrow - wide), axis=0, initial=0.0)
     size = np.nanmax(np.abs(narrow), axis=0, initial=0.0)
-    noise = 1e-6 * np.nanmax(np.abs(values), axis=(0, 1), initial=0.0) / step
+    noise = STEPPING_NOISE * np.nanmax(np.abs(values), axis=(0, 1), initial=0.0) / step
     if not np.isfinite(derivative[np.isfinite(narrow)]).all():
         return float("inf")
     return float(np.max(np.maximum(error - 2 * doubt - noise, 0.0) / np.maximum(size, 1e-300)))

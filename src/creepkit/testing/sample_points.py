@@ -81,12 +81,17 @@ def _constraint_functions(law: CreepLaw) -> tuple[Callable[..., Any], ...]:
 
 
 def _to_points(law: CreepLaw, unit: Floats) -> Floats:
-    """Stress, strain, time spread over decades; the principal stress 0.4 to 1 of the stress, the mean -1/3 to 2/3."""
+    """Stress, strain, time spread over decades; the mean stress 0 to 1.5 of the von Mises stress, from torsion to
+    notches, and the largest principal stress above it by 1/3 to 2/3 of the latter, as any state of stress has it. In
+    compression rates of damage are zero, which no relative error can be stated of.
+    """
     stress, strain, time = (
         _log_between(u, r) for u, r in zip(unit.T, (STRESS_RANGE, STRAIN_RANGE, TIME_RANGE), strict=False)
     )
     temperature = TEMPERATURE_RANGE[0] + unit[:, 3] * (TEMPERATURE_RANGE[1] - TEMPERATURE_RANGE[0])
-    point = [stress, strain, time, temperature, stress * (0.4 + 0.6 * unit[:, 4]), stress * (unit[:, 5] - 1 / 3)]
+    mean = 1.5 * stress * unit[:, 5]
+    principal = mean + stress * (1.0 + unit[:, 4]) / 3.0
+    point = [stress, strain, time, temperature, principal, mean]
     state_values = [_state_between(u, state) for u, state in zip(unit.T[POINT_SIZE:], law.states.values(), strict=True)]
     return np.stack([*point, *state_values], axis=1)
 

@@ -85,12 +85,12 @@ def test_several_specimens_come_back_each_with_its_settings(fit):
 
 
 def test_a_specimen_of_a_missing_plugin_is_said_in_one_sentence_and_kept(document, tmp_path):
-    changed = {**document, "predictor_documents": {"": {"kind": "specimen", "name": "tube", "fields": {}}}}
+    changed = {**document, "predictor_documents": {"": {"kind": "specimen", "name": "torsion-tube", "fields": {}}}}
     back = identification_from_json(changed)
 
     assert back.values["n"] > 1
     for ask in (lambda: back.predict(TESTS), lambda: back.with_histories(TESTS), lambda: back.rupture_time(80.0)):
-        with pytest.raises(FitError, match=r"with specimen 'tube', which is not known here: install the plugin"):
+        with pytest.raises(FitError, match="with specimen 'torsion-tube', which is not known here: install"):
             ask()
     np.testing.assert_array_equal(back.with_histories(TESTS, BAR).predict().values, back.predict(TESTS, BAR).values)
     assert ck.load(back.save(tmp_path / "fit.json")).predictor_documents == back.predictor_documents
@@ -117,9 +117,9 @@ def test_a_reduced_order_model_is_found_again_with_the_fields_of_its_specimen():
         assert documents[""].kind == "reduced-order model"
         assert predictor_from_documents(documents) == model
 
-    gone = {"": replace(documents[""], name="tube")}
+    gone = {"": replace(documents[""], name="torsion-tube")}
     assert predictor_from_documents(gone) is None
-    assert "made with specimen 'tube', which is not known here" in missing_predictor(gone)
+    assert "made with specimen 'torsion-tube', which is not known here" in missing_predictor(gone)
 
 
 def test_a_trained_surrogate_is_asked_for():
