@@ -204,7 +204,7 @@ def check_sensitivities(case: PredictorCase) -> Iterator[ConformanceCheck]:
         if excess > worst:
             worst, of = excess, name
     passed = worst <= SENSITIVITY_TOLERANCE
-    detail = f"within {worst:.1e} of differences" if passed else (
+    detail = f"{worst:.1e} beyond what differences leave open" if passed else (
         f"the derivative to {of} is off by {worst:.2g} of its largest value; it is to the internal parameter, the "
         "natural logarithm where the scale is log"
     )  # fmt: skip
@@ -267,7 +267,7 @@ def check_nuisances(case: PredictorCase) -> Iterator[ConformanceCheck]:
                 detail = f"its derivative is off by {excess:.2g} of the largest; it is to the value in its own unit"
                 yield ConformanceCheck(f"nuisance {kind}", False, detail)
                 continue
-            detail += f", derivative within {excess:.1e}"
+            detail += f", derivative {excess:.1e} beyond what differences leave open"
         yield ConformanceCheck(f"nuisance {kind}", True, detail)
     yield must_refuse(
         "an undeclared nuisance is refused",
