@@ -12,7 +12,17 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.experiments.rig import HIGHER_LEVEL, LOWER_LEVEL, Rig
-from creepkit.records import History, Loading, PressureJump, StrainSteps, StressSteps, constant_strain, constant_stress
+from creepkit.records import (
+    History,
+    Loading,
+    PressureJump,
+    StrainSteps,
+    StressSteps,
+    constant_strain,
+    constant_stress,
+    load_steps,
+    load_unit,
+)
 from creepkit.records.loading import Quantity
 
 ControlledQuantity = Literal["load", "stress"]
@@ -72,13 +82,13 @@ def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperatu
     if longest <= 0:
         raise FitError(f"a budget of {budget:g} h leaves no time for a test beside {rig.setup_hours:g} h to set it up")
     quantity = base.loading.quantity
-    if quantity not in _LOADINGS:
+    if quantity == NOT_PLANNED:
         raise FitError(f"no further tests are known for a loading by {quantity}; give candidates=, a list of histories")
     temperatures: tuple[float, ...] = rig.temperatures if by_temperature else (base.mean_temperature,)
     pieces = [*_test_pieces(rig, base)]
     candidates = []
     for duration, T in product(_durations(rig, longest), temperatures):
-        for loading, text in _LOADINGS[quantity](rig, base, duration):
+        for loading, text in _LOADINGS.get(quantity, _loads)(rig, base, duration):
             at_temperature = f" at {T:.5g} K" if len(temperatures) > 1 else ""
             whole = f"{text} for {hours_text(duration)}{at_temperature}"
             times = frame_times(duration, rig.frame_interval)
@@ -176,11 +186,28 @@ def _strains(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading
         yield steps, f"a strain of {first:.3g}, from {hours_text(change)} on {second:.3g},"
 
 
+def _loads(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
+    """Any other load, in its unit, after a ramp as long as that of `base`."""
+    quantity, unit, program = base.loading.quantity, load_unit(base), base.loading.program()
+    ramp = float(program.times[1]) if program.values[0] == 0.0 and program.times.size > 1 else 0.0
+    ramp = min(ramp, 0.1 * duration)
+    for level in _levels(rig):
+        yield load_steps(quantity, [(0.0, level)], ramp), f"{level:.3g} {unit}".rstrip()
+    for first, second in _pairs(rig):
+        change = CHANGE_AT * duration
+        steps = load_steps(quantity, [(0.0, first), (change, second)], ramp)
+        yield steps, f"{first:.3g} {unit}, from {hours_text(change)} on {second:.3g} {unit},"
+
+
 _LOADINGS: dict[Quantity, Callable[[Rig, History, float], Iterator[tuple[Loading, str]]]] = {
     "pressure": _pressures,
     "stress": _stresses,
     "strain": _strains,
 }
+
+
+NOT_PLANNED = "components"
+"""The load of a material point: there are too many of it to plan."""
 
 
 def hours_text(seconds: float) -> str:
@@ -201,7 +228,7 @@ def variations_of_tests(
     """
     candidates: list[CandidateTest] = []
     for rig in rigs:
-        tests = [h for h in histories if h.specimen == rig.specimen and h.loading.quantity in _LOADINGS]
+        tests = [h for h in histories if h.specimen == rig.specimen and h.loading.quantity != NOT_PLANNED]
         if tests:
             levels = np.concatenate([h.loading.program().values for h in tests])
             candidates += _variations(rig, max(tests, key=lambda h: float(h.times[-1])), levels[levels > 0], exponent)
@@ -216,7 +243,7 @@ def _variations(rig: Rig, base: History, made_levels: Floats, exponent: float) -
     end, longest = float(base.times[-1]), rig.longest_hours * 3600.0
     base_level = float(base.loading.program().values.max())
     at_levels = rig.replace(load_changes=False)
-    loadings = _LOADINGS[base.loading.quantity]
+    loadings = _LOADINGS.get(base.loading.quantity, _loads)
     for level in dict.fromkeys((rig.levels[0], LOWER_LEVEL * high, rig.levels[1])):
         is_bar = base.loading.quantity == "stress"
         duration = min(end * (level / base_level) ** -exponent, longest) if is_bar else end

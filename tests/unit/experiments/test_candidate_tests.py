@@ -120,3 +120,18 @@ def test_a_rig_says_why_it_cannot_make_a_test():
     assert "more than the 12 h" in rig.refusal(over.replace(times=np.array([1e6])))
     warm = over.replace(temperature=Program([0.0, 3600.0], [1100.0, 1120.0]))
     assert "1100 K is none of the rig's temperatures (1000 K)" in rig.refusal(warm)
+
+
+def test_any_load_is_varied_in_its_unit_after_the_ramp_that_was_made():
+    base = ck.History(
+        "beam", np.linspace(3600.0, 36000.0, 10), {}, ck.constant_load("force", 200.0, ramp=30.0), 1000.0,
+        "three-point-bend", ck.Elastic(150e3),
+    )  # fmt: skip
+    found = grid_of_rig(Rig("three-point-bend", (100.0, 400.0), 20.0, (1000.0,)), base)
+    assert any(c.description.startswith("400 N for ") for c in found)
+    assert any("100 N, from " in c.description and " on 141 N" in c.description for c in found)
+    for candidate in found:
+        loading = candidate.histories[0].loading
+        assert loading.quantity == "force"
+        assert loading.program().values[0] == 0.0
+        assert loading.program().times[1] == 30.0
