@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import frame_times, grid_of_rig, variations_of_tests
 from creepkit.experiments.rig import Rig, rigs_of
