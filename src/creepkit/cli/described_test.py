@@ -74,6 +74,12 @@ def further_options(context: typer.Context | None) -> dict[str, list[str]]:
     return {} if context is None else context.meta.get(SPECIMEN_OPTIONS, {})
 
 
+def context_of(context: typer.Context | None) -> typer.Context:
+    """The context of a command that has further options."""
+    assert context is not None
+    return context
+
+
 def specimen_options(
     specimen: Specimen, context: typer.Context | None
 ) -> tuple[dict[str, Sequence[str]], dict[str, float]]:
@@ -88,11 +94,14 @@ def specimen_options(
         if name in loads:
             texts[name] = values
         elif dimension is not None:
+            if dimension.name in lengths:
+                context_of(context).fail(f"{option}: {dimension.name} is given twice; keep one of them")
             lengths |= parse_numbers([f"{dimension.name}={value}" for value in values], option, f"{option} 12")
         else:
             known = [f"--{each.replace('_', '-')}" for each in (*loads, *(d.name for d in dimensions_of(specimen)))]
-            assert context is not None
-            context.fail(f"No such option: {option}; --specimen {specimen.name} takes {', '.join(sorted(known))}")
+            context_of(context).fail(
+                f"No such option: {option}; --specimen {specimen.name} takes {', '.join(sorted(known))}"
+            )
     return texts, lengths
 
 

@@ -118,6 +118,7 @@ class DescribedTest:
 def described_test(options: TestOptions) -> DescribedTest:
     """What the options say of a test; SolveError where they contradict each other or leave out what is needed."""
     import creepkit as ck
+    from creepkit.errors import SolveError
 
     usual = {"stress": options.stress, "strain": options.strain, "pressure": options.pressure}
     loads = {name: texts for name, texts in usual.items() if texts}
@@ -127,7 +128,10 @@ def described_test(options: TestOptions) -> DescribedTest:
     further, lengths = specimen_options(specimen, options.context)
     loads |= further
     check_options(specimen, loads, options.control, options.ramp)
-    lengths |= parse_lengths(specimen, options.geometry)
+    for name, value in parse_lengths(specimen, options.geometry).items():
+        if name in lengths:
+            raise SolveError(f"--geometry {name}: {name} is given twice; keep one of them")
+        lengths[name] = value
     check_duration(options.end_h)
     loading = parse_loading(specimen, loads, options.control, options.ramp, 3600.0 * options.end_h)
     check_modulus(specimen, options.modulus_gpa, loads)

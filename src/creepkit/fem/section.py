@@ -244,6 +244,11 @@ class Section:
 
     def model(self, observed: Ints) -> FiniteElementModel:
         """The finite element model; observed : (observed,) displacements, 2 node + 0 for u_r or + 1 for u_z."""
+        if self.controlled is not None and (self.pressed.size or self.forces.any()):
+            raise SolveError(
+                "a section is moved by its load, a displacement, and pressed or pulled by it as well; make a section "
+                "for each load, as section(load) is asked by its name"
+            )
         mesh = Mesh(self.nodes, self.elements, self.held, self.pressed, np.zeros(0, dtype=np.int64))
         constraints = AxialConstraints(self.forces, self.planes, self.controlled, observed)
         return finite_element_model(mesh, constraints)

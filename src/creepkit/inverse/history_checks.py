@@ -83,12 +83,27 @@ def _creeps_under_load(history: History, output: str) -> bool:
     return not output_named(output, history.specimen).grows or detect_creep(history, output).shows_creep
 
 
+def check_outputs_agree(histories: Sequence[History]) -> None:
+    """FitError where outputs of one name are other quantities in other specimens: they would share one noise."""
+    known: dict[str, tuple[str, str]] = {}
+    for history in histories:
+        for name in history.outputs:
+            output = output_named(name, history.specimen)
+            quantity, specimen = known.setdefault(name, (output.quantity, history.specimen))
+            if quantity != output.quantity:
+                raise FitError(
+                    f"'{name}' is a {quantity} of specimen '{specimen}' and a {output.quantity} of "
+                    f"'{history.specimen}'; outputs of one name share their noise in a fit: rename one of them in its specimen"
+                )
+
+
 def check_histories(law: CreepLaw, histories: Sequence[History], predictor: Predictor) -> None:
     """There must be parameters, and named histories with enough finite outputs to find them from."""
     if not histories:
         raise FitError(f"law '{law.name}': there are no histories to identify it from")
     if not law.params:
         raise FitError(f"law '{law.name}' has no parameter left to identify")
+    check_outputs_agree(histories)
     names = [h.name for h in histories]
     for history in histories:
         if names.count(history.name) > 1:

@@ -80,6 +80,7 @@ class NuisanceParameters:
         """One for each test, alloy, group or all tests that it applies to and whose predictor knows the kind."""
         parameters: list[tuple[Nuisance, str]] = []
         test_index: dict[str, Ints] = {}
+        _refuse_two_names(nuisances, histories, predictor)
         for nuisance in (n for n in nuisances if n.is_simulated):
             offered = [_takes_effect(nuisance, h, predictor) for h in histories]
             named = any(nuisance.applies_to(h.name) for h in histories)
@@ -169,6 +170,19 @@ class NuisanceParameters:
                 least = SMALLEST_PRIOR_SD * initial_prior_sd(replace(nuisance, sd=None), float(self.mean[mask][0]))
                 sd[mask] = max(float(estimated_sd), least)
         return replace(self, sd=sd)
+
+
+def _refuse_two_names(nuisances: Sequence[Nuisance], histories: Sequence[History], predictor: Predictor) -> None:
+    """FitError where a test would have one length twice, by its name and by its alias."""
+    for history in histories:
+        own = predictor_for(predictor, history)
+        of_length: dict[str, str] = {}
+        for kind in (n.kind for n in nuisances if n.is_length and n.applies_to(history.name)):
+            length = dimension_named(own, kind)
+            if length is not None and of_length.setdefault(length.name, kind) != kind:
+                raise FitError(
+                    f"nuisances '{of_length[length.name]}' and '{kind}' are the same length of the test piece; keep one"
+                )
 
 
 def _takes_effect(nuisance: Nuisance, history: History, predictor: Predictor) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -90,6 +91,8 @@ def _specimen_and_outputs(
         chosen = [named] if named in present else []
     else:
         chosen = [name for name in present if load in terms.loads.get(name, [load])] or present
+    if named and named not in terms.outputs and (near := get_close_matches(named, terms.outputs, 1, cutoff=0.8)):
+        raise HistoryError(f"{location}: there is no specimen '{named}'; did you mean '{near[0]}'?")
     if len(chosen) != 1:
         raise _unidentified(named, present if named in terms.outputs else chosen, terms, location)
     outputs = {name: frames.values[name] for name in terms.outputs[chosen[0]] if name in frames.values}

@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Literal, TypeVar
 
 import numpy as np
 
-from creepkit.errors import CreepkitError, HistoryError
+from creepkit.errors import CreepkitError, HistoryError, nearest
 from creepkit.readers.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATURE_RECORD_TOLERANCE, recorded_program
 from creepkit.readers.text_tables import Frames, SourceText
 from creepkit.readers.vocabulary import (
@@ -42,6 +43,10 @@ END_OF_TEST_TERMS = ("ruptured", "stopped")
 
 
 _T = TypeVar("_T")
+
+
+CLOSE_SPELLING = 0.8
+"""Similarity above which an unknown name is a misspelt one."""
 
 
 TimeValuePairs = tuple[tuple[float, float], ...]
@@ -154,6 +159,7 @@ class StatedConditions:
             value = LENGTH.convert(entry.number(key), dimension[1], entry.location, key)
             _put_once(self.geometry, dimension[0], value, entry.location)
         elif result is None:
+            _refuse_misread_length(name, entry, self.terms)
             _put_once(self.labels, name, entry.text, entry.location)
         else:
             _put_once(self._numbers, result[0], self._stated_number(result, key, entry), entry.location)
@@ -176,6 +182,19 @@ def _dimension_with_unit(name: str, dimensions: Mapping[str, str]) -> tuple[str,
     """A length of a test piece and its unit, where a key is one, such as `apex_thickness_mm`."""
     base, _, suffix = name.rpartition("_")
     return (dimensions[base], suffix) if base in dimensions and suffix in LENGTH.units else None
+
+
+def _refuse_misread_length(name: str, entry: SourceText, terms: Terms) -> None:
+    """HistoryError for what looks like a length of the test piece, in another unit or misspelt; not for a label."""
+    base, _, suffix = name.rpartition("_")
+    lengths, units = terms.own_dimensions, ", ".join(LENGTH.units)
+    for known in lengths:
+        if name == known or (base == known and suffix not in LENGTH.units):
+            raise HistoryError(f"{entry.location}: '{name}' needs a unit of length: write {known}_mm (or {units})")
+    if suffix in LENGTH.units and lengths and get_close_matches(base, lengths, 1, cutoff=CLOSE_SPELLING):
+        raise HistoryError(
+            f"{entry.location}: no length of the test piece is called '{base}'; {nearest(base, lengths)}"
+        )
 
 
 @contextmanager

@@ -86,6 +86,7 @@ class HeaderVocabulary:
             loads={specimen: [load.name for load in loads_of(one)] for specimen, one in known.items()},
             load_kinds={name: kind for name, kind in loads.items() if name != "components"},
             dimensions={name: d.name for one in named.values() for d in dimensions_of(one) for name in d.names},
+            own_dimensions=[name for d in dimensions_of(known.get(specimen)) for name in d.names],
         )
 
 
@@ -95,7 +96,7 @@ class Terms:
 
     outputs : {specimen: {output: kind}}; own_outputs : those of the specimen that the file names, {} where it names
     none. loads : {specimen: names}. load_kinds : {load: kind} of those that are stated by one number or program.
-    dimensions : {name or alias: length of a test piece}.
+    dimensions : {name or alias: length of a test piece}; own_dimensions : of the specimen that the file names.
     """
 
     outputs: Mapping[str, Mapping[str, QuantityKind]]
@@ -103,6 +104,7 @@ class Terms:
     loads: Mapping[str, Sequence[str]]
     load_kinds: Mapping[str, QuantityKind]
     dimensions: Mapping[str, str]
+    own_dimensions: Sequence[str]
 
     @property
     def number_kinds(self) -> dict[str, QuantityKind]:

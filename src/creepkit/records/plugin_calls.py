@@ -36,7 +36,7 @@ def call_of_plugin(call: Callable[[], _T], owner: object, what: str, error: type
         return call()
     except CreepkitError:
         raise
-    except Exception as raised:
+    except (Exception, SystemExit) as raised:
         if type(owner).__module__.partition(".")[0] == OWN_PACKAGE:
             raise
         message = " ".join(str(raised).split()) or "no message"

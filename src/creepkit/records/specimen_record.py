@@ -27,7 +27,8 @@ class Output(str):
         (N mm), "angle" (rad), "temperature" (K) or "time" (s); it decides the unit.
     long_name : what people call it, for axes and tables; its name with spaces by default.
     grows : whether it grows with creep while the load is held; a stress that relaxes does not.
-    noise : standard deviation of its measurement, in its unit, where a test does not state one; None: not known.
+    noise : standard deviation of a usual measurement, in its unit: what data sets and planted tests are made with. An
+        identification takes what a test states or shows. None: not known.
     logarithmic : whether tests scatter, and are compared, by its logarithm, as creep strains of bars do.
     weight : its share in the paper's loss, where outputs have shares.
     visible : how much of it plainly shows creep, in its unit; ten times the noise by default.

@@ -290,10 +290,40 @@ def contributions_of(kind: ContributionKind, implementation: pluggy.HookImpl) ->
             f"{implementation.plugin_name}: {kind.hook} returned a record that cannot be asked its name: "
             f"{error_text(error)}{place}"
         ) from error
-    for name, _ in contributions:
+    for name, contribution in contributions:
+        if kind.label == "specimen" and (problem := record_problem(contribution)):
+            raise PluginError(f"{implementation.plugin_name}: specimen '{name}' {problem}{place}")
         if [other for other, _ in contributions].count(name) > 1:
             raise PluginError(f"{implementation.plugin_name} offers the {kind.label} '{name}' twice; rename one{place}")
     return dict(contributions)
+
+
+def record_problem(specimen: Any) -> str:
+    """What is wrong with the record of a specimen, as the end of a sentence; "" where files and options can use it."""
+    try:
+        outputs, loads, lengths = (tuple(getattr(specimen, name, ())) for name in ("outputs", "loads", "dimensions"))
+        known = (*(str(name) for name in outputs), *(one.name for one in loads), *(one.name for one in lengths))
+    except Exception as error:
+        return (
+            f"has a record that cannot be read: {error_text(error)}; outputs are names, loads ck.Load, lengths fields"
+        )
+    if not outputs or not all(isinstance(name, str) for name in outputs):
+        return f"has outputs {outputs!r:.60}; give at least one name, or ck.Output"
+    if both := {str(o) for o in outputs} & {load.name for load in loads}:
+        return f"has an output and a load called '{both.pop()}', which a file could not tell apart; rename one"
+    for name in known:
+        if name in RESERVED_NAMES or name.endswith("_sd"):
+            return f"calls something '{name}', which means something else in files or options; rename it"
+    return ""
+
+
+_RESERVED = """time used temperature modulus poisson jump_time end_time rupture ended label geometry offset rate control
+ramp specimen name alloy operator set to help points every picture end_h modulus_gpa temperature_c level draws target
+tolerance json plot"""
+
+
+RESERVED_NAMES = frozenset(_RESERVED.split())
+"""Columns and keys of files, options of commands and kinds of nuisance parameters that every specimen has."""
 
 
 def call_hook(implementation: pluggy.HookImpl, **keywords: Any) -> Any:
@@ -301,7 +331,7 @@ def call_hook(implementation: pluggy.HookImpl, **keywords: Any) -> Any:
     arguments = [keywords[name] for name in implementation.argnames]
     try:
         return implementation.function(*arguments)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         name = implementation.function.__name__
         raise PluginError(f"{implementation.plugin_name}: {name} raised {error_text(error)}") from error
 

@@ -113,13 +113,22 @@ class PerTest(TestPiece, ABC):
             return np.full((history.times.size, len(self.outputs)), np.nan), Status.NOT_CONVERGED, 0.0, str(error)
         except CreepkitError as error:
             raise SolveError(f"{self._place(values, history)}: {error}") from error
-        except Exception as error:  # of the author's code, whatever it is
+        except (Exception, SystemExit) as error:  # of the author's code, whatever it is
             last = traceback.extract_tb(error.__traceback__)[-1]
             raise SolveError(
                 f"{self._place(values, history)}: {type(error).__name__}: {error} ({last.filename}:{last.lineno})"
             ) from error
+        if not isinstance(found, (OneTest, Mapping)):
+            raise SolveError(
+                f"{self._place(values, history)}: one() gave {found!r:.40}; it must return {{output: values}}, or a "
+                "OneTest where a test ends early"
+            )
         if not isinstance(found, OneTest):
             found = OneTest(found, Status.COMPLETE, end)
+        if not isinstance(found.status, Status):
+            raise SolveError(
+                f"{self._place(values, history)}: one() gave the status {found.status!r:.40}; use ck.Status"
+            )
         ended = end if np.isnan(found.end_time) else found.end_time
         return self._rows(found, values, history), found.status, ended, ""
 
@@ -131,7 +140,16 @@ class PerTest(TestPiece, ABC):
             )
         rows = []
         for name in self.outputs:
-            row = np.asarray(found.outputs[name], float)
+            try:
+                given = np.asarray(found.outputs[name])
+                row = given.astype(float) if not np.iscomplexobj(given) else np.zeros(0)
+            except (TypeError, ValueError):
+                given = row = np.zeros(0)
+            if np.iscomplexobj(given) or (not row.size and history.times.size):
+                raise SolveError(
+                    f"{self._place(values, history)}: one() gave '{name}' as {found.outputs[name]!r:.60}; real "
+                    "numbers, one for each time, are needed"
+                )
             if row.shape != history.times.shape:
                 raise SolveError(
                     f"{self._place(values, history)}: one() gave '{name}' of shape {row.shape}; the test has "

@@ -69,15 +69,16 @@ class TestPiece:
     def of_test(self, history: History, nuisances: Mapping[str, float]) -> tuple[Self, History]:
         """The test piece and the history of one test, as that test and its nuisances {kind: value} say.
 
-        SolveError for a load that the specimen does not take, and for a length that it does not have.
+        SolveError for a load that the specimen does not take, and for a length that it does not have. A nuisance
+        parameter beyond the bounds of its length counts as at them.
         """
         check_load(self, history)
         check_geometry(self, history.geometry, history.origin)
         lengths = {name: self._length(name, value, history) for name, value in history.geometry.items()}
         for kind, value in nuisances.items():
             known = dimension_named(self, kind)
-            if known is not None:
-                lengths[known.name] = self._length(kind, value, history)
+            if known is not None:  # what an estimate tries beyond the bounds is drawn back by its penalty
+                lengths[known.name] = float(min(max(value, known.bounds[0]), known.bounds[1]))
         piece = self.replace(**lengths) if lengths and self.dimensions else self
         return piece, warmer_and_stiffer(history, nuisances.get("temperature", 0.0), nuisances.get("modulus", 0.0))
 
