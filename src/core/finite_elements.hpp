@@ -163,6 +163,23 @@ public:
         }
     }
 
+    bool touches() const { return model.contact_sides > 0; }
+
+    // mm, that corrections of equilibrium are cut to; small beside a body that moves freely, which they throw far into
+    // the mesh while little of it touches.
+    double longest_correction() const {
+        if (model.bordered < 0) return 1.0;
+        double shortest = 1.0;
+        for (int64_t side = 0; side < model.contact_sides; ++side) {
+            const int64_t* row = model.contacts + 5 * side;
+            if (model.equations[2 * row[3] + 1] != model.bordered) continue;
+            const double r = model.coordinates[2 * row[4]] - model.coordinates[2 * row[3]];
+            const double z = model.coordinates[2 * row[4] + 1] - model.coordinates[2 * row[3] + 1];
+            shortest = fmin(shortest, 0.01 * sqrt(r * r + z * z));
+        }
+        return shortest;
+    }
+
     // Largest displacement, mm, that the numbers in `residual` stand for; NaN or infinite where one is.
     double largest_correction() const {
         double worst = 0.0;

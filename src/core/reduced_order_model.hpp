@@ -81,6 +81,8 @@ public:
     int64_t observed_count() const { return model.observed; }
     double reaction() const { return 0.0; }
     double reaction_error() const { return 0.0; }
+    bool touches() const { return false; }
+    double longest_correction() const { return 1.0; }  // mm
     Eight weights(int64_t block) const { return load(model.weights + EIGHT * block); }
 
     // Deformation gradient of eight points.

@@ -124,7 +124,7 @@ private:
         constexpr int PASSES = 16;
         constexpr double LOOSE = 0.03;   // tolerance of the points' equations in the first pass
         constexpr double KEEP = 0.3;     // the tangent is kept while a correction is at most this share of the last
-        constexpr double LONGEST = 1.0;  // mm, corrections are cut to this
+        const double longest = system.longest_correction();
         double last = 0.0, size = 0.0, factor = 1.0;
         for (int pass = 0; pass < PASSES; ++pass) {
             const bool stiff = pass == 0 || factor < 1.0 || (pass > 1 && size > KEEP * last);
@@ -139,7 +139,7 @@ private:
             last = size;
             size = system.largest_correction();
             if (!isfinite(size) || (pass > 6 && size > last)) return TOO_FAR;
-            factor = size > LONGEST ? LONGEST / size : 1.0;
+            factor = size > longest ? longest / size : 1.0;
             system.correct(displacement, factor);
             if (size <= tolerance) return CONVERGED;
         }
@@ -161,6 +161,7 @@ private:
             if (solve_equilibrium(stage, newton, 1e-3) == CONVERGED) {
                 done = now;
                 copy(displacement, start);
+                if (system.touches()) part *= 4.0;  // the first part closes gaps; others may then be larger
                 if (done < 1.0) continue;
                 if (!sensitivities.differentiate(system, law, points, input, n, 0.0, 0.0, tableau, &displacement,
                                                  ended.records))
