@@ -139,6 +139,10 @@ public:
         if (model.bordered < 0) return true;
         memcpy(border_solution, border, sizeof(double) * size_t(shape.rows()));
         solve_symmetric(shape, tangent, border_solution);
+        if (border_stiffness == 0.0) {  // nothing touches the body: let its force move it until something does
+            border_pivot = NEARLY_FREE;
+            return true;
+        }
         border_pivot = border_stiffness;
         for (int64_t k = 0; k < model.size; ++k) border_pivot -= border[k] * border_solution[k];
         return border_pivot > 0.0;
@@ -217,6 +221,7 @@ private:
     double controlled_error = 0.0;  // N/rad, of it, at fixed displacements
     double* controlled_row = nullptr;  // (size,) its row of the tangent, without the diagonal
 
+    static constexpr double NEARLY_FREE = 1e-3;  // N/(rad mm); corrections are cut
     double *border = nullptr, *border_solution = nullptr;  // (rows,) column of the bordered equation; K^-1 times it
     double border_stiffness = 0.0, border_pivot = 0.0;     // N/(rad mm), its diagonal; less border K^-1 border
 
