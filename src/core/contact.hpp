@@ -63,6 +63,18 @@ public:
         return touches;
     }
 
+    // Depth at the Gauss points, (3,) mm, below zero where there is a gap.
+    void penetrations(double* depths) const {
+        for (int g = 0; g < 3; ++g) {
+            double away[2];
+            for (int i = 0; i < 2; ++i) {
+                away[i] = -centre[i];
+                for (int a = 0; a < 3; ++a) away[i] += quadrature.values[g][a] * now[i][a];
+            }
+            depths[g] = radius - sqrt(away[0] * away[0] + away[1] * away[1]);
+        }
+    }
+
     // Change of `force` with a velocity (2 nodes,) of all nodes, at fixed displacements; after assemble<true>.
     void change(const double* velocity, double changes[CONTACT_UNKNOWNS]) const {
         double grows = 0.0;  // of the radius

@@ -46,6 +46,7 @@ public:
         tangent = memory.doubles(shape.numbers() + 1);
         residual = memory.doubles(shape.rows());
         controlled_row = memory.doubles(model.controlled >= 0 ? model.size : 0);
+        depths = memory.doubles(3 * model.contact_sides);
         border = memory.doubles(model.bordered >= 0 ? shape.rows() : 0);
         border_solution = memory.doubles(model.bordered >= 0 ? shape.rows() : 0);
     }
@@ -169,19 +170,27 @@ public:
 
     bool touches() const { return model.contact_sides > 0; }
 
-    // mm, that corrections of equilibrium are cut to; small beside a body that moves freely, which they throw far into
-    // the mesh while little of it touches.
-    double longest_correction() const {
-        if (model.bordered < 0) return 1.0;
-        double shortest = 1.0;
+    // Share of the correction in `residual` that is made, so that none is longer than 1 mm and no contact pressure rises
+    // by more than a tenth of the bulk modulus: of a body that little touches as yet, corrections are far too long.
+    double correction_share(const StageConditions& stage, double* u, double size) {
+        constexpr double LONGEST = 1.0, PRESSURE_SHARE = 0.1;
+        const double whole = size > LONGEST ? LONGEST / size : 1.0;
+        if (model.contact_sides == 0) return whole;
+        double share = whole;
+        for (int64_t side = 0; side < model.contact_sides; ++side)
+            ContactSide(model, quadrature, side, u).penetrations(depths + 3 * side);
+        correct(u, whole);
         for (int64_t side = 0; side < model.contact_sides; ++side) {
-            const int64_t* row = model.contacts + 5 * side;
-            if (model.equations[2 * row[3] + 1] != model.bordered) continue;
-            const double r = model.coordinates[2 * row[4]] - model.coordinates[2 * row[3]];
-            const double z = model.coordinates[2 * row[4] + 1] - model.coordinates[2 * row[3] + 1];
-            shortest = fmin(shortest, 0.01 * sqrt(r * r + z * z));
+            double after[3];
+            ContactSide(model, quadrature, side, u).penetrations(after);
+            const double longest = PRESSURE_SHARE * stage.bulk / model.contact_laws[2 * side];
+            for (int g = 0; g < 3; ++g) {
+                const double deeper = after[g] - fmax(depths[3 * side + g], 0.0);
+                if (deeper > longest) share = fmin(share, whole * longest / deeper);
+            }
         }
-        return shortest;
+        correct(u, -whole);
+        return share;
     }
 
     // Largest displacement, mm, that the numbers in `residual` stand for; NaN or infinite where one is.
@@ -221,6 +230,7 @@ private:
     double controlled_error = 0.0;  // N/rad, of it, at fixed displacements
     double* controlled_row = nullptr;  // (size,) its row of the tangent, without the diagonal
 
+    double* depths = nullptr;                    // (contact sides, 3) mm
     static constexpr double NEARLY_FREE = 1e-3;  // N/(rad mm); corrections are cut
     double *border = nullptr, *border_solution = nullptr;  // (rows,) column of the bordered equation; K^-1 times it
     double border_stiffness = 0.0, border_pivot = 0.0;     // N/(rad mm), its diagonal; less border K^-1 border
