@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import ClassVar
 
@@ -33,9 +33,9 @@ class SmallPunch(ck.Axisymmetric):
     punch_radius: float = ck.dimension(1.25, (0.1, 20.0), tolerance=2e-3, long_name="radius of the ball")
     hole_radius: float = ck.dimension(2.0, (0.2, 40.0), tolerance=5e-3, long_name="radius of the hole")
     edge_radius: float = ck.dimension(0.2, (0.01, 5.0), tolerance=0.1, long_name="radius of the edge of the hole")
-    contact_stiffness: float = 4e6
-    contact_smoothing: float = 1e-4
-    strain_limit: float = 1.5
+    contact_stiffness: float = field(default=4e6, kw_only=True)
+    contact_smoothing: float = field(default=1e-4, kw_only=True)
+    strain_limit: float = field(default=1.5, kw_only=True)
 
     name, title = "small-punch", "Disc under a ball at constant force"
     outputs = (ck.Output("deflection", "length", "deflection of the lower face", noise=2e-3),)
