@@ -62,6 +62,12 @@ class NotchedBar(ck.Axisymmetric):
         """Height over the root at which the notch ends, mm."""
         return float(np.sqrt(max(self.notch_radius**2 - (self.notch_radius - self.depth) ** 2, 0.0)))
 
+    @property
+    def constraint(self) -> float:
+        """Bridgman's factor of the root."""
+        ratio = 4.0 * self.notch_radius / self.notch_diameter
+        return float((1.0 + ratio) * np.log1p(1.0 / ratio))
+
     def profile(self, count: int, straight: int) -> tuple[np.ndarray, np.ndarray]:
         """Ends (2 (count + straight) + 1, 2) of the column lines on the surface and on the axis, mm, from the root up.
 
@@ -99,16 +105,20 @@ class NotchedBar(ck.Axisymmetric):
         P. W. Bridgman, Studies in Large Plastic Flow and Fracture, 1952: mean stress over flow stress of a neck.
         """
         bar, _ = self.of_test(history, {})
-        root, levels = 0.5 * bar.notch_diameter, np.unique(np.abs(history.loading.program().values))
-        ratio = 2.0 * bar.notch_radius / root
-        return levels[levels > 0] / (np.pi * root**2 * (1.0 + ratio) * np.log1p(1.0 / ratio))
+        levels = np.unique(np.abs(history.loading.program().values))
+        return levels[levels > 0] / (0.25 * np.pi * bar.notch_diameter**2 * bar.constraint)
 
     def growth_per_strain(self, history: ck.History) -> float:
-        """mm of elongation for each unit of reference strain: the length that would creep as the root does."""
+        """mm of elongation for each unit of reference strain: the length that would creep as the root does.
+
+        Every section creeps by its mean stress over the factor of the root, which fades to 1 at the end of the notch.
+        """
         bar, _ = self.of_test(history, {})
         surface, _ = bar.profile(200, 200)
-        rates = (0.5 * bar.notch_diameter / surface[:, 0]) ** (2.0 * EXPONENT)
-        return float(2.0 * np.trapezoid(rates, surface[:, 1]))
+        within = np.maximum(1.0 - surface[:, 1] / bar.shoulder, 0.0)
+        stress = bar.constraint / (1.0 + (bar.constraint - 1.0) * within)
+        stress *= (0.5 * bar.notch_diameter / surface[:, 0]) ** 2
+        return float(2.0 * np.trapezoid(stress**EXPONENT, surface[:, 1]))
 
 
 @dataclass(frozen=True)
@@ -137,10 +147,9 @@ class NotchedRelaxation(NotchedBar):
         modulus = (
             150e3 if history.elastic is None else float(history.elastic.at(history.temperature_program().values[0]).E)
         )
-        root, levels = 0.5 * bar.notch_diameter, np.unique(np.abs(history.loading.program().values))
-        ratio = 2.0 * bar.notch_radius / root
-        net = modulus * levels[levels > 0] / (compliance * np.pi * root**2)
-        return net / ((1.0 + ratio) * np.log1p(1.0 / ratio))
+        levels = np.unique(np.abs(history.loading.program().values))
+        force = modulus * levels[levels > 0] / compliance
+        return force / (0.25 * np.pi * bar.notch_diameter**2 * bar.constraint)
 
 
 @ck.hookimpl

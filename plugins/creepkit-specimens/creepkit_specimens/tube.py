@@ -23,7 +23,7 @@ class Tube(ck.Axisymmetric):
 
     outer_diameter: float = ck.dimension(20.0, (1.0, 1000.0), tolerance=1e-3, long_name="outer diameter")
     thickness: float = ck.dimension(2.0, (0.05, 300.0), tolerance=0.02, long_name="wall thickness")
-    closed: bool = True
+    closed: ClassVar[bool] = True
 
     name, title = "tube", "Tube under internal pressure with closed ends"
     outputs = (ck.Output("growth", "length", "growth of the outer diameter", noise=1e-3),)
@@ -69,7 +69,7 @@ class Tube(ck.Axisymmetric):
         return 0.5 * math.sqrt(3.0) * levels[levels > 0] / math.log(0.5 * tube.outer_diameter / tube.bore)
 
     def growth_per_strain(self, history: ck.History) -> float:
-        """mm of diameter for each unit of reference strain: the outer hoop strain is some sqrt(3)/2 of it."""
+        """mm of diameter for each unit of reference strain: sqrt(3)/2 times the bore's diameter."""
         tube, _ = self.of_test(history, {})
         ratio = 1.0 - 2.0 * tube.thickness / tube.outer_diameter
         return 0.5 * math.sqrt(3.0) * tube.outer_diameter * ratio
@@ -79,8 +79,16 @@ class Tube(ck.Axisymmetric):
 class OpenTube(Tube):
     """A tube under internal pressure whose ends carry no force."""
 
-    closed: bool = False
+    closed: ClassVar[bool] = False
     name, title = "open-tube", "Tube under internal pressure with open ends"
+
+    def reference_stress(self, history: ck.History) -> np.ndarray:
+        """P/ln(b/a) of each pressure level, (levels,) MPa: the hoop stress of a thin tube, which is alone in it."""
+        return super().reference_stress(history) / (0.5 * math.sqrt(3.0))
+
+    def growth_per_strain(self, history: ck.History) -> float:
+        """mm of diameter for each unit of reference strain, which is that of the circumference."""
+        return super().growth_per_strain(history) / (0.5 * math.sqrt(3.0))
 
 
 @ck.hookimpl

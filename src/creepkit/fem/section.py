@@ -153,7 +153,11 @@ class Section:
         if half_bandwidth(place[elements]) < half_bandwidth(elements):
             order, elements, new = better, place[elements], np.where(new >= 0, place[new], -1)
         number = new[number]
-        outer = {tuple(edge) for edge in _outline(elements).tolist()}
+        edges_left = _outline(elements)
+        shared = np.isin(edges_left, number[len(self.nodes) :][found])
+        if (shared[:, 0] & shared[:, 2] & ~shared[:, 1]).any():
+            raise SolveError("two sections to be joined have other element sides where they meet; give them the same")
+        outer = {tuple(edge) for edge in edges_left.tolist()}
         sides = {}
         for name in {**self.sides, **other.sides}:
             given = [number[one.sides[name] + first] for one, first in ((self, 0), (other, len(self.nodes)))
@@ -301,15 +305,16 @@ class Section:
     def _nodes_of(self, name: str) -> Ints:
         if name in self.points:
             return np.array([self.points[name]])
-        return np.unique(_side(self, name, (*self.sides, *self.points)))
+        if name not in self.sides:
+            known = (*self.sides, *self.points)
+            raise SolveError(f"a section has no side or point '{name}'; {nearest(name, known)}")
+        return np.unique(self.sides[name])
 
 
-def _side(section: Section, name: str, known: tuple[str, ...] | None = None) -> Ints:
+def _side(section: Section, name: str) -> Ints:
     """The element sides (edges, 3) of a name; SolveError for an unknown one."""
     if name not in section.sides:
-        if known is None and name not in section.points:
-            raise SolveError(f"a section has no side '{name}'; {nearest(name, tuple(section.sides))}")
-        raise SolveError(f"a section has no side or point '{name}'; {nearest(name, known or tuple(section.sides))}")
+        raise SolveError(f"a section has no side '{name}'; {nearest(name, tuple(section.sides))}")
     return np.asarray(section.sides[name])
 
 

@@ -17,7 +17,7 @@ STEP_DURATION = 5.0
 """s, in which a step of temperature, rate or load takes place: programs stay continuous."""
 
 
-SCALABLE_LOADS = ("stress", "pressure", "force")
+SCALABLE_LOADS = ("stress", "pressure", "force", "displacement")
 """Quantities of a loading that a load step can change."""
 
 

@@ -117,6 +117,7 @@ def test_a_section_says_what_is_wrong() -> None:
         (lambda: BAR.move("top").move("bottom"), "the load can move one side of a section"),
         (lambda: BAR.pull("left"), "side 'left' of a section has no area that a force could act on"),
         (lambda: BAR.joined(Section.rectangle((5.0, 0.0), (6.0, 1.0), 1, 1)), "sections to be joined share no node"),
+        (lambda: BAR.joined(Section.rectangle((0.0, 3.0), (2.0, 4.0), 6, 1)), "have other element sides"),
         (lambda: BAR.press("right").joined(BAR), "a section is joined with another before either is held or loaded"),
         (lambda: Section.rectangle((0.0, 0.0), (1.0, 1.0), 0, 1), "allowed are whole numbers from 1 on"),
         (lambda: Section.rectangle((0.0, 0.0), (1.0, 1.0), (0.0, 2.0), 1), "boundaries of elements must rise"),

@@ -224,3 +224,41 @@ def test_what_is_wrong_is_said() -> None:
         RoundBar(tolerance=1.0)
     with pytest.raises(SolveError, match="only a side that the load moves has a force to be observed"):
         ck.Displacements(RoundBar().section("force")).force  # noqa: B018
+
+
+@dataclass(frozen=True)
+class Dimple(ck.Axisymmetric):
+    """The dimple of the bulge test, with its apex observed in the place of Gaussian fits."""
+
+    apex_thickness: float = ck.dimension(0.5, (0.1, 2.0), tolerance=0.02)
+
+    name, title = "dimple", "Dimple by the general interface"
+    outputs = (ck.Output("apex", "length"),)
+    loads = (ck.Load("pressure", "pressure"),)
+
+    def section(self, load: str) -> ck.Section:
+        mesh = ck.specimen("bulge").geometry.replace(apex_thickness=self.apex_thickness).mesh(1.0)
+        return ck.Section.of_mesh(mesh).press("pressed")
+
+    def observe(self, displacements: ck.Displacements):
+        return {"apex": displacements.axial("top_first")}
+
+
+def test_the_dimple_is_such_a_specimen() -> None:
+    """What the bulge specimen says of its apex, in steps of its own, and the derivative to its thickness."""
+    loading, times = ck.PressureJump(P1=8.0, P2=10.0, Tj=7200.0), np.geomspace(60.0, 14400.0, 12)
+    given = {"loading": loading, "elastic": ck.Elastic(E=150e3), "temperature": 1000.0, "times": times}
+    known = ck.simulate("norton", ck.specimen("bulge").replace(tolerance=2e-4), LAWS["norton"], **given)
+    found = ck.simulate("norton", Dimple(tolerance=2e-4, resolution=0.01), LAWS["norton"], **given)
+    np.testing.assert_allclose(found.outputs["apex"], known.displacement(0.0), rtol=5e-4)
+    thicker = (
+        ck.simulate("norton", ck.specimen("bulge").replace(tolerance=2e-4, apex_thickness=t), LAWS["norton"], **given)
+        for t in (0.501, 0.499)
+    )
+    up, down = (run.displacement(0.0) for run in thicker)
+    derivatives = predicted(
+        Dimple(tolerance=2e-4, resolution=0.01), "norton", LAWS["norton"], [plan_of(Dimple(), loading, times)],
+        nuisances={"apex_thickness": np.array([[0.5]])}, sensitivities=True,
+    )  # fmt: skip
+    slope = (up - down) / 0.002
+    np.testing.assert_allclose(derivatives.nuisance_jacobian["apex_thickness"][0, 0, :, 0], slope, rtol=5e-3)
