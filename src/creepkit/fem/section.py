@@ -11,12 +11,7 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen
 from creepkit.errors import SolveError, nearest
-from creepkit.fem.finite_element_model import (
-    AxialConstraints,
-    FiniteElementModel,
-    RigidContact,
-    finite_element_model,
-)
+from creepkit.fem.finite_element_model import AxialConstraints, FiniteElementModel, RigidContact, finite_element_model
 from creepkit.fem.mesh import SIDE_SLOPES, SIDE_VALUES, SIDE_WEIGHTS, SIDES, Mesh, half_bandwidth, outline, strip_mesh
 from creepkit.fem.mesh_builder import order_by_neighbours
 

@@ -48,8 +48,8 @@ def test_a_ball_on_a_block_comes_nearer_as_hertz_says(force: float) -> None:
     """K. L. Johnson, Contact Mechanics, 1985, (4.23), less what a half space moves 100 mm below: F/(pi E* 100 mm)."""
     block = BallOnBlock(refinement=2.0, resolution=1e-6, tolerance=1e-3)
     run = ck.simulate(
-        "norton", block, {"A": 1e-40, "n": 1.0}, loading=ck.constant_load("force", force), elastic=ck.Elastic(E=E, nu=NU),
-        temperature=900.0, times=[1.0],
+        "norton", block, {"A": 1e-40, "n": 1.0}, loading=ck.constant_load("force", force), temperature=900.0,
+        elastic=ck.Elastic(E=E, nu=NU), times=[1.0],
     )  # fmt: skip
     plane = E / (1.0 - NU**2)
     known = (9.0 * force**2 / (16.0 * plane**2 * 50.0)) ** (1 / 3) - force / (np.pi * plane * 100.0)
