@@ -40,7 +40,7 @@ class SmallPunch(ck.Axisymmetric):
     name, title = "small-punch", "Disc under a ball at constant force"
     outputs = (ck.Output("deflection", "length", "deflection of the lower face", noise=2e-3),)
     loads = (ck.Load("force", "force", "force on the ball"),)
-    first_step = 1e-3
+    first_step = 1e-6
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {"force": (150.0, 500.0), "modulus": (50e3, 300e3)}
     )
