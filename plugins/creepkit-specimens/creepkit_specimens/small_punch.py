@@ -27,6 +27,10 @@ class SmallPunch(ck.Axisymmetric):
 
     Both faces are held beyond the rounded edge of the hole, over which the disc bends; contact with the ball and with
     the edge is without friction. The deflection is that of the lower face in its middle.
+
+    contact_stiffness : MPa/mm, pressure for each mm of penetration; with ten times as much set a smaller tolerance
+        too, for errors of equilibrium, mm, mean larger ones of pressure.
+    contact_smoothing : mm, gap at which pressure begins.
     """
 
     thickness: float = ck.dimension(0.5, (0.05, 5.0), tolerance=0.01)

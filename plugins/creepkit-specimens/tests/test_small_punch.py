@@ -79,11 +79,15 @@ def test_deflections_to_half_the_diameter_of_the_hole(n: float, force: float) ->
 
 @pytest.mark.parametrize("n", [3.0, 7.0])
 def test_mesh_and_penalty_converge(n: float) -> None:
-    """The mesh errs by 1.3 % at most, by half as much as one twice as coarse; stiffer contact changes 1 % at most."""
+    """The mesh errs by 1.3 % at most, by half as much as one twice as coarse; stiffer contact changes 1 % at most.
+
+    Steps and equilibrium are tight: with a penalty of 100 times, looser equilibrium means pressures so wrong that steps
+    fail.
+    """
     times = [1e3, 1e5]
 
     def deflections(**changes):
-        return crept(SmallPunch(tolerance=1e-3, **changes), n, 300.0, times).outputs["deflection"]
+        return crept(SmallPunch(tolerance=2e-4, **changes), n, 300.0, times).outputs["deflection"]
 
     coarse, usual, fine = (deflections(refinement=r) for r in (0.5, 1.0, 2.0))
     assert (np.abs(usual / fine - 1.0) < 0.013).all()
