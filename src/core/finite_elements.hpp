@@ -176,7 +176,7 @@ public:
         constexpr double LONGEST = 1.0, PRESSURE_SHARE = 0.1;
         const double whole = size > LONGEST ? LONGEST / size : 1.0;
         if (model.contact_sides == 0) return whole;
-        double share = whole;
+        double share = whole, change = 0.0, largest = 0.0;  // MPa, of the pressures
         for (int64_t side = 0; side < model.contact_sides; ++side)
             ContactSide(model, quadrature, side, u).penetrations(depths + 3 * side);
         correct(u, whole);
@@ -187,11 +187,18 @@ public:
             for (int g = 0; g < 3; ++g) {
                 const double deeper = after[g] - fmax(depths[3 * side + g], 0.0);
                 if (deeper > longest) share = fmin(share, whole * longest / deeper);
+                const double stiffness = model.contact_laws[2 * side], first = fmax(depths[3 * side + g], 0.0);
+                change = fmax(change, stiffness * fabs(fmax(after[g], 0.0) - first));
+                largest = fmax(largest, stiffness * fmax(after[g], 0.0));
             }
         }
         correct(u, -whole);
+        settled = change <= PRESSURE_ERROR * largest;
         return share;
     }
+
+    // Whether the last correction changed contact pressures little, by a share of the largest.
+    bool contact_settled() const { return settled; }
 
     // Largest displacement, mm, that the numbers in `residual` stand for; NaN or infinite where one is.
     double largest_correction() const {
@@ -231,6 +238,8 @@ private:
     double* controlled_row = nullptr;  // (size,) its row of the tangent, without the diagonal
 
     double* depths = nullptr;                    // (contact sides, 3) mm
+    bool settled = true;
+    static constexpr double PRESSURE_ERROR = 0.03;
     static constexpr double NEARLY_FREE = 1e-3;  // N/(rad mm); corrections are cut
     double *border = nullptr, *border_solution = nullptr;  // (rows,) column of the bordered equation; K^-1 times it
     double border_stiffness = 0.0, border_pivot = 0.0;     // N/(rad mm), its diagonal; less border K^-1 border

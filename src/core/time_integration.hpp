@@ -140,7 +140,7 @@ private:
             if (!isfinite(size) || (pass > patience && size > last)) return TOO_FAR;
             factor = system.correction_share(stage, displacement, size);
             system.correct(displacement, factor);
-            if (size <= tolerance) return CONVERGED;
+            if (size <= tolerance && system.contact_settled()) return CONVERGED;
         }
         return TOO_MANY_PASSES;
     }
