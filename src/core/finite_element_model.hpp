@@ -2,7 +2,9 @@
 //
 // Lengths are mm. Elements come in pairs, whose eight points lie side by side; an odd last one is followed by a copy of
 // it without weight. Displacements are (2 nodes,) numbers, u_r and u_z of each node in turn. Displacements that must be
-// equal, such as u_z of all nodes of a gripped face, share one equation: its force is the sum of theirs.
+// equal, such as u_z of all nodes of a gripped face, share one equation: its force is the sum of theirs. A rigid circle is
+// two nodes without elements, its centre and a point of it; it is coupled to any node, so that its equation borders the
+// band.
 #pragma once
 
 #include <stdint.h>
@@ -18,6 +20,8 @@ struct FiniteElementModel {
     int64_t observed_displacements;
     int64_t controlled;            // equation whose displacement is the motion; -1: none
     int64_t dead_forces;           // `size`, or 0 where the load does not act by dead forces
+    int64_t contact_sides;         // sides that may touch a rigid circle
+    int64_t bordered;              // equation, the last, of a circle that is free to move along the axis; -1: none
     const double* coordinates;     // (nodes, 2) r and z at rest
     const double* by_radius;       // (elements, 4, 8) derivatives of the shape functions to r, 1/mm
     const double* by_height;       // (elements, 4, 8) to z
@@ -32,6 +36,8 @@ struct FiniteElementModel {
     const int64_t* pressed_places; // (sides, 3, 3, 3) of its blocks rr, rz, zz
     const int64_t* observed;       // (observed,) which of the displacements are observed
     const double* dead;            // (dead forces,) N/rad on each equation for a unit of the load
+    const int64_t* contacts;       // (contact sides, 5) nodes of the side, of the circle's centre and of a point of it
+    const double* contact_laws;    // (contact sides, 2) stiffness MPa/mm, smoothing mm
 };
 
 }  // namespace creepkit

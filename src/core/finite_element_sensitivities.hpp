@@ -15,6 +15,8 @@ public:
         const bool controlled = system.model.controlled >= 0;
         controlled_row = memory.doubles(controlled ? system.shape.size : 0);
         controlled_right = memory.doubles(controlled ? padded : 0);
+        border = memory.doubles(system.model.bordered >= 0 ? system.shape.rows() : 0);
+        border_solution = memory.doubles(system.model.bordered >= 0 ? system.shape.rows() * EIGHT : 0);
         places_known = false;
     }
 
@@ -86,7 +88,7 @@ public:
         }
     }
 
-    // The pressure's exact load stiffness, and its forces in the columns that change it or move the surface.
+    // The exact load stiffness of pressure and contact, and their forces in the columns that change it or move the surface.
     void press(const FiniteElements& system, double pressure, const double* u, const SensitivityDirections& directions,
                const double* inputs, int64_t parameters, int64_t padded) {
         const FiniteElementModel& model = system.model;
@@ -124,6 +126,7 @@ public:
             for (int64_t g = 0; g < directions.geometries; ++g)
                 columns[directions.directions + g] += pressure * directions.forces[g * model.size + row];
         }
+        if (model.contact_sides > 0) touch(system, u, directions, parameters, padded);
         if (model.controlled >= 0) hold_controlled(system, directions, inputs, parameters, padded);
     }
 
@@ -131,8 +134,11 @@ public:
     bool solve(const FiniteElements& system, int64_t padded) {
         double* upper = matrix + system.shape.numbers();
         if (!factorize_general(system.shape, matrix, upper)) return false;
-        solve_general(system.shape, matrix, upper, right, padded);
-        return true;
+        if (system.model.bordered < 0) {
+            solve_general(system.shape, matrix, upper, right, padded);
+            return true;
+        }
+        return solve_bordered(system, upper, padded);
     }
 
     // Changes (8 points, 5, padded) of the deformation gradient of a pair of elements.
@@ -183,7 +189,68 @@ private:
     double *matrix = nullptr, *right = nullptr;  // lower and upper triangle and one place behind; (rows, padded)
     int64_t* places = nullptr;                   // (elements, 16, 16) of the tangent of an element, r and z in turn
     double *controlled_row = nullptr, *controlled_right = nullptr;  // (size,), (padded,) of the controlled equation
+    double *border = nullptr, *border_solution = nullptr;  // (rows,) of the bordered equation, symmetric; (rows, 8)
+    double border_stiffness = 0.0;
     bool places_known = false, right_is_clear = false;
+
+    // The tangent of contact, and its forces in the columns that move the nodes.
+    void touch(const FiniteElements& system, const double* u, const SensitivityDirections& directions,
+               int64_t parameters, int64_t padded) {
+        const FiniteElementModel& model = system.model;
+        if (model.bordered >= 0) {
+            memset(border, 0, sizeof(double) * size_t(system.shape.rows()));
+            border_stiffness = 0.0;
+            matrix[place(system, model.bordered, model.bordered)] = 1.0;
+        }
+        for (int64_t side = 0; side < model.contact_sides; ++side) {
+            ContactSide contact(model, system.quadrature, side, u);
+            if (!contact.template assemble<true>()) continue;
+            for (int64_t g = 0; g < directions.geometries; ++g) {
+                double changes[CONTACT_UNKNOWNS];
+                contact.change(directions.velocities + g * 2 * model.nodes, changes);
+                for (int i = 0; i < CONTACT_UNKNOWNS; ++i) {
+                    const int64_t row = model.equations[contact.numbers[i]];
+                    if (row >= 0) right[row * padded + parameters + directions.directions + g] -= changes[i];
+                }
+            }
+            for (int i = 0; i < CONTACT_UNKNOWNS; ++i)
+                for (int j = 0; j < CONTACT_UNKNOWNS; ++j) {
+                    const int64_t row = model.equations[contact.numbers[i]], column = model.equations[contact.numbers[j]];
+                    if (row < 0 || column < 0) continue;
+                    const double value = contact.tangent[i][j];
+                    if (row != model.bordered && column != model.bordered) {
+                        matrix[place(system, row, column)] += value;
+                    } else if (row == column) {
+                        border_stiffness += value;
+                    } else if (row == model.bordered) {
+                        border[column] += value;
+                    }
+                }
+        }
+    }
+
+    // As `solve`, with the equation that borders the band; the factors are made.
+    bool solve_bordered(const FiniteElements& system, const double* upper, int64_t padded) {
+        const int64_t last = system.model.bordered, size = system.model.size;
+        memset(border_solution, 0, sizeof(double) * size_t(system.shape.rows() * EIGHT));
+        for (int64_t k = 0; k < size; ++k) border_solution[k * EIGHT] = border[k];
+        solve_general(system.shape, matrix, upper, border_solution, EIGHT);
+        double pivot = border_stiffness;
+        for (int64_t k = 0; k < size; ++k) pivot -= border[k] * border_solution[k * EIGHT];
+        if (pivot == 0.0) return false;
+        solve_general(system.shape, matrix, upper, right, padded);  // with a unit row for the bordered equation
+        for (int64_t block = 0; block < padded; block += EIGHT) {
+            Eight change = load(right + last * padded + block);
+            for (int64_t k = 0; k < size; ++k) change -= border[k] * load(right + k * padded + block);
+            change = change * (1.0 / pivot);
+            for (int64_t k = 0; k < size; ++k) {
+                double* row = right + k * padded + block;
+                store(row, load(row) - border_solution[k * EIGHT] * change);
+            }
+            store(right + last * padded + block, change);
+        }
+        return true;
+    }
 
     // Keep the equation of the controlled displacement, and put the change of the motion in its place.
     void hold_controlled(const FiniteElements& system, const SensitivityDirections& directions, const double* inputs,

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "banded_matrix.hpp"
+#include "contact.hpp"
 #include "finite_element_model.hpp"
 #include "material_point.hpp"
 #include "pressure.hpp"
@@ -45,6 +46,9 @@ public:
         tangent = memory.doubles(shape.numbers() + 1);
         residual = memory.doubles(shape.rows());
         controlled_row = memory.doubles(model.controlled >= 0 ? model.size : 0);
+        depths = memory.doubles(3 * model.contact_sides);
+        border = memory.doubles(model.bordered >= 0 ? shape.rows() : 0);
+        border_solution = memory.doubles(model.bordered >= 0 ? shape.rows() : 0);
     }
 
     int64_t point_count() const { return 4 * model.elements; }
@@ -105,6 +109,7 @@ public:
         }
         press<STIFF>(stage.pressure, u);
         for (int64_t k = 0; k < model.dead_forces; ++k) residual[k] -= stage.pressure * model.dead[k];
+        if (model.contact_sides > 0) touch<STIFF>(u);
         if (model.controlled >= 0) hold_controlled<STIFF>();
         return POINTS_SOLVED;
     }
@@ -129,8 +134,71 @@ public:
         residual[model.controlled] = 0.0;
     }
 
-    bool factorize() { return factorize_symmetric(shape, tangent); }
-    void solve() { solve_symmetric(shape, tangent, residual); }
+    // False when the tangent, its border included, is not positive definite.
+    bool factorize() {
+        if (!factorize_symmetric(shape, tangent)) return false;
+        if (model.bordered < 0) return true;
+        memcpy(border_solution, border, sizeof(double) * size_t(shape.rows()));
+        solve_symmetric(shape, tangent, border_solution);
+        if (border_stiffness == 0.0) {  // nothing touches the body: let its force move it until something does
+            border_pivot = NEARLY_FREE;
+            return true;
+        }
+        border_pivot = border_stiffness;
+        for (int64_t k = 0; k < model.size; ++k) border_pivot -= border[k] * border_solution[k];
+        return border_pivot > 0.0;
+    }
+
+    void solve() {
+        solve_symmetric(shape, tangent, residual);  // with a unit row for the bordered equation
+        if (model.bordered < 0) return;
+        double last = residual[model.bordered];
+        for (int64_t k = 0; k < model.size; ++k) last -= border[k] * residual[k];
+        last /= border_pivot;
+        for (int64_t k = 0; k < model.size; ++k) residual[k] -= last * border_solution[k];
+        residual[model.bordered] = last;
+    }
+
+    // Write the bordered equation into a full matrix (size, size).
+    void copy_border(double* matrix) const {
+        const int64_t own = model.bordered;
+        for (int64_t k = 0; k < model.size; ++k) {
+            const double value = k == own ? border_stiffness : border[k];
+            matrix[own * model.size + k] = matrix[k * model.size + own] = value;
+        }
+    }
+
+    bool touches() const { return model.contact_sides > 0; }
+
+    // Share of the correction in `residual` that is made, so that none is longer than 1 mm and no contact pressure rises
+    // by more than a tenth of the bulk modulus: of a body that little touches as yet, corrections are far too long.
+    double correction_share(const StageConditions& stage, double* u, double size) {
+        constexpr double LONGEST = 1.0, PRESSURE_SHARE = 0.1;
+        const double whole = size > LONGEST ? LONGEST / size : 1.0;
+        if (model.contact_sides == 0) return whole;
+        double share = whole, change = 0.0, largest = 0.0;  // MPa, of the pressures
+        for (int64_t side = 0; side < model.contact_sides; ++side)
+            ContactSide(model, quadrature, side, u).penetrations(depths + 3 * side);
+        correct(u, whole);
+        for (int64_t side = 0; side < model.contact_sides; ++side) {
+            double after[3];
+            ContactSide(model, quadrature, side, u).penetrations(after);
+            const double longest = PRESSURE_SHARE * stage.bulk / model.contact_laws[2 * side];
+            for (int g = 0; g < 3; ++g) {
+                const double deeper = after[g] - fmax(depths[3 * side + g], 0.0);
+                if (deeper > longest) share = fmin(share, whole * longest / deeper);
+                const double stiffness = model.contact_laws[2 * side], first = fmax(depths[3 * side + g], 0.0);
+                change = fmax(change, stiffness * fabs(fmax(after[g], 0.0) - first));
+                largest = fmax(largest, stiffness * fmax(after[g], 0.0));
+            }
+        }
+        correct(u, -whole);
+        settled = change <= PRESSURE_ERROR * largest;
+        return share;
+    }
+
+    // Whether the last correction changed contact pressures little, by a share of the largest.
+    bool contact_settled() const { return settled; }
 
     // Largest displacement, mm, that the numbers in `residual` stand for; NaN or infinite where one is.
     double largest_correction() const {
@@ -168,6 +236,42 @@ private:
     double controlled_force = 0.0;  // N/rad, that the controlled displacement needed when forces were last assembled
     double controlled_error = 0.0;  // N/rad, of it, at fixed displacements
     double* controlled_row = nullptr;  // (size,) its row of the tangent, without the diagonal
+
+    double* depths = nullptr;                    // (contact sides, 3) mm
+    bool settled = true;
+    static constexpr double PRESSURE_ERROR = 0.03;
+    static constexpr double NEARLY_FREE = 1e-3;  // N/(rad mm); corrections are cut
+    double *border = nullptr, *border_solution = nullptr;  // (rows,) column of the bordered equation; K^-1 times it
+    double border_stiffness = 0.0, border_pivot = 0.0;     // N/(rad mm), its diagonal; less border K^-1 border
+
+    // Add the forces of contact and, if STIFF, their tangent; that of the bordered equation stays beside the band.
+    template <bool STIFF>
+    void touch(const double* u) {
+        if (STIFF && model.bordered >= 0) {
+            clear(border, shape.rows());
+            border_stiffness = 0.0;
+            tangent[shape.place(model.bordered, model.bordered)] = 1.0;
+        }
+        for (int64_t side = 0; side < model.contact_sides; ++side) {
+            ContactSide contact(model, quadrature, side, u);
+            if (!contact.template assemble<STIFF>()) continue;
+            for (int i = 0; i < CONTACT_UNKNOWNS; ++i) {
+                const int64_t row = model.equations[contact.numbers[i]];
+                if (row < 0) continue;
+                residual[row] += contact.force[i];
+                for (int j = 0; STIFF && j < CONTACT_UNKNOWNS; ++j) {
+                    const int64_t column = model.equations[contact.numbers[j]];
+                    if (column < 0 || column > row) continue;
+                    const double value = contact.tangent[i][j];
+                    if (row != model.bordered) {
+                        tangent[shape.place(row, column)] += value;
+                    } else {
+                        (column == row ? border_stiffness : border[column]) += value;
+                    }
+                }
+            }
+        }
+    }
 
     // Keep the force of the controlled displacement and make its equation that of no correction.
     template <bool STIFF>

@@ -81,6 +81,9 @@ public:
     int64_t observed_count() const { return model.observed; }
     double reaction() const { return 0.0; }
     double reaction_error() const { return 0.0; }
+    bool touches() const { return false; }
+    bool contact_settled() const { return true; }
+    double correction_share(const StageConditions&, double*, double size) const { return size > 1.0 ? 1.0 / size : 1.0; }
     Eight weights(int64_t block) const { return load(model.weights + EIGHT * block); }
 
     // Deformation gradient of eight points.

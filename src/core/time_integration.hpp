@@ -121,12 +121,11 @@ private:
     //
     // tight : tolerance of the points' own equations once near.
     EquilibriumFlag solve_equilibrium(const StageConditions& stage, double tolerance, double tight) {
-        constexpr int PASSES = 16;
+        const int passes = system.touches() ? 40 : 16, patience = system.touches() ? 20 : 6;
         constexpr double LOOSE = 0.03;   // tolerance of the points' equations in the first pass
         constexpr double KEEP = 0.3;     // the tangent is kept while a correction is at most this share of the last
-        constexpr double LONGEST = 1.0;  // mm, corrections are cut to this
         double last = 0.0, size = 0.0, factor = 1.0;
-        for (int pass = 0; pass < PASSES; ++pass) {
+        for (int pass = 0; pass < passes; ++pass) {
             const bool stiff = pass == 0 || factor < 1.0 || (pass > 1 && size > KEEP * last);
             const double local = pass == 0 ? fmax(tight, LOOSE) : tight;
             const PointFlag flag =
@@ -138,10 +137,10 @@ private:
             system.solve();
             last = size;
             size = system.largest_correction();
-            if (!isfinite(size) || (pass > 6 && size > last)) return TOO_FAR;
-            factor = size > LONGEST ? LONGEST / size : 1.0;
+            if (!isfinite(size) || (pass > patience && size > last)) return TOO_FAR;
+            factor = system.correction_share(stage, displacement, size);
             system.correct(displacement, factor);
-            if (size <= tolerance) return CONVERGED;
+            if (size <= tolerance && system.contact_settled()) return CONVERGED;
         }
         return TOO_MANY_PASSES;
     }
@@ -161,6 +160,7 @@ private:
             if (solve_equilibrium(stage, newton, 1e-3) == CONVERGED) {
                 done = now;
                 copy(displacement, start);
+                if (system.touches()) part *= 4.0;  // the first part closes gaps; others may then be larger
                 if (done < 1.0) continue;
                 if (!sensitivities.differentiate(system, law, points, input, n, 0.0, 0.0, tableau, &displacement,
                                                  ended.records))

@@ -47,5 +47,6 @@ extern "C" int64_t LANE_FUNCTION(creepkit_assemble)(
             tangent[i * model->size + j] = tangent[j * model->size + i] =
                 inside ? system.tangent[system.shape.place(i, j)] : 0.0;
         }
+    if (tangent && model->bordered >= 0) system.copy_border(tangent);
     return flag;
 }

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, cast
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 from creepkit import registry
 from creepkit.errors import ExportError, FitError, nearest
-from creepkit.records import History, LawWithValues, Nuisance, Predictor, Units, exported_text
+from creepkit.records import History, LawWithValues, Nuisance, Predictor, Units, dimension_named, exported_text
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictors
 
 if TYPE_CHECKING:
@@ -72,9 +72,9 @@ def identify(
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.inverse.sparsity.term_selection import identify_sparse
 
-    law, settings = resolve_law(law), change_settings(settings or IdentificationSettings(), changes)
+    law, predictor = resolve_law(law), resolve_predictors(using, check_histories(histories))
+    settings = change_settings(settings or IdentificationSettings(), changes, predictor)
     histories = without_suspect_frames(check_histories(histories), settings)
-    predictor = resolve_predictors(using, histories)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     surrogate = _resolve_through(through, predictor)
     if through == "auto":
@@ -120,14 +120,14 @@ def select(
     from creepkit.inverse.selection.select import select as run
     from creepkit.inverse.settings import IdentificationSettings
 
-    settings = change_settings(settings or IdentificationSettings(), changes)
+    predictor = resolve_predictors(using, check_histories(histories))
+    settings = change_settings(settings or IdentificationSettings(), changes, predictor)
     if changes.get("weights") not in (None, "likelihood"):
         raise FitError(
             f"select() compares laws by their likelihood, found weights={changes['weights']!r}; leave weights out, or "
             "identify each law with them and rank() the results"
         )
     histories = without_suspect_frames(check_histories(histories), settings)
-    predictor = resolve_predictors(using, histories)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     ranking = run(
         [resolve_law(law) for law in ((laws,) if isinstance(laws, str) else laws)],
@@ -191,8 +191,14 @@ def confirm(
     return run(fit, histories, used if len(used) > 1 else next(iter(used.values())))
 
 
-def change_settings(settings: IdentificationSettings, changes: SettingChanges) -> IdentificationSettings:
+def change_settings(
+    settings: IdentificationSettings,
+    changes: SettingChanges,
+    predictor: Predictor | Mapping[str, Predictor] | None = None,
+) -> IdentificationSettings:
     """The settings with fields changed by name; nuisances=None leaves those of `settings`.
+
+    A nuisance that is a name alone has its prior as usual; that of a length is the tolerance that its specimen states.
 
     With another number of starts the number of Sobol points that are screened follows, unless it is given too.
     """
@@ -204,11 +210,19 @@ def change_settings(settings: IdentificationSettings, changes: SettingChanges) -
     if "nuisances" in given:
         listed: Any = given["nuisances"]
         listed = [listed] if isinstance(listed, str | Nuisance) else listed
-        given["nuisances"] = tuple(Nuisance(cast(Any, one)) if isinstance(one, str) else one for one in listed)
+        given["nuisances"] = tuple(_nuisance_named(one, predictor) if isinstance(one, str) else one for one in listed)
     if "starts" in given:  # eight points a start, a power of two, and at least 64
         points = max(64, 1 << (8 * max(int(given["starts"]), 1) - 1).bit_length())
         given.setdefault("sobol_points", points)
     return replace(settings, **given)
+
+
+def _nuisance_named(kind: str, predictor: Predictor | Mapping[str, Predictor] | None) -> Nuisance:
+    """The nuisance of this name; of a length with the tolerance of its specimen, the largest where several have it."""
+    predictors = [*predictor.values()] if isinstance(predictor, Mapping) else [predictor]
+    lengths = [length for p in predictors if (length := dimension_named(p, kind)) is not None]
+    sd = max((length.tolerance * length.default for length in lengths), default=0.0)
+    return Nuisance(kind, sd=sd) if sd > 0.0 else Nuisance(kind)
 
 
 def _resolve_through(

@@ -6,7 +6,7 @@ import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -20,20 +20,40 @@ TILE = 8
 """Side of the tiles in which the core keeps banded matrices."""
 
 
+class RigidContact(NamedTuple):
+    """A rigid circle of the section that sides may touch without friction: a sphere on the axis, or a ring.
+
+    sides : (edges, 3) first, middle and last node of the element sides that may touch it.
+    centre, edge : nodes, of no element: its centre and a point of it.
+    stiffness : MPa/mm, pressure for each mm that it is penetrated. smoothing : mm, gap at which pressure begins; at a
+        penetration of as much its slope is the stiffness.
+    moves : whether it moves freely along the axis; then centre and edge must be a plane.
+    """
+
+    sides: Ints
+    centre: int
+    edge: int
+    stiffness: float
+    smoothing: float
+    moves: bool
+
+
 @dataclass(frozen=True, eq=False)
 class AxialConstraints:
-    """Dead forces on a mesh, faces that stay plane, and what is observed.
+    """Dead forces on a mesh, faces that stay plane, rigid bodies it touches, and what is observed.
 
     forces : (nodes, 2) N/rad in r and z for a unit of the load, whatever the deformation; None for none.
     planes : of each face (nodes,) that have one u_z.
     controlled : number of the plane whose u_z is the motion of the load history; None for none.
     observed : (observed,) displacements, 2 node + 0 for u_r or + 1 for u_z; None for u_z of the mesh's top.
+    contacts : rigid circles that the mesh may touch, of which one at most moves.
     """
 
     forces: Floats | None = None
     planes: tuple[Ints, ...] = ()
     controlled: int | None = None
     observed: Ints | None = None
+    contacts: tuple[RigidContact, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +69,9 @@ class FiniteElementModel:
     observed : (observed,) observed displacements, 2 node + 0 for u_r or + 1 for u_z.
     dead : (size,) N/rad on each equation for a unit of the load, or (0,).
     controlled : number of the equation whose displacement is the motion; -1 for none.
+    contacts : (contact sides, 5) nodes of a side that may touch a rigid circle, of its centre and of a point of it.
+    contact_laws : (contact sides, 2) MPa/mm and mm, stiffness and smoothing of that contact.
+    bordered : number of the equation, the last, of a circle that moves freely; -1 for none.
     """
 
     nodes: Floats
@@ -65,6 +88,9 @@ class FiniteElementModel:
     observed: Ints
     dead: Floats = field(default_factory=lambda: np.zeros(0))
     controlled: int = -1
+    contacts: Ints = field(default_factory=lambda: np.zeros((0, 5), dtype=np.int64))
+    contact_laws: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    bordered: int = -1
 
     entry: ClassVar[str] = "creepkit_simulate"
     """The function of the core that simulates it."""
@@ -165,9 +191,24 @@ def finite_element_model(mesh: Mesh, constraints: AxialConstraints | None = None
         observed=observed,
         controlled=controlled,
     )
+    if constraints.contacts:
+        model = _with_contacts(model, constraints.contacts)
     if constraints.forces is None or not constraints.forces.any():
         return model
     return replace(model, dead=model.on_equations(constraints.forces))
+
+
+def _with_contacts(model: FiniteElementModel, contacts: Sequence[RigidContact]) -> FiniteElementModel:
+    """The model with what it may touch; SolveError unless a circle that moves has the last equation."""
+    moving = [2 * each.centre + 1 for each in contacts if each.moves]
+    if len(moving) > 1:
+        raise SolveError(f"{len(moving)} rigid bodies of a section move freely; allowed is one")
+    bordered = int(model.equations[moving[0]]) if moving else -1
+    if moving and bordered != model.size - 1:
+        raise SolveError("the rigid body that moves must have the last node of the mesh that is free")
+    rows = [np.hstack([each.sides, np.tile([each.centre, each.edge], (len(each.sides), 1))]) for each in contacts]
+    laws = [np.tile([each.stiffness, each.smoothing], (len(each.sides), 1)) for each in contacts]
+    return replace(model, contacts=np.vstack(rows), contact_laws=np.vstack(laws), bordered=bordered)
 
 
 def _equation_numbers(free: Bools, planes: Sequence[Ints]) -> Ints:
@@ -210,10 +251,12 @@ class _ModelStructure(CoreStructure):
     _fields_ = (
         *((name, ctypes.c_int64) for name in (
             "elements", "nodes", "size", "half_bandwidth", "pressed", "observed", "controlled", "dead_forces",
+            "contact_sides", "bordered",
         )),
         *((name, ctypes.c_void_p) for name in (
             "coordinates", "by_radius", "by_height", "over_radius", "weights", "points_first", "connectivity",
             "equations", "tied", "places", "pressed_nodes", "pressed_places", "observed_displacements", "dead",
+            "contacts", "contact_laws",
         )),
     )  # fmt: skip
 
@@ -252,11 +295,14 @@ class CompiledModel:
             "pressed_places": _places(sides, model.size, model.width),
             "observed_displacements": model.observed,
             "dead": model.dead,
+            "contacts": model.contacts,
+            "contact_laws": model.contact_laws,
         }
         self._kept = {name: np.ascontiguousarray(array) for name, array in self._kept.items()}
         self.structure = _ModelStructure(
             self.elements, len(model.nodes), model.size, model.width, len(model.pressed), len(model.observed),
-            model.controlled, len(model.dead), *(address(array) for array in self._kept.values()),
+            model.controlled, len(model.dead), len(model.contacts), model.bordered,
+            *(address(array) for array in self._kept.values()),
         )  # fmt: skip
 
     def padded(self, values: Any) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen
 from creepkit.errors import SolveError, nearest
-from creepkit.fem.finite_element_model import AxialConstraints, FiniteElementModel, finite_element_model
+from creepkit.fem.finite_element_model import AxialConstraints, FiniteElementModel, RigidContact, finite_element_model
 from creepkit.fem.mesh import SIDE_SLOPES, SIDE_VALUES, SIDE_WEIGHTS, SIDES, Mesh, half_bandwidth, outline, strip_mesh
 from creepkit.fem.mesh_builder import order_by_neighbours
 
@@ -33,6 +33,7 @@ class Section:
     forces : (nodes, 2) N/rad in r and z for a unit of the load, whatever the deformation.
     planes : (nodes,) those of each face that stays plane. controlled : number of the plane that the load moves, and
     motion : mm of its u_z for a unit of the load.
+    contacts : rigid bodies that it may touch.
     """
 
     nodes: Floats
@@ -45,6 +46,7 @@ class Section:
     planes: tuple[Ints, ...] = ()
     controlled: int | None = None
     motion: float = 1.0
+    contacts: tuple[RigidContact, ...] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -235,12 +237,47 @@ class Section:
             raise SolveError("the load can move one side of a section; give the others planes, forces or supports")
         return replace(self.plane(side), controlled=len(self.planes), motion=float(by))
 
+    def touch(
+        self,
+        side: str,
+        centre: tuple[float, float],
+        edge: tuple[float, float],
+        *,
+        name: str,
+        force: float | None = None,
+        stiffness: float = 1e6,
+        smoothing: float = 2e-4,
+    ) -> Self:
+        """Let a side touch, without friction, a rigid circle: a sphere, if its centre is on the axis, or else a ring.
+
+        centre, edge : (r, z) mm of its centre and of a point of it, from which its radius is taken.
+        name : of a new point, at the edge, that moves with it.
+        force : N along z on it for a unit of the load; it then moves freely along the axis. None: it stays where it is.
+        stiffness : MPa/mm, pressure for each mm that the side penetrates it (penalty method), for each area at rest.
+        smoothing : mm, gap at which pressure begins to rise from zero, so that its slope has no jump.
+        Other forces and rigid bodies may be added after; sides are named before.
+        """
+        edges, first = _side(self, side), len(self.nodes)
+        free = force is not None
+        contact = RigidContact(edges, first, first + 1, float(stiffness), float(smoothing), free)
+        forces = np.vstack([self.forces, np.zeros((2, 2))])
+        forces[first, 1] = 0.0 if force is None else force / (2.0 * np.pi)
+        return replace(
+            self,
+            nodes=np.vstack([self.nodes, [centre, edge]]),
+            points={**self.points, name: first + 1},
+            held=np.vstack([self.held, [[True, not free]] * 2]),
+            forces=forces,
+            planes=(*self.planes, np.array([first, first + 1])) if free else self.planes,
+            contacts=(*self.contacts, contact),
+        )
+
     # ---- what it is for -------------------------------------------------------------------------------------------
 
     @property
     def is_loaded(self) -> bool:
         """Whether anything holds it or acts on it."""
-        return bool(self.held.any() or self.pressed.size or self.forces.any() or self.planes)
+        return bool(self.held.any() or self.pressed.size or self.forces.any() or self.planes or self.contacts)
 
     def model(self, observed: Ints) -> FiniteElementModel:
         """The finite element model; observed : (observed,) displacements, 2 node + 0 for u_r or + 1 for u_z."""
@@ -250,7 +287,7 @@ class Section:
                 "for each load, as section(load) is asked by its name"
             )
         mesh = Mesh(self.nodes, self.elements, self.held, self.pressed, np.zeros(0, dtype=np.int64))
-        constraints = AxialConstraints(self.forces, self.planes, self.controlled, observed)
+        constraints = AxialConstraints(self.forces, self.planes, self.controlled, observed, self.contacts)
         return finite_element_model(mesh, constraints)
 
     def has_topology_of(self, other: Section) -> bool:
@@ -260,6 +297,9 @@ class Section:
         same &= len(self.planes) == len(other.planes)
         same &= (self.controlled, self.motion) == (other.controlled, other.motion)
         same &= all(np.array_equal(one, two) for one, two in zip(self.planes, other.planes, strict=False))
+        same &= len(self.contacts) == len(other.contacts)
+        for one, two in zip(self.contacts, other.contacts, strict=False):
+            same &= one[1:] == two[1:] and np.array_equal(one.sides, two.sides)
         return same and dict(self.points) == dict(other.points)
 
     def _nodes_of(self, name: str) -> Ints:

@@ -93,7 +93,7 @@ def check_outputs_agree(histories: Sequence[History]) -> None:
             if quantity != output.quantity:
                 raise FitError(
                     f"'{name}' is a {quantity} of specimen '{specimen}' and a {output.quantity} of "
-                    f"'{history.specimen}'; outputs of one name share their noise in a fit: rename one of them in its specimen"
+                    f"'{history.specimen}'; outputs of one name share their noise in a fit: rename one of them"
                 )
 
 

@@ -85,7 +85,7 @@ def _specimen_and_outputs(
     conditions: StatedConditions, frames: Frames, load: str, location: str
 ) -> tuple[str, dict[str, Floats]]:
     """The specimen, as named or as outputs and load identify it, and its outputs."""
-    named, terms = conditions.take_text("specimen"), conditions.terms
+    named, terms = conditions.take_text("specimen", conditions.default_specimen), conditions.terms
     present = terms.specimens_with(frames.values)
     if named in terms.outputs:
         chosen = [named] if named in present else []

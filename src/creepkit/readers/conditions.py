@@ -71,6 +71,7 @@ class StatedConditions:
         self.stated: dict[str, Program] = {}
         self._vocabulary = vocabulary
         self.terms = vocabulary.terms(_stated_specimen(entries, vocabulary))
+        self.default_specimen = vocabulary.default_texts.get("specimen", "")
         self._kinds = self.terms.condition_kinds
         self._text_keys = self.terms.text_keys
         self._end_of_test_terms = {**{word: word for word in END_OF_TEST_TERMS}, **vocabulary.end_of_test_terms}
@@ -175,7 +176,7 @@ class StatedConditions:
 def _stated_specimen(entries: Mapping[str, SourceText], vocabulary: HeaderVocabulary) -> str:
     """The specimen that a file names, "" where it names none."""
     named = [e.text for key, e in entries.items() if vocabulary.synonyms.get(key, key) == "specimen"]
-    return named[0] if named else ""
+    return named[0] if named else vocabulary.default_texts.get("specimen", "")
 
 
 def _dimension_with_unit(name: str, dimensions: Mapping[str, str]) -> tuple[str, str] | None:

@@ -174,7 +174,7 @@ class ParameterSurrogate(Surrogate):
         self, theta: Floats, histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues
     ) -> Floats:
         """(candidates, tests, frames) what the model that is corrected predicts of the first output."""
-        tests = [h.replace(times=t, outputs={}) for h, t in zip(histories, frames, strict=True)]
+        tests = [h.replace(times=t, outputs={}, standard_deviation={}) for h, t in zip(histories, frames, strict=True)]
         prediction = base_model(self.specimen, self.recipe.base).predict(
             self.metadata.law, theta, tests, nuisances=nuisances
         )

@@ -98,7 +98,9 @@ class ReferenceStressModel:
         return assemble_prediction(parts, histories, self.outputs, len(theta))
 
     def _parts(self, kernel: CompiledLaw, theta: Floats, histories: Sequence[History]) -> list[HistoryPrediction]:
-        pieces = [tested_piece(self.specimen, history.replace(outputs={})) for history in histories]
+        pieces = [
+            tested_piece(self.specimen, history.replace(outputs={}, standard_deviation={})) for history in histories
+        ]
         tests = [_point_test(piece, plan) for piece, plan in pieces]
         found = integration.integrate(kernel, theta, tests, settings=SETTINGS)
         parts = []

@@ -94,7 +94,7 @@ def check_specimen(
     specimen: Specimen,
     histories: Sequence[History] | None = None,
     *,
-    law: CreepLaw | None = None,
+    law: CreepLaw | str | None = None,
     values: Mapping[str, float] | None = None,
 ) -> ConformanceReport:
     """Run every check on a specimen; what its code raises is a finding, too.
@@ -132,7 +132,7 @@ def check_predictor(
     predictor: Predictor,
     histories: Sequence[History] | None = None,
     *,
-    law: CreepLaw | None = None,
+    law: CreepLaw | str | None = None,
     values: Mapping[str, float] | None = None,
 ) -> ConformanceReport:
     """Run every check on a predictor, such as a surrogate or a closed form; as check_specimen(), less the record.
@@ -236,7 +236,7 @@ def _all_findings(checks: Mapping[str, Callable[[Any], Iterable[ConformanceCheck
 def _case(
     predictor: Any,
     histories: Sequence[History] | None,
-    law: CreepLaw | None,
+    law: CreepLaw | str | None,
     values: Mapping[str, float] | None,
     kind: str,
 ) -> tuple[PredictorCase | None, ConformanceCheck]:
@@ -247,13 +247,28 @@ def _case(
         tests = list(histories) if histories is not None else default_histories(predictor)
         if len(tests) == 1:
             tests = [*tests, tests[0].replace(name=f"{tests[0].name}, shorter", times=tests[0].times[:-1], outputs={})]
-        chosen = law or default_registry().law("norton").times(arrhenius(T_ref=1050.0))
-        given = values or (chosen.center() if law is not None else _norton_values(predictor, tests[0]))
+        chosen, usual = _law_of_check(predictor, law, tests[0])
+        given = values or usual
         cases.append(PredictorCase(predictor, chosen, chosen.to_internal(chosen.values(given)), tests, kind))
         yield ConformanceCheck("a planned test", True, ", ".join(test.name for test in tests))
 
     found = findings("a planned test", made)
     return (cases[0] if cases else None), found[-1]
+
+
+def _law_of_check(predictor: Any, law: CreepLaw | str | None, history: History) -> tuple[CreepLaw, Mapping[str, float]]:
+    """The law that a predictor is checked with, and values of it: Norton's, with temperature if the predictor can."""
+    norton = default_registry().law("norton")
+    if law is not None:
+        chosen = default_registry().law(law) if isinstance(law, str) else law
+        return chosen, chosen.center()
+    values = _norton_values(predictor, history)
+    warm = norton.times(arrhenius(T_ref=1050.0))
+    try:
+        predictor.predict(warm, warm.to_internal(warm.values(values)), [history])
+    except CreepkitError:  # a closed form of Norton's law alone
+        return norton, {name: values[name] for name in norton.names}
+    return warm, values
 
 
 TYPICAL_STRAIN = 0.005

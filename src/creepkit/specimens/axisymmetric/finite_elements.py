@@ -294,6 +294,7 @@ def solver_settings(specimen: AxisymmetricSettings, *, exact: bool = False) -> S
     return SolverSettings(
         tolerance=specimen.tolerance,
         newton=1e-6 if exact else 1e-2 * specimen.tolerance,
+        first=specimen.first_step,
         deflection_limit=specimen.deflection_limit,
         strain_limit=specimen.strain_limit,
         max_steps=int(specimen.max_steps),

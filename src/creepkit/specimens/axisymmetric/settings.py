@@ -45,6 +45,9 @@ class AxisymmetricSettings(TestPiece, ABC):
     outputs: ClassVar[tuple[Output, ...]]
     loads: ClassVar[tuple[Load, ...]]
 
+    first_step: ClassVar[float] = 10.0
+    """s, the longest first step after a change of load; less where high stresses relax in less."""
+
     program_nuisances: ClassVar[tuple[str, ...]] = PROGRAM_NUISANCES
     """Kinds of nuisances of a history's programs that predict() differentiates itself."""
 
