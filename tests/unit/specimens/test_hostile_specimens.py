@@ -128,8 +128,6 @@ def rods(*pushes, **changes):
     for push in pushes:
         plan = {"loading": ck.constant_load("push", push), "times": times, "temperature": 1000.0}
         run = ck.simulate(NORTON, Rod(), values, **plan)
-            NORTON, Rod(), values, loading=ck.constant_load("push", push), times=times, temperature=1000.0
-        )
         sag = run.outputs["sag"] * (1.0 + 1e-3 * rng.standard_normal(15))
         found.append(run.replace(name=f"{push:g}", outputs={"sag": sag}, **changes))
     return found
