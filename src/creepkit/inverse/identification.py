@@ -20,7 +20,7 @@ from creepkit.inverse.extrapolation import warn_of_extrapolation
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
-from creepkit.inverse.nuisance_parameters import NuisanceEstimate, owner_of, prior_mean
+from creepkit.inverse.nuisance_parameters import NuisanceEstimate, has_nuisance, owner_of, prior_mean
 from creepkit.inverse.predictor_documents import PredictorDocument, missing_predictor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
@@ -279,7 +279,7 @@ class Identification(Presentable):
         using = using or self.predictor
 
         def of(n: Nuisance, history: History) -> float:
-            if not n.applies_to(history.name):
+            if not n.applies_to(history.name) or not has_nuisance(n, history, using):
                 return 0.0
             known = estimates.get((n.key, owner_of(n, history)))
             return known if known is not None else n.mean if using is None else prior_mean(n, history, using)

@@ -240,6 +240,11 @@ def prior_mean(nuisance: Nuisance, history: History | None, using: Predictor) ->
     return float(history.geometry.get(length.name, length.default))
 
 
+def has_nuisance(nuisance: Nuisance, history: History, using: Predictor | None) -> bool:
+    """Whether what predicts a test knows a nuisance: in joint fits lengths belong to tests of some specimens alone."""
+    return using is None or not nuisance.is_length or supports_nuisance(predictor_for(using, history), nuisance.kind)
+
+
 def initial_prior_sd(nuisance: Nuisance, mean: float) -> float:
     """The prior standard deviation of a nuisance parameter, or where its estimate begins; mean : of the prior."""
     if nuisance.sd is not None:
