@@ -13,7 +13,7 @@ from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, 
 from creepkit.kernels.lowering import lower
 from creepkit.language import arrhenius
 from creepkit.language.law import CreepLaw
-from creepkit.records import Exporter, History, Predictor, Reader, Specimen, remember_specimen
+from creepkit.records import Exporter, History, Predictor, Reader, Specimen, predict_with, remember_specimen
 from creepkit.registry import Plugin, default_registry
 from creepkit.testing import (
     exporter_checks,
@@ -265,7 +265,7 @@ def _law_of_check(predictor: Any, law: CreepLaw | str | None, history: History) 
     values = _norton_values(predictor, history)
     warm = norton.times(arrhenius(T_ref=1050.0))
     try:
-        predictor.predict(warm, warm.to_internal(warm.values(values)), [history])
+        predict_with(predictor, warm, warm.to_internal(warm.values(values)), [history])
     except CreepkitError:  # a closed form of Norton's law alone
         return norton, {name: values[name] for name in norton.names}
     return warm, values
