@@ -120,8 +120,12 @@ def test_the_ball_carries_the_force_with_little_penetration() -> None:
 
 
 def test_derivatives_are_those_of_differences_in_the_same_steps() -> None:
-    """To the law, modulus, temperature, load and all lengths, within 1e-3 of the largest of each."""
-    disc = SmallPunch()
+    """To the law, modulus, temperature, load and all lengths, within 1e-3 of the largest of each.
+
+    In long steps: in a short one in which a point just comes into contact, within the smoothing of 0.1 um, the
+    difference of lengths that move it by 0.05 um is off by 2.5e-3 itself.
+    """
+    disc = SmallPunch(tolerance=5e-3)
     law = ck.law("norton").times(ck.arrhenius(1000.0, 300e3))
     kernel = kernels.lower(law, "compiled")
     theta = law.to_internal(law.values({"A": 1e-15, "n": 4.0}))[0]
