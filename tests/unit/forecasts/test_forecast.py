@@ -12,7 +12,6 @@ import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.forecasts.draws import law_draws
 from creepkit.forecasts.forecast import forecast
-from creepkit.inverse.ranking_document import read_fit_or_ranking, write_ranking_document
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.records import Status
 from creepkit.report.forecast import forecast_to_json
@@ -349,8 +348,6 @@ def test_celsius_is_refused_and_may_be_insisted_on(fit):
 
 
 def test_an_identification_without_scatter_says_so(fit):
-    from dataclasses import replace
-
     with pytest.raises(FitError, match=r"says nothing of the scatter between tests, .*identify again"):
         replace(fit, rate_scatter=None).forecast(bar("plan", 100.0, noise=0.0))
 
@@ -366,46 +363,3 @@ def test_text_json_and_picture(fit, tmp_path):
     assert (tmp_path / "forecast.png").stat().st_size > 10_000
     with pytest.raises(FitError, match="there is no forecast of a test 'x'"):
         result["x"]
-
-
-def test_a_ranking_has_a_file(fit, tmp_path):
-    fit.save(tmp_path / "norton.json")
-    write_ranking_document({"norton.json": 1.0}, tmp_path / "ranking.json")
-    source = read_fit_or_ranking(tmp_path / "ranking.json")
-    assert isinstance(source, ModelAverage)
-    assert source.fits[0].values == fit.values
-
-
-@pytest.mark.parametrize(
-    ("laws", "sentence"),
-    [
-        ([], "laws is no list of 1 to 100 laws"),
-        ([{"file": "ranking.json", "weight": 1.0}], "it is a name in the same folder"),
-        ([{"file": "../norton.json", "weight": 1.0}], "it is a name in the same folder"),
-        ([{"file": "norton.json", "weight": 2.0}], "it is a number from 0 to 1"),
-        ([{"file": "norton.json"}], "each of its laws is a file and a weight"),
-        ([{"file": "absent.json", "weight": 1.0}], "absent.json"),
-    ],
-)
-def test_other_files_of_rankings_are_refused(laws, sentence, tmp_path):
-    path = tmp_path / "ranking.json"
-    path.write_text(json.dumps({"format": "creepkit-ranking", "version": 1, "laws": laws}))
-    with pytest.raises(FitError, match=sentence):
-        read_fit_or_ranking(path)
-
-
-def test_weights_of_a_ranking_that_add_up_to_more_than_one_are_refused(fit, tmp_path):
-    for name in ("a.json", "b.json"):
-        fit.save(tmp_path / name)
-    path = write_ranking_document({"a.json": 0.9, "b.json": 0.9}, tmp_path / "ranking.json")
-    with pytest.raises(FitError, match=r"the weights add up to 1\.8, more than 1"):
-        read_fit_or_ranking(path)
-
-
-def test_values_and_coordinates_of_a_file_that_contradict_each_other_are_refused(fit, tmp_path):
-    path = fit.save(tmp_path / "fit.json")
-    content = json.loads(path.read_text())
-    content["u"][0] += 2.0
-    path.write_text(json.dumps(content))
-    with pytest.raises(FitError, match="contradict each other"):
-        read_fit_or_ranking(path)
