@@ -118,43 +118,42 @@ class Cantilever(RectangularBeam):
         return BeamStations(*self.stretch(self.span, self.span), largest=self.span)
 
 
+class HeldDeflection:
+    """What beams have in common whose deflection is held, in steps or ramps, and whose force is observed."""
+
+    outputs: ClassVar[tuple[ck.Output, ...]] = FORCE_OUTPUT
+    loads: ClassVar[tuple[ck.Load, ...]] = DISPLACEMENT
+    relaxes: ClassVar[bool] = True
+
+
 @dataclass(frozen=True)
-class ThreePointBendRelaxation(ThreePointBend):
+class ThreePointBendRelaxation(HeldDeflection, ThreePointBend):
     """Three-point bending with the deflection of the middle held, in steps or ramps; its output is the force."""
 
     name: ClassVar[str] = "three-point-bend-relaxation"
     title: ClassVar[str] = "Three-point bending under a held deflection of the middle, small deflections"
-    outputs: ClassVar[tuple[ck.Output, ...]] = FORCE_OUTPUT
-    loads: ClassVar[tuple[ck.Load, ...]] = DISPLACEMENT
-    relaxes: ClassVar[bool] = True
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {"displacement": (0.03, 0.25), "modulus": (50e3, 300e3)}
     )
 
 
 @dataclass(frozen=True)
-class FourPointBendRelaxation(FourPointBend):
+class FourPointBendRelaxation(HeldDeflection, FourPointBend):
     """Four-point bending with the deflection of the load points held, in steps or ramps; its output is the force."""
 
     name: ClassVar[str] = "four-point-bend-relaxation"
     title: ClassVar[str] = "Four-point bending under a held deflection of the load points, small deflections"
-    outputs: ClassVar[tuple[ck.Output, ...]] = FORCE_OUTPUT
-    loads: ClassVar[tuple[ck.Load, ...]] = DISPLACEMENT
-    relaxes: ClassVar[bool] = True
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {"displacement": (0.03, 0.25), "modulus": (50e3, 300e3)}
     )
 
 
 @dataclass(frozen=True)
-class CantileverRelaxation(Cantilever):
+class CantileverRelaxation(HeldDeflection, Cantilever):
     """A cantilever with the deflection of its end held, in steps or ramps; its output is the force."""
 
     name: ClassVar[str] = "cantilever-bend-relaxation"
     title: ClassVar[str] = "Cantilever under a held deflection of its end, small deflections"
-    outputs: ClassVar[tuple[ck.Output, ...]] = FORCE_OUTPUT
-    loads: ClassVar[tuple[ck.Load, ...]] = DISPLACEMENT
-    relaxes: ClassVar[bool] = True
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {"displacement": (0.05, 0.5), "modulus": (50e3, 300e3)}
     )
