@@ -17,7 +17,7 @@ from creepkit.readers.conditions import (
     read_loading,
     read_temperature,
 )
-from creepkit.readers.text_tables import Frames, SourceText, TextTable, column_means, read_frames
+from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records import History
 
@@ -77,12 +77,12 @@ def assemble_history(
     )
 
 
-def _merge_label(frames: Frames) -> dict[str, str]:
+def _merge_label(frames: TableFrames) -> dict[str, str]:
     return {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
 
 
 def _specimen_and_outputs(
-    conditions: StatedConditions, frames: Frames, load: str, location: str
+    conditions: StatedConditions, frames: TableFrames, load: str, location: str
 ) -> tuple[str, dict[str, Floats]]:
     """The specimen, as named or as outputs and load identify it, and its outputs."""
     named, terms = conditions.take_text("specimen", conditions.default_specimen), conditions.terms
@@ -112,7 +112,7 @@ def _unidentified(named: str, present: Sequence[str], terms: Terms, location: st
     return HistoryError(f"{location}: missing column: the columns hold {description}, {advice}: {known}")
 
 
-def _refuse_unread_columns(frames: Frames, read_columns: Collection[str], location: str) -> None:
+def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], location: str) -> None:
     """Refuse a column that would go unread, such as a pressure beside a stress."""
     unread = [name for name in frames.values if name.removesuffix("_sd") not in {"time", "used", *read_columns}]
     if unread:
@@ -133,7 +133,7 @@ def _elastic(conditions: StatedConditions) -> Elastic | None:
 
 
 def _standard_deviations(
-    conditions: StatedConditions, frames: Frames, outputs: Mapping[str, Floats]
+    conditions: StatedConditions, frames: TableFrames, outputs: Mapping[str, Floats]
 ) -> dict[str, Floats]:
     """Standard deviations by output, from a column or one number for all frames."""
     standard_deviations: dict[str, Floats] = {}
@@ -148,7 +148,7 @@ def _standard_deviations(
     return standard_deviations
 
 
-def _used_frames(conditions: StatedConditions, frames: Frames) -> Bools:
+def _used_frames(conditions: StatedConditions, frames: TableFrames) -> Bools:
     """Which frames a fit may use: those marked so, up to the end of the test; later ones saw the unloading."""
     used = np.asarray(frames.values.get("used", np.ones(frames.times.size)) == 1.0)
     end = conditions.take_number("end_time")
@@ -162,7 +162,7 @@ def _used_frames(conditions: StatedConditions, frames: Frames) -> Bools:
     return used & ~after
 
 
-def _end_of_test(conditions: StatedConditions, frames: Frames, used: Bools) -> tuple[float | None, bool]:
+def _end_of_test(conditions: StatedConditions, frames: TableFrames, used: Bools) -> tuple[float | None, bool]:
     """The rupture time, s, if the test ruptured, and whether it was stopped before; neither where nothing is said.
 
     A test that is said to have ruptured, without a time, did so when its last frame was taken.

@@ -15,7 +15,7 @@ import numpy as np
 
 from creepkit.errors import CreepkitError, HistoryError, nearest
 from creepkit.readers.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATURE_RECORD_TOLERANCE, recorded_program
-from creepkit.readers.text_tables import Frames, SourceText
+from creepkit.readers.text_tables import SourceText, TableFrames
 from creepkit.readers.vocabulary import (
     COMPONENT_LOADING_KINDS,
     SPECIMEN_NAME_PATTERN,
@@ -238,7 +238,7 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, location: str) -> 
     return TIME.convert(time, parts[1], location, key), kind.convert(value, parts[3], location, key)
 
 
-def read_temperature(conditions: StatedConditions, frames: Frames) -> float | Program:
+def read_temperature(conditions: StatedConditions, frames: TableFrames) -> float | Program:
     """The temperature, K."""
     result = _stated_loading(conditions, frames, "temperature")
     if result is None:
@@ -246,7 +246,7 @@ def read_temperature(conditions: StatedConditions, frames: Frames) -> float | Pr
     return Program.steps(result) if isinstance(result, tuple) else result
 
 
-def read_loading(conditions: StatedConditions, frames: Frames) -> Loading:
+def read_loading(conditions: StatedConditions, frames: TableFrames) -> Loading:
     """The loading: by components, by what has steps and programs alone, else by the first load that is stated."""
     terms, load_kinds = conditions.terms, conditions.terms.load_kinds
     quantities = (*load_kinds, *COMPONENT_LOADING_KINDS)
@@ -277,7 +277,7 @@ def _loading_advice(terms: Terms, loads: Sequence[str]) -> str:
     return f"write {'; or '.join(forms)}"
 
 
-def _loading_by(quantity: str, conditions: StatedConditions, frames: Frames) -> Loading | None:
+def _loading_by(quantity: str, conditions: StatedConditions, frames: TableFrames) -> Loading | None:
     """The loading by one quantity, if it is stated."""
     kind = conditions.terms.load_kinds[quantity]
     if quantity not in conditions.terms.number_kinds:
@@ -343,7 +343,7 @@ def _required_number(conditions: StatedConditions, name: str, companion: StatedN
 
 
 def _stated_loading(
-    conditions: StatedConditions, frames: Frames, quantity: str
+    conditions: StatedConditions, frames: TableFrames, quantity: str
 ) -> float | TimeValuePairs | Program | None:
     """The value given for a quantity: a number, steps as (time, value), or a Program.
 

@@ -51,7 +51,7 @@ def _running_median(values: Floats) -> Floats:
 
 
 def _breakpoints(times: Floats, values: Floats, tolerance: float) -> Ints:
-    """Frames between which straight lines stay within the tolerance."""
+    """TableFrames between which straight lines stay within the tolerance."""
     kept, spans = {0, values.size - 1}, [(0, values.size - 1)]
     while spans:
         first, last = spans.pop()

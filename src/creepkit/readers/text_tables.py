@@ -152,7 +152,7 @@ def _check_columns(location: str, columns: Sequence[str]) -> None:
 
 
 @dataclass(frozen=True)
-class Frames:
+class TableFrames:
     """The frames of one test.
 
     values : {quantity: (frames,)} in MPa, mm, s, K; "time" is among them and increases strictly.
@@ -177,7 +177,7 @@ class Frames:
 
 def read_frames(
     table: TextTable, vocabulary: HeaderVocabulary, terms: Terms, skipped_columns: Collection[str] = ()
-) -> Frames:
+) -> TableFrames:
     """Read the frames in a table, except the columns in `skip` and those that are averaged to labels."""
     kinds = terms.column_kinds
     ignored = {*skipped_columns, *(name for names in vocabulary.averaged_columns.values() for name in names)}
@@ -191,7 +191,7 @@ def read_frames(
     if "time" not in values:
         place, result = table.location(table.columns_line), ", ".join(table.columns)
         raise HistoryError(f"{place}: missing column: no time among {result}; name one time_s, time_min or time_h")
-    return _strictly_increasing(Frames(table.path, values, np.array([row.line for row in table.rows])))
+    return _strictly_increasing(TableFrames(table.path, values, np.array([row.line for row in table.rows])))
 
 
 def column_means(table: TextTable, vocabulary: HeaderVocabulary) -> dict[str, str]:
@@ -221,7 +221,7 @@ def _converted_column(table: TextTable, name: str, kind: QuantityKind, suffix: s
     )
 
 
-def _strictly_increasing(frames: Frames) -> Frames:
+def _strictly_increasing(frames: TableFrames) -> TableFrames:
     """Refuse a time that falls; merge frames of equal time into their mean.
 
     A clock that is coarser than the recording, or a last reading at rupture, gives several frames one time. Their
@@ -237,4 +237,4 @@ def _strictly_increasing(frames: Frames) -> Frames:
     values = {name: np.add.reduceat(column, first) / counts for name, column in frames.values.items()}
     if first.size < 2:
         raise HistoryError(f"{frames.location(0)}: only one frame in time; at least two are needed to identify a law")
-    return Frames(frames.path, values, frames.lines[first], frames.times.size - first.size)
+    return TableFrames(frames.path, values, frames.lines[first], frames.times.size - first.size)

@@ -43,6 +43,10 @@ class History:
     rupture_time : s, when the specimen broke; None where it did not, or where that is not known.
     unruptured : whether the test was stopped, at its last time, before the specimen broke. A test with neither says
         nothing of how it ended.
+    noise_correlation : {(output, output): correlation} of the noise of two outputs in one frame, -1 to 1; pairs
+        that are not given err independently.
+    minimum_rate : 1/s, the smallest creep rate of the test, where it is all or part of what is known; minimum_rate_sd :
+        its standard deviation, 1/s. A test of which only that, or only its end, is known has outputs {} and one time.
     stated : {"temperature", "stress" or "pressure": program} that was stated of a quantity whose record is used, K and
         MPa; a check of data quality compares them.
     """
@@ -66,6 +70,9 @@ class History:
     rupture_time: float | None = None
     unruptured: bool = False
     stated: Mapping[str, Program] = field(default_factory=dict)
+    noise_correlation: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    minimum_rate: float | None = None
+    minimum_rate_sd: float | None = None
 
     def __post_init__(self) -> None:
         origin = self.origin
@@ -102,6 +109,8 @@ class History:
         freeze(self, "geometry", MappingProxyType(dict(self.geometry)))
         freeze(self, "stated", MappingProxyType(dict(self.stated)))
         freeze(self, "labels", MappingProxyType(dict(self.labels)))
+        freeze(self, "noise_correlation", MappingProxyType(self._checked_correlation(origin)))
+        self._check_minimum_rate(origin)
 
     @staticmethod
     def _checked_sd(origin: str, name: str, values: Floats, frames: int) -> Floats:
@@ -115,6 +124,39 @@ class History:
                 "where it is not known"
             )
         return frozen(np.broadcast_to(array.ravel() if array.size == 1 else array, (frames,)))
+
+    def _checked_correlation(self, origin: str) -> dict[tuple[str, str], float]:
+        """Correlations by pair, in the order of the outputs; HistoryError for what cannot be one."""
+        order = list(self.outputs)
+        correlations: dict[tuple[str, str], float] = {}
+        for pair, value in self.noise_correlation.items():
+            if len(set(pair)) != 2 or not set(pair) <= set(order):
+                names = " and ".join(str(name) for name in pair)
+                raise HistoryError(
+                    f"{origin}: a noise_correlation of {names}; give it of two of its outputs: {', '.join(order)}"
+                )
+            correlations[min(pair, key=order.index), max(pair, key=order.index)] = float(value)
+        if not correlations:
+            return correlations
+        matrix = np.eye(len(order))
+        for (first, second), value in correlations.items():
+            i, j = order.index(first), order.index(second)
+            matrix[i, j] = matrix[j, i] = value
+        if not (np.isfinite(matrix).all() and (np.linalg.eigvalsh(matrix) > 0).all()):
+            stated = ", ".join(f"{a} {b} {value:g}" for (a, b), value in correlations.items())
+            raise HistoryError(f"{origin}: the noise correlations {stated} cannot all hold; give numbers within +-1")
+        return correlations
+
+    def _check_minimum_rate(self, origin: str) -> None:
+        for name in ("minimum_rate", "minimum_rate_sd"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            if not (np.isfinite(value) and value > 0):
+                raise HistoryError(f"{origin}: {name} is {value:g} 1/s; it must be a finite number above zero")
+            object.__setattr__(self, name, float(value))
+        if self.minimum_rate is None and self.minimum_rate_sd is not None:
+            raise HistoryError(f"{origin}: a minimum_rate_sd without a minimum_rate; give both")
 
     def _check_end(self, origin: str) -> None:
         """A specimen breaks once, and has no frames afterwards but for the rounding of the rupture time."""
