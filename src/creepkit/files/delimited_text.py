@@ -210,7 +210,7 @@ def _score(sample: Sequence[str], delimiter: str) -> tuple[bool, int, int]:
         if len(cells) < 2:
             continue
         counts[len(cells)] = counts.get(len(cells), 0) + 1
-        for cell in cells:
+        for cell in (cell.rstrip("% ") for cell in cells):
             if cell and (cell[0] in "+-.," or "0" <= cell[0] <= "9"):
                 is_numeric = _NUMBERS["."].fullmatch(cell) or (delimiter != "," and _NUMBERS[","].fullmatch(cell))
                 numbers += 1 if is_numeric else -2
@@ -234,7 +234,7 @@ def _decimal(lines: Sequence[str], delimiter: str, place: str) -> str:
             break
         if "," not in line and "." not in line:
             continue
-        for cell in _possible_numbers(line, delimiter):
+        for cell in (cell.rstrip("% ") for cell in _possible_numbers(line, delimiter)):
             if "," in cell and _NUMBERS[","].fullmatch(cell):
                 if _THOUSANDS_LIKE.fullmatch(cell):
                     doubtful = doubtful or cell

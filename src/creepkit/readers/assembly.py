@@ -17,6 +17,7 @@ from creepkit.readers.conditions import (
     read_loading,
     read_temperature,
 )
+from creepkit.readers.standard_names import in_standard_names
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records import History
@@ -40,7 +41,10 @@ def assemble_history(
     entries : what is said once for the test; location : where that stands; table : its frames, without reading the
     columns in `skipped_columns`; source : what the history says of its origin.
     """
+    entries, table = in_standard_names(entries, table, vocabulary)
     conditions = StatedConditions(entries, vocabulary, location)
+    for assumption in table.assumptions:
+        conditions.record_assumption(assumption)
     frames = read_frames(table, vocabulary, conditions.terms, skipped_columns)
     columns = table.location(table.columns_line)
     loading = read_loading(conditions, frames)
