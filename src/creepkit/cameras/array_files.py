@@ -6,6 +6,7 @@ is that of MathWorks, MAT-File Format (2024); no more is unpacked than the array
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -97,7 +98,7 @@ def _hdf5_table(path: Path) -> ArrayTable:
 
     with open_hdf5(path, FRAME_FILE) as file:
         arrays = {
-            name: np.asarray(item[()], dtype=float).ravel()
+            name: np.asarray(item[()], dtype=float).T.ravel()
             for name, item in file.items()
             if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and 0 < item.size <= LARGEST_ARRAY
         }
@@ -170,10 +171,9 @@ def _array_of(data: bytes, order: str) -> _Array | None:
     (word,) = struct.unpack_from(f"{order}I", flags.data)
     if word & 0xFF not in _NUMERIC_CLASSES or word & 0x0800 or shape.kind != 5:
         return None
-    count = 1
-    for size in struct.unpack(f"{order}{len(shape.data) // 4}i", shape.data[: len(shape.data) // 4 * 4]):
-        count *= size
-    if not 0 < count <= LARGEST_ARRAY:
+    sizes = struct.unpack(f"{order}{len(shape.data) // 4}i", shape.data[: len(shape.data) // 4 * 4])
+    count = math.prod(sizes)
+    if min(sizes, default=0) < 1 or not 0 < count <= LARGEST_ARRAY:
         return None
     values = next(parts, None)
     if values is None or values.kind not in _TYPES:
@@ -182,7 +182,7 @@ def _array_of(data: bytes, order: str) -> _Array | None:
     label = name.data.decode("ascii", errors="replace").rstrip("\0")
     if numbers.size != count:
         raise ValueError(f"the array {label:.40} has {numbers.size} numbers in the place of {count}")
-    return _Array(label, numbers.astype(float))
+    return _Array(label, numbers.astype(float).reshape(sizes, order="F").ravel())
 
 
 def row_table(path: Path, layout: Sequence[tuple[str, str]]) -> ArrayTable:

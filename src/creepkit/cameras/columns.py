@@ -100,6 +100,8 @@ def columns_of(format: CameraFormat, names: Sequence[str], location: str) -> Fra
     spelt: dict[str, ColumnName] = {}
     for quantity, spellings in version.items():
         found = [(k, word) for word in spellings for k in _matches(parsed, word)]
+        if len({k for k, _ in found}) > 1:  # the same in the image and on the surface, as of pyvale
+            found = [(k, word) for k, word in found if parsed[k].unit.casefold() not in PIXELS] or found
         if len({k for k, _ in found}) > 1:
             both = " and ".join(f"'{names[k].strip()}'" for k in sorted({k for k, _ in found})[:2])
             raise HistoryError(f"{location}: {both} both are the column {quantity} of {format}; keep one of them")

@@ -60,7 +60,7 @@ def recognise(path: Path, formats: Sequence[CameraFormat], chosen: bool) -> Reco
         return Recognised(_only(path, by_layout), path, None, chosen)
     if is_matlab(beginning):
         return _recognised_arrays(path, formats, chosen)
-    return _recognised_text(path, [one for one in formats if chosen or not is_for_matlab(one)], chosen)
+    return _recognised_text(path, [one for one in formats if chosen or not (one.layout or is_for_matlab(one))], chosen)
 
 
 def is_for_matlab(format: CameraFormat) -> bool:
@@ -91,12 +91,13 @@ def _recognised_arrays(path: Path, formats: Sequence[CameraFormat], chosen: bool
 
 
 def _recognised_text(path: Path, formats: Sequence[CameraFormat], chosen: bool) -> Recognised:
-    heads = list(candidate_heads(head_bytes(path)))
+    content = head_bytes(path)
     for any_case in (False, True) if chosen else (False,):
-        for head in heads:
+        for head in candidate_heads(content):
             accepting = [one for one in formats if fits(one, head.names, any_case=any_case)]
             if accepting:
                 return Recognised(_only(head.location(path), accepting), path, head, chosen)
+    heads = list(candidate_heads(content))
     _explain_near_misses(path, heads, formats, chosen)
     first = next((head for head in heads if not _begins_with_number(head)), None)
     place = f"{path}" if first is None else first.location(path)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ctypes
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +31,13 @@ HEAD_LINES = 500
 DELIMITERS = (";", "\t", ",", " ")
 
 
+LEAST_COLUMNS = 4
+"""x, y, u and v."""
+
+
+_LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\n|\r|\Z)")
+
+
 SAMPLE_ROWS = 50
 """Rows whose cells show the decimal sign."""
 
@@ -38,7 +47,6 @@ class TextHead:
     """The line of columns of a text file.
 
     line : as it stands in the file, without its end. number : of that line, from 1. end : first byte behind it.
-    comments : the lines above it.
     """
 
     line: bytes
@@ -46,7 +54,6 @@ class TextHead:
     end: int
     delimiter: str
     names: tuple[str, ...]
-    comments: tuple[str, ...]
 
     def location(self, path: Path) -> str:
         """Where it stands, 'file:line'."""
@@ -72,17 +79,12 @@ def head_bytes(path: Path) -> bytes:
 
 def candidate_heads(content: bytes) -> Iterator[TextHead]:
     """The lines of a file that may name columns, divided by each delimiter that they have."""
-    end = 0
-    comments: list[str] = []
-    for number, whole in enumerate(content.splitlines(keepends=True)[:HEAD_LINES], start=1):
-        start, end = end, end + len(whole)
-        line = content[start:end].rstrip(b"\r\n")
-        text = _decoded(line)
+    for number, found in enumerate(islice(_LINE.finditer(content), HEAD_LINES), start=1):
+        text = _decoded(found[1])
         for delimiter in DELIMITERS:
             names = _names(text, delimiter)
-            if len(names) >= 4:
-                yield TextHead(line, number, end, delimiter, names, tuple(comments))
-        comments.append(text)
+            if len(names) >= LEAST_COLUMNS:
+                yield TextHead(found[1], number, found.end(), delimiter, names)
 
 
 def _decoded(line: bytes) -> str:
