@@ -101,7 +101,9 @@ inline bool parse_number(const char* p, const char* end, char decimal, double& v
         if (p < end) return false;
         exponent += small ? -power : power;
     }
-    if (digits <= 19 && mantissa <= (uint64_t(1) << 53) && exponent >= -22 && exponent <= 22) {
+    if (digits == 0) {
+        value = 0.0;
+    } else if (digits <= 19 && mantissa <= (uint64_t(1) << 53) && exponent >= -22 && exponent <= 22) {
         value = exponent < 0 ? double(mantissa) / powers[-exponent] : double(mantissa) * powers[exponent];
     } else if (digits <= 19 && exponent >= -27 && exponent <= 27) {
         value = scaled(mantissa, exponent);

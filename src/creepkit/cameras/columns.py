@@ -83,7 +83,7 @@ def looks_planar(format: CameraFormat, names: Sequence[str]) -> bool:
     if format.planar and all(has((name,)) for name in format.planar):
         return True
     return any(
-        has(version["u"]) and has(version["v"]) and has(version["x"]) and not has(version["w"])
+        has(version["u"]) and has(version["v"]) and not (has(version["z"]) or has(version["w"]))
         for version in format.versions
         if "w" in version
     )

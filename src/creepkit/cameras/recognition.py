@@ -60,6 +60,8 @@ def recognise(path: Path, formats: Sequence[CameraFormat], chosen: bool) -> Reco
         return Recognised(_only(path, by_layout), path, None, chosen)
     if is_matlab(beginning):
         return _recognised_arrays(path, formats, chosen)
+    if path.suffix.lower() == ".mat":
+        raise HistoryError(f"{path}: does not begin as a MATLAB file of arrays (version 5 or 7.3) does; is it damaged?")
     return _recognised_text(path, [one for one in formats if chosen or not (one.layout or is_for_matlab(one))], chosen)
 
 

@@ -31,6 +31,10 @@ HEAD_LINES = 500
 DELIMITERS = (";", "\t", ",", " ")
 
 
+BAD_CELL_COUNT, TOO_MANY_ROWS = -1, -3
+"""Of NumberTableError in the core."""
+
+
 LEAST_COLUMNS = 4
 """x, y, u and v."""
 
@@ -124,7 +128,7 @@ class TextTable:
         """(rows, positions) the numbers of some columns; HistoryError with line and column for what is none."""
         places = np.full(len(self.names), -1, dtype=np.int64)
         places[list(positions)] = np.arange(len(positions))
-        capacity = self.rows.count(b"\n") + self.rows.count(b"\r") + 1
+        capacity = (self.rows.count(b"\n") or self.rows.count(b"\r")) + 1
         out = np.empty((capacity, len(positions)))
         where = np.zeros(3, dtype=np.int64)
         decimal = self._decimal(positions)
@@ -140,6 +144,8 @@ class TextTable:
             core.address(out),
             core.address(where),
         )
+        if read == TOO_MANY_ROWS:
+            raise HistoryError(f"{self.path}: its lines end now in line feeds, now in carriage returns; save it anew")
         if read < 0:
             raise HistoryError(self._problem(int(read), [int(one) for one in where], decimal))
         return out[:read]
@@ -180,13 +186,14 @@ class TextTable:
         before = self.rows[:first]
         number = self.first_line() + len(before.splitlines()) - (not before.endswith((b"\n", b"\r")) and bool(before))
         found = _decoded(self.rows[first:last]).strip()
-        if kind == -1:
+        if kind == BAD_CELL_COUNT:
             cells = len(_names(found, self.delimiter)) or 1
             return (
                 f"{self.path}:{number}: number of cells {cells}, of columns {len(self.names)}; a row has one cell a "
                 "column, so the file may be cut off or damaged"
             )
-        shown = found if len(found) <= 40 else f"{found[:37]}..."
+        shown = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in found[:41])
+        shown = shown if len(found) <= 40 else f"{shown[:37]}..."
         sign = "comma" if decimal == "," else "point"
         return (
             f"{self.path}:{number}: '{self.names[column].strip()}' is '{shown}'; write a finite number with a decimal "
