@@ -13,6 +13,9 @@ DEFAULT_MAXIMUM_BYTES = 50_000_000
 """Bytes; no document of creepkit is near it, and a reader must not load what memory cannot hold."""
 
 
+_MORE_BYTES = 1_000_000
+
+
 @dataclass(frozen=True)
 class FileKind:
     """A kind of file that creepkit reads or writes.
@@ -47,12 +50,25 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
     descriptor = _open_regular(path, kind, any_size=first is not None)
     try:
         with os.fdopen(descriptor, "rb") as stream:
-            content = stream.read(kind.maximum_bytes + 1 if first is None else first)
+            content = stream.read(os.fstat(descriptor).st_size if first is None else first)
+            while first is None and len(content) <= kind.maximum_bytes and (more := stream.read(_MORE_BYTES)):
+                content += more  # it has grown meanwhile, or is one of the system's that have no size
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
-    if first is None and len(content) > kind.maximum_bytes:  # it has grown meanwhile
+    if first is None and len(content) > kind.maximum_bytes:
         raise kind.error(_too_large(path, kind))
     return content
+
+
+def read_range(path: Path, kind: FileKind, start: int, count: int) -> bytes:
+    """Bytes of a regular file however large: `count` of them from byte `start`, fewer at its end."""
+    descriptor = _open_regular(path, kind, any_size=True)
+    try:
+        with os.fdopen(descriptor, "rb") as stream:
+            stream.seek(start)
+            return stream.read(count)
+    except OSError as error:
+        raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
 
 
 def read_text(path: Path, kind: FileKind) -> str:

@@ -1,0 +1,156 @@
+"""Folders of frames: which files belong to a sequence, in which order, at which times; and one frame in memory."""
+
+from __future__ import annotations
+
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import HistoryError
+from helpers.camera_samples import dice, dice_blanks, dome, matchid_2023, pyvale, vic_3d, zeiss
+
+
+def folder_of(path: Path, names: list[str], write=dice) -> Path:
+    """Frames whose apex rises by 0.1 mm from one name to the next."""
+    path.mkdir(exist_ok=True)
+    for k, name in enumerate(names):
+        (path / name).write_bytes(write(dome(0.1 * k)))
+    return path
+
+
+def apexes(frames: ck.Frames) -> list[float]:
+    return [round(float(frame.displacements[24, 2]), 6) for frame in frames]
+
+
+def test_natural_order_and_missing_numbers(tmp_path: Path) -> None:
+    names = [f"DICe_solution_{k}.txt" for k in (2, 3, 9, 10, 12)]
+    frames = ck.read_frames(folder_of(tmp_path / "test", names))
+
+    assert apexes(frames) == [0.0, 0.1, 0.2, 0.3, 0.4]
+    assert frames.missing == (4, 5, 6, 7, 8, 11)
+    assert frames[-1].source.endswith("DICe_solution_12.txt")
+
+
+def test_numbers_may_count_in_steps(tmp_path: Path) -> None:
+    frames = ck.read_frames(folder_of(tmp_path / "test", [f"run2_{k:05d}_0.csv" for k in (10, 20, 30, 50)], vic_3d))
+    assert frames.missing == (40,)
+
+
+def test_what_else_lies_in_the_folder_is_no_frame(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "test", ["f_1.txt", "f_2.txt"])
+    (folder / "frame_times.csv").write_text("index,time\n0,1755561113266\n")
+    (folder / "notes.txt").write_text("two frames")
+    (folder / ".hidden_3.txt").write_bytes(dice())
+    (folder / "f_3.tif").write_bytes(b"II*\0")
+    assert apexes(ck.read_frames(folder)) == [0.0, 0.1]
+
+
+@pytest.mark.parametrize("content", [b"", b"***\n***\n", b"SUBSET_ID,SIGMA\n1,2\n", b"\xff\xd8\xff\x00"])
+def test_a_broken_frame_is_missed_when_it_is_read(content: bytes, tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "test", ["f_1.txt", "f_2.txt", "f_3.txt"])
+    (folder / "f_2.txt").write_bytes(content)
+    frames = ck.read_frames(folder)
+
+    assert len(frames) == 3
+    assert frames[2].valid.size == 49
+    with pytest.raises(HistoryError, match="f_2.txt"):
+        frames[1]
+
+
+def test_frames_of_other_columns(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "test", ["f_1.txt", "f_2.txt", "f_3.txt"])
+    (folder / "f_2.txt").write_bytes(dice_blanks())  # the same columns, with blanks
+    (folder / "f_3.txt").write_bytes(dice().replace(b"GAMMA", b"GAMMA_2"))
+    frames = ck.read_frames(folder)
+
+    assert frames[1].valid.size == 49
+    with pytest.raises(HistoryError, match=r"f_3.txt:5: its columns are not those of f_1.txt \('GAMMA'"):
+        frames[2]
+
+
+def test_an_image_that_comes_twice_in_a_file_of_a_folder(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "test", ["f_1.csv", "f_2.csv"], vic_3d)
+    (folder / "f_2.csv").write_bytes(vic_3d() + vic_3d())
+    with pytest.raises(HistoryError, match="f_2.csv:53: the line of columns comes again"):
+        ck.read_frames(folder)[1]
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (["left_1.txt", "left_2.txt", "right_1.txt"], "left_#.txt and right_#.txt, are no one sequence"),
+        (["cam0_1.txt", "cam0_2.txt", "cam1_1.txt", "cam1_2.txt"], "look like 2 sequences side by side"),
+        (["f_1.txt", "f_01.txt"], "have the same number"),
+    ],
+)
+def test_files_that_are_no_one_sequence(names: list[str], message: str, tmp_path: Path) -> None:
+    with pytest.raises(HistoryError, match=message):
+        ck.read_frames(folder_of(tmp_path / "test", names))
+
+
+def test_patterns_and_lists(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "test", ["cam0_1.txt", "cam0_2.txt", "cam1_1.txt", "cam1_2.txt"])
+    assert apexes(ck.read_frames(f"{folder}/cam1_*.txt")) == [0.2, 0.3]
+    assert apexes(ck.read_frames([folder / "cam1_2.txt", folder / "cam0_1.txt"])) == [0.3, 0.0]
+    with pytest.raises(HistoryError, match="no file matches this pattern"):
+        ck.read_frames(f"{folder}/cam2_*.txt")
+    with pytest.raises(HistoryError, match="there is no such file"):
+        ck.read_frames(folder / "cam2_1.txt")
+    with pytest.raises(HistoryError, match="no files are given"):
+        ck.read_frames([])
+
+
+def test_times_given(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "test", ["f_1.txt", "f_2.txt", "f_3.txt"])
+    frames = ck.read_frames(folder, times=[0.0, 5.0, 7.5])
+    assert frames.times.tolist() == [0.0, 5.0, 7.5]
+    assert frames[1].time == 5.0
+    for times, message in [
+        ([0, 1], "2 times for 3 frames"),
+        ([0, 2, 2], "the time of frame 2 is 2 s, after 2 s"),
+        ([0, np.nan, 2], "the time of frame 1 is no finite number"),
+        (["a", "b", "c"], "give an array of s"),
+    ]:
+        with pytest.raises(HistoryError, match=message):
+            ck.read_frames(folder, times=times)
+
+
+def test_times_in_heads_and_names(tmp_path: Path) -> None:
+    import dataclasses
+
+    folder = folder_of(tmp_path / "test", ["map_100.txt", "map_350.txt"], zeiss)
+    for k, file in enumerate(sorted(folder.iterdir())):
+        file.write_bytes(file.read_bytes().replace(b"# force :", f"# clock: {k + 2} min\n# force :".encode()))
+    system = ck.available("cameras")["zeiss"]
+    assert np.isnan(ck.read_frames(folder).times).all()
+    by_head = dataclasses.replace(system, time=("head", "clock", "min"))
+    assert ck.read_frames(folder, format=by_head).times.tolist() == [120.0, 180.0]
+    by_name = dataclasses.replace(system, time=("name", "", "ms"))
+    assert ck.read_frames(folder, format=by_name).times.tolist() == pytest.approx([0.1, 0.35])
+
+
+def test_one_frame_at_a_time_in_memory(tmp_path: Path) -> None:
+    """Thirty frames take no more memory than six; nothing of a frame is kept."""
+    folder = tmp_path / "test"
+    folder.mkdir()
+    for k in range(30):
+        (folder / f"f_{k}.csv").write_bytes(matchid_2023(dome(0.1, count=25)))
+
+    def peak(pattern: str) -> int:
+        tracemalloc.start()
+        total = sum(np.nansum(frame.displacements) for frame in ck.read_frames(f"{folder}/{pattern}"))
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert np.isfinite(total)
+        return most
+
+    peak("f_?.csv")  # what is imported and remembered at the first time
+    assert peak("f_*.csv") < 1.1 * peak("f_[0-5].csv") + 30_000
+
+
+def test_a_test_of_pyvale(tmp_path: Path) -> None:
+    frames = ck.read_frames(folder_of(tmp_path / "test", [f"dic_results_{k:04d}.csv" for k in range(3)], pyvale))
+    assert apexes(frames) == [0.0, 0.1, 0.2]
