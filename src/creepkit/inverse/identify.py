@@ -61,7 +61,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note
 from creepkit.inverse.variance_components import estimate_variance_components
-from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
 from creepkit.records import History, Nuisance, Predictor, is_length_nuisance
 
@@ -364,7 +364,7 @@ def _uncertainty(
         nuisances,
     )
     rate_is_given = any(n.kind == "rate" and n.sd is not None for n in nuisances)
-    fitting_noise = with_rupture_weight(best.working_noise, problem.observations)
+    fitting_noise = with_single_value_weight(best.working_noise, problem.observations)
     return noise_model, *laplace_covariance(
         best.residuals,
         fitting_noise,

@@ -16,7 +16,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.observation_series import ObservationSeries
-from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
+from creepkit.inverse.observation_vector import SINGLE_VALUES, ObservationVector
 from creepkit.records import Nuisance
 
 
@@ -167,10 +167,10 @@ def initial_working_noise(observations: ObservationVector, nuisances: Sequence[N
 
 
 def initial_noise_model(working: NoiseModel, nuisances: Sequence[Nuisance]) -> NoiseModel:
-    """The noise model from which its estimate begins; the one rupture time of a test cannot drift."""
+    """The noise model from which its estimate begins; the one rate or rupture time of a test cannot drift."""
     outputs = {
         name: s
-        if name == RUPTURE_OUTPUT
+        if name in SINGLE_VALUES
         else replace(s, misfit=0.3 * s.misfit, drift=0.5 * s.misfit, correlation_length=1.0)
         for name, s in working.outputs.items()
     }

@@ -1,7 +1,7 @@
 """The records that the public functions take and return. Frozen; MPa, mm, s, K throughout."""
 
 from creepkit.records.camera_frames import CameraFrame, Frames
-from creepkit.records.history import EVERY_FRAME, History
+from creepkit.records.history import EVERY_FRAME, UNKNOWN_DURATION, History
 from creepkit.records.interfaces import (
     Exporter,
     Predictor,
@@ -89,6 +89,7 @@ __all__ = [
     "STEP_DURATION",
     "STEP_NUISANCES",
     "TENSOR_COMPONENTS",
+    "UNKNOWN_DURATION",
     "ZERO_CELSIUS",
     "CameraFrame",
     "Dimension",
