@@ -40,6 +40,7 @@ from creepkit.inverse.iterative_estimation import (
     linearised,
     starting_point,
 )
+from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS, NoiseModel, initial_noise_model
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
@@ -296,9 +297,13 @@ def _result(
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
     law_covariance = positive_semidefinite(covariance[:count, :count])
-    ruptures = compare_rupture_times(coordinates, u, scatter, noise_model, histories, problem.predictor)
+    ruptures, rates = (
+        compare(coordinates, u, scatter, noise_model, histories, problem.predictor)
+        for compare in (compare_rupture_times, compare_minimum_rates)
+    )
+    random_effects = predicted_random_effects(residuals, noise_model)
     tests = test_fits(
-        problem, residuals, predicted_random_effects(residuals, noise_model), histories, prediction, ruptures
+        problem, residuals, random_effects, histories, prediction, [*zip(ruptures, rates, strict=True)]
     )
     nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]

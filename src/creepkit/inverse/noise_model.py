@@ -174,7 +174,14 @@ def initial_noise_model(working: NoiseModel, nuisances: Sequence[Nuisance]) -> N
         else replace(s, misfit=0.3 * s.misfit, drift=0.5 * s.misfit, correlation_length=1.0)
         for name, s in working.outputs.items()
     }
-    return NoiseModel(outputs, initial_sd(nuisances, "rate", ASSUMED_RATE_SD))
+    return without_confounded_misfit(NoiseModel(outputs, initial_sd(nuisances, "rate", ASSUMED_RATE_SD)))
+
+
+def without_confounded_misfit(noise_model: NoiseModel) -> NoiseModel:
+    """The same where a test has one value alone: all its scatter is that of the rates between tests, if there is one."""
+    (name, *others) = noise_model.outputs
+    confounded = not others and name in SINGLE_VALUES and noise_model.rate > 0
+    return noise_model.with_output(name, misfit=0.0) if confounded else noise_model
 
 
 def initial_sd(nuisances: Sequence[Nuisance], kind: str, default: float, output: str = "") -> float:

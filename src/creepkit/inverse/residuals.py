@@ -250,7 +250,7 @@ def _masked_residuals(
 def _jacobian_after_rupture(jacobian: Floats, reached: Bools, output: Ints) -> Floats:
     """Derivatives at frames after a rupture: those of the last frame of the output that the prediction reaches."""
     if reached.all():
-        return jacobian
+        return np.where(np.isfinite(jacobian), jacobian, 0.0)
     frames = np.broadcast_to(np.arange(reached.shape[1]), reached.shape)
     index = np.array(frames)
     for position in np.unique(output):

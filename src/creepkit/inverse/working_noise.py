@@ -21,6 +21,7 @@ from creepkit.inverse.noise_model import (
     autocorrelated_components,
     initial_sd,
     initial_working_noise,
+    without_confounded_misfit,
 )
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, SINGLE_VALUES, SMALLEST_NOISE, ObservationVector
 from creepkit.inverse.output_transforms import LinearTransform
@@ -136,7 +137,9 @@ class WorkingNoiseEstimator:
         units = self.observations.discrepancy_unit[self.observations.present & self.observations.leading_output]
         units = units[units > 0]
         discrepancy = INITIAL_AUTOCORRELATION / float(np.median(units)) if units.size else 0.0
-        return NoiseModel(by_output, initial_sd(rate_nuisances, "rate", ASSUMED_RATE_SD), discrepancy)
+        return without_confounded_misfit(
+            NoiseModel(by_output, initial_sd(rate_nuisances, "rate", ASSUMED_RATE_SD), discrepancy)
+        )
 
     def _by_restricted_likelihood(self, linearised: LinearisedProblem, previous: NoiseModel) -> NoiseModel:
         """The noise model of largest restricted likelihood; autocorrelated where that is significantly more likely.
