@@ -302,9 +302,7 @@ def _result(
         for compare in (compare_rupture_times, compare_minimum_rates)
     )
     random_effects = predicted_random_effects(residuals, noise_model)
-    tests = test_fits(
-        problem, residuals, random_effects, histories, prediction, [*zip(ruptures, rates, strict=True)]
-    )
+    tests = test_fits(problem, residuals, random_effects, histories, prediction, [*zip(ruptures, rates, strict=True)])
     nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]
     )

@@ -120,7 +120,9 @@ def _covariance_factor(
 ) -> CovarianceFactor:
     """The covariance under which the values of a round are found."""
     fitting_noise = (
-        working_noise if working_estimator.by_likelihood else with_single_value_weight(working_noise, problem.observations)
+        working_noise
+        if working_estimator.by_likelihood
+        else with_single_value_weight(working_noise, problem.observations)
     )
     # A stopped test that says nothing here may say something a step further.
     return CovarianceFactor.of_residuals(replace(residuals, present=problem.observations.present), fitting_noise)

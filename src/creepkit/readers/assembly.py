@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from difflib import get_close_matches
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,13 +14,14 @@ from creepkit.errors import HistoryError
 from creepkit.readers.conditions import (
     END_OF_TEST_TERMS,
     StatedConditions,
+    StatedNumber,
     errors_located_at,
     read_loading,
     read_temperature,
 )
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
-from creepkit.records import History
+from creepkit.records import UNKNOWN_DURATION, History
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -71,10 +73,84 @@ def assemble_history(
         source=source,
         rupture_time=rupture_time,
         unruptured=unruptured,
+        **_minimum_rate(conditions),
         stated=conditions.stated,
         # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
     )
+
+
+def assemble_without_frames(
+    name: str, entries: Mapping[str, SourceText], vocabulary: HeaderVocabulary, *, location: str, source: str
+) -> History:
+    """Return the history of a test of which only the minimum creep rate, only its end, or both are known.
+
+    Its one time is that of its end, where that is stated, as rupture or as `end_time`, else UNKNOWN_DURATION.
+    """
+    conditions = StatedConditions(entries, vocabulary, location)
+    rate, time = _minimum_rate(conditions), conditions.take_number("rupture")
+    end = conditions.take_number("end_time")
+    ended = conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
+    if not rate and time is None and ended != "stopped":
+        raise conditions.missing_error(
+            "frames, no minimum creep rate and no end of the test",
+            "write minimum_rate_1/h, rupture_h, or end_time_h with 'ended: stopped'; or columns of frames, such as "
+            "time_h,strain_pct",
+        )
+    _check_end_without_frames(time, end, ended, location)
+    duration = (time or end or StatedNumber(UNKNOWN_DURATION, "", location)).value
+    path, _, line = location.rpartition(":")
+    only = TableFrames(Path(path), {"time": np.array([duration])}, np.array([int(line) if line.isdigit() else 0]))
+    loading = read_loading(conditions, only)
+    strain_measure = conditions.take_choice("strain_measure", ("engineering", "logarithmic"), required=bool(rate))
+    conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
+    named = conditions.take_text("specimen", conditions.default_specimen)
+    _refuse_unknown_specimen(named, conditions.terms, location)
+    with errors_located_at(location):
+        return History(
+            name=conditions.take_text("name", name),
+            times=only.times,
+            outputs={},
+            loading=loading,
+            temperature=read_temperature(conditions, only),
+            **({"specimen": named} if named else {}),
+            elastic=_elastic(conditions),
+            strain_measure="logarithmic" if strain_measure == "logarithmic" else "engineering",
+            geometry=conditions.geometry,
+            operator=conditions.take_text("operator"),
+            alloy=conditions.take_text("alloy"),
+            source=source,
+            rupture_time=None if time is None else time.value,
+            unruptured=ended == "stopped",
+            stated=conditions.stated,
+            **rate,
+            labels=conditions.all_labels(),  # last: entries that nothing has used by now are refused
+        )
+
+
+def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | None, ended: str, location: str) -> None:
+    """Refuse ends that contradict one another, or say too little."""
+    if time is not None and (end is not None or ended == "stopped"):
+        other = f"'{end.key}' says when it ended" if end is not None else "the test was stopped"
+        raise HistoryError(f"{time.location}: '{time.key}' says when the test ruptured, and {other}; keep one of them")
+    if time is None and ended == "ruptured":
+        raise HistoryError(f"{location}: the test ruptured, and nothing says when; write rupture_h")
+    if ended == "stopped" and end is None:
+        raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
+
+
+def _minimum_rate(conditions: StatedConditions) -> dict[str, float]:
+    """The minimum creep rate and its standard deviation, 1/s, as fields of a history, where they are stated."""
+    stated = {name: conditions.take_number(name) for name in ("minimum_rate", "minimum_rate_sd")}
+    sd = stated["minimum_rate_sd"]
+    if stated["minimum_rate"] is None and sd is not None:
+        raise HistoryError(f"{sd.location}: '{sd.key}' stands there without a minimum_rate; give both")
+    return {name: number.value for name, number in stated.items() if number is not None}
+
+
+def _refuse_unknown_specimen(named: str, terms: Terms, location: str) -> None:
+    if named and named not in terms.outputs and (near := get_close_matches(named, terms.outputs, 1, cutoff=0.8)):
+        raise HistoryError(f"{location}: there is no specimen '{named}'; did you mean '{near[0]}'?")
 
 
 def _merge_label(frames: TableFrames) -> dict[str, str]:
@@ -91,8 +167,7 @@ def _specimen_and_outputs(
         chosen = [named] if named in present else []
     else:
         chosen = [name for name in present if load in terms.loads.get(name, [load])] or present
-    if named and named not in terms.outputs and (near := get_close_matches(named, terms.outputs, 1, cutoff=0.8)):
-        raise HistoryError(f"{location}: there is no specimen '{named}'; did you mean '{near[0]}'?")
+    _refuse_unknown_specimen(named, terms, location)
     if len(chosen) != 1:
         raise _unidentified(named, present if named in terms.outputs else chosen, terms, location)
     outputs = {name: frames.values[name] for name in terms.outputs[chosen[0]] if name in frames.values}

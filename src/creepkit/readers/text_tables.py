@@ -101,6 +101,13 @@ def read_table(path: Path) -> TextTable:
     return TextTable(path, _header(path, lines[:start]), columns, start + 1, rows)
 
 
+def read_head_alone(path: Path) -> dict[str, SourceText] | None:
+    """The entries of a file that holds a head of `# key: value` lines and no table; None where it holds a table."""
+    lines = _lines(path)
+    entries = _header(path, lines) if all(not line.strip() or line.lstrip().startswith("#") for line in lines) else {}
+    return entries or None
+
+
 TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
 
 

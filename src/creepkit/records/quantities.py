@@ -87,6 +87,19 @@ LENGTH = QuantityKind("length", {"mm": UnitConversion(1.0), "um": UnitConversion
 STRAIN = QuantityKind("strain", {"": UnitConversion(1.0), "pct": UnitConversion(1e-2), "percent": UnitConversion(1e-2)})
 
 
+RATE = QuantityKind(
+    "creep rate",
+    {
+        f"{prefix}/{unit}": UnitConversion(factor / time.factor)
+        for prefix, factor in (("1", 1.0), ("pct", 1e-2), ("%", 1e-2))
+        for unit, time in TIME.units.items()
+    },
+    low=0.0,
+    high=1e3,
+    open_interval=True,
+)
+
+
 NUMBER = QuantityKind("number", {"": UnitConversion(1.0)})
 
 
