@@ -297,12 +297,10 @@ def _result(
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
     law_covariance = positive_semidefinite(covariance[:count, :count])
-    ruptures, rates = (
-        compare(coordinates, u, scatter, noise_model, histories, problem.predictor)
-        for compare in (compare_rupture_times, compare_minimum_rates)
-    )
+    known = coordinates, u, scatter, noise_model, histories, problem.predictor
+    single_values = [*zip(compare_rupture_times(*known), compare_minimum_rates(*known), strict=True)]
     random_effects = predicted_random_effects(residuals, noise_model)
-    tests = test_fits(problem, residuals, random_effects, histories, prediction, [*zip(ruptures, rates, strict=True)])
+    tests = test_fits(problem, residuals, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]
     )

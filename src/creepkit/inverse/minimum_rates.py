@@ -170,7 +170,7 @@ def _at_minimum(array: Floats, index: Ints, weights: Floats) -> Floats:
 
 
 def _with_output(array: Floats, tests: Sequence[int], values: Floats) -> Floats:
-    """Array (candidates, tests, times, outputs, ...) with one output more: values (candidates, tests, ...), else NaN."""
+    """Array (candidates, tests, times, outputs, ...) with one output more, of values (candidates, tests, ...)."""
     further = np.full((*array.shape[:3], 1, *array.shape[4:]), np.nan)
     further[:, tests, 0, 0] = values
     return np.concatenate([array, further], axis=3)

@@ -178,7 +178,7 @@ def initial_noise_model(working: NoiseModel, nuisances: Sequence[Nuisance]) -> N
 
 
 def without_confounded_misfit(noise_model: NoiseModel) -> NoiseModel:
-    """The same where a test has one value alone: all its scatter is that of the rates between tests, if there is one."""
+    """The same; where each test has one value alone, all its scatter is that of the rates between tests, if any."""
     (name, *others) = noise_model.outputs
     confounded = not others and name in SINGLE_VALUES and noise_model.rate > 0
     return noise_model.with_output(name, misfit=0.0) if confounded else noise_model

@@ -53,6 +53,7 @@ def assemble_history(
     elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required="strain" in outputs)
     temperature = read_temperature(conditions, frames)
     used = _used_frames(conditions, frames)
+    minimum_rate, minimum_rate_sd = _minimum_rate(conditions)
     rupture_time, unruptured = _end_of_test(conditions, frames, used)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
     return History(
@@ -73,7 +74,8 @@ def assemble_history(
         source=source,
         rupture_time=rupture_time,
         unruptured=unruptured,
-        **_minimum_rate(conditions),
+        minimum_rate=minimum_rate,
+        minimum_rate_sd=minimum_rate_sd,
         stated=conditions.stated,
         # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
@@ -88,10 +90,11 @@ def assemble_without_frames(
     Its one time is that of its end, where that is stated, as rupture or as `end_time`, else UNKNOWN_DURATION.
     """
     conditions = StatedConditions(entries, vocabulary, location)
-    rate, time = _minimum_rate(conditions), conditions.take_number("rupture")
+    minimum_rate, minimum_rate_sd = _minimum_rate(conditions)
+    time = conditions.take_number("rupture")
     end = conditions.take_number("end_time")
     ended = conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
-    if not rate and time is None and ended != "stopped":
+    if minimum_rate is None and time is None and ended != "stopped":
         raise conditions.missing_error(
             "frames, no minimum creep rate and no end of the test",
             "write minimum_rate_1/h, rupture_h, or end_time_h with 'ended: stopped'; or columns of frames, such as "
@@ -102,18 +105,19 @@ def assemble_without_frames(
     path, _, line = location.rpartition(":")
     only = TableFrames(Path(path), {"time": np.array([duration])}, np.array([int(line) if line.isdigit() else 0]))
     loading = read_loading(conditions, only)
-    strain_measure = conditions.take_choice("strain_measure", ("engineering", "logarithmic"), required=bool(rate))
+    strain_measure = conditions.take_choice(
+        "strain_measure", ("engineering", "logarithmic"), required=minimum_rate is not None
+    )
     conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
     named = conditions.take_text("specimen", conditions.default_specimen)
     _refuse_unknown_specimen(named, conditions.terms, location)
     with errors_located_at(location):
-        return History(
+        history = History(
             name=conditions.take_text("name", name),
             times=only.times,
             outputs={},
             loading=loading,
             temperature=read_temperature(conditions, only),
-            **({"specimen": named} if named else {}),
             elastic=_elastic(conditions),
             strain_measure="logarithmic" if strain_measure == "logarithmic" else "engineering",
             geometry=conditions.geometry,
@@ -123,9 +127,11 @@ def assemble_without_frames(
             rupture_time=None if time is None else time.value,
             unruptured=ended == "stopped",
             stated=conditions.stated,
-            **rate,
+            minimum_rate=minimum_rate,
+            minimum_rate_sd=minimum_rate_sd,
             labels=conditions.all_labels(),  # last: entries that nothing has used by now are refused
         )
+        return history.replace(specimen=named) if named else history
 
 
 def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | None, ended: str, location: str) -> None:
@@ -139,13 +145,12 @@ def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | Non
         raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
 
 
-def _minimum_rate(conditions: StatedConditions) -> dict[str, float]:
-    """The minimum creep rate and its standard deviation, 1/s, as fields of a history, where they are stated."""
-    stated = {name: conditions.take_number(name) for name in ("minimum_rate", "minimum_rate_sd")}
-    sd = stated["minimum_rate_sd"]
-    if stated["minimum_rate"] is None and sd is not None:
+def _minimum_rate(conditions: StatedConditions) -> tuple[float | None, float | None]:
+    """The minimum creep rate and its standard deviation, 1/s, where they are stated."""
+    rate, sd = conditions.take_number("minimum_rate"), conditions.take_number("minimum_rate_sd")
+    if rate is None and sd is not None:
         raise HistoryError(f"{sd.location}: '{sd.key}' stands there without a minimum_rate; give both")
-    return {name: number.value for name, number in stated.items() if number is not None}
+    return None if rate is None else rate.value, None if sd is None else sd.value
 
 
 def _refuse_unknown_specimen(named: str, terms: Terms, location: str) -> None:

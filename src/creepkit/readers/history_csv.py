@@ -67,7 +67,8 @@ class HistoryCsvReader:
 
     def read(self, path: Path) -> list[History]:
         """Return the one history in the file; a head without frames is that of a test known by rate or end alone."""
-        if head := read_head_alone(path):
+        head = read_head_alone(path)
+        if head and any(key.startswith(("minimum_rate", "rupture", "ended")) for key in head):
             return [assemble_without_frames(path.stem, head, self.vocabulary, location=str(path), source=str(path))]
         table = read_table(path)
         return [assemble_history(path.stem, table.header, table, self.vocabulary, location=str(path), source=str(path))]

@@ -151,7 +151,7 @@ def key_of_column(written: str) -> tuple[str, str]:
 
 def _keys(table: TextTable) -> list[str]:
     """The key of each column in a history file; HistoryError for units and names that are not understood."""
-    location, keys = table.location(table.columns_line), []
+    location, keys = table.location(table.columns_line), list[str]()
     for written in table.columns:
         quantity, unit = key_of_column(written)
         if quantity in QUANTITIES:

@@ -209,8 +209,8 @@ def _covariance_within_tests(residuals: Residuals, without_rate: NoiseModel) -> 
     without_misfit = without_rate
     for name in single:
         without_misfit = without_misfit.with_output(name, misfit=0.0)
-    has_frames = of_frames.any(axis=1)
-    return c if has_frames.all() else np.where(has_frames[:, None, None], c, covariance(residuals, without_misfit))
+    has_frames = of_frames.sum(axis=1)[:, None, None] > 0
+    return c if has_frames.all() else np.where(has_frames, c, covariance(residuals, without_misfit))
 
 
 def normal_matrix(residuals: Residuals, working_noise: NoiseModel) -> Floats:
