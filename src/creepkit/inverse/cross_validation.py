@@ -79,11 +79,9 @@ class Fold:
             return [{} for _ in self.held_out]
         assert fit.predictor is not None
         known = fit.coordinates, fit.u, fit.scatter_of_rates, fit.noise_model, self.held_out, fit.predictor
-        comparisons = {"rupture time": compare_rupture_times(*known), "minimum rate": compare_minimum_rates(*known)}
-        return [
-            {what: one for what, of_tests in comparisons.items() if (one := of_tests[k]) is not None}
-            for k in range(len(self.held_out))
-        ]
+        pairs = zip(compare_rupture_times(*known), compare_minimum_rates(*known), strict=True)
+        named = ({"rupture time": end, "minimum rate": rate} for end, rate in pairs)
+        return [{what: one for what, one in of_test.items() if one is not None} for of_test in named]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

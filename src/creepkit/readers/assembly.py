@@ -19,6 +19,7 @@ from creepkit.readers.conditions import (
     read_loading,
     read_temperature,
 )
+from creepkit.readers.standard_names import in_standard_names
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records import UNKNOWN_DURATION, History
@@ -42,7 +43,10 @@ def assemble_history(
     entries : what is said once for the test; location : where that stands; table : its frames, without reading the
     columns in `skipped_columns`; source : what the history says of its origin.
     """
+    entries, table = in_standard_names(entries, table, vocabulary)
     conditions = StatedConditions(entries, vocabulary, location)
+    for assumption in table.assumptions:
+        conditions.record_assumption(assumption)
     frames = read_frames(table, vocabulary, conditions.terms, skipped_columns)
     columns = table.location(table.columns_line)
     loading = read_loading(conditions, frames)
@@ -102,8 +106,7 @@ def assemble_without_frames(
         )
     _check_end_without_frames(time, end, ended, location)
     duration = (time or end or StatedNumber(UNKNOWN_DURATION, "", location)).value
-    path, _, line = location.rpartition(":")
-    only = TableFrames(Path(path), {"time": np.array([duration])}, np.array([int(line) if line.isdigit() else 0]))
+    only = TableFrames(TextTable(Path(source), {}, (), 0, ()), {"time": np.array([duration])}, np.array([0]))
     loading = read_loading(conditions, only)
     strain_measure = conditions.take_choice(
         "strain_measure", ("engineering", "logarithmic"), required=minimum_rate is not None

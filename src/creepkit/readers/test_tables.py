@@ -19,7 +19,8 @@ from pathlib import Path
 
 from creepkit.errors import HistoryError
 from creepkit.readers.assembly import assemble_without_frames
-from creepkit.readers.text_tables import SourceText, TableRow, TextTable, peek_columns, read_table
+from creepkit.readers.cell_grids import CellGrid, peek_columns, read_text_grid, table_of
+from creepkit.readers.text_tables import SourceText, TableRow, TextTable
 from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary
 from creepkit.records import History
 from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
@@ -97,42 +98,71 @@ class RowPerTestReader:
 
     def accepts(self, path: Path) -> bool:
         """Say whether `path` is such a table: a minimum rate or a rupture time beside a stress, and no strain."""
-        if path.suffix.lower() not in (".csv", ".txt", ".tsv", ".dat") or not path.is_file():
+        suffix = path.suffix.lower()
+        if suffix not in (*TEXT_SUFFIXES, *SPREADSHEET_SUFFIXES) or not path.is_file():
             return False
-        columns = peek_columns(path)
-        keys = [key_of_column(name)[0] for name in columns]
-        has_frames = any("strain" in _words(name).split() and "rate" not in _words(name).split() for name in columns)
-        return "stress" in keys and any(name in keys for name in MEASURED) and not has_frames
+        if suffix in TEXT_SUFFIXES:
+            return _is_test_table(peek_columns(path))
+        try:
+            sheets = [grid.rows[0].cells for grid in _grids(path)]
+        except HistoryError:
+            return False
+        return any(_is_test_table(names) for names in sheets) and not any(_has_frames(names) for names in sheets)
 
     def read(self, path: Path) -> list[History]:
-        """Return one history a row, in the order of the rows."""
-        table = read_table(path)
-        keys = _keys(table)
-        lines: dict[str, int] = {}
+        """Return one history a row, in the order of the rows; of a spreadsheet those of all its tables of tests."""
+        grids = [grid for grid in _grids(path) if not grid.sheet or _is_test_table(grid.rows[0].cells)]
+        places: dict[str, str] = {}
         histories = []
-        for row in table.rows:
-            history = self._history(table, row, keys)
-            if history.name in lines:
-                raise HistoryError(
-                    f"{table.location(row.line)}: test '{history.name}' already stands in line {lines[history.name]}; "
-                    "give each row its own name"
-                )
-            lines[history.name] = row.line
-            histories.append(history)
+        for table in map(table_of, grids):
+            keys = _keys(table)
+            for row in table.rows:
+                history, place = self._history(table, row, keys), table.location(row.line)
+                if history.name in places:
+                    raise HistoryError(
+                        f"{place}: test '{history.name}' already stands in {places[history.name]}; give each row its "
+                        "own name"
+                    )
+                places[history.name] = place
+                histories.append(history)
         return histories
 
     def _history(self, table: TextTable, row: TableRow, keys: Sequence[str]) -> History:
         location = table.location(row.line)
         cells = {keys[table.columns.index(name)]: entry for name, entry in table.entries(row).items()}
         entries = {**table.header, **_with_end(cells, location)}
-        name = f"{table.path.stem} {row.line}"
-        source = f"{table.path} ({cells['name'].text if 'name' in cells else f'line {row.line}'})"
+        name = f"{table.sheet or table.path.stem} {row.line}"
+        where = f"sheet {table.sheet}, " if table.sheet else ""
+        source = f"{table.path} ({where}{cells['name'].text if 'name' in cells else f'line {row.line}'})"
         return assemble_without_frames(name, entries, self.vocabulary, location=location, source=source)
 
 
 TEST_TABLE = RowPerTestReader(
     "test-table", "one row a test: stress, temperature, and minimum creep rate or rupture time, with run-outs"
 )
+
+
+TEXT_SUFFIXES, SPREADSHEET_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc"), (".xlsx", ".xlsm")
+
+
+def _grids(path: Path) -> list[CellGrid]:
+    """The cells of a text file, or of the sheets of a spreadsheet."""
+    if path.suffix.lower() not in SPREADSHEET_SUFFIXES:
+        return [read_text_grid(path)]
+    from creepkit.readers.spreadsheets import read_sheets
+
+    return read_sheets(path)
+
+
+def _is_test_table(names: Sequence[str]) -> bool:
+    keys = [key_of_column(name)[0] for name in names]
+    return "stress" in keys and any(name in keys for name in MEASURED) and not _has_frames(names)
+
+
+def _has_frames(names: Sequence[str]) -> bool:
+    """Whether a column is a strain, and no rate of it."""
+    words = [set(_words(name).split()) for name in names]
+    return any("strain" in one and "rate" not in one for one in words)
 
 
 def key_of_column(written: str) -> tuple[str, str]:
