@@ -103,6 +103,8 @@ class Confirmation(Presentable):
                 f"not confirmed: {self.predictor_name} differs from the fit by {self.noise_ratio:.2g} times the noise "
                 f"({output} of '{test_name}'); identify again with using= this specimen"
             )
+        if not any(test.outputs for test in self.tests):
+            return f"confirmed by {self.predictor_name}: the simulation reaches every end; the tests have no frames"
         test_name, output = self._largest(lambda o: o.simulation_errors.chi_square)
         worst = self[test_name, output].simulation_errors.chi_square
         if worst > ACCEPTABLE_CHI_SQUARE and self[test_name, output].p_value < CONDEMNED / self._comparisons:

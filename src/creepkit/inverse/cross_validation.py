@@ -20,12 +20,20 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs, predict_to_rupture
-from creepkit.inverse.goodness_of_fit import OutputErrors, errors_of_output, relative_squared_error
+from creepkit.inverse.goodness_of_fit import (
+    OutputErrors,
+    RateComparison,
+    RuptureComparison,
+    errors_of_output,
+    relative_squared_error,
+)
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
+from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.observation_vector import usable_frames
+from creepkit.inverse.rupture_prediction import compare_rupture_times
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable
@@ -63,6 +71,18 @@ class Fold:
             if usable_frames(history, name).any()
         }
 
+    @cached_property
+    def single_values(self) -> list[dict[str, RuptureComparison | RateComparison]]:
+        """Rupture time and minimum rate of each of its tests, predicted as those of a new test; none by time."""
+        fit = self.fit
+        if any(m.name == h.name for m in fit.tests for h in self.held_out):
+            return [{} for _ in self.held_out]
+        assert fit.predictor is not None
+        known = fit.coordinates, fit.u, fit.scatter_of_rates, fit.noise_model, self.held_out, fit.predictor
+        pairs = zip(compare_rupture_times(*known), compare_minimum_rates(*known), strict=True)
+        named = ({"rupture time": end, "minimum rate": rate} for end, rate in pairs)
+        return [{what: one for what, one in of_test.items() if one is not None} for of_test in named]
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CrossValidation(Presentable):
@@ -76,6 +96,13 @@ class CrossValidation(Presentable):
     def errors(self) -> dict[str, dict[str, OutputErrors]]:
         """{test: {output: errors}} of the held-out tests, about the mean of the test."""
         return {h.name: fold.errors(k) for fold in self.folds for k, h in enumerate(fold.held_out)}
+
+    @property
+    def single_values(self) -> dict[str, dict[str, RuptureComparison | RateComparison]]:
+        """{test: {"rupture time" or "minimum rate": comparison}} of the held-out tests, with intervals of new tests."""
+        return {
+            h.name: values for fold in self.folds for h, values in zip(fold.held_out, fold.single_values, strict=True)
+        }
 
     def pooled_error(self, output: str) -> float:
         """Relative squared error of one output over all held-out tests, about the mean of all their frames."""
@@ -119,7 +146,7 @@ class CrossValidation(Presentable):
         (fold,) = self.folds
         problem = self.fit.least_squares_problem
         residuals = problem.residuals(fold.fit.x)
-        ends = np.array([[h.times[-1]] for h in self.fit.histories])
+        ends = np.array([[h.times[-1] if h.outputs else np.inf] for h in self.fit.histories])
         is_early = problem.observations.times <= fitted_fraction * ends
         beginning = replace(
             residuals, present=residuals.present & is_early, values=np.where(is_early, residuals.values, 0.0)
@@ -159,6 +186,8 @@ def _folds(
     tests: Sequence[History], by: FoldBy, fitted_fraction: float
 ) -> Iterator[tuple[list[History], list[History]]]:
     """(held out, fitted) histories of each fold."""
+    if by == "time" and not any(h.outputs for h in tests):
+        raise FitError("cross-validation by time holds out the last frames, and these tests have none; take by='test'")
     if by == "time":
         yield list(tests), [_first_part(h, fitted_fraction) for h in tests]
         return
@@ -174,7 +203,9 @@ def _folds(
 
 
 def _first_part(history: History, fitted_fraction: float) -> History:
-    """The first part of a history, without how the test ended."""
+    """The first part of a history, without how the test ended; one without frames has no parts, and is fitted."""
+    if not history.outputs:
+        return history
     used = history.used & (history.times <= fitted_fraction * float(history.times[-1]))
     return history.replace(used=used, rupture_time=None, unruptured=False)
 

@@ -124,6 +124,25 @@ class RuptureComparison:
 
 
 @dataclass(frozen=True)
+class RateComparison:
+    """The minimum creep rate of one test without frames.
+
+    measured, predicted : 1/s; predicted by the law alone, NaN where it gives none.
+    low, high : 95 % interval for a single test, from the parameters and the scatter between tests, 1/s.
+    """
+
+    measured: float
+    predicted: float
+    low: float
+    high: float
+
+    @property
+    def ratio(self) -> float:
+        """Predicted over measured."""
+        return self.predicted / self.measured
+
+
+@dataclass(frozen=True)
 class TestFit:
     """One test in the fit.
 
@@ -132,7 +151,7 @@ class TestFit:
         strains, else NaN. For a test followed to rupture, of its orthogonal residual (see inverse.orthogonal_residual).
     rate_factor : estimated factor of this test's creep rate on the law's (heat-to-heat scatter).
     weight : of the test in the fit; below one where test_loss="student" found it far from the others.
-    rupture : its end, where that is known and predicted.
+    rupture : its end, where that is known and predicted. minimum_rate : of a test without frames, where it is stated.
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
@@ -146,14 +165,14 @@ class TestFit:
     weight: float = 1.0
     outputs: tuple[OutputFit, ...] = ()
     rupture: RuptureComparison | None = None
+    minimum_rate: RateComparison | None = None
 
     def __getitem__(self, output: str) -> OutputFit:
         for one in self.outputs:
             if one.output == output:
                 return one
-        raise FitError(
-            f"test '{self.name}' has no output '{output}'; it has {', '.join(o.output for o in self.outputs)}"
-        )
+        known = ", ".join(o.output for o in self.outputs) or "no frames"
+        raise FitError(f"test '{self.name}' has no output '{output}'; it has {known}")
 
     @property
     def offset(self) -> float:
@@ -167,12 +186,12 @@ def test_fits(
     random_effects: tuple[Floats, Floats],
     histories: Sequence[History],
     prediction: Prediction,
-    ruptures: Sequence[RuptureComparison | None],
+    single_values: Sequence[tuple[RuptureComparison | None, RateComparison | None]],
 ) -> tuple[TestFit, ...]:
     """One TestFit for each test.
 
     random_effects : offsets (tests, outputs) in the output's unit, and ln rate factors (tests,).
-    histories, prediction : with all frames; ruptures : how each of them ended.
+    histories, prediction : with all frames; single_values : end and minimum rate of each of them.
     """
     offsets, log_factors = random_effects
     observations = problem.observations
@@ -204,7 +223,7 @@ def test_fits(
                 rate_factor,
                 weight,
                 outputs,
-                ruptures[k],
+                *single_values[k],
             )
         )
     return tuple(test_fits)

@@ -8,7 +8,7 @@ import numpy as np
 
 from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import compared_outputs, predictor_for
+from creepkit.inverse.composite_predictor import compared_outputs, predictor_for, predicts_rupture
 from creepkit.inverse.observation_vector import ObservationVector, frames_with_data
 from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
@@ -51,7 +51,12 @@ def rig_notes(histories: Sequence[History], settings: IdentificationSettings) ->
 
 
 def check_creep(observations: ObservationVector, histories: Sequence[History]) -> None:
-    """Some strain must rise above the floor of its transform, or some other output grow beyond its noise."""
+    """Some strain must rise above the floor of its transform, or some other output grow beyond its noise.
+
+    A minimum rate, and a rupture, are creep.
+    """
+    if (observations.single_value_mask & ~(observations.rupture_mask & observations.censored[:, None])).any():
+        return
     for position, (name, transform) in enumerate(zip(observations.outputs, observations.transforms, strict=True)):
         mask = observations.leading_output & (observations.output_index == position)
         if is_logarithmic(name):
@@ -109,13 +114,24 @@ def check_histories(law: CreepLaw, histories: Sequence[History], predictor: Pred
         if names.count(history.name) > 1:
             raise FitError(f"two histories are called '{history.name}'; give each its own name")
         _check_outputs(history, predictor)
-    frames = sum(int(h.used.sum()) for h in histories)
-    if frames <= len(law.params):
-        raise FitError(f"law '{law.name}' has {len(law.params)} parameters and the histories only {frames} frames")
+    values = sum(_value_count(history) for history in histories)
+    if values <= len(law.params):
+        raise FitError(
+            f"law '{law.name}' has {len(law.params)} parameters and the histories only {values} frames, minimum rates "
+            "and rupture times"
+        )
+
+
+def _value_count(history: History) -> int:
+    """Used frames; of a test without frames how many of minimum rate and end are known."""
+    return int(history.used.sum()) if history.outputs else (history.minimum_rate is not None) + history.end_known
 
 
 def _check_outputs(history: History, predictor: Predictor) -> None:
     """Frames without a number are left out, output by output; an infinite one is a mistake."""
+    if not history.outputs:
+        _check_without_frames(history, predictor)
+        return
     outputs = compared_outputs(predictor, history)
     if not outputs:
         known = ", ".join(getattr(predictor_for(predictor, history), "outputs", ())) or "nothing"
@@ -129,6 +145,19 @@ def _check_outputs(history: History, predictor: Predictor) -> None:
     for name in outputs:
         if np.isinf(history.outputs[name][used]).any():
             raise FitError(f"history '{history.name}' has an infinite {name}; mark the frame unused")
+
+
+def _check_without_frames(history: History, predictor: Predictor) -> None:
+    """A test without frames has a minimum rate, or an end that is predicted."""
+    if history.minimum_rate is None and not history.end_known:
+        raise FitError(
+            f"history '{history.name}' has no frames, no minimum rate and no known end: nothing to identify a law from"
+        )
+    if history.minimum_rate is None and not predicts_rupture(predictor, history):
+        name = getattr(predictor_for(predictor, history), "name", "predictor")
+        raise FitError(
+            f"history '{history.name}' has its end alone, and {name} follows no test to rupture; leave the test out"
+        )
 
 
 def check_explicit_nuisances(

@@ -14,7 +14,7 @@ from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError, ValueCodec
 from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
 from creepkit.inverse.defect_correction import NumericalError
-from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, RuptureComparison, TestFit
+from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, RateComparison, RuptureComparison, TestFit
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
@@ -98,6 +98,7 @@ CODEC = RecordCodec(
         },
         OutputFit: {"noise": NOT_NEGATIVE},
         RuptureComparison: {"measured": POSITIVE, **dict.fromkeys(("predicted", "low", "high"), INFINITY_ALLOWED)},
+        RateComparison: {"measured": POSITIVE, **dict.fromkeys(("predicted", "low", "high"), NOT_NEGATIVE_OR_NAN)},
         TestFit: {
             "frames": NOT_NEGATIVE,
             "log_strain_rms": NAN_ALLOWED,

@@ -15,7 +15,7 @@ from creepkit.inverse.iterative_estimation import EstimationResult
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS
 from creepkit.inverse.nuisance_correlation import nuisance_correlation_notes
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
-from creepkit.inverse.observation_vector import usable_frames
+from creepkit.inverse.observation_vector import followed_duration, usable_frames
 from creepkit.inverse.prediction_failures import tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_end_strain, reference_stresses
@@ -37,9 +37,16 @@ def fitted_ranges(problem: LeastSquaresProblem) -> dict[str, tuple[float, float]
         "stress": [v for h in tests for v in reference_stresses(h, problem.predictor)],
         "temperature": [v for h in tests for v in h.temperature_program().values],
         "strain": [0.0, *(reference_end_strain(h, problem.predictor) for h in tests)],
-        "time": [v for h in tests for v in (float(h.times[0]), float(h.times[-1]))],
+        "time": [v for h in tests for v in _time_range(h)],
     }
     return {name: (float(min(values)), float(max(values))) for name, values in values_by_name.items()}
+
+
+def _time_range(history: History) -> tuple[float, float]:
+    """First and last time, s; of a test without frames from loading to its end."""
+    if not history.outputs:
+        return 0.0, followed_duration(history)
+    return float(history.times[0]), float(history.times[-1])
 
 
 def provenance_of(problem: LeastSquaresProblem, search_evaluations: int) -> dict[str, str | int]:

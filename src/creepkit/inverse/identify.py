@@ -40,6 +40,7 @@ from creepkit.inverse.iterative_estimation import (
     linearised,
     starting_point,
 )
+from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS, NoiseModel, initial_noise_model
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
@@ -61,7 +62,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note
 from creepkit.inverse.variance_components import estimate_variance_components
-from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
 from creepkit.records import History, Nuisance, Predictor, is_length_nuisance
 
@@ -296,10 +297,10 @@ def _result(
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
     law_covariance = positive_semidefinite(covariance[:count, :count])
-    ruptures = compare_rupture_times(coordinates, u, scatter, noise_model, histories, problem.predictor)
-    tests = test_fits(
-        problem, residuals, predicted_random_effects(residuals, noise_model), histories, prediction, ruptures
-    )
+    known = coordinates, u, scatter, noise_model, histories, problem.predictor
+    single_values = [*zip(compare_rupture_times(*known), compare_minimum_rates(*known), strict=True)]
+    random_effects = predicted_random_effects(residuals, noise_model)
+    tests = test_fits(problem, residuals, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]
     )
@@ -364,7 +365,7 @@ def _uncertainty(
         nuisances,
     )
     rate_is_given = any(n.kind == "rate" and n.sd is not None for n in nuisances)
-    fitting_noise = with_rupture_weight(best.working_noise, problem.observations)
+    fitting_noise = with_single_value_weight(best.working_noise, problem.observations)
     return noise_model, *laplace_covariance(
         best.residuals,
         fitting_noise,

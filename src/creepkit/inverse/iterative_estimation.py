@@ -20,7 +20,7 @@ from creepkit.inverse.variance_components import (
     restricted_log_likelihood,
     scaled_inverse,
 )
-from creepkit.inverse.working_noise import WorkingNoiseEstimator, robust_test_weights, with_rupture_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator, robust_test_weights, with_single_value_weight
 
 PRIOR_STEPS = 30
 """Steps of the estimate of prior standard deviations in each round; they cost no simulation."""
@@ -120,7 +120,9 @@ def _covariance_factor(
 ) -> CovarianceFactor:
     """The covariance under which the values of a round are found."""
     fitting_noise = (
-        working_noise if working_estimator.by_likelihood else with_rupture_weight(working_noise, problem.observations)
+        working_noise
+        if working_estimator.by_likelihood
+        else with_single_value_weight(working_noise, problem.observations)
     )
     # A stopped test that says nothing here may say something a step further.
     return CovarianceFactor.of_residuals(replace(residuals, present=problem.observations.present), fitting_noise)

@@ -10,7 +10,7 @@ from scipy.stats import chi2, f
 
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.observation_vector import (
-    RUPTURE_OUTPUT,
+    SINGLE_VALUES,
     SMALLEST_NOISE,
     ObservationVector,
     frame_noise,
@@ -51,7 +51,7 @@ class KnownNoise:
         for test, history in enumerate(histories):
             for position, name in enumerate(observations.outputs):
                 mask = observations.present[test] & (observations.output_index[test] == position)
-                if name == RUPTURE_OUTPUT or observations.stated[position] or not mask.any():
+                if name in SINGLE_VALUES or observations.stated[position] or not mask.any():
                     continue
                 frames = int(usable_frames(history, name).sum())
                 floor = SMALLEST_NOISE * observations.transforms[position].floor

@@ -16,7 +16,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.observation_series import ObservationSeries
-from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
+from creepkit.inverse.observation_vector import SINGLE_VALUES, ObservationVector
 from creepkit.records import Nuisance
 
 
@@ -167,14 +167,21 @@ def initial_working_noise(observations: ObservationVector, nuisances: Sequence[N
 
 
 def initial_noise_model(working: NoiseModel, nuisances: Sequence[Nuisance]) -> NoiseModel:
-    """The noise model from which its estimate begins; the one rupture time of a test cannot drift."""
+    """The noise model from which its estimate begins; the one rate or rupture time of a test cannot drift."""
     outputs = {
         name: s
-        if name == RUPTURE_OUTPUT
+        if name in SINGLE_VALUES
         else replace(s, misfit=0.3 * s.misfit, drift=0.5 * s.misfit, correlation_length=1.0)
         for name, s in working.outputs.items()
     }
-    return NoiseModel(outputs, initial_sd(nuisances, "rate", ASSUMED_RATE_SD))
+    return without_confounded_misfit(NoiseModel(outputs, initial_sd(nuisances, "rate", ASSUMED_RATE_SD)))
+
+
+def without_confounded_misfit(noise_model: NoiseModel) -> NoiseModel:
+    """The same; where each test has one value alone, all its scatter is that of the rates between tests, if any."""
+    (name, *others) = noise_model.outputs
+    confounded = not others and name in SINGLE_VALUES and noise_model.rate > 0
+    return noise_model.with_output(name, misfit=0.0) if confounded else noise_model
 
 
 def initial_sd(nuisances: Sequence[Nuisance], kind: str, default: float, output: str = "") -> float:

@@ -15,17 +15,51 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
 from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
-from creepkit.inverse.output_transforms import LinearTransform, LogTransform, NegativeLogTransform, OutputTransform
-from creepkit.records import History, Prediction, Predictor, is_logarithmic
+from creepkit.inverse.output_transforms import (
+    LinearTransform,
+    LogTransform,
+    NegativeLogTransform,
+    OutputTransform,
+    RateTransform,
+)
+from creepkit.records import UNKNOWN_DURATION, History, Prediction, Predictor, is_logarithmic
 
 RUPTURE_OUTPUT = "rupture"
 """The output of tests that were followed to rupture: the rupture time, s. It has no frames of its own."""
+
+
+MINIMUM_RATE_OUTPUT = "minimum_rate"
+"""The output of tests without frames of which the minimum creep rate is known, 1/s."""
+
+
+SINGLE_VALUES = (MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT)
+"""Outputs of which a test has one value: no frames, no offset, no drift, and all of its scatter in one misfit."""
+
+
+STRAIN_OF_UNKNOWN_DURATION = 0.05
+"""Creep strain to which a test of unknown duration is followed, at its minimum rate: products of minimum rate and time
+to rupture (Monkman and Grant 1956) lie mostly between 0.02 and 0.2."""
+
+
+def compares_minimum_rate(history: History) -> bool:
+    """Whether a test is compared by its minimum rate: it states one and has no frames, which would hold it already."""
+    return history.minimum_rate is not None and not history.outputs
+
+
+def followed_duration(history: History) -> float:
+    """For how long a test lasted, s: to its rupture or last time; without frames and duration, see above."""
+    last = history.rupture_time or float(history.times[-1])
+    if history.minimum_rate is None or history.outputs or history.end_known or last > UNKNOWN_DURATION:
+        return last
+    return STRAIN_OF_UNKNOWN_DURATION / history.minimum_rate
 
 
 def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
     """The transform of one output of these histories, all of which have it."""
     if output == RUPTURE_OUTPUT:
         return NegativeLogTransform()
+    if output == MINIMUM_RATE_OUTPUT:
+        return RateTransform(max(float(h.minimum_rate or 0.0) for h in histories))
     return log_transform_for(histories, output) if is_logarithmic(output) else linear_transform_for(histories, output)
 
 
@@ -103,7 +137,9 @@ def frames_with_data(history: History) -> Bools:
 
 
 def thinned_history(history: History, count: int) -> History:
-    """The history at its selected frames only, all outputs of a frame together."""
+    """The history at its selected frames only, all outputs of a frame together; one without frames as it is."""
+    if not history.outputs:
+        return history
     selected = selected_frames(history, count)
     return replace(
         history,
@@ -164,16 +200,19 @@ class ObservationVector:
         full = histories if full is None else full
         followed_to_rupture = np.array([h.end_known and predicts_rupture(predictor, h) for h in histories])
         outputs_by_test = [
-            (*_observed_outputs(h, predictor), *[RUPTURE_OUTPUT][: int(w)])
+            _observed_outputs(h, predictor, followed=bool(w))
             for h, w in zip(histories, followed_to_rupture, strict=True)
         ]
-        outputs = tuple(dict.fromkeys(name for names in outputs_by_test for name in names))
+        distinct = dict.fromkeys(name for names in outputs_by_test for name in names)
+        # Those of single values last: absent observations are padded as the first output, whose value may be zero.
+        outputs = tuple(sorted(distinct, key=lambda name: name in SINGLE_VALUES and 1 + SINGLE_VALUES.index(name)))
         tests_by_output = {name: [k for k, names in enumerate(outputs_by_test) if name in names] for name in outputs}
         transforms = tuple(transform_for([histories[k] for k in tests_by_output[name]], name) for name in outputs)
         noise, noise_levels = np.zeros(len(outputs)), {}
         for position, name in ((k, n) for k, n in enumerate(outputs) if n != RUPTURE_OUTPUT):
             noise_by_test = [_noise_at_frames(full[k], histories[k], name) for k in tests_by_output[name]]
-            noise[position] = np.median([np.median(v) for v in noise_by_test])
+            known = [v for v in noise_by_test if v.any()] if name == MINIMUM_RATE_OUTPUT else noise_by_test
+            noise[position] = np.median([np.median(v) for v in known]) if known else 0.0
             noise_levels.update({(k, name): v for k, v in zip(tests_by_output[name], noise_by_test, strict=True)})
         rows = [
             [(n, _observed_frames(h, n)) for n in names] for h, names in zip(histories, outputs_by_test, strict=True)
@@ -209,9 +248,15 @@ class ObservationVector:
                 frames,
                 True,
             )
-            self.leading_output[k, columns] = rank == 0
+            self.leading_output[k, columns] = rank == 0 and name != RUPTURE_OUTPUT
+            start += frames.size
             if name == RUPTURE_OUTPUT:
                 self.values[k, columns] = self.times[k, columns] = history.rupture_time or history.times[-1]
+                continue
+            if name == MINIMUM_RATE_OUTPUT:
+                self.values[k, columns], self.times[k, columns] = history.minimum_rate, followed_duration(history)
+                typical_noise, own = self.noise[position], noise_levels[k, name]
+                self.relative_noise[k, columns] = own / typical_noise if typical_noise > 0 else 1.0
                 continue
             self.values[k, columns], self.times[k, columns] = history.outputs[name][frames], history.times[frames]
             noise = noise_levels[k, name][frames]
@@ -220,7 +265,6 @@ class ObservationVector:
                 self.relative_noise[k, columns] = (
                     np.where(noise > 0, noise, typical_noise) / typical_noise if typical_noise > 0 else 1.0
                 )
-            start += frames.size
 
     @cached_property
     def transformed_values(self) -> Floats:
@@ -248,7 +292,7 @@ class ObservationVector:
         """(tests, observations) -, what a model discrepancy of one is on the scale of the transformed output."""
         units = [
             0.0
-            if name == RUPTURE_OUTPUT
+            if name in SINGLE_VALUES
             else RELATIVE_DISCREPANCY_UNIT
             if is_logarithmic(name)
             else max(float(noise), SMALLEST_NOISE * transform.floor) / transform.scale  # type: ignore[attr-defined]
@@ -267,7 +311,7 @@ class ObservationVector:
         """(tests, observations) -, ln t where the transform is logarithmic, else 5 t / last time."""
         last_times = np.where(self.present, self.times, 0.0).max(axis=1, keepdims=True)
         logarithmic = (
-            self.per_observation([float(name == RUPTURE_OUTPUT or is_logarithmic(name)) for name in self.outputs]) > 0
+            self.per_observation([float(name in SINGLE_VALUES or is_logarithmic(name)) for name in self.outputs]) > 0
         )
         return np.where(
             logarithmic, self.log_times, LINEAR_COORDINATE_LENGTH * self.times / np.maximum(last_times, 1e-300)
@@ -292,9 +336,15 @@ class ObservationVector:
     @property
     def rupture_mask(self) -> Bools:
         """(tests, observations) which are rupture times, or times without rupture."""
-        return np.asarray(
-            self.present & self.per_observation([float(n == RUPTURE_OUTPUT) for n in self.outputs]).astype(bool)
-        )
+        return self._mask_of(RUPTURE_OUTPUT)
+
+    @property
+    def single_value_mask(self) -> Bools:
+        """(tests, observations) which are the only value of their output: rupture times and minimum rates."""
+        return self._mask_of(*SINGLE_VALUES)
+
+    def _mask_of(self, *outputs: str) -> Bools:
+        return np.asarray(self.present & (self.per_observation([float(n in outputs) for n in self.outputs]) > 0))
 
     def select_outputs(self, array: Floats, prediction: Prediction) -> Floats:
         """(candidates, tests, observations, ...) of an array (candidates, tests, times, outputs, ...).
@@ -326,6 +376,8 @@ class ObservationVector:
 
 def _states_noise(histories: Sequence[History], name: str) -> bool:
     """Whether all of them state a standard deviation of this output."""
+    if name == MINIMUM_RATE_OUTPUT:
+        return all(h.minimum_rate_sd is not None for h in histories)
     stated = [np.asarray(h.standard_deviation.get(name, np.nan)) for h in histories]
     return name != RUPTURE_OUTPUT and all(
         sd.shape == h.times.shape and (np.isfinite(sd) & (sd > 0))[usable_frames(h, name)].all()
@@ -333,20 +385,24 @@ def _states_noise(histories: Sequence[History], name: str) -> bool:
     )
 
 
-def _observed_outputs(history: History, predictor: Predictor) -> tuple[str, ...]:
-    names = tuple(n for n in compared_outputs(predictor, history) if usable_frames(history, n).any())
-    if not names:
+def _observed_outputs(history: History, predictor: Predictor, *, followed: bool) -> tuple[str, ...]:
+    """Outputs with usable frames, the minimum rate of a test without any, and the end of one that is followed to it."""
+    names = [n for n in compared_outputs(predictor, history) if usable_frames(history, n).any()]
+    names += [MINIMUM_RATE_OUTPUT] if compares_minimum_rate(history) else []
+    if not names and (history.outputs or not followed):
         raise FitError(
             f"history '{history.name}' has no output that is predicted; it has {', '.join(history.outputs) or 'none'}"
         )
-    return names
+    return (*names, *([RUPTURE_OUTPUT] if followed else []))
 
 
 def _observed_frames(history: History, name: str) -> Ints:
-    return np.zeros(1, np.int64) if name == RUPTURE_OUTPUT else np.flatnonzero(usable_frames(history, name))
+    return np.zeros(1, np.int64) if name in SINGLE_VALUES else np.flatnonzero(usable_frames(history, name))
 
 
 def _noise_at_frames(full: History, thinned: History, name: str) -> Floats:
-    """(frames of `thinned`,) noise as the full history shows it, in the output's unit."""
+    """(frames of `thinned`,) noise as the full history shows it, in the output's unit; of a minimum rate as stated."""
+    if name == MINIMUM_RATE_OUTPUT:
+        return np.array([full.minimum_rate_sd or 0.0])
     noise = noise_standard_deviation(full, name)
     return noise[np.searchsorted(full.times, thinned.times)]

@@ -82,7 +82,7 @@ def orthogonal_residuals(
         return OrthogonalResiduals(vertical, unit, zeros, np.broadcast_to(observations.present, vertical.shape))
     strain_times, frames = (
         prediction.times_to_strain,
-        observations.followed_to_rupture[:, None] & observations.present & ~observations.rupture_mask,
+        observations.followed_to_rupture[:, None] & observations.present & ~observations.single_value_mask,
     )
     log_time_ratio = observations.log_times - _log_times(observations.select_frames(strain_times.times))
     not_converged = ~reached & np.isneginf(log_time_ratio)  # neither reached nor ruptured: no convergence

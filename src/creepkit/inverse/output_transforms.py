@@ -111,3 +111,32 @@ class NegativeLogTransform:
     def derivative(self, y: Floats) -> Floats:
         """dg/dy (...,) at outputs y (...,)."""
         return -1.0 / y
+
+
+@dataclass(frozen=True)
+class RateTransform:
+    """g(r) = ln r of a creep rate r in 1/s. largest : of the measured rates, 1/s."""
+
+    largest: float
+    floor: float = 0.0
+
+    @property
+    def ceiling(self) -> float:
+        """The transformed rate of a test that breaks at once: e times the largest that was measured."""
+        return float(np.log(self.largest)) + 1.0
+
+    def forward(self, y: Floats) -> Floats:
+        """The compared quantity (...,) of rates y (...,)."""
+        return np.log(np.maximum(y, SMALLEST_RATE))
+
+    def inverse(self, g: Floats) -> Floats:
+        """The rates (...,) 1/s whose compared quantity is g (...,)."""
+        return np.exp(g)
+
+    def derivative(self, y: Floats) -> Floats:
+        """dg/dy (...,) at rates y (...,)."""
+        return 1.0 / np.maximum(y, SMALLEST_RATE)
+
+
+SMALLEST_RATE = 1e-200
+"""1/s; a candidate that does not creep at all is compared as if it did at this rate."""

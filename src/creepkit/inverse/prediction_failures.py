@@ -9,15 +9,19 @@ import numpy as np
 
 from creepkit.arrays import Bools
 from creepkit.errors import FitError
+from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.records import History, Prediction, Status
 
 
 def tests_without_prediction(prediction: Prediction, histories: Sequence[History]) -> Bools:
-    """(candidates, tests): which tests have frames after the start, none of which has a predicted number."""
+    """(candidates, tests): which tests have frames after the start, none of which has a predicted number.
+
+    Of a test without frames its minimum rate takes their place, where the prediction has it.
+    """
     result = np.zeros(prediction.status.shape, bool)
     for k, history in enumerate(histories):
         later = history.times > 0.0
-        if later.any():
+        if later.any() and (history.outputs or MINIMUM_RATE_OUTPUT in prediction.outputs):
             result[:, k] = ~np.isfinite(prediction.values[:, k, : later.size][:, later]).any(axis=(1, 2))
     return result
 

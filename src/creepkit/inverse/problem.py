@@ -30,6 +30,7 @@ from creepkit.inverse.composite_predictor import (
 )
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.history_checks import check_creep, check_explicit_nuisances, check_histories
+from creepkit.inverse.minimum_rates import check_minimum_rates, with_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters, check_nuisance_law
@@ -51,7 +52,7 @@ from creepkit.inverse.search.local_refinement import (
     robust_loss,
 )
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
 from creepkit.records import History, Prediction, Predictor
 
@@ -130,6 +131,7 @@ class LeastSquaresProblem:
         """
         predictor = CompositePredictor(dict(predictor)) if isinstance(predictor, Mapping) else predictor
         check_histories(law, histories, predictor)
+        check_minimum_rates(histories, predictor)
         tests = [thinned_history(h, settings.frames) for h in histories]
         coordinates = Coordinates(law, reference or ReferencePoint.from_histories(tests, predictor))
         observations = ObservationVector.from_histories(tests, predictor, histories)
@@ -141,7 +143,7 @@ class LeastSquaresProblem:
         bounds = Bounds.from_law(law, coordinates, log_rate, log_internal_rate).with_nuisances(nuisances)
         noise = WorkingNoiseEstimator(settings, observations, prediction_errors_of(predictor)).initial()
         covariance_factor = CovarianceFactor.of_residuals(
-            residuals_at_measured_values(observations), with_rupture_weight(noise, observations)
+            residuals_at_measured_values(observations), with_single_value_weight(noise, observations)
         )
         return cls(tuple(tests), predictor, coordinates, observations, nuisances, bounds, settings, covariance_factor)
 
@@ -239,11 +241,13 @@ class LeastSquaresProblem:
         return np.stack([r.values for r in evaluated]), np.stack(jacobians)
 
     def _prediction(self, u: Floats, *, jacobian: bool) -> Prediction:
-        theta, histories = self.coordinates.theta(u), self.histories
-        if self.observations.followed_to_rupture.any():
-            return predict_to_rupture(self.predictor, self.law, theta, histories, sensitivities=jacobian)
+        tests = (self.predictor, self.law, self.coordinates.theta(u), self.histories)
         nuisances = replace(self.nuisance_parameters, fixed=True).predictor_values(np.zeros(0))
-        return predict(self.predictor, self.law, theta, histories, nuisances=nuisances, sensitivities=jacobian)
+        if self.observations.followed_to_rupture.any():
+            prediction = predict_to_rupture(*tests, sensitivities=jacobian)
+        else:
+            prediction = predict(*tests, nuisances=nuisances, sensitivities=jacobian)
+        return with_minimum_rates(prediction, *tests, nuisances, sensitivities=jacobian)
 
     def check_predicted(self, u: Floats) -> None:
         """FitError, with counts over all that were tried, where nothing is predicted at u (candidates, parameters)."""
@@ -252,13 +256,13 @@ class LeastSquaresProblem:
 
     def _evaluated(self, x: Floats) -> Residuals:
         u, e = x[: self.parameter_count], x[self.parameter_count :]
-        theta = self.coordinates.theta(u)
+        theta, nuisances = self.coordinates.theta(u), self.nuisance_parameters.predictor_values(e)
+        tests = (self.predictor, self.law, theta[None], self.histories)
         if self.observations.followed_to_rupture.any():
-            prediction = predict_to_rupture(self.predictor, self.law, theta[None], self.histories, sensitivities=True)
+            prediction = predict_to_rupture(*tests, sensitivities=True)
         else:
-            prediction = predict_with_sensitivities(
-                self.predictor, self.law, theta, self.histories, self.nuisance_parameters.predictor_values(e)
-            )
+            prediction = predict_with_sensitivities(self.predictor, self.law, theta, self.histories, nuisances)
+        prediction = with_minimum_rates(prediction, *tests, nuisances, sensitivities=True)
         self.evaluations.failures.record(prediction, self.histories)
         coefficients = self.coordinates.coefficients
         every_rate_has_one = len(coefficients) == len(self.law.terms) + len(self.law.states)

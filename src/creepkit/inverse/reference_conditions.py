@@ -11,7 +11,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predictor_for
-from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
+from creepkit.inverse.observation_vector import followed_duration, noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, arrhenius, temperature
 from creepkit.records import ZERO_CELSIUS, History, Predictor, growing_output, is_logarithmic, specimen_of
 
@@ -25,6 +25,10 @@ MINIMUM_FRAMES = 6
 
 SIGNIFICANT_ERRORS = 5.0
 """Standard errors that an increase must exceed; and it must exceed the noise of one frame."""
+
+
+STRAIN_WITHOUT_FRAMES = 0.1
+"""Creep strain at the end of a test of which the end alone is known."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +115,9 @@ def growth_per_strain(history: History, predictor: Predictor | None = None) -> f
 
 def reference_end_strain(history: History, predictor: Predictor | None = None) -> float:
     """The largest strain that a test reached, estimated from its outputs; the predictor may state it."""
+    if not history.outputs:
+        rate = history.minimum_rate
+        return STRAIN_WITHOUT_FRAMES if rate is None else max(rate * followed_duration(history), 1e-7)
     reference_strain = _stated(history, predictor, "reference_strain")
     if reference_strain is not None:
         return max(float(reference_strain(history)), 1e-7)
@@ -120,13 +127,18 @@ def reference_end_strain(history: History, predictor: Predictor | None = None) -
     return max(_output_increase(history)[0] / growth_per_strain(history, predictor), 1e-7)
 
 
+def _duration(history: History) -> float:
+    """s, up to the last used frame; of a test without frames for how long it lasted."""
+    return float(history.times[history.used][-1]) if history.outputs else followed_duration(history)
+
+
 def median_log_strain_rate(histories: Sequence[History], predictor: Predictor | None = None) -> float:
     """Median over tests of ln(strain / time), in 1/s."""
     log_rates = []
     for history in histories:
         output = growing_output(history)
-        if _stated(history, predictor, "reference_strain") is not None:
-            strain, time = reference_end_strain(history, predictor), float(history.times[history.used][-1])
+        if not history.outputs or _stated(history, predictor, "reference_strain") is not None:
+            strain, time = reference_end_strain(history, predictor), _duration(history)
         elif is_logarithmic(output):
             last = int(np.flatnonzero(usable_frames(history, output))[-1])
             strain, time = float(history.outputs[output][last]), float(history.times[last])
@@ -139,7 +151,7 @@ def median_log_strain_rate(histories: Sequence[History], predictor: Predictor | 
 
 def median_log_inverse_duration(histories: Sequence[History]) -> float:
     """Median over tests of ln of one over their duration, in 1/s."""
-    return float(-np.median([np.log(h.rupture_time or h.times[-1]) for h in histories]))
+    return float(-np.median([np.log(followed_duration(h)) for h in histories]))
 
 
 def _output_increase(history: History) -> tuple[float, float]:
@@ -196,7 +208,7 @@ class ReferencePoint:
         mean_stresses = [
             float(np.exp(np.mean(np.log(np.maximum(reference_stresses(h, predictor), 1e-6))))) for h in histories
         ]
-        times = [float(h.times[h.used][-1]) for h in histories]
+        times = [_duration(h) for h in histories]
         strains = [reference_end_strain(h, predictor) for h in histories]
         temperatures = [float(np.mean(h.temperature_program().values)) for h in histories]
         central_values = [float(np.exp(np.mean(np.log(v)))) for v in (mean_stresses, strains, times)]

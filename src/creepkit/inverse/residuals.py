@@ -13,7 +13,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.observation_vector import ObservationVector
+from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, ObservationVector
 from creepkit.inverse.orthogonal_residual import (
     OrthogonalResiduals,
     offset_time_derivative,
@@ -218,7 +218,9 @@ def _time_derivative(observations: ObservationVector, predicted: Floats, orthogo
     for k, present in enumerate(observations.present):
         for position in np.unique(observations.output_index[k, present]):
             row = present & (observations.output_index[k] == position)
-            if row.sum() > 1:
+            if observations.outputs[position] == MINIMUM_RATE_OUTPUT:
+                sensitivity[k, row] = 1.0
+            elif row.sum() > 1:
                 sensitivity[k, row] = np.gradient(transformed[k, row], observations.log_times[k, row])
     return np.asarray(orthogonal.strain_derivative[0] * sensitivity + orthogonal.time_derivative[0])
 
@@ -248,7 +250,7 @@ def _masked_residuals(
 def _jacobian_after_rupture(jacobian: Floats, reached: Bools, output: Ints) -> Floats:
     """Derivatives at frames after a rupture: those of the last frame of the output that the prediction reaches."""
     if reached.all():
-        return jacobian
+        return np.where(np.isfinite(jacobian), jacobian, 0.0)
     frames = np.broadcast_to(np.arange(reached.shape[1]), reached.shape)
     index = np.array(frames)
     for position in np.unique(output):

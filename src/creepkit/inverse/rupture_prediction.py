@@ -13,7 +13,7 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.goodness_of_fit import RuptureComparison
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
-from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, MixtureDistribution
+from creepkit.inverse.uncertainty.log_values import LogValues, misfit_variance
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.records import History, Predictor, constant_stress
 
@@ -50,29 +50,18 @@ def predict_rupture_times(
     assert prediction.times_to_strain.rupture_jacobian is not None
     at_values = prediction.times_to_strain.rupture_times[0]
     by_parameter = np.nan_to_num(prediction.times_to_strain.rupture_jacobian[0])
-    locations, variances = [], []
-    for k, history in enumerate(histories):
-        test = scatter.new_test(history)
-        row = np.zeros(scatter.joint_design.shape[1])
-        row[: u.size] = by_parameter[k] @ coordinates.jacobian(u)
-        rate_effect = _log_time_by_log_rate(coordinates, by_parameter[k])
-        row[[*test.known.values()]] = rate_effect if noise_model is not None else 0.0
-        parts = [scatter.joint(sd) for sd in scatter.posterior.sd]
-        own = scatter.own_variance(test, scatter.posterior.sd) * rate_effect**2 + _rupture_variance(noise_model)
-        locations.append([row @ mean for mean, _ in parts])
-        by_law = np.array([row @ covariance @ row for _, covariance in parts])
-        variances.append(by_law + own if noise_model is not None else by_law)
-    posterior, variance = scatter.posterior, np.array(variances).T
+    rate_effects = np.array([_log_time_by_log_rate(coordinates, row) for row in by_parameter])
     ruptured = np.isfinite(at_values)
-    log_times = np.log(np.where(ruptured, at_values, 1.0))
-    mixture = MixtureDistribution(
-        posterior.weight,
-        np.full(posterior.weight.size, NORMAL_FREEDOM),
-        log_times + np.array(locations).T,
-        np.sqrt(np.maximum(variance, 1e-20)),
+    log_times = LogValues(np.log(np.where(ruptured, at_values, 1.0)), by_parameter, rate_effects)
+    low, high = log_times.intervals(
+        coordinates,
+        u,
+        scatter,
+        histories,
+        None if noise_model is None else misfit_variance(noise_model, RUPTURE_OUTPUT),
     )
-    low, high = (np.exp(mixture.quantile(probability)) for probability in (0.025, 0.975))
-    return tuple(np.where(ruptured, each, np.inf) for each in (at_values, low, high))  # type: ignore[return-value]
+    times = (at_values, np.exp(low), np.exp(high))
+    return tuple(np.where(ruptured, each, np.inf) for each in times)  # type: ignore[return-value]
 
 
 def _log_time_by_log_rate(coordinates: Coordinates, by_parameter: Floats) -> float:
@@ -84,12 +73,6 @@ def _log_time_by_log_rate(coordinates: Coordinates, by_parameter: Floats) -> flo
     if len(coefficients) < len(coordinates.law.terms) + len(coordinates.law.states):
         return -1.0
     return float(by_parameter[coefficients].sum())
-
-
-def _rupture_variance(noise_model: NoiseModel | None) -> float:
-    """Variance of ln of the rupture time of a single test beside its rate."""
-    known = noise_model is not None and RUPTURE_OUTPUT in noise_model.outputs
-    return float(noise_model[RUPTURE_OUTPUT].misfit ** 2) if known else 0.0  # type: ignore[index]
 
 
 def _extended_to_rupture(history: History) -> History:

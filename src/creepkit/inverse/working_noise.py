@@ -21,8 +21,9 @@ from creepkit.inverse.noise_model import (
     autocorrelated_components,
     initial_sd,
     initial_working_noise,
+    without_confounded_misfit,
 )
-from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, SMALLEST_NOISE, ObservationVector
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, SINGLE_VALUES, SMALLEST_NOISE, ObservationVector
 from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.variance_components import (
@@ -63,8 +64,8 @@ INITIAL_DISCREPANCY = 1.0
 """In noises, where the estimate of a discrepancy begins."""
 
 
-INITIAL_RUPTURE_SD = 0.3
-"""Scatter of ln of rupture times to begin from: one of each test, which has no noise, and cannot drift."""
+INITIAL_SINGLE_VALUE_SD = 0.3
+"""Scatter of ln of rupture times and of minimum rates to begin from: one of each test, which cannot drift."""
 
 
 SMALLEST_WEIGHT = 1e-6
@@ -130,12 +131,15 @@ class WorkingNoiseEstimator:
             self.observations.outputs, self.observations.transforms, self.observations.noise, strict=True
         ):
             offset = initial_sd(nuisances, "offset", scale.floor, name)
-            misfit = INITIAL_RUPTURE_SD if name == RUPTURE_OUTPUT else 0.03 if is_logarithmic(name) else 0.0
+            misfit = INITIAL_SINGLE_VALUE_SD if name in SINGLE_VALUES else 0.03 if is_logarithmic(name) else 0.0
             by_output[name] = OutputNoise(max(float(noise), SMALLEST_NOISE * scale.floor), misfit, offset)
         rate_nuisances = [n for n in nuisances if n.kind == "rate" and (n.sd is not None or tests >= MINIMUM_TESTS)]
         units = self.observations.discrepancy_unit[self.observations.present & self.observations.leading_output]
-        discrepancy = INITIAL_AUTOCORRELATION / float(np.median(units)) if (units > 0).any() else 0.0
-        return NoiseModel(by_output, initial_sd(rate_nuisances, "rate", ASSUMED_RATE_SD), discrepancy)
+        units = units[units > 0]
+        discrepancy = INITIAL_AUTOCORRELATION / float(np.median(units)) if units.size else 0.0
+        return without_confounded_misfit(
+            NoiseModel(by_output, initial_sd(rate_nuisances, "rate", ASSUMED_RATE_SD), discrepancy)
+        )
 
     def _by_restricted_likelihood(self, linearised: LinearisedProblem, previous: NoiseModel) -> NoiseModel:
         """The noise model of largest restricted likelihood; autocorrelated where that is significantly more likely.
@@ -208,7 +212,7 @@ class WorkingNoiseEstimator:
             observations.outputs, observations.noise, observations.stated, observations.transforms, strict=True
         ):
             initial_noise = max(float(noise), SMALLEST_NOISE * scale.floor)
-            initial_drift = max(noise_model[name].drift, INITIAL_DRIFT) if drift and name != RUPTURE_OUTPUT else 0.0
+            initial_drift = max(noise_model[name].drift, INITIAL_DRIFT) if drift and name not in SINGLE_VALUES else 0.0
             noise_model = noise_model.with_output(
                 name,
                 noise=initial_noise,
@@ -246,17 +250,18 @@ def _drifts_at_longest(noise_model: NoiseModel, residuals: Residuals) -> bool:
     return False
 
 
-def with_rupture_weight(working: NoiseModel, observations: ObservationVector) -> NoiseModel:
-    """The working noise with which values are found: the one rupture time of a test weighs as much as its whole curve.
+def with_single_value_weight(working: NoiseModel, observations: ObservationVector) -> NoiseModel:
+    """The working noise with which values are found: a rupture time or minimum rate weighs as much as a whole curve.
 
     Frames that follow one another say the same thing many times; a rupture time says it once.
     """
-    if RUPTURE_OUTPUT not in working.outputs:
-        return working
-    frames = int((observations.present & ~observations.rupture_mask)[observations.followed_to_rupture].sum()) / int(
-        observations.followed_to_rupture.sum()
-    )
-    return working.with_output(RUPTURE_OUTPUT, misfit=working[RUPTURE_OUTPUT].misfit / float(np.sqrt(frames)))
+    frames = (observations.present & ~observations.single_value_mask).sum(axis=1)
+    for name in (name for name in SINGLE_VALUES if name in working.outputs):
+        curves = frames[observations.followed_to_rupture & (frames > 0)] if name == RUPTURE_OUTPUT else frames[:0]
+        curves = curves if curves.size else frames[frames > 0]
+        if curves.size:
+            working = working.with_output(name, misfit=working[name].misfit / float(np.sqrt(np.mean(curves))))
+    return working
 
 
 def _paper_weights(observations: ObservationVector) -> dict[str, float]:

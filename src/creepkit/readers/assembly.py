@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from difflib import get_close_matches
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from creepkit.errors import HistoryError
 from creepkit.readers.conditions import (
     END_OF_TEST_TERMS,
     StatedConditions,
+    StatedNumber,
     errors_located_at,
     read_loading,
     read_temperature,
@@ -20,7 +22,7 @@ from creepkit.readers.conditions import (
 from creepkit.readers.standard_names import in_standard_names
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
-from creepkit.records import History
+from creepkit.records import UNKNOWN_DURATION, History
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -55,6 +57,7 @@ def assemble_history(
     elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required="strain" in outputs)
     temperature = read_temperature(conditions, frames)
     used = _used_frames(conditions, frames)
+    minimum_rate, minimum_rate_sd = _minimum_rate(conditions)
     rupture_time, unruptured = _end_of_test(conditions, frames, used)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
     return History(
@@ -75,10 +78,87 @@ def assemble_history(
         source=source,
         rupture_time=rupture_time,
         unruptured=unruptured,
+        minimum_rate=minimum_rate,
+        minimum_rate_sd=minimum_rate_sd,
         stated=conditions.stated,
         # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
     )
+
+
+def assemble_without_frames(
+    name: str, entries: Mapping[str, SourceText], vocabulary: HeaderVocabulary, *, location: str, source: str
+) -> History:
+    """Return the history of a test of which only the minimum creep rate, only its end, or both are known.
+
+    Its one time is that of its end, where that is stated, as rupture or as `end_time`, else UNKNOWN_DURATION.
+    """
+    conditions = StatedConditions(entries, vocabulary, location)
+    minimum_rate, minimum_rate_sd = _minimum_rate(conditions)
+    time = conditions.take_number("rupture")
+    end = conditions.take_number("end_time")
+    ended = conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
+    if minimum_rate is None and time is None and ended != "stopped":
+        raise conditions.missing_error(
+            "frames, no minimum creep rate and no end of the test",
+            "write minimum_rate_1/h, rupture_h, or end_time_h with 'ended: stopped'; or columns of frames, such as "
+            "time_h,strain_pct",
+        )
+    _check_end_without_frames(time, end, ended, location)
+    duration = (time or end or StatedNumber(UNKNOWN_DURATION, "", location)).value
+    only = TableFrames(TextTable(Path(source), {}, (), 0, ()), {"time": np.array([duration])}, np.array([0]))
+    loading = read_loading(conditions, only)
+    strain_measure = conditions.take_choice(
+        "strain_measure", ("engineering", "logarithmic"), required=minimum_rate is not None
+    )
+    conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
+    named = conditions.take_text("specimen", conditions.default_specimen)
+    _refuse_unknown_specimen(named, conditions.terms, location)
+    with errors_located_at(location):
+        history = History(
+            name=conditions.take_text("name", name),
+            times=only.times,
+            outputs={},
+            loading=loading,
+            temperature=read_temperature(conditions, only),
+            elastic=_elastic(conditions),
+            strain_measure="logarithmic" if strain_measure == "logarithmic" else "engineering",
+            geometry=conditions.geometry,
+            operator=conditions.take_text("operator"),
+            alloy=conditions.take_text("alloy"),
+            source=source,
+            rupture_time=None if time is None else time.value,
+            unruptured=ended == "stopped",
+            stated=conditions.stated,
+            minimum_rate=minimum_rate,
+            minimum_rate_sd=minimum_rate_sd,
+            labels=conditions.all_labels(),  # last: entries that nothing has used by now are refused
+        )
+        return history.replace(specimen=named) if named else history
+
+
+def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | None, ended: str, location: str) -> None:
+    """Refuse ends that contradict one another, or say too little."""
+    if time is not None and (end is not None or ended == "stopped"):
+        other = f"'{end.key}' says when it ended" if end is not None else "the test was stopped"
+        raise HistoryError(f"{time.location}: '{time.key}' says when the test ruptured, and {other}; keep one of them")
+    if time is None and ended == "ruptured":
+        raise HistoryError(f"{location}: the test ruptured, and nothing says when; write rupture_h")
+    if ended == "stopped" and end is None:
+        raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
+
+
+def _minimum_rate(conditions: StatedConditions) -> tuple[float | None, float | None]:
+    """The minimum creep rate and its standard deviation, 1/s, where they are stated."""
+    rate, sd = conditions.take_number("minimum_rate"), conditions.take_number("minimum_rate_sd")
+    if rate is None and sd is not None:
+        raise HistoryError(f"{sd.location}: '{sd.key}' stands there without a minimum_rate; give both")
+    return None if rate is None else rate.value, None if sd is None else sd.value
+
+
+def _refuse_unknown_specimen(named: str, terms: Terms, location: str) -> None:
+    if named and named not in terms.outputs and (near := get_close_matches(named, terms.outputs, 1, cutoff=0.8)):
+        raise HistoryError(f"{location}: there is no specimen '{named}'; did you mean '{near[0]}'?")
 
 
 def _merge_label(frames: TableFrames) -> dict[str, str]:
@@ -95,8 +175,7 @@ def _specimen_and_outputs(
         chosen = [named] if named in present else []
     else:
         chosen = [name for name in present if load in terms.loads.get(name, [load])] or present
-    if named and named not in terms.outputs and (near := get_close_matches(named, terms.outputs, 1, cutoff=0.8)):
-        raise HistoryError(f"{location}: there is no specimen '{named}'; did you mean '{near[0]}'?")
+    _refuse_unknown_specimen(named, terms, location)
     if len(chosen) != 1:
         raise _unidentified(named, present if named in terms.outputs else chosen, terms, location)
     outputs = {name: frames.values[name] for name in terms.outputs[chosen[0]] if name in frames.values}

@@ -72,6 +72,15 @@ def read_text_grid(path: Path) -> CellGrid:
     return _grid_of_lines(path, text_lines(text))
 
 
+def read_head_alone(path: Path) -> dict[str, SourceText]:
+    """The entries of a file that holds `# key: value` lines and no table; {} where it holds one."""
+    start = read_bytes(path, TABLE_FILE, first=_LARGE_TEXT)
+    lines = text_lines(decode_text(start, path)) if len(start) < _LARGE_TEXT else [" a table"]
+    if any(line.strip() and not is_comment(line) for line in lines):
+        return {}
+    return _header(path, lines, (), Dialect(decimal=_stated_decimal(path, lines) or "."))
+
+
 def _grid_of_lines(path: Path, lines: Sequence[str]) -> CellGrid:
     start = next((k for k, line in enumerate(lines) if line.strip() and not is_comment(line)), None)
     if start is None:

@@ -14,7 +14,8 @@ Keys and columns carry their units (`words.py` lists them, `units.py` their unit
 change: `# stress_steps: 0 s 100 MPa; 1 h 120 MPa` jumps, `# temperature_program: 0 s 700 C; 2 h 720 C` is piecewise
 linear, and a column of that name was recorded: it is used, thinned to 0.25 K or 0.2 % of the load, and what is stated
 beside it is kept for the check of data quality. `_sd` names a standard deviation, `used` (0 or 1) marks frames,
-`# geometry apex_thickness_mm: 0.48` measures of the specimen, `# label heat: X7` and unknown keys are labels.
+`# minimum_rate_1/h: 2.1e-6` and `# rupture_h: 8200` are known beside the frames, or without any: a test may be a head
+alone. `# geometry apex_thickness_mm: 0.48` measures of the specimen, `# label heat: X7` and unknown keys are labels.
 """
 
 from __future__ import annotations
@@ -28,12 +29,13 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
-from creepkit.readers.assembly import assemble_history
-from creepkit.readers.cell_grids import CellGrid, peek_columns, read_text_grid
+from creepkit.readers.assembly import assemble_history, assemble_without_frames
+from creepkit.readers.cell_grids import CellGrid, peek_columns, read_head_alone, read_text_grid
 from creepkit.readers.column_names import KnownNames
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (
+    UNKNOWN_DURATION,
     History,
     PointLoading,
     PressureJump,
@@ -72,7 +74,10 @@ class HistoryCsvReader:
         return len(present) > 1 and any(known.quantity(name) == "time" for name in present)
 
     def read(self, path: Path) -> list[History]:
-        """Return the histories in the file."""
+        """Return the histories in the file; a head without frames is that of a test known by rate or end alone."""
+        head = read_head_alone(path)
+        if head and any(key.startswith(("minimum_rate", "rupture", "ended")) for key in head):
+            return [assemble_without_frames(path.stem, head, self.vocabulary, location=str(path), source=str(path))]
         grid = read_text_grid(path)
         return histories_of_tests([(grid, test) for test in tests_in(grid, self.vocabulary)], path, self.vocabulary)
 
@@ -111,6 +116,8 @@ def write_history(history: History, path: str | Path) -> Path:
 
 def history_text(history: History) -> str:
     """The text of the CSV file of a history; HistoryError when it could not be read back."""
+    if not history.outputs:
+        return _text_without_frames(history)
     if history.times.size < 2:
         raise HistoryError(f"history '{history.name}' has one frame; at least two can be written and read back")
     columns = dict(_frame_columns(history, HeaderVocabulary().terms(history.specimen)))
@@ -121,6 +128,15 @@ def history_text(history: History) -> str:
     lines.append(",".join(columns))
     lines += [",".join(map(_number_text, row)) for row in zip(*columns.values(), strict=True)]
     return "\n".join(lines) + "\n"
+
+
+def _text_without_frames(history: History) -> str:
+    """The head of a test of which only the minimum rate, or its end, is known."""
+    known = history.minimum_rate is not None or history.end_known
+    if not known or history.times.size > 1:
+        problem = "no minimum rate and no known end" if not known else f"{history.times.size} times"
+        raise HistoryError(f"history '{history.name}' has no outputs and {problem}; it cannot be written and read back")
+    return "\n".join(f"# {key}: {_one_line(history, text)}" for key, text in _header_lines(history)) + "\n"
 
 
 def _header_lines(history: History) -> Iterator[tuple[str, str]]:
@@ -143,6 +159,11 @@ def _header_lines(history: History) -> Iterator[tuple[str, str]]:
         yield "rupture_s", _number_text(history.rupture_time)
     if history.unruptured:
         yield "ended", "stopped"
+    if not history.outputs and history.rupture_time is None and history.times[-1] != UNKNOWN_DURATION:
+        yield "end_time_s", _number_text(float(history.times[-1]))
+    for key, rate in (("minimum_rate", history.minimum_rate), ("minimum_rate_sd", history.minimum_rate_sd)):
+        if rate is not None:
+            yield f"{key}_1/s", _number_text(rate)
     if history.operator:
         yield "operator", history.operator
     for key, value in history.geometry.items():

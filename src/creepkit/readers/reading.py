@@ -12,13 +12,14 @@ from creepkit.hookspecs import hookimpl
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
 from creepkit.readers.spreadsheets import SPREADSHEET
+from creepkit.readers.test_tables import TEST_TABLE
 from creepkit.records import History, Reader, accepts_path, histories_in
 
 
 @hookimpl
 def creepkit_readers() -> list[Reader]:
     """Return the built-in readers."""
-    return [INDEXED_TABLE, INDEXED_FILES, HISTORY_CSV, SPREADSHEET]
+    return [INDEXED_TABLE, INDEXED_FILES, TEST_TABLE, HISTORY_CSV, SPREADSHEET]
 
 
 GENERAL_READERS: tuple[Reader, ...] = (HISTORY_CSV, SPREADSHEET)

@@ -10,7 +10,17 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from creepkit.records import TENSOR_COMPONENTS, dimensions_of, known_specimens, loads_of, outputs_of
-from creepkit.records.quantities import FLAG, MODULUS, POISSON, SIGNED_STRESS, STRAIN, TEMPERATURE, TIME, QuantityKind
+from creepkit.records.quantities import (
+    FLAG,
+    MODULUS,
+    POISSON,
+    RATE,
+    SIGNED_STRESS,
+    STRAIN,
+    TEMPERATURE,
+    TIME,
+    QuantityKind,
+)
 
 
 def split_unit(name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str] | None:
@@ -33,6 +43,8 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
     **dict.fromkeys(("jump_time", "end_time", "ramp", "rupture"), TIME),
     "modulus": MODULUS,
     "poisson": POISSON,
+    "minimum_rate": RATE,
+    "minimum_rate_sd": RATE,
 }
 """Numbers that stand once for a whole test, beside its loads."""
 

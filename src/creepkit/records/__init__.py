@@ -2,7 +2,7 @@
 
 from creepkit.records.camera_format import CameraFormat
 from creepkit.records.camera_frames import CameraFrame, Frames
-from creepkit.records.history import EVERY_FRAME, History
+from creepkit.records.history import EVERY_FRAME, UNKNOWN_DURATION, History
 from creepkit.records.interfaces import (
     Exporter,
     Predictor,
@@ -90,6 +90,7 @@ __all__ = [
     "STEP_DURATION",
     "STEP_NUISANCES",
     "TENSOR_COMPONENTS",
+    "UNKNOWN_DURATION",
     "ZERO_CELSIUS",
     "CameraFormat",
     "CameraFrame",

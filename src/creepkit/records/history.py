@@ -23,6 +23,10 @@ RUPTURE_TIME_TOLERANCE = 0.01
 """By how much of a rupture time frames may lie after it: laboratories round it to three digits."""
 
 
+UNKNOWN_DURATION = 1.0
+"""s; the one time of a test without frames whose duration nobody stated."""
+
+
 EVERY_FRAME: Bools = frozen([], dtype=bool)
 """The value of History.used that marks every frame."""
 

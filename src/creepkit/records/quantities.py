@@ -120,6 +120,19 @@ STRAIN = QuantityKind(
 )
 
 
+RATE = QuantityKind(
+    "creep rate",
+    {
+        f"{prefix}/{unit}": UnitConversion(factor / time.factor)
+        for prefix, factor in (("1", 1.0), ("pct", 1e-2), ("%", 1e-2))
+        for unit, time in TIME.units.items()
+    },
+    low=0.0,
+    high=1e3,
+    open_interval=True,
+)
+
+
 NUMBER = QuantityKind("number", {"": UnitConversion(1.0)})
 
 

@@ -151,7 +151,8 @@ def _leading_outputs(fit: Identification) -> dict[str, list[int]]:
     """{output that grows with creep: positions of the tests of which it is the first}."""
     outputs: dict[str, list[int]] = {}
     for k, test in enumerate(fit.tests):
-        outputs.setdefault(test.outputs[0].output, []).append(k)
+        if test.outputs:
+            outputs.setdefault(test.outputs[0].output, []).append(k)
     return outputs
 
 
@@ -159,7 +160,9 @@ def _few_tests(fit: Identification, curves: FittedCurves) -> Figure:
     leading, has_ruptures = _leading_outputs(fit), bool(rupture_rows(fit))
     extras = ["rates", "ruptures"] if has_ruptures else ["rates"]
     cells = [(kind, name) for name in leading for kind in ("curves", "residuals")]
-    if len(leading) == 1 and has_ruptures:
+    if not leading:
+        rows = [[(e, "") for e in extras]]
+    elif len(leading) == 1 and has_ruptures:
         rows = [[*cells], [(e, "") for e in extras]]
     else:
         count = max(len(leading), len(extras))
@@ -215,7 +218,7 @@ def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
         ]
         for output, tests in leading.items()
     }
-    most = max(len(g) for g in groups.values())
+    most = max((len(g) for g in groups.values()), default=1)
     columns = min(COLUMNS, key=lambda count: (-most % count, -(-most // count))) if most > COLUMNS[0] else most
     row_counts = [-(-len(g) // columns) for g in groups.values()]
     width = 15.0

@@ -15,13 +15,13 @@ from creepkit.records import is_length_nuisance, is_logarithmic, kind_and_start,
 if TYPE_CHECKING:
     from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
     from creepkit.inverse.cross_validation import CrossValidation
-    from creepkit.inverse.goodness_of_fit import RuptureComparison
+    from creepkit.inverse.goodness_of_fit import RateComparison, RuptureComparison
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 
 
-LISTED_RUPTURES = 15
-"""With more tests than this their rupture times are summed up alone."""
+LISTED_TESTS = 15
+"""With more tests than this their rupture times, or minimum rates, are summed up alone."""
 
 
 UNITS = {
@@ -41,6 +41,7 @@ def identification_text(fit: Identification) -> str:
         *_reference(fit),
         "",
         *_strains(fit),
+        *_minimum_rates(fit),
         *_ruptures(fit),
         *_linear_outputs(fit),
         *_table(fit),
@@ -114,6 +115,29 @@ def _rms_label(fit: Identification) -> str:
     return "rms distance in ln strain and ln time" if whole else "rms of ln strain"
 
 
+def _minimum_rates(fit: Identification) -> list[str]:
+    """Minimum rates of tests without frames, predicted over measured, and each test's where they are few."""
+    rows = [(m.name, m.condition, m.minimum_rate) for m in fit.tests if m.minimum_rate is not None]
+    if not rows:
+        return []
+    ratios = [r.ratio for _, _, r in rows if math.isfinite(r.ratio)]
+    text = f"{min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}" if ratios else "not predicted"
+    within_interval = sum(r.low <= r.measured <= r.high for _, _, r in rows)
+    lines = [
+        f"  minimum rates of {_tests(len(rows))} without frames: predicted over measured {text}; {within_interval} "
+        f"within the 95 % interval of a single test; rates between tests scatter by {100 * fit.noise_model.rate:.0f} %"
+    ]
+    if len(rows) > LISTED_TESTS:
+        return lines
+    width, condition_width = max(len(name) for name, _, _ in rows), max(len(text) for _, text, _ in rows)
+    lines.append(f"  {'test':{width}}  {'condition':{condition_width}} {'rate, 1/s':>11} {'predicted':>10}  [95 %]")
+    return lines + [
+        f"  {name:{width}}  {condition:{condition_width}} {r.measured:>11.3g} {r.predicted:>10.3g}  "
+        f"[{r.low:.3g}, {r.high:.3g}]"
+        for name, condition, r in rows
+    ]
+
+
 def _ruptures(fit: Identification) -> list[str]:
     """Rupture times, predicted over measured, and each test's where they are few."""
     ruptures = rupture_rows(fit)
@@ -130,7 +154,7 @@ def _ruptures(fit: Identification) -> list[str]:
     if censored:
         unexpected = sum(r.predicted < r.measured for r in censored)
         line += f"; {len(censored)} stopped before, of which {unexpected or 'none'} should have broken"
-    return [line, *(_rupture_table(ruptures) if len(ruptures) <= LISTED_RUPTURES else [])]
+    return [line, *(_rupture_table(ruptures) if len(ruptures) <= LISTED_TESTS else [])]
 
 
 def _rupture_table(ruptures: Sequence[tuple[str, str, RuptureComparison]]) -> list[str]:
@@ -255,12 +279,23 @@ def confirmation_text(confirmation: Confirmation) -> str:
 
 
 def cross_validation_text(validation: CrossValidation) -> str:
-    """One line for each held-out test: its relative squared errors, about the mean of the test."""
+    """One line for each held-out test: its relative squared errors, about the mean of the test.
+
+    Of its rupture time and minimum rate the prediction over the measured one, with its 95 % interval.
+    """
     lines = [f"law '{validation.fit.law.name}', held out by {validation.by}: relative squared errors"]
     for name, errors in validation.errors.items():
-        cells = ", ".join(f"{output} {e.relative_squared_error:.3g}" for output, e in errors.items())
-        lines.append(f"  {name}: {cells}")
+        cells = [f"{output} {e.relative_squared_error:.3g}" for output, e in errors.items()]
+        cells += [f"{what} {_held_out_text(one)}" for what, one in validation.single_values[name].items()]
+        lines.append(f"  {name}: {', '.join(cells)}")
     return "\n".join(lines)
+
+
+def _held_out_text(one: RuptureComparison | RateComparison) -> str:
+    """Predicted over measured, with the interval of a single test."""
+    low, high = one.low / one.measured, one.high / one.measured
+    unbroken = " of the time it lasted unbroken" if getattr(one, "censored", False) else ""
+    return f"predicted over measured {one.ratio:.3g} [{low:.3g}, {high:.3g}]{unbroken}"
 
 
 def confirmation_to_json(confirmation: Confirmation) -> dict[str, Any]:

@@ -95,13 +95,15 @@ class HoldRate:
     """The creep rate that one hold of one test shows, at the strain and time of the reference point.
 
     stress : MPa; temperature : K; rate : 1/s, the identified one times measured over identified growth of the output
-    that grows with creep, the median over the hold.
+    that grows with creep, the median over the hold; of a test without frames times measured over identified minimum
+    rate, which is `stated`.
     """
 
     test: int
     stress: float
     temperature: float
     rate: float
+    stated: bool = False
 
 
 FEWEST_FRAMES = 3
@@ -114,8 +116,11 @@ def rates_of_tests(fit: Identification, prediction: Prediction) -> list[HoldRate
     prediction : of the fitted tests, at their own nuisances.
     """
     rates = []
-    for k, history in enumerate(fit.histories):
-        output = fit.tests[k].outputs[0].output
+    for k, (history, test) in enumerate(zip(fit.histories, fit.tests, strict=True)):
+        if not test.outputs:
+            rates += _stated_rate(fit, k)
+            continue
+        output = test.outputs[0].output
         predicted = prediction.of(k)[:, prediction.outputs.index(output)]
         for stress, frames in _levels(fit, history, output):
             frames = frames & np.isfinite(predicted)
@@ -126,6 +131,16 @@ def rates_of_tests(fit: Identification, prediction: Prediction) -> list[HoldRate
                 rate = ratio * float(fit.rate(stress, history.mean_temperature, warn=False)[0])
                 rates.append(HoldRate(k, stress, history.mean_temperature, rate))
     return rates
+
+
+def _stated_rate(fit: Identification, test: int) -> list[HoldRate]:
+    """The creep rate that the minimum rate of a test without frames shows, if it has one."""
+    history, compared = fit.histories[test], fit.tests[test].minimum_rate
+    if compared is None or not compared.ratio > 0:
+        return []
+    stress, temperature = float(reference_stresses(history, fit.predictor)[0]), history.mean_temperature
+    rate = float(fit.rate(stress, temperature, warn=False)[0]) / compared.ratio
+    return [HoldRate(test, stress, temperature, rate, stated=True)]
 
 
 def _levels(fit: Identification, history: History, output: str) -> list[tuple[float, Bools]]:

@@ -181,12 +181,12 @@ def _label_tests(axes: Axes, fit: Identification, order: Sequence[int]) -> None:
 
 def _tests_to_draw(fits: Sequence[Identification], curves: Sequence[FittedCurves]) -> list[int]:
     """Positions of the tests in which the laws differ most, in noises; of one law, of its largest misfits."""
-    count = len(fits[0].tests)
-    if count <= MOST_TESTS_DRAWN:
-        return list(range(count))
-    scores = np.array([_separation(fits, curves, test) for test in range(count)])
+    with_frames = [k for k, test in enumerate(fits[0].tests) if test.outputs]
+    if len(with_frames) <= MOST_TESTS_DRAWN:
+        return with_frames
+    scores = np.array([_separation(fits, curves, test) for test in with_frames])
     chosen = np.argsort(-np.nan_to_num(scores), kind="stable")[:MOST_TESTS_DRAWN]
-    return [int(k) for k in np.sort(chosen)]
+    return [with_frames[k] for k in np.sort(chosen)]
 
 
 def _separation(fits: Sequence[Identification], curves: Sequence[FittedCurves], test: int) -> float:

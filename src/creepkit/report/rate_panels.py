@@ -43,17 +43,21 @@ def draw_rates(axes: Axes, fit: Identification, rates: Sequence[HoldRate]) -> No
         axes.plot(grid, rate, color=scale(celsius), lw=1.4, label=f"{celsius:.0f} °C")
         bounds += [float(rate.min()), float(rate.max()), float(low.min()), float(high.max())]
     shown = [r for r in rates if r.rate > SMALLEST_SHARE * min(bounds)]
-    for k, test in enumerate(shown):
-        axes.plot(
-            test.stress,
-            test.rate,
-            "o",
-            ms=4,
-            color=scale(test.temperature - ZERO_CELSIUS),
-            mec="black",
-            mew=0.4,
-            label="tests" if k == 0 else None,
-        )
+    for marker, label, tests in (
+        ("o", "tests", [r for r in shown if not r.stated]),
+        ("s", "minimum rates", [r for r in shown if r.stated]),
+    ):
+        for k, test in enumerate(tests):
+            axes.plot(
+                test.stress,
+                test.rate,
+                marker,
+                ms=4,
+                color=scale(test.temperature - ZERO_CELSIUS),
+                mec="black",
+                mew=0.4,
+                label=label if k == 0 else None,
+            )
     bounds += [r.rate for r in shown]
     set_range(axes, "x", float(grid[0]), float(grid[-1]), logarithmic=True)
     finite = [b for b in bounds if np.isfinite(b) and b > 0]
@@ -64,7 +68,7 @@ def draw_rates(axes: Axes, fit: Identification, rates: Sequence[HoldRate]) -> No
     reference = fit.reference
     axes.set_title(
         f"rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.4g} h\n"
-        "tests: identified rate × measured / identified growth",
+        "tests: identified rate × measured / identified growth or minimum rate",
         fontsize=9,
     )
 

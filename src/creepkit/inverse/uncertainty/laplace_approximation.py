@@ -24,6 +24,7 @@ from creepkit.inverse.noise_model import (
     covariance,
 )
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
+from creepkit.inverse.observation_vector import SINGLE_VALUES
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, scaled_inverse
 from creepkit.language import CreepLaw
 from creepkit.records import Nuisance
@@ -178,14 +179,13 @@ def laplace_covariance(
     prior = np.diag(np.concatenate([12.0 / bounds.width[:count] ** 2, nuisance_parameters.precision]))
     inverse_normal_matrix = scaled_inverse(np.einsum("tfp,tfq->pq", residuals.jacobian, weighted) + prior)
 
-    def meat(source: NoiseModel) -> Floats:
-        c = covariance(residuals, source)
+    def meat(c: Floats) -> Floats:
         return np.asarray(np.einsum("tfp,tfg,tgq->pq", weighted, c, weighted, optimize=True))
 
     without_rate = replace(noise_model, rate=0.0)
-    within_meat = meat(without_rate)
+    within_meat = meat(_covariance_within_tests(residuals, without_rate))
     within = inverse_normal_matrix @ (within_meat + prior) @ inverse_normal_matrix
-    between = inverse_normal_matrix @ (meat(noise_model) - within_meat) @ inverse_normal_matrix
+    between = inverse_normal_matrix @ (meat(covariance(residuals, noise_model)) - within_meat) @ inverse_normal_matrix
     determined = (residuals.jacobian[residuals.present][:, :count] != 0).any(axis=0)
     parameters = max(int(determined.sum()), 1)
     freedoms = max(tests - parameters, 1.0), max(effective_sample_size(residuals, without_rate) - parameters, 1.0)
@@ -196,6 +196,21 @@ def laplace_covariance(
     between_share = np.diag(between)[:count] / np.maximum(np.diag(between + within)[:count], 1e-300)
     mean_between_share = float(between_share[determined].sum() / parameters)
     return within + between, 1.0 / (mean_between_share**2 / freedoms[0] + (1 - mean_between_share) ** 2 / freedoms[1])
+
+
+def _covariance_within_tests(residuals: Residuals, without_rate: NoiseModel) -> Floats:
+    """(tests, observations, observations) -, without what scatters between tests.
+
+    Of a test without frames that is also the misfit of its one minimum rate and its one rupture time.
+    """
+    c, outputs = covariance(residuals, without_rate), list(without_rate.outputs)
+    single = [name for name in outputs if name in SINGLE_VALUES]
+    of_frames = residuals.present & ~np.isin(residuals.output_index, [outputs.index(name) for name in single])
+    without_misfit = without_rate
+    for name in single:
+        without_misfit = without_misfit.with_output(name, misfit=0.0)
+    has_frames = of_frames.sum(axis=1)[:, None, None] > 0
+    return c if has_frames.all() else np.where(has_frames, c, covariance(residuals, without_misfit))
 
 
 def normal_matrix(residuals: Residuals, working_noise: NoiseModel) -> Floats:

@@ -1,0 +1,176 @@
+"""Minimum creep rates of tests that have no frames, predicted as one more output, with sensitivities.
+
+The rate is the slope of the predicted curve of the leading strain between neighbouring times; its minimum lies on the
+parabola through the logarithms of three slopes, over ln t. Of a curve with a primary and a tertiary stage it is within
+0.2 % of the exact minimum, of steady creep exact, and the derivatives are those of the parabola.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from creepkit.arrays import Floats, Ints
+from creepkit.errors import FitError
+from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for
+from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, compares_minimum_rate, followed_duration
+from creepkit.language import CreepLaw
+from creepkit.records import History, NuisanceValues, Output, Prediction, Predictor, load_unit, outputs_of
+
+TIMES = np.concatenate([[0.0], np.geomspace(1e-6, 0.1, 48), np.linspace(0.1, 1.0, 25)[1:]])
+"""Times between which rates are taken, over the duration of the test: early ones for predictions that break early."""
+
+
+STRAIGHT = 1e-9
+"""Second difference of ln of three rates below which they are taken to be the same."""
+
+
+CONSTANT_LOAD = 1e-6
+"""Relative range of a load that is constant."""
+
+
+def check_minimum_rates(histories: Sequence[History], predictor: Predictor) -> None:
+    """FitError for a stated rate that cannot be predicted: no strain leads, or the load is not constant."""
+    for history in (h for h in histories if compares_minimum_rate(h)):
+        own = predictor_for(predictor, history)
+        leading = _leading_output(own)
+        if leading is None or leading.quantity != "strain":
+            known = "nothing is known of its outputs" if leading is None else f"its leading output is {leading}"
+            raise FitError(
+                f"history '{history.name}' has a minimum creep rate and no frames, which is predicted where the "
+                f"leading output is a strain; of specimen '{history.specimen}' {known}: leave the test out"
+            )
+        values = history.loading.program().values
+        if np.ptp(values) > CONSTANT_LOAD * np.abs(values).max():
+            raise FitError(
+                f"history '{history.name}' has a minimum creep rate and a load that changes from {values.min():g} to "
+                f"{values.max():g} {load_unit(history)}; give each load a test of its own"
+            )
+
+
+def with_minimum_rates(
+    prediction: Prediction,
+    predictor: Predictor,
+    law: CreepLaw,
+    theta: Floats,
+    histories: Sequence[History],
+    nuisances: NuisanceValues | None = None,
+    *,
+    sensitivities: bool = False,
+) -> Prediction:
+    """A prediction with the minimum rates of those tests that are compared by them, 1/s, as one more output.
+
+    theta : (candidates, parameters) internal values. The rate stands at the first time of its test; it is NaN where
+    nothing was predicted. sensitivities : also those that the predictor does not know itself, of one candidate.
+    """
+    tests = [k for k, history in enumerate(histories) if compares_minimum_rate(history)]
+    if not tests:
+        return prediction
+    curves = [_curve(histories[k]) for k in tests]
+    given = {key: values[:, tests] for key, values in (nuisances or {}).items()}
+    if sensitivities and len(theta) == 1:
+        predicted = predict_with_sensitivities(predictor, law, theta[0], curves, given)
+    else:
+        predicted = predict(predictor, law, theta, curves, nuisances=given, sensitivities=sensitivities)
+    columns = [predicted.outputs.index(str(_leading_output(predictor_for(predictor, h)))) for h in curves]
+    rates = _slopes(_of_outputs(predicted.values, columns), curves)
+    index, weights = _minima(rates, curves)
+    values = np.exp(_at_minimum(np.log(np.where(rates > 0, rates, np.nan)), index, weights))
+
+    def derivative(array: Floats) -> Floats:
+        """Of the minimum rates, (candidates, tests, ...), from that of the outputs, as Prediction.jacobian."""
+        relative = _slopes(_of_outputs(array, columns), curves) / np.where(rates > 0, rates, np.nan).reshape(
+            *rates.shape, *(1,) * (array.ndim - 4)
+        )
+        of_logarithm = _at_minimum(relative, index, weights)
+        return np.asarray(values.reshape(*values.shape, *(1,) * (array.ndim - 4)) * of_logarithm)
+
+    jacobian = predicted.jacobian
+    return replace(
+        prediction,
+        values=_with_output(prediction.values, tests, values),
+        outputs=(*prediction.outputs, MINIMUM_RATE_OUTPUT),
+        jacobian=None
+        if prediction.jacobian is None or jacobian is None
+        else _with_output(prediction.jacobian, tests, derivative(jacobian)),
+        nuisance_jacobian={
+            key: _with_output(array, tests, derivative(predicted.nuisance_jacobian[key]))
+            for key, array in prediction.nuisance_jacobian.items()
+        },
+    )
+
+
+def _leading_output(predictor: Predictor) -> Output | None:
+    """The output of a predictor that grows with creep; None where it names none."""
+    return next((output for output in outputs_of(predictor) if output.grows), None)
+
+
+def _curve(history: History) -> History:
+    """The test whose curve is predicted: from loading to its end, at TIMES."""
+    times = followed_duration(history) * TIMES
+    return history.replace(times=times, outputs={}, includes_elastic=False, minimum_rate=None, minimum_rate_sd=None)
+
+
+def _of_outputs(array: Floats, columns: Sequence[int]) -> Floats:
+    """(candidates, tests, times, ...) of one output of each test; array : (candidates, tests, times, outputs, ...)."""
+    return np.stack([array[:, k, :, column] for k, column in enumerate(columns)], axis=1)
+
+
+def _slopes(strains: Floats, curves: Sequence[History]) -> Floats:
+    """(candidates, tests, times - 1, ...) 1/s, slopes between times of strains (candidates, tests, times, ...)."""
+    intervals = np.stack([np.diff(h.times) for h in curves])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.diff(strains, axis=2) / intervals.reshape(*intervals.shape, *(1,) * (strains.ndim - 3)))
+
+
+def _minima(rates: Floats, curves: Sequence[History]) -> tuple[Ints, Floats]:
+    """Three neighbouring rates around each minimum, and the weights of their logarithms in it.
+
+    rates : (candidates, tests, intervals) 1/s. Returns positions (candidates, tests, 3) and weights of that shape. At
+    the beginning the minimum is the first rate; at the end the parabola is followed to the end of the test.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logarithms = np.where(rates > 0, np.log(rates), np.inf)
+    lowest, last = np.argmin(logarithms, axis=2), rates.shape[2] - 1
+    index = np.clip(lowest, 1, last - 1)[..., None] + np.array([-1, 0, 1])
+    x = np.log(np.stack([0.5 * (h.times[1:] + h.times[:-1]) for h in curves]))
+    ends = np.log([h.times[-1] for h in curves])
+    x0, x1, x2 = np.moveaxis(np.take_along_axis(np.broadcast_to(x, rates.shape), index, axis=2), 2, 0)
+    y0, y1, y2 = np.moveaxis(np.take_along_axis(logarithms, index, axis=2), 2, 0)
+    complete = np.isfinite(y0) & np.isfinite(y2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        first, second = (y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1)
+        curvature = (second - first) / (x2 - x0)
+        vertex = 0.5 * (x0 + x1) - 0.5 * first / curvature
+    straight = ~(np.abs(second - first) * (x2 - x0) > STRAIGHT)
+    at_lowest = np.take_along_axis(np.broadcast_to(x, rates.shape), lowest[..., None], axis=2)[..., 0]
+    outermost = np.where(lowest == last, ends, x2)
+    place = np.where(curvature > 0, np.clip(vertex, x0, outermost), np.where(lowest == last, ends, at_lowest))
+    place = np.where(complete & ~straight, place, at_lowest)
+    weights = np.stack(
+        [
+            (place - x1) * (place - x2) / ((x0 - x1) * (x0 - x2)),
+            (place - x0) * (place - x2) / ((x1 - x0) * (x1 - x2)),
+            (place - x0) * (place - x1) / ((x2 - x0) * (x2 - x1)),
+        ],
+        axis=-1,
+    )
+    alone = (index == lowest[..., None]).astype(float)
+    return index, np.where((complete & ~straight)[..., None], weights, alone)
+
+
+def _at_minimum(array: Floats, index: Ints, weights: Floats) -> Floats:
+    """(candidates, tests, ...) weighted sums of three intervals; array : (candidates, tests, intervals, ...)."""
+    trailing = (1,) * (array.ndim - 3)
+    three = np.take_along_axis(array, index.reshape(*index.shape, *trailing), axis=2)
+    share = weights.reshape(*weights.shape, *trailing)
+    return np.asarray(np.where(share != 0.0, share * three, 0.0).sum(axis=2))
+
+
+def _with_output(array: Floats, tests: Sequence[int], values: Floats) -> Floats:
+    """Array (candidates, tests, times, outputs, ...) with one output more, of values (candidates, tests, ...)."""
+    further = np.full((*array.shape[:3], 1, *array.shape[4:]), np.nan)
+    further[:, tests, 0, 0] = values
+    return np.concatenate([array, further], axis=3)

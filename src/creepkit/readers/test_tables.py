@@ -1,0 +1,299 @@
+"""Tables of creep tests, one row a test: stress, temperature, minimum creep rate, rupture time or run-out.
+
+    test,stress_MPa,temperature_C,min creep rate (1/h),t_r (h),heat
+    A1,120,750,2.1e-6,8200,X7
+    A2,100,750,,>10000,X7
+
+Names of columns may be spelled as COLUMN_NAMES lists them, with their unit behind `_`, `,` or `/`, or in brackets. A
+rupture time `>10000`, or a row that `ended` calls stopped, is a run-out: the test lasted so long, unbroken. Other
+columns are labels. What all rows share may stand above them as `# key: value`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+
+from creepkit.errors import HistoryError
+from creepkit.readers.assembly import assemble_without_frames
+from creepkit.readers.cell_grids import CellGrid, peek_columns, read_text_grid, table_of
+from creepkit.readers.text_tables import SourceText, TableRow, TextTable
+from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary
+from creepkit.records import History
+from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
+
+MEASURED = ("minimum_rate", "rupture")
+"""Of which a table of tests has one at least."""
+
+
+QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
+    "stress": (STRESS, ("stress", "sigma", "nominal stress", "applied stress", "initial stress", "creep stress")),
+    "temperature": (TEMPERATURE, ("temperature", "temp", "t", "test temperature", "creep temperature")),
+    "minimum_rate": (
+        RATE,
+        (
+            *("minimum rate", "min rate", "minimum creep rate", "min creep rate", "minimum strain rate", "mcr"),
+            *("steady state creep rate", "steady state rate", "secondary creep rate", "steady creep rate"),
+        ),
+    ),
+    "minimum_rate_sd": (RATE, ("minimum rate sd", "min rate sd", "minimum creep rate sd", "min creep rate sd")),
+    "rupture": (
+        TIME,
+        (
+            *("rupture", "rupture time", "time to rupture", "creep rupture time", "rupture life", "creep life"),
+            *("t r", "tr", "t rupture", "time to failure", "failure time", "life"),
+        ),
+    ),
+    "end_time": (TIME, ("end time", "duration", "test duration", "time", "test time", "time on test", "t")),
+}
+"""{quantity: its kind, and the names of a column of it in small letters}."""
+
+
+TEXTS: Mapping[str, tuple[str, ...]] = {
+    "name": ("name", "test", "test id", "test name", "test no", "test number", "id", "no", "sample", "specimen id"),
+    "ended": ("ended", "end", "end of test", "outcome", "status", "state", "result"),
+    "alloy": ("alloy", "material"),
+    "control": ("control",),
+    "specimen": ("specimen",),
+    "label heat": ("heat", "cast", "batch", "heat number", "heat no"),
+    "label laboratory": ("laboratory", "lab"),
+    "label elongation_pct": ("elongation pct", "elongation", "rupture elongation", "elongation at rupture"),
+    "label reduction_of_area_pct": ("reduction of area", "area reduction", "ra", "z", "reduction in area"),
+}
+"""{key of a history file: the names of a column of it in small letters}."""
+
+
+ENDED: Mapping[str, str] = {
+    **dict.fromkeys(("ruptured", "rupture", "broken", "failed", "failure", "fractured", "r", "f"), "ruptured"),
+    **dict.fromkeys(("stopped", "runout", "run-out", "run out", "discontinued", "interrupted", "unbroken"), "stopped"),
+    **dict.fromkeys(("censored", "running", "in progress", "unruptured", "not ruptured", "not broken"), "stopped"),
+}
+"""{word in small letters: how a test ended}."""
+
+
+UNITS: Mapping[str, str] = {
+    **dict.fromkeys(("hr", "hrs", "hour", "hours"), "h"),
+    **dict.fromkeys(("sec", "second", "seconds"), "s"),
+    **dict.fromkeys(("day", "days"), "d"),
+    **dict.fromkeys(("c", "\N{DEGREE SIGN}c", "degc", "deg c", "celsius"), "C"),
+    **dict.fromkeys(("k", "kelvin"), "K"),
+    **{"mpa": "MPa", "ksi": "ksi", "kpa": "kPa", "gpa": "GPa", "bar": "bar", "n/mm2": "MPa"},
+}
+"""{spelling in small letters: unit}, beside those of rates."""
+
+
+RUN_OUT = re.compile(r">=?|\N{GREATER-THAN OR EQUAL TO}")
+
+
+@dataclass(frozen=True)
+class RowPerTestReader:
+    """Reader of tables of minimum creep rates and of rupture times, one row a test."""
+
+    name: str
+    title: str
+    vocabulary: HeaderVocabulary = field(default_factory=HeaderVocabulary)
+
+    def accepts(self, path: Path) -> bool:
+        """Say whether `path` is such a table: a minimum rate or a rupture time beside a stress, and no strain."""
+        suffix = path.suffix.lower()
+        if suffix not in (*TEXT_SUFFIXES, *SPREADSHEET_SUFFIXES) or not path.is_file():
+            return False
+        if suffix in TEXT_SUFFIXES:
+            return _is_test_table(peek_columns(path))
+        try:
+            sheets = [grid.rows[0].cells for grid in _grids(path)]
+        except HistoryError:
+            return False
+        return any(_is_test_table(names) for names in sheets) and not any(_has_frames(names) for names in sheets)
+
+    def read(self, path: Path) -> list[History]:
+        """Return one history a row, in the order of the rows; of a spreadsheet those of all its tables of tests."""
+        grids = [grid for grid in _grids(path) if not grid.sheet or _is_test_table(grid.rows[0].cells)]
+        places: dict[str, str] = {}
+        histories = []
+        for table in map(table_of, grids):
+            keys = _keys(table)
+            for row in table.rows:
+                history, place = self._history(table, row, keys), table.location(row.line)
+                if history.name in places:
+                    raise HistoryError(
+                        f"{place}: test '{history.name}' already stands in {places[history.name]}; give each row its "
+                        "own name"
+                    )
+                places[history.name] = place
+                histories.append(history)
+        return histories
+
+    def _history(self, table: TextTable, row: TableRow, keys: Sequence[str]) -> History:
+        location = table.location(row.line)
+        cells = {keys[table.columns.index(name)]: entry for name, entry in table.entries(row).items()}
+        entries = {**table.header, **_with_end(cells, location)}
+        name = f"{table.sheet or table.path.stem} {row.line}"
+        where = f"sheet {table.sheet}, " if table.sheet else ""
+        source = f"{table.path} ({where}{cells['name'].text if 'name' in cells else f'line {row.line}'})"
+        return assemble_without_frames(name, entries, self.vocabulary, location=location, source=source)
+
+
+TEST_TABLE = RowPerTestReader(
+    "test-table", "one row a test: stress, temperature, and minimum creep rate or rupture time, with run-outs"
+)
+
+
+TEXT_SUFFIXES, SPREADSHEET_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc"), (".xlsx", ".xlsm")
+
+
+def _grids(path: Path) -> list[CellGrid]:
+    """The cells of a text file, or of the sheets of a spreadsheet."""
+    if path.suffix.lower() not in SPREADSHEET_SUFFIXES:
+        return [read_text_grid(path)]
+    from creepkit.readers.spreadsheets import read_sheets
+
+    return read_sheets(path)
+
+
+def _is_test_table(names: Sequence[str]) -> bool:
+    keys = [key_of_column(name)[0] for name in names]
+    return "stress" in keys and any(name in keys for name in MEASURED) and not _has_frames(names)
+
+
+def _has_frames(names: Sequence[str]) -> bool:
+    """Whether a column is a strain, and no rate of it."""
+    words = [set(_words(name).split()) for name in names]
+    return any("strain" in one and "rate" not in one for one in words)
+
+
+def key_of_column(written: str) -> tuple[str, str]:
+    """The quantity, or key, that the name of a column means, and its unit; ("", "") where it means none."""
+    name, unit = _split(written)
+    for quantity, (kind, names) in QUANTITIES.items():
+        if name in names and unit in kind.units:
+            return quantity, unit
+    meant = [quantity for quantity, (_, names) in QUANTITIES.items() if name in names]
+    if meant:
+        return meant[0], unit
+    whole = _words(written)
+    texts = [key for key, names in TEXTS.items() if whole in names or (name in names and unit in ("pct", "%"))]
+    return (texts[0], "") if texts else ("", "")
+
+
+def _keys(table: TextTable) -> list[str]:
+    """The key of each column in a history file; HistoryError for units and names that are not understood."""
+    location, keys = table.location(table.columns_line), list[str]()
+    for written in table.columns:
+        quantity, unit = key_of_column(written)
+        if quantity in QUANTITIES:
+            QUANTITIES[quantity][0].unit(unit, location, written)
+            quantity = f"{quantity}_{unit}"
+        elif not quantity:
+            _refuse_misspelt(written, location)
+            quantity = written if written.startswith(("label ", "geometry ")) else f"label {written}"
+        first = next((k for k, key in enumerate(keys) if _quantity(key) == _quantity(quantity)), None)
+        if first is not None:
+            raise HistoryError(f"{location}: '{table.columns[first]}' and '{written}' mean the same; keep one of them")
+        key_in_header = next((key for key in table.header if _quantity(key) == _quantity(quantity)), None)
+        if key_in_header is not None:
+            place = table.header[key_in_header].location
+            raise HistoryError(f"{place}: '{key_in_header}' is also a column, '{written}'; keep one of them")
+        keys.append(quantity)
+    return keys
+
+
+def _quantity(key: str) -> str:
+    """The quantity of a key, without its unit; other keys as they are."""
+    found = max(
+        (q for q in CONDITION_KINDS.keys() | QUANTITIES if key == q or key.startswith(f"{q}_")), key=len, default=""
+    )
+    return found or key
+
+
+def _refuse_misspelt(written: str, location: str) -> None:
+    name = _split(written)[0]
+    known = {one: key for key, (_, names) in QUANTITIES.items() for one in names}
+    known |= {one: key for key, names in TEXTS.items() for one in names}
+    near = get_close_matches(name, [one for one in known if len(one) > 3], 1, cutoff=0.8)
+    if near:
+        raise HistoryError(
+            f"{location}: column '{written}' is not understood; did you mean '{near[0]}'? A label is written "
+            f"'label {written}'"
+        )
+
+
+def _with_end(cells: Mapping[str, SourceText], location: str) -> dict[str, SourceText]:
+    """The entries of a row, its run-out as the time at which it was stopped."""
+    entries = dict(cells)
+    stated = entries.pop("ended", None)
+    ended = ENDED.get(stated.text.casefold(), "") if stated is not None else ""
+    if stated is not None and not ended:
+        words = ", ".join(dict.fromkeys((*dict.fromkeys(ENDED.values()), *ENDED)))
+        raise HistoryError(f"{location}: the test ended '{stated.text}'; allowed: {words}")
+    key = next((key for key in entries if _quantity(key) == "rupture"), None)
+    if key is not None:
+        time = entries[key]
+        word = ENDED.get(time.text.casefold(), "")
+        run_out = RUN_OUT.match(time.text)
+        if run_out and ended == "ruptured":
+            raise HistoryError(f"{location}: '{time.text}' is a time without rupture, and the test ruptured; keep one")
+        if word:  # the word stands in the place of the time
+            del entries[key]
+            ended = ended or word
+        elif run_out or ended == "stopped":
+            del entries[key]
+            text = time.text[run_out.end() :].strip() if run_out else time.text
+            taken = next((other for other in entries if _quantity(other) == "end_time"), None)
+            if taken is not None and entries[taken].text != text:
+                raise HistoryError(
+                    f"{location}: it was stopped at '{time.text}' and at '{entries[taken].text}'; keep one"
+                )
+            if taken is None:
+                entries[f"end_time_{key.rpartition('_')[2]}"] = SourceText(text, location)
+            ended = "stopped"
+    ruptures = any(_quantity(key) == "rupture" for key in entries)
+    if ended == "ruptured" and not ruptures:
+        # A column of durations says when it broke.
+        duration = next((other for other in entries if _quantity(other) == "end_time"), None)
+        if duration is not None:
+            entries[f"rupture_{duration.rpartition('_')[2]}"] = entries.pop(duration)
+    elif ruptures:
+        entries = {key: entry for key, entry in entries.items() if _quantity(key) != "end_time"}
+    if ended == "stopped":
+        entries["ended"] = SourceText("stopped", location)
+    return entries
+
+
+def _split(written: str) -> tuple[str, str]:
+    """Name in small letters with single blanks, and unit as creepkit spells it, "" for none."""
+    text = " ".join(written.split())
+    if match := re.fullmatch(r"([^(\[]*)[(\[]([^)\]]*)[)\]]", text):
+        return _words(match[1]), _unit(match[2])
+    for separator in (",", " in ", "_", " ", "/"):
+        for k in range(1, text.count(separator) + 1):
+            parts = text.split(separator)
+            name, unit = separator.join(parts[:k]), separator.join(parts[k:])
+            if name and _is_unit(unit):
+                return _words(name), _unit(unit)
+    return _words(text), ""
+
+
+def _words(name: str) -> str:
+    return " ".join(re.sub(r"[_\-.]+", " ", name.strip(" /,_")).casefold().split())
+
+
+def _is_unit(text: str) -> bool:
+    return any(_unit(text) in kind.units for kind, _ in QUANTITIES.values()) or _unit(text) == "pct"
+
+
+def _unit(text: str) -> str:
+    """A unit as creepkit spells it; the text where it is none."""
+    plain = text.strip().casefold()
+    if match := re.fullmatch(r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:/|per )?\s*([a-z]+)(?:\^?-1)?", plain):
+        share = "pct" if match[1] in ("%", "pct", "percent") else "1"
+        time = UNITS.get(match[2], match[2])
+        is_rate = "/" in plain.removeprefix(match[1]) or "per" in plain or plain.endswith("-1")
+        if is_rate and time in TIME.units:
+            return f"{share}/{time}"
+    if plain in ("%", "pct", "percent"):
+        return "pct"
+    return UNITS.get(plain, text.strip())
