@@ -34,7 +34,16 @@ def rupture_text(assessment: RuptureAssessment) -> str:
         head,
         assessment.verdict,
         "",
-        *_aligned(("method", "weight", f"{assessment.settings.criterion.upper().replace('AICC', 'AICc')} - best", "scatter of a test", "between heats"), _method_rows(assessment)),
+        *_aligned(
+            (
+                "method",
+                "weight",
+                f"{assessment.settings.criterion.upper().replace('AICC', 'AICc')} - best",
+                "scatter of a test",
+                "between heats",
+            ),
+            _method_rows(assessment),
+        ),
         *(f"{name}: not ranked, for {why}" for name, why in assessment.rejected.items()),
         "",
         *_constants(best),
@@ -84,16 +93,22 @@ def _constants(fit: RuptureFit) -> list[str]:
     head = f"{fit.name}: {METHODS[fit.method].equation}{given}"
     return [
         head,
-        *(
-            f"  {p.name} = {p.value:.5g} [{p.low:.5g}, {p.high:.5g}] {p.unit}".rstrip()
-            for p in fit.parameters
-        ),
+        *(f"  {p.name} = {p.value:.5g} [{p.low:.5g}, {p.high:.5g}] {p.unit}".rstrip() for p in fit.parameters),
     ]
 
 
 def _strength_lines(assessment: RuptureAssessment) -> list[str]:
     level = f"{100 * assessment.settings.level:g} %"
-    heads = ("strength, MPa", "temperature", "time, h", "value", f"{level} of the mean", "of a new heat", "of one test", "")
+    heads = (
+        "strength, MPa",
+        "temperature",
+        "time, h",
+        "value",
+        f"{level} of the mean",
+        "of a new heat",
+        "of one test",
+        "",
+    )
     shown = [one for one in assessment.strengths if one.method == "average"]
     if assessment.relation is not None:
         shown += [one for one in assessment.strengths if one.method == assessment.relation.times.method]
@@ -106,7 +121,9 @@ def _strength_lines(assessment: RuptureAssessment) -> list[str]:
             _pair(one.mean),
             _pair(one.heat),
             _pair(one.test),
-            "; ".join(text for text in (one.extrapolation and f"extrapolated: {one.extrapolation}", one.reason) if text),
+            "; ".join(
+                text for text in (one.extrapolation and f"extrapolated: {one.extrapolation}", one.reason) if text
+            ),
         )
         for one in shown
     ]
@@ -126,11 +143,7 @@ def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
         "tests": len(assessment.tests),
         "run_outs": int(assessment.tests.censored.sum()),
         "methods": [
-            {
-                **_fit_to_json(one.fit),
-                f"{assessment.settings.criterion}_excess": one.excess,
-                "weight": one.weight,
-            }
+            {**_fit_to_json(one.fit), f"{assessment.settings.criterion}_excess": one.excess, "weight": one.weight}
             for one in assessment.ranked
         ],
         "rejected": dict(assessment.rejected),

@@ -122,7 +122,9 @@ def _draw_isotherm(
     limit = float(assessment.tensile(np.array([temperature]))[0])
     stress = np.geomspace(stresses[0], min(stresses[1], 0.99 * limit if np.isfinite(limit) else np.inf), POINTS)
     at = _points(stress, temperature, limit)
-    if any(METHODS[m.method].needs == "tensile_strength" for m, _ in models if hasattr(m, "method")) and not np.isfinite(limit):
+    if any(
+        METHODS[m.method].needs == "tensile_strength" for m, _ in models if hasattr(m, "method")
+    ) and not np.isfinite(limit):
         return
     tail = 0.5 * (1.0 - assessment.settings.level)
     for of, alpha in (("test", 0.13), ("mean", 0.35)):
@@ -138,9 +140,15 @@ def _draw_isotherm(
     if shown.any():
         k = int(np.flatnonzero(shown)[0])
         axes.annotate(
-            f"{temperature - ZERO_CELSIUS:.0f} °C", (times[k], stress[k]), fontsize=8, color=colour, xytext=(3, 3),
-            textcoords="offset points", fontweight="bold",
-        )  # fmt: skip
+            f"{temperature - ZERO_CELSIUS:.0f} °C",
+            (times[k], stress[k]),
+            xytext=(-3, 5),
+            textcoords="offset points",
+            ha="right",
+            fontsize=8,
+            fontweight="bold",
+            color=colour,
+        )
 
 
 def _wide(hours: tuple[float, float]) -> tuple[float, float]:
@@ -187,7 +195,9 @@ def _parameter(assessment: RuptureAssessment, at: Conditions, log_time: Floats) 
     if fit.method == "larson-miller":
         return at.temperature * (values["C"] + log_time) / 1000.0, f"T ({values['C']:.2f} + log t) / 1000, K, h"
     if fit.method in ("orr-sherby-dorn", "wilshire"):
-        return log_time - values["Q"] / (THERMAL * at.temperature), f"log t - {values['Q'] / 1000:.0f} kJ/mol / (R T ln 10), h"
+        return log_time - values["Q"] / (
+            THERMAL * at.temperature
+        ), f"log t - {values['Q'] / 1000:.0f} kJ/mol / (R T ln 10), h"
     if fit.method == "manson-haferd":
         t_a, T_a = values["log10 t_a"], values["T_a"]
         return (log_time - t_a) / (at.temperature - T_a), f"(log t - {t_a:.2f}) / (T - {T_a:.0f} K), h"
@@ -200,7 +210,14 @@ def _draw_predicted(axes: Axes, assessment: RuptureAssessment, colours: dict[flo
     for censored, marker in ((False, "o"), (True, RUN_OUT)):
         for k in np.flatnonzero(tests.censored == censored):
             colour = _colour_of(tests.temperature[k], colours)
-            axes.plot(10.0 ** tests.log_time[k], 10.0 ** predicted[k], ls="", marker=marker, ms=8 if censored else 3.5, color=colour)
+            axes.plot(
+                10.0 ** tests.log_time[k],
+                10.0 ** predicted[k],
+                ls="",
+                marker=marker,
+                ms=8 if censored else 3.5,
+                color=colour,
+            )
     both = np.concatenate([tests.log_time, predicted])
     low, high = 10.0 ** (both.min() - 0.1), 10.0 ** (both.max() + 0.1)
     line = np.array([low, high])
@@ -208,7 +225,7 @@ def _draw_predicted(axes: Axes, assessment: RuptureAssessment, colours: dict[flo
     for factor in (BAND_FACTOR, 1.0 / BAND_FACTOR):
         axes.plot(line, factor * line, ":", color="black", lw=0.8)
     for which in ("x", "y"):
-        set_range(axes, which, low, high, logarithmic=True, most=6)  # type: ignore[arg-type]
+        set_range(axes, which, low, high, logarithmic=True, most=6)
     axes.set_xlabel("measured, h (dotted: a factor of 2)", fontsize=8)
     axes.set_ylabel("predicted, h", fontsize=8)
     axes.set_title(f"{fit.name}: predicted against measured", fontsize=9)

@@ -23,13 +23,7 @@ from creepkit.rupture_assessment.assessment import (
     check_temperatures,
     interpolated,
 )
-from creepkit.rupture_assessment.checks import (
-    AssessmentCheck,
-    effectiveness,
-    physical_realism,
-    repeatability,
-    turning,
-)
+from creepkit.rupture_assessment.checks import AssessmentCheck, effectiveness, physical_realism, repeatability, turning
 from creepkit.rupture_assessment.fitting import RuptureFit, conditions_of, fit_method
 from creepkit.rupture_assessment.methods import METHODS, MINIMUM_RATE, MONKMAN_GRANT
 from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation, fit_relation
@@ -64,11 +58,12 @@ def rupture(
     """Assess rupture tests: every method under one censored likelihood, ranked, with strengths and checks.
 
     tests : histories with a rupture time, or stopped unruptured, with or without frames, of one stress and temperature
-        each; labels heat and laboratory where they are known, and tensile_strength_MPa and minimum rates for the methods
-        that need them.
+        each; labels heat and laboratory where they are known, and tensile_strength_MPa and minimum rates for the
+        methods that need them.
     methods : of "larson-miller", "orr-sherby-dorn", "manson-haferd", "wilshire", "monkman-grant", and "isothermal" for
         tests of one temperature; by default all that the tests allow.
-    hours, temperatures : h and K, at which strengths are stated; by default 1e3, 1e4 and 1e5 h at the temperatures tested.
+    hours, temperatures : h and K, at which strengths are stated; by default 1e3, 1e4 and 1e5 h at the temperatures
+    tested.
     tensile_strength : {temperature in K: MPa}, interpolated between; by default as the tests state it.
     """
     chosen = settings or RuptureSettings()
@@ -118,10 +113,12 @@ def rupture(
 def _methods(
     methods: Sequence[str] | str | None, tests: RuptureTests, tensile: Tensile, settings: RuptureSettings
 ) -> tuple[list[str], bool]:
-    """Methods that are ranked, and whether Monkman-Grant's was asked for by name; FitError for what cannot be fitted."""
+    """Methods that are ranked, and whether Monkman-Grant's was asked for; FitError for what cannot be fitted."""
     known = [name for name in METHODS if name != MINIMUM_RATE.name]
     strengths = tensile(tests.temperature)
-    has_tensile = bool(np.isfinite(np.where(np.isfinite(tests.tensile_strength), tests.tensile_strength, strengths)).all())
+    has_tensile = bool(
+        np.isfinite(np.where(np.isfinite(tests.tensile_strength), tests.tensile_strength, strengths)).all()
+    )
     if methods is None:
         names = ["isothermal"] if tests.isothermal else [*THERMAL_METHODS]
         if has_tensile and (not tests.isothermal or "Q" in settings.fixed.get("wilshire", {})):
@@ -142,8 +139,8 @@ def _methods(
             missing = [T for T in tests.isotherms if not np.isfinite(tensile(np.array([T]))[0])]
             where = f" at {', '.join(celsius(T) for T in missing)}" if missing else ""
             raise FitError(
-                f"wilshire needs the tensile strength{where}: give tensile_strength={{temperature in K: MPa}}, or a label "
-                "tensile_strength_MPa of each test"
+                f"wilshire needs the tensile strength{where}: give tensile_strength={{temperature in K: MPa}}, or a "
+                "label tensile_strength_MPa of each test"
             )
         if name == "isothermal" and not tests.isothermal:
             raise FitError(f"isothermal is for tests of one temperature; these have {len(tests.isotherms)}: select one")
@@ -264,4 +261,6 @@ def _checks(
 
 def _unknown(assessment: RuptureAssessment, temperature: float) -> bool:
     """Whether no strength can be stated at a temperature."""
-    return bool(assessment.strengths_at([1.0], temperature, assessment.best.name)[0].reason.startswith(("no tensile", "all")))
+    return bool(
+        assessment.strengths_at([1.0], temperature, assessment.best.name)[0].reason.startswith(("no tensile", "all"))
+    )

@@ -1,4 +1,4 @@
-"""RuptureAssessment: fitted methods with weights, strengths with bounds, checks, and a verdict no stronger than they are."""
+"""RuptureAssessment: methods with weights, strengths with bounds, checks, and a verdict no stronger than they are."""
 
 from __future__ import annotations
 
@@ -93,7 +93,8 @@ class RuptureAssessment(Presentable):
     ranked : methods, each with every degree that was tried, best first. rejected : {method: why it is not ranked}.
     relation : Monkman-Grant's, where rates are known; it is not ranked, for it uses rates that the others do not.
     strengths : by the average, by the best fit of each method, and by the relation.
-    checks : post-assessment checks of the best fit. tensile_temperatures, tensile_strengths : K and MPa, to interpolate.
+    checks : post-assessment checks of the best fit. tensile_temperatures, tensile_strengths : K and MPa, to
+    interpolate.
     """
 
     tests: RuptureTests
@@ -194,7 +195,15 @@ class RuptureAssessment(Presentable):
         if reason:
             return [
                 StrengthEstimate(
-                    h, temperature, method, None, unknown, unknown, unknown, extrapolation(self.tests, h, temperature, None), reason
+                    h,
+                    temperature,
+                    method,
+                    None,
+                    unknown,
+                    unknown,
+                    unknown,
+                    extrapolation(self.tests, h, temperature, None),
+                    reason,
                 )
                 for h in hours
             ]
@@ -218,9 +227,7 @@ class RuptureAssessment(Presentable):
         at = Conditions(s, T, self.tensile(T), np.full(1, np.nan))
         times = mixed(self.models(method), at, of)
         tail = 0.5 * (1.0 - self.settings.level)
-        median, low, high = (
-            SECONDS_PER_HOUR * 10.0 ** float(times.quantile(p)[0]) for p in (0.5, tail, 1.0 - tail)
-        )
+        median, low, high = (SECONDS_PER_HOUR * 10.0 ** float(times.quantile(p)[0]) for p in (0.5, tail, 1.0 - tail))
         return median, low, high
 
     def plot(self, path: str | Path | None = None) -> Figure:

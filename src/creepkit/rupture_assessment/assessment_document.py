@@ -41,9 +41,7 @@ CODEC = RecordCodec(
 
 def write_assessment(assessment: RuptureAssessment, path: str | Path) -> Path:
     """Write the assessment; the file is whole or absent."""
-    return write_json(
-        {**ASSESSMENT.heading, **CODEC.to_json(assessment)}, Path(path), ASSESSMENT.kind
-    )
+    return write_json({**ASSESSMENT.heading, **CODEC.to_json(assessment)}, Path(path), ASSESSMENT.kind)
 
 
 def read_assessment(path: str | Path) -> RuptureAssessment:

@@ -1,18 +1,22 @@
-"""Post-assessment checks of a rupture assessment, as the recommendations of the European Creep Collaborative Committee ask.
+"""Post-assessment checks of a rupture assessment, as the European Creep Collaborative Committee (ECCC) asks for them.
 
-ECCC Recommendations, Volume 5, Part I (Holdsworth et al., first 1996), with PD 6605 (1998) beside them, name three groups:
+ECCC Recommendations, Volume 5, Part I (Holdsworth et al., first 1996), with PD 6605 (1998) beside them, name three
+groups:
 
-1. physical realism: isotherms fit the tests by eye (a plot), do not cross, come together or turn back between 10 h and 1e6 h
-   at stresses from 0.8 of the lowest tested, and -d log t / d log s is at least 1.5 there;
-2. effectiveness within the tests: of log t* (predicted) over log t, for all tests and for each main temperature, at most 1.5 %
-   of the tests lie beyond 2.5 standard deviations of the residuals, and the mean line has a slope of 0.78 to 1.22 and
-   stays within a factor of 2 from 100 h to 100,000 h (here: over the range of the tests, where that is shorter);
-3. repeatability: without a random half of the tests that lasted longer than a tenth of the longest, and without the tenth of
-   the tests at the lowest stresses of each main temperature, the strength at the longest time changes by at most 10 %.
+1. physical realism: isotherms fit the tests by eye (a plot), do not cross, come together or turn back between 10 h and
+   1e6 h at stresses from 0.8 of the lowest tested, and -d log t / d log s is at least 1.5 there;
+2. effectiveness within the tests: of log t* (predicted) over log t, for all tests and for each main temperature, at
+   most 1.5 % of the tests lie beyond 2.5 standard deviations of the residuals, and the mean line has a slope of 0.78 to
+   1.22 and stays within a factor of 2 from 100 h to 100,000 h (here: over the range of the tests, where that is
+   shorter);
+3. repeatability: without a random half of the tests that lasted longer than a tenth of the longest, and without the
+   tenth of the tests at the lowest stresses of each main temperature, the strength at the longest time changes by at
+   most 10 %.
 
-Here the longest time is that asked for (ECCC: 300,000 h), the stresses of group 1 start at 0.9 of the lowest tested or at the
-strength at the longest time, whichever is lower, and the main temperatures have a tenth of the tests each, or are the
-lowest and the highest. Of few tests one may always lie beyond 2.5 standard deviations. Run-outs are left out of group 2, since their rupture times are not known.
+Here the longest time is that asked for (ECCC: 300,000 h), the stresses of group 1 start at 0.9 of the lowest tested or
+at the strength at the longest time, whichever is lower, and the main temperatures have a tenth of the tests each, or
+are the lowest and the highest. Of few tests one may always lie beyond 2.5 standard deviations. Run-outs are left out of
+group 2, since their rupture times are not known.
 """
 
 from __future__ import annotations
@@ -61,7 +65,7 @@ class AssessmentCheck:
 
 
 def turning(fit: RuptureFit, tests: RuptureTests, tensile: Callable[[Floats], Floats]) -> str:
-    """Where, between the lowest and highest stress tested at a temperature, the time does not fall with stress; or ""."""
+    """Where the time does not fall with stress within the stresses tested at a temperature; "" where it does."""
     for T in tests.isotherms:
         near = np.abs(tests.temperature - T) <= ISOTHERMAL_RANGE
         low, high = float(tests.stress[near].min()), float(tests.stress[near].max())
@@ -86,7 +90,11 @@ def physical_realism(
     stress = np.geomspace(lowest, float(tests.stress.max()), STRESS_POINTS)
     low, high = float(tests.temperature.min()), float(tests.temperature.max())
     thermal = METHODS[fit.method].thermal and high > low
-    T = np.arange(low - ISOTHERM_STEP, high + ISOTHERM_STEP + 1.0, ISOTHERM_STEP) if thermal else np.array([0.5 * (low + high)])
+    T = (
+        np.arange(low - ISOTHERM_STEP, high + ISOTHERM_STEP + 1.0, ISOTHERM_STEP)
+        if thermal
+        else np.array([0.5 * (low + high)])
+    )
     known = np.isfinite(tensile(T)) if METHODS[fit.method].needs == "tensile_strength" else np.ones(T.size, bool)
     T = T[known]
     times = np.array([fit.location(_isotherm(stress, float(t), tensile)) for t in T])
@@ -97,7 +105,9 @@ def physical_realism(
     row, column = np.unravel_index(int(np.argmin(slopes)), slopes.shape)
     least, where = float(slopes[row, column]), f"{celsius(float(T[row]))}, {stress[column]:.3g} MPa"
     checks = [
-        AssessmentCheck("isotherms do not turn back", bool(least > 0), f"-d log t / d log s at least {least:.2f}, at {where}"),
+        AssessmentCheck(
+            "isotherms do not turn back", bool(least > 0), f"-d log t / d log s at least {least:.2f}, at {where}"
+        ),
         AssessmentCheck(
             "isotherms are steep enough",
             bool(least >= LEAST_SLOPE),
@@ -107,7 +117,8 @@ def physical_realism(
     if T.size > 1:
         gaps = np.where(inside[1:] & inside[:-1], times[:-1] - times[1:], np.inf)
         row, column = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
-        text = f"a step of {ISOTHERM_STEP:g} K shortens the time by a factor of at least {10.0 ** float(gaps[row, column]):.3g}"
+        factor = 10.0 ** float(gaps[row, column])
+        text = f"a step of {ISOTHERM_STEP:g} K shortens the time by a factor of at least {factor:.3g}"
         checks.append(
             AssessmentCheck(
                 "isotherms do not cross",
@@ -138,7 +149,11 @@ def _predicted_against_measured(name: str, predicted: Floats, measured: Floats) 
     outside = int((np.abs(predicted - measured) > OUTSIDE_DEVIATIONS * deviation).sum())
     ends = np.clip(np.log10(BAND_HOURS), measured.min(), measured.max())
     departure = 10.0 ** float(np.abs(constant + (slope - 1.0) * ends).max())
-    passed = SLOPE_RANGE[0] <= slope <= SLOPE_RANGE[1] and departure <= BAND_FACTOR and outside <= max(OUTSIDE_SHARE * measured.size, 1)
+    passed = (
+        SLOPE_RANGE[0] <= slope <= SLOPE_RANGE[1]
+        and departure <= BAND_FACTOR
+        and outside <= max(OUTSIDE_SHARE * measured.size, 1)
+    )
     found = (
         f"slope {slope:.2f} (allowed: {SLOPE_RANGE[0]} to {SLOPE_RANGE[1]}), mean line within a factor {departure:.2f} "
         f"(2), {outside} of {measured.size} beyond {OUTSIDE_DEVIATIONS} standard deviations (1.5 %, or one)"
@@ -179,12 +194,7 @@ def repeatability(
 
 
 def _changed(
-    name: str,
-    tests: RuptureTests,
-    places: Floats,
-    original: Sequence[float | None],
-    strengths: Strengths,
-    hours: float,
+    name: str, tests: RuptureTests, places: Floats, original: Sequence[float | None], strengths: Strengths, hours: float
 ) -> AssessmentCheck:
     kept = np.ones(len(tests), bool)
     kept[np.asarray(places, int)] = False

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -21,6 +23,9 @@ GRADIENT_STEP, HESSIAN_STEP = 1e-5, 3e-4
 
 CURVATURES = np.linspace(-0.98, 0.98, 41)
 """Of Manson-Haferd's k tried as starts, between the values at which isotherms of the tests would meet."""
+
+NEWTON_STEPS = 6
+"""After the quasi-Newton method: to the last digits."""
 
 LEAST_INDEPENDENCE = 1e-9
 """Smallest singular value of the scaled functions of a method at which its coefficients are determined."""
@@ -47,8 +52,8 @@ class RuptureFit:
     """One method with its estimates.
 
     coefficients : (coefficients,), curvature : Manson-Haferd's k (0 elsewhere), of the basis of the method.
-    scale : of log10 of the times of one heat; a standard deviation for lognormal times. scatter : {group: standard deviation
-    of its effect}. levels : {group: how many}.
+    scale : of log10 of the times of one heat; a standard deviation for lognormal times. scatter : {group: standard
+    deviation of its effect}. levels : {group: how many}.
     covariance : of coefficients, curvature where the method has one, scale and scatters, by observed information,
     with the correction of `freedom` below.
     scale_corrected, scatter_corrected : with which predictions are made: scale^2 n / (n - p), scatter^2 h / (h - 1).
@@ -116,8 +121,8 @@ class RuptureFit:
     def log_time(self, at: Conditions, of: str) -> LogTimeDistribution:
         """Distribution of log10 of a time in hours.
 
-        of : "mean", the median time of the average heat, which only the estimates make uncertain; "heat", the median time
-        of a new heat (and laboratory); "test", the time of one test of it.
+        of : "mean", the median time of the average heat, which only the estimates make uncertain; "heat", the median
+        time of a new heat (and laboratory); "test", the time of one test of it.
         """
         median, derivatives = self._location(at)
         estimates = np.einsum("pi,ij,pj->p", derivatives, self.covariance, derivatives)
@@ -140,6 +145,10 @@ class RuptureFit:
         return np.asarray(np.maximum(total**2 / np.maximum(parts, 1e-300), 1.0))
 
 
+Cost = Callable[[Floats], Floats]
+"""Negative log-likelihoods (candidates,) of estimates (candidates, estimates)."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Scaled:
     """The problem in coordinates of order one: mean = offset + U c + k V c, with U orthogonal."""
@@ -152,7 +161,19 @@ class _Scaled:
 
     @property
     def location_count(self) -> int:
-        return self.linear.shape[1] + (self.bilinear is not None)
+        return int(self.linear.shape[1]) + (self.bilinear is not None)
+
+    def unit(self, scale: float) -> Floats:
+        """(estimates,) steps of one likelihood: of coefficients, Manson-Haferd's k, ln of the scale, and scatters."""
+        unit = np.full(self.location_count + 1 + len(self.times.members), scale)
+        unit[self.location_count] = 1.0
+        if self.bilinear is not None:
+            unit[self.location_count - 1] = 1.0 / max(float(np.abs(self.bilinear).max()), 1e-12)
+        return unit
+
+    def about(self, start: Floats, unit: Floats) -> Cost:
+        """The cost about a point, in units of each coordinate."""
+        return lambda candidates: self.cost(start + unit * candidates)
 
     def mean(self, candidates: Floats) -> Floats:
         count = self.linear.shape[1]
@@ -169,23 +190,22 @@ class _Scaled:
         value = -self.times.log_likelihood(self.mean(candidates), scale, scatter)
         return np.where(np.isfinite(value), value, 1e30)
 
-    def gradient(self, point: Floats) -> Floats:
-        steps = GRADIENT_STEP * np.eye(point.size)
-        values = self.cost(np.concatenate([point + steps, point - steps]))
-        return np.asarray((values[: point.size] - values[point.size :]) / (2.0 * GRADIENT_STEP))
 
-    def hessian(self, point: Floats) -> Floats:
-        size, steps = point.size, HESSIAN_STEP * np.eye(point.size)
-        first, second = np.tril_indices(size)
-        values = self.cost(
-            np.concatenate(
-                [point + a * steps[first] + b * steps[second] for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
-            )
-        )
-        plus_plus, plus_minus, minus_plus, minus_minus = values.reshape(4, -1)
-        matrix = np.zeros((size, size))
-        matrix[first, second] = (plus_plus - plus_minus - minus_plus + minus_minus) / (4.0 * HESSIAN_STEP**2)
-        return matrix + np.tril(matrix, -1).T
+def _gradient(cost: Cost, point: Floats) -> Floats:
+    steps = GRADIENT_STEP * np.eye(point.size)
+    values = cost(np.concatenate([point + steps, point - steps]))
+    return np.asarray((values[: point.size] - values[point.size :]) / (2.0 * GRADIENT_STEP))
+
+
+def _hessian(cost: Cost, point: Floats) -> Floats:
+    size, steps = point.size, HESSIAN_STEP * np.eye(point.size)
+    first, second = np.tril_indices(size)
+    signs = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+    values = cost(np.concatenate([point + a * steps[first] + b * steps[second] for a, b in signs]))
+    plus_plus, plus_minus, minus_plus, minus_minus = values.reshape(4, -1)
+    matrix = np.zeros((size, size))
+    matrix[first, second] = (plus_plus - plus_minus - minus_plus + minus_minus) / (4.0 * HESSIAN_STEP**2)
+    return np.asarray(matrix + np.tril(matrix, -1).T)
 
 
 def conditions_of(tests: RuptureTests, tensile: Callable[[Floats], Floats]) -> Conditions:
@@ -238,7 +258,7 @@ def _scaled(method: RuptureMethod, basis: Basis, times: GroupedTimes, ruptured: 
 def _start(problem: _Scaled, tests: RuptureTests) -> Floats:
     """Least squares, run-outs taken as broken; Manson-Haferd's k from a line of values."""
     target = problem.times.log_time - problem.offset
-    best: tuple[float, Floats, float] | None = None
+    best: tuple[float, Any, float] | None = None
     warmer = tests.temperature - tests.temperature.mean()
     for share in CURVATURES if problem.bilinear is not None else (0.0,):
         reach = -warmer.min() if share > 0 else warmer.max()
@@ -256,24 +276,18 @@ def _start(problem: _Scaled, tests: RuptureTests) -> Floats:
 
 def _minimum(problem: _Scaled, start: Floats) -> Floats:
     """By a quasi-Newton method, then Newton steps until they end; FitError where the scatter vanishes."""
-    # The step of differences must suit every coordinate: those of effects and of k are scaled to order one.
-    unit = np.ones(start.size)
-    location = problem.location_count
-    if problem.bilinear is not None:
-        unit[location - 1] = 1.0 / max(float(np.abs(problem.bilinear).max()), 1e-12)
-    scale = float(np.exp(start[location]))
-    unit[: problem.linear.shape[1]] = scale
-    unit[location + 1 :] = scale
-    scaled = _InUnits(problem, start, unit)
-    result = minimize(
-        scaled.cost_at, np.zeros(start.size), jac=scaled.gradient, method="BFGS", options={"gtol": 1e-5, "maxiter": 300}
-    )
-    point = result.x
-    for _ in range(6):
-        gradient, hessian = scaled.gradient(point), scaled.hessian(point)
-        values, vectors = np.linalg.eigh(hessian)
+    unit, location = problem.unit(float(np.exp(start[problem.location_count]))), problem.location_count
+    cost = problem.about(start, unit)
+
+    def value(point: Floats) -> float:
+        return float(cost(point[None])[0])
+
+    options = {"gtol": 1e-5, "maxiter": 300}
+    point = minimize(value, np.zeros(start.size), jac=partial(_gradient, cost), method="BFGS", options=options).x
+    for _ in range(NEWTON_STEPS):
+        gradient, (values, vectors) = _gradient(cost, point), np.linalg.eigh(_hessian(cost, point))
         step = -vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(values), 1e-6 * np.abs(values).max()))
-        if not scaled.cost_at(point + step) <= scaled.cost_at(point) + 1e-9:
+        if not value(point + step) <= value(point) + 1e-9:
             break
         point = point + step
         if np.abs(step).max() < 1e-11:
@@ -282,24 +296,6 @@ def _minimum(problem: _Scaled, start: Floats) -> Floats:
     if np.exp(point[location]) < LEAST_SCALE:
         raise FitError("the method passes through every rupture time, so there is no scatter to estimate; add tests")
     return np.asarray(point)
-
-
-@dataclass(frozen=True, eq=False)
-class _InUnits:
-    """Cost about a start, in units of each coordinate."""
-
-    problem: _Scaled
-    start: Floats
-    unit: Floats
-
-    def cost(self, candidates: Floats) -> Floats:
-        return self.problem.cost(self.start + self.unit * candidates)
-
-    def cost_at(self, point: Floats) -> float:
-        return float(self.cost(point[None])[0])
-
-    gradient = _Scaled.gradient
-    hessian = _Scaled.hessian
 
 
 def _result(
@@ -359,16 +355,9 @@ def _result(
 
 
 def _covariance(problem: _Scaled, point: Floats, corrected: Floats) -> Floats:
-    """Inverse of the observed information; that of location parameters with scale and scatters corrected for freedom."""
-    location = problem.location_count
-    unit = np.ones(point.size)
-    unit[: problem.linear.shape[1]] = np.exp(point[location])
-    if problem.bilinear is not None:
-        unit[location - 1] = 1.0 / max(float(np.abs(problem.bilinear).max()), 1e-12)
-    unit[location + 1 :] = np.exp(point[location])
-    full, at_corrected = (
-        _InUnits(problem, base, unit).hessian(np.zeros(point.size)) for base in (point, corrected)
-    )
+    """Inverse of the observed information; of location parameters with scale and scatters corrected for freedom."""
+    location, unit = problem.location_count, problem.unit(float(np.exp(point[problem.location_count])))
+    full, at_corrected = (_hessian(problem.about(base, unit), np.zeros(point.size)) for base in (point, corrected))
     covariance = _inverse(full)
     more = _inverse(at_corrected[:location, :location]) - _inverse(full[:location, :location])
     covariance[:location, :location] += more
@@ -395,14 +384,17 @@ def _parameters(
     point = np.array([*coefficients, curvature] if method.bilinear else [*coefficients])
 
     def values(p: Floats) -> dict[str, float]:
-        return method.parameters(p[: coefficients.size], float(p[-1]) if method.bilinear else 0.0, degree, fixed, centre)
+        return method.parameters(
+            p[: coefficients.size], float(p[-1]) if method.bilinear else 0.0, degree, fixed, centre
+        )
 
     spread = np.sqrt(np.maximum(np.diag(covariance)[: point.size], 0.0))
     with np.errstate(invalid="ignore", divide="ignore"):
         at = values(point)
         steps = [1e-3 * s * e for s, e in zip(spread, np.eye(point.size), strict=True)]
         jacobian = [
-            (np.array([*values(point + h).values()]) - np.array([*values(point - h).values()])) / (2e-3 * max(s, 1e-300))
+            (np.array([*values(point + h).values()]) - np.array([*values(point - h).values()]))
+            / (2e-3 * max(s, 1e-300))
             for h, s in zip(steps, spread, strict=True)
         ]
         part = covariance[: point.size, : point.size]

@@ -1,11 +1,12 @@
 """Marginal likelihood of log rupture times: right-censored run-outs, random effects of heats and laboratories.
 
-log10 of the time of a test is m + b + s e, with m by the method, b the sum of the effects of its heat and laboratory, each
-normal with mean 0, and e standard normal ("lognormal" times) or of the smallest extreme value ("weibull" times). A test
-that broke contributes its density, a run-out the probability that it lasts longer (Tobin (1958), Econometrica 26, 24).
+log10 of the time of a test is m + b + s e, with m by the method, b the sum of the effects of its heat and laboratory,
+each normal with mean 0, and e standard normal ("lognormal" times) or of the smallest extreme value ("weibull" times). A
+test that broke contributes its density, a run-out the probability that it lasts longer (Tobin (1958), Econometrica 26,
+24).
 
-Effects are integrated out. With one kind of effect by adaptive Gauss-Hermite quadrature about the mode of each effect (Liu,
-Pierce (1994), Biometrika 81, 624), with two by Laplace's approximation about their joint mode. Both are exact, to
+Effects are integrated out. With one kind of effect by adaptive Gauss-Hermite quadrature about the mode of each effect
+(Liu, Pierce (1994), Biometrika 81, 624), with two by Laplace's approximation about their joint mode. Both are exact, to
 rounding, for lognormal times without run-outs: there the integrand is Gaussian.
 
 All functions take several candidates at once, so that derivatives by differences cost one call.
@@ -73,8 +74,10 @@ class GroupedTimes:
         if not self.members:
             return np.asarray(self._terms(mean, scale[:, None])[0].sum(axis=-1))
         scatter = np.maximum(np.abs(scatter), LEAST_SCATTER)
-        return self._by_quadrature(mean, scale, scatter[:, 0]) if len(self.members) == 1 else self._by_laplace(
-            mean, scale, scatter
+        return (
+            self._by_quadrature(mean, scale, scatter[:, 0])
+            if len(self.members) == 1
+            else self._by_laplace(mean, scale, scatter)
         )
 
     def _terms(self, mean: Floats, scale: Floats) -> tuple[Floats, Floats, Floats]:

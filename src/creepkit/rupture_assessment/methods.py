@@ -2,16 +2,20 @@
 
 With x = log10 of the stress in MPa, T in K, R the gas constant and t in hours, the median rupture time is
 
-    Larson-Miller     log10 t = -C + (a_0 + a_1 x + ...) / T         Larson, Miller (1952), Trans. ASME 74, 765
-    Orr-Sherby-Dorn   log10 t = Q / (R T ln 10) + a_0 + a_1 x + ...  Orr, Sherby, Dorn (1954), Trans. ASM 46, 113
-    Manson-Haferd     log10 t = log10 t_a + (T - T_a) (a_0 + a_1 x + ...)     Manson, Haferd (1953), NACA TN 2890
-    Wilshire          s / s_TS = exp(-k_1 (t exp(-Q / (R T)))^u)     Wilshire, Battenbough (2007), Mater. Sci. Eng. A 443, 156
-    Monkman-Grant     log10 t = c - m log10 of the minimum creep rate in 1/h  Monkman, Grant (1956), Proc. ASTM 56, 593
-    isothermal        log10 t = a_0 + a_1 x + ...                    all of the first three, at one temperature
+    Larson-Miller     log10 t = -C + (a_0 + a_1 x + ...) / T
+    Orr-Sherby-Dorn   log10 t = Q / (R T ln 10) + a_0 + a_1 x + ...
+    Manson-Haferd     log10 t = log10 t_a + (T - T_a) (a_0 + a_1 x + ...)
+    Wilshire          s / s_TS = exp(-k_1 (t exp(-Q / (R T)))^u)
+    Monkman-Grant     log10 t = c - m log10 of the minimum creep rate in 1/h
+    isothermal        log10 t = a_0 + a_1 x + ..., which the first three are at one temperature
 
-All are linear in their coefficients but Manson-Haferd's, which is bilinear: with T_0 the mean temperature, x_0 the mean x,
-g the polynomial and k = 1 / (T_0 - T_a), log10 t = m_0 + m_1 (T - T_0) + (1 + k (T - T_0)) h(x - x_0), h(0) = 0. In this form
-parallel isotherms (k = 0) are a point like any other.
+Sources, in their order: Larson, Miller (1952), Trans. ASME 74, 765; Orr, Sherby, Dorn (1954), Trans. ASM 46, 113; Manson,
+Haferd (1953), NACA TN 2890; Wilshire, Battenbough (2007), Mater. Sci. Eng. A 443, 156; Monkman, Grant (1956), Proc. ASTM
+56, 593.
+
+All are linear in their coefficients but Manson-Haferd's, which is bilinear: with T_0 the mean temperature, x_0 the mean
+x, g the polynomial and k = 1 / (T_0 - T_a), log10 t = m_0 + m_1 (T - T_0) + (1 + k (T - T_0)) h(x - x_0), h(0) = 0. In
+this form parallel isotherms (k = 0) are a point like any other.
 """
 
 from __future__ import annotations
@@ -156,9 +160,7 @@ def _wilshire(at: Conditions, _degree: int, fixed: Mapping[str, float], _: Centr
     return Basis(np.zeros(at.stress.shape), np.column_stack([columns, inverse]))
 
 
-def _wilshire_parameters(
-    c: Floats, _k: float, _degree: int, fixed: Mapping[str, float], _: Centre
-) -> dict[str, float]:
+def _wilshire_parameters(c: Floats, _k: float, _degree: int, fixed: Mapping[str, float], _: Centre) -> dict[str, float]:
     values = {"u": 1.0 / float(c[0]), "ln k_1": float(LN10 * c[1] / c[0])}
     return values if "Q" in fixed else {**values, "Q": float(c[2])}
 
@@ -254,15 +256,11 @@ MINIMUM_RATE = RuptureMethod(
 )
 """No method of rupture times: the rate law that predicts minimum rates for Monkman-Grant's."""
 ISOTHERMAL = RuptureMethod(
-    "isothermal",
-    "log10 t = a_0 + a_1 x + ...",
-    _isothermal,
-    _isothermal_parameters,
-    {},
-    thermal=False,
+    "isothermal", "log10 t = a_0 + a_1 x + ...", _isothermal, _isothermal_parameters, {}, thermal=False
 )
 
 METHODS = {
-    m.name: m for m in (LARSON_MILLER, ORR_SHERBY_DORN, MANSON_HAFERD, WILSHIRE, MONKMAN_GRANT, ISOTHERMAL, MINIMUM_RATE)
+    m.name: m
+    for m in (LARSON_MILLER, ORR_SHERBY_DORN, MANSON_HAFERD, WILSHIRE, MONKMAN_GRANT, ISOTHERMAL, MINIMUM_RATE)
 }
 """By name; x is log10 of the stress in MPa, t in hours, T in K."""

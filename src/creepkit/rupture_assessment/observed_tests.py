@@ -29,9 +29,11 @@ NOT_STATED = "not stated"
 class RuptureTests:
     """Rupture tests, one place in every array each.
 
-    log_time : (tests,) log10 of the time to rupture, or to the end of a run-out, in hours. censored : (tests,) run-outs.
+    log_time : (tests,) log10 of the time to rupture, or to the end of a run-out, in hours. censored : (tests,)
+    run-outs.
     stress : (tests,) MPa, constant and nominal. temperature : (tests,) K.
-    tensile_strength : (tests,) MPa at the temperature of the test, and minimum_rate : (tests,) 1/s; NaN where not known.
+    tensile_strength : (tests,) MPa at the temperature of the test, and minimum_rate : (tests,) 1/s; NaN where not
+    known.
     groups : {"heat": (tests,) names, "laboratory": ...}, of labels that scatter.
     """
 
@@ -99,20 +101,19 @@ def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTe
     with_rate = [h for h in histories if h.minimum_rate is not None]
     if not any(h.rupture_time is not None for h in histories):
         raise HistoryError(
-            f"none of {len(histories)} tests broke; an assessment needs rupture times, such as a key rupture_time_h or a "
-            "column of a table"
+            f"none of {len(histories)} tests broke; an assessment needs rupture times, such as a key rupture_time_h or "
+            "a column of a table"
         )
     alloys = sorted({h.alloy for h in known if h.alloy})
     if len(alloys) > 1:
         raise HistoryError(
-            f"the tests are of {len(alloys)} alloys ({', '.join(alloys[:4])}); assess one, by select_tests(tests, alloy=...)"
+            f"the tests are of {len(alloys)} alloys ({', '.join(alloys[:4])}); assess one, by "
+            "select_tests(tests, alloy=...)"
         )
     notes = []
     silent = sum(not h.end_known and h.minimum_rate is None for h in histories)
     if silent:
-        notes.append(
-            f"{silent} tests say neither when they broke nor that they were stopped before; they are left out"
-        )
+        notes.append(f"{silent} tests say neither when they broke nor that they were stopped before; they are left out")
     return _as_arrays(known), _as_arrays(with_rate), tuple(notes)
 
 

@@ -1,8 +1,8 @@
 """Rupture strength: the stress at which a test lasts a given time, with bounds, of one method or an average of several.
 
 The distribution of log10 of the rupture time at a stress and temperature is a mixture over methods by their weights. A
-bound of the strength is the stress at which a quantile of that distribution is the time asked for (Fieller's construction
-for a curve), so bounds exist only where that quantile falls with stress down to the time.
+bound of the strength is the stress at which a quantile of that distribution is the time asked for (Fieller's
+construction for a curve), so bounds exist only where that quantile falls with stress down to the time.
 """
 
 from __future__ import annotations
@@ -49,8 +49,10 @@ WeightedModels = Sequence[tuple[LogTimeModel, float]]
 class StrengthEstimate:
     """Rupture strength at a time and a temperature.
 
-    hours; temperature : K; method : or "average". value : MPa, at which the median time of the average heat is that time.
-    mean : (low, high) of that value. heat : of a new heat. test : of one test of a new heat. None where it is not bracketed.
+    hours; temperature : K; method : or "average". value : MPa, at which the median time of the average heat is that
+    time.
+    mean : (low, high) of that value. heat : of a new heat. test : of one test of a new heat. None where it is not
+    bracketed.
     extrapolation : what lies beyond the tests, "" where nothing does. reason : why a value or a bound is None, or "".
     """
 
@@ -91,7 +93,9 @@ def strength_estimates(
     tail = 0.5 * (1.0 - level)
     by_kind = {of: mixed(models, at, of) for of in BOUND_KINDS}
     branches = {
-        (of, p): _falling_branch(stress, by_kind[of].quantile(p), tests) for of in BOUND_KINDS for p in (tail, 1.0 - tail)
+        (of, p): _falling_branch(stress, by_kind[of].quantile(p), tests)
+        for of in BOUND_KINDS
+        for p in (tail, 1.0 - tail)
     }
     central = _falling_branch(stress, by_kind["mean"].quantile(0.5), tests)
     return [_estimate(central, branches, name, tests, time, temperature) for time in hours]
@@ -152,7 +156,10 @@ class _Branch:
         if target > self.log_time[0]:
             if self.turns[0]:
                 return None, f"times turn back below {low:.3g} MPa, at {_hours(self.log_time[0])}"
-            return None, f"only {_hours(self.log_time[0])} are reached at {low:.3g} MPa, a tenth of the lowest stress tested"
+            return (
+                None,
+                f"only {_hours(self.log_time[0])} are reached at {low:.3g} MPa, a tenth of the lowest stress tested",
+            )
         if target < self.log_time[-1]:
             if self.turns[1]:
                 return None, f"times turn back above {high:.3g} MPa, at {_hours(self.log_time[-1])}"
