@@ -11,7 +11,7 @@ from creepkit.rupture_assessment.observed_tests import celsius
 
 if TYPE_CHECKING:
     from creepkit.rupture_assessment.assessment import RuptureAssessment
-    from creepkit.rupture_assessment.fitting import RuptureFit
+    from creepkit.rupture_assessment.rupture_fit import RuptureFit
     from creepkit.rupture_assessment.strength import StrengthEstimate
 
 SHOWN_WEIGHT = 1e-3

@@ -24,7 +24,7 @@ from creepkit.rupture_assessment.assessment import (
     interpolated,
 )
 from creepkit.rupture_assessment.checks import AssessmentCheck, effectiveness, physical_realism, repeatability, turning
-from creepkit.rupture_assessment.fitting import RuptureFit, conditions_of, fit_method
+from creepkit.rupture_assessment.fitting import conditions_of, fit_method
 from creepkit.rupture_assessment.methods import METHODS, MINIMUM_RATE, MONKMAN_GRANT
 from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation, fit_relation
 from creepkit.rupture_assessment.observed_tests import (
@@ -34,6 +34,7 @@ from creepkit.rupture_assessment.observed_tests import (
     rupture_tests,
     tensile_strengths,
 )
+from creepkit.rupture_assessment.rupture_fit import RuptureFit
 from creepkit.rupture_assessment.strength import strength_estimates
 
 DEFAULT_HOURS = (1e3, 1e4, 1e5)

@@ -14,11 +14,11 @@ from creepkit.errors import FitError, nearest
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.presentation import Presentable, present
 from creepkit.rupture_assessment.checks import AssessmentCheck
-from creepkit.rupture_assessment.fitting import RuptureFit
 from creepkit.rupture_assessment.likelihood import DISTRIBUTIONS, Distribution
 from creepkit.rupture_assessment.methods import METHODS, Conditions
 from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
 from creepkit.rupture_assessment.observed_tests import SECONDS_PER_HOUR, RuptureTests, celsius
+from creepkit.rupture_assessment.rupture_fit import RuptureFit
 from creepkit.rupture_assessment.strength import (
     BOUND_KINDS,
     StrengthEstimate,

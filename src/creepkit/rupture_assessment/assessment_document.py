@@ -10,9 +10,9 @@ from creepkit.files.json_documents import DocumentFormat, check_heading, read_js
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, NumberRange, RecordCodec, RecordError
 from creepkit.rupture_assessment.assessment import RankedRuptureFit, RuptureAssessment
-from creepkit.rupture_assessment.fitting import RuptureFit, RuptureParameter
 from creepkit.rupture_assessment.methods import METHODS
 from creepkit.rupture_assessment.observed_tests import RuptureTests
+from creepkit.rupture_assessment.rupture_fit import RuptureFit, RuptureParameter
 
 ASSESSMENT = DocumentFormat(
     "creepkit-rupture-assessment",

@@ -29,9 +29,9 @@ import numpy as np
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
-from creepkit.rupture_assessment.fitting import RuptureFit
 from creepkit.rupture_assessment.methods import METHODS, Conditions
 from creepkit.rupture_assessment.observed_tests import RuptureTests, celsius
+from creepkit.rupture_assessment.rupture_fit import RuptureFit
 
 LEAST_SLOPE = 1.5
 """-d log t / d log s."""

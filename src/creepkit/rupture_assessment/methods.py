@@ -9,9 +9,9 @@ With x = log10 of the stress in MPa, T in K, R the gas constant and t in hours, 
     Monkman-Grant     log10 t = c - m log10 of the minimum creep rate in 1/h
     isothermal        log10 t = a_0 + a_1 x + ..., which the first three are at one temperature
 
-Sources, in their order: Larson, Miller (1952), Trans. ASME 74, 765; Orr, Sherby, Dorn (1954), Trans. ASM 46, 113; Manson,
-Haferd (1953), NACA TN 2890; Wilshire, Battenbough (2007), Mater. Sci. Eng. A 443, 156; Monkman, Grant (1956), Proc. ASTM
-56, 593.
+Sources, in their order: Larson, Miller (1952), Trans. ASME 74, 765; Orr, Sherby, Dorn (1954), Trans. ASM 46, 113;
+Manson, Haferd (1953), NACA TN 2890; Wilshire, Battenbough (2007), Mater. Sci. Eng. A 443, 156; Monkman, Grant (1956),
+Proc. ASTM 56, 593.
 
 All are linear in their coefficients but Manson-Haferd's, which is bilinear: with T_0 the mean temperature, x_0 the mean
 x, g the polynomial and k = 1 / (T_0 - T_a), log10 t = m_0 + m_1 (T - T_0) + (1 + k (T - T_0)) h(x - x_0), h(0) = 0. In
