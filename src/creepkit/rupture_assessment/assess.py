@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -30,6 +30,7 @@ from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation, fit_r
 from creepkit.rupture_assessment.observed_tests import (
     NOT_STATED,
     RuptureTests,
+    TensileStrength,
     celsius,
     rupture_tests,
     tensile_strengths,
@@ -43,8 +44,6 @@ THERMAL_METHODS = ("larson-miller", "orr-sherby-dorn", "manson-haferd")
 
 LEAST_RATES = 4
 """Tests with a rupture time and a minimum rate from which Monkman-Grant's relation is fitted unasked."""
-
-Tensile = Callable[[Floats], Floats]
 
 
 def rupture(
@@ -71,6 +70,7 @@ def rupture(
     check_hours(hours)
     if not hours:
         raise FitError("no time is given at which strengths are wanted; give hours, such as [1e5]")
+    asked = _known_names(methods)
     observed, with_rate, notes = rupture_tests(check_histories(tests))
     if not chosen.random_effects:
         observed, with_rate = replace(observed, groups={}), replace(with_rate, groups={})
@@ -79,7 +79,7 @@ def rupture(
     def tensile(at: Floats) -> Floats:
         return interpolated(T, strengths, at)
 
-    names, relation_asked = _methods(methods, observed, tensile, chosen)
+    names, relation_asked = _methods(asked, observed, tensile, chosen)
     if temperatures is not None:
         check_temperatures(temperatures)
     with single_threaded_blas():
@@ -111,24 +111,32 @@ def rupture(
     return replace(assessment, strengths=tuple(stated), checks=tuple(checks))
 
 
-def _methods(
-    methods: Sequence[str] | str | None, tests: RuptureTests, tensile: Tensile, settings: RuptureSettings
-) -> tuple[list[str], bool]:
-    """Methods that are ranked, and whether Monkman-Grant's was asked for; FitError for what cannot be fitted."""
-    known = [name for name in METHODS if name != MINIMUM_RATE.name]
-    strengths = tensile(tests.temperature)
-    has_tensile = bool(
-        np.isfinite(np.where(np.isfinite(tests.tensile_strength), tests.tensile_strength, strengths)).all()
-    )
+def _known_names(methods: Sequence[str] | str | None) -> list[str] | None:
+    """The methods asked for, each once; FitError for one that there is not."""
     if methods is None:
-        names = ["isothermal"] if tests.isothermal else [*THERMAL_METHODS]
-        if has_tensile and (not tests.isothermal or "Q" in settings.fixed.get("wilshire", {})):
-            names.append("wilshire")
-        return names, False
+        return None
+    known = [name for name in METHODS if name != MINIMUM_RATE.name]
     asked = list(dict.fromkeys([methods] if isinstance(methods, str) else methods))
     for name in asked:
         if name not in known:
             raise FitError(f"there is no method '{name}' of rupture times; {nearest(str(name), known)}")
+    return asked
+
+
+def _methods(
+    asked: Sequence[str] | None, tests: RuptureTests, tensile: TensileStrength, settings: RuptureSettings
+) -> tuple[list[str], bool]:
+    """Methods that are ranked, and whether Monkman-Grant's was asked for; FitError for what cannot be fitted."""
+    strengths = tensile(tests.temperature)
+    has_tensile = bool(
+        np.isfinite(np.where(np.isfinite(tests.tensile_strength), tests.tensile_strength, strengths)).all()
+    )
+    if asked is None:
+        names = ["isothermal"] if tests.isothermal else [*THERMAL_METHODS]
+        if has_tensile and (not tests.isothermal or "Q" in settings.fixed.get("wilshire", {})):
+            names.append("wilshire")
+        return names, False
+    for name in asked:
         constants = settings.fixed.get(name, {})
         if tests.isothermal and METHODS[name].thermal and not constants:
             place = celsius(float(tests.temperature.mean()))
@@ -149,7 +157,7 @@ def _methods(
 
 
 def _ranked(
-    names: Sequence[str], tests: RuptureTests, tensile: Tensile, settings: RuptureSettings
+    names: Sequence[str], tests: RuptureTests, tensile: TensileStrength, settings: RuptureSettings
 ) -> tuple[tuple[RankedRuptureFit, ...], dict[str, str]]:
     fits, rejected = [], {}
     at = conditions_of(tests, tensile)
@@ -182,7 +190,9 @@ def _ranked(
     return tuple(RankedRuptureFit(fits[k], float(excess[k]), float(weight[k])) for k in order), rejected
 
 
-def _fit(name: str, degree: int, tests: RuptureTests, tensile: Tensile, settings: RuptureSettings) -> RuptureFit:
+def _fit(
+    name: str, degree: int, tests: RuptureTests, tensile: TensileStrength, settings: RuptureSettings
+) -> RuptureFit:
     return fit_method(
         METHODS[name],
         tests,
@@ -227,14 +237,14 @@ def _notes(tests: RuptureTests, settings: RuptureSettings) -> list[str]:
     if len(tests.groups) > 1 and tests.censored.any():
         notes.append("effects of heats and laboratories are integrated out by Laplace's approximation")
     elif tests.groups and tests.censored.any():
-        notes.append("effects are integrated out by adaptive Gauss-Hermite quadrature with 9 nodes")
+        notes.append("effects are integrated out by adaptive Gauss-Hermite quadrature")
     few = [group for group, values in tests.groups.items() if len(set(values)) < 5]
     notes += [f"the scatter between {len(set(tests.groups[g]))} values of {g} is poorly known" for g in few]
     return notes
 
 
 def _checks(
-    assessment: RuptureAssessment, tensile: Tensile, hours: float, temperatures: Sequence[float]
+    assessment: RuptureAssessment, tensile: TensileStrength, hours: float, temperatures: Sequence[float]
 ) -> list[AssessmentCheck]:
     best, tests = assessment.best, assessment.tests
 

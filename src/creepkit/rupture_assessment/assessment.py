@@ -93,8 +93,8 @@ class RuptureAssessment(Presentable):
     ranked : methods, each with every degree that was tried, best first. rejected : {method: why it is not ranked}.
     relation : Monkman-Grant's, where rates are known; it is not ranked, for it uses rates that the others do not.
     strengths : by the average, by the best fit of each method, and by the relation.
-    checks : post-assessment checks of the best fit. tensile_temperatures, tensile_strengths : K and MPa, to
-    interpolate.
+    checks : post-assessment checks of the best fit. tensile_temperatures, tensile_strengths : (known,) K and
+    MPa, to interpolate.
     """
 
     tests: RuptureTests
@@ -170,7 +170,10 @@ class RuptureAssessment(Presentable):
         return [(fit, weight / total) for fit, weight in kept]
 
     def tensile(self, temperature: Floats) -> Floats:
-        """(...,) tensile strength, MPa, at temperatures (...,) K; NaN where it is not known."""
+        """(...,) tensile strength, MPa; NaN where it is not known.
+
+        temperature : (...,) K.
+        """
         return interpolated(self.tensile_temperatures, self.tensile_strengths, temperature)
 
     def strength(self, hours: float, temperature: float, method: str | None = None) -> StrengthEstimate:
@@ -252,7 +255,10 @@ def _needs(model: Any, what: str) -> bool:
 
 
 def interpolated(temperatures: Floats, strengths: Floats, at: Floats) -> Floats:
-    """(...,) linear between known temperatures, NaN more than 1 K beyond them."""
+    """(...,) linear between known temperatures, NaN more than 1 K beyond them.
+
+    temperatures, strengths : (known,) K and MPa. at : (...,) K.
+    """
     at = np.asarray(at, float)
     if not len(temperatures):
         return np.full(at.shape, np.nan)

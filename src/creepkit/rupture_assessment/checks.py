@@ -30,7 +30,7 @@ from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.rupture_assessment.methods import METHODS, Conditions
-from creepkit.rupture_assessment.observed_tests import RuptureTests, celsius
+from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength, celsius
 from creepkit.rupture_assessment.rupture_fit import RuptureFit
 
 LEAST_SLOPE = 1.5
@@ -64,7 +64,7 @@ class AssessmentCheck:
     found: str
 
 
-def turning(fit: RuptureFit, tests: RuptureTests, tensile: Callable[[Floats], Floats]) -> str:
+def turning(fit: RuptureFit, tests: RuptureTests, tensile: TensileStrength) -> str:
     """Where the time does not fall with stress within the stresses tested at a temperature; "" where it does."""
     for T in tests.isotherms:
         near = np.abs(tests.temperature - T) <= ISOTHERMAL_RANGE
@@ -78,7 +78,7 @@ def turning(fit: RuptureFit, tests: RuptureTests, tensile: Callable[[Floats], Fl
 
 
 def physical_realism(
-    fit: RuptureFit, tests: RuptureTests, tensile: Callable[[Floats], Floats], lowest_strength: float | None
+    fit: RuptureFit, tests: RuptureTests, tensile: TensileStrength, lowest_strength: float | None
 ) -> list[AssessmentCheck]:
     """Group 1: isotherms fall, keep their order, and are not too flat in log-log coordinates.
 
@@ -162,7 +162,7 @@ def _predicted_against_measured(name: str, predicted: Floats, measured: Floats) 
 
 
 def main_isotherms(tests: RuptureTests) -> list[tuple[float, Bools]]:
-    """Temperatures with a tenth of the tests each, the lowest and the highest; and their tests."""
+    """Temperatures with a tenth of the tests each, the lowest and the highest; and which tests are at it, (tests,)."""
     isotherms = tests.isotherms
     near = [np.abs(tests.temperature - T) <= ISOTHERMAL_RANGE for T in isotherms]
     kept = [k for k, n in enumerate(near) if n.mean() >= MAIN_SHARE or k in (0, len(isotherms) - 1)]
@@ -211,6 +211,6 @@ def _changed(
     return AssessmentCheck(name, abs(largest) <= LARGEST_CHANGE, f"{text}; allowed: 10 %")
 
 
-def _isotherm(stress: Floats, temperature: float, tensile: Callable[[Floats], Floats]) -> Conditions:
+def _isotherm(stress: Floats, temperature: float, tensile: TensileStrength) -> Conditions:
     T = np.full(stress.shape, temperature)
     return Conditions(stress, T, tensile(T), np.full(stress.shape, np.nan))

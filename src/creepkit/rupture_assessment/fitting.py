@@ -15,7 +15,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.rupture_assessment.likelihood import Distribution, GroupedTimes
 from creepkit.rupture_assessment.methods import Basis, Centre, Conditions, RuptureMethod
-from creepkit.rupture_assessment.observed_tests import RuptureTests
+from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
 from creepkit.rupture_assessment.rupture_fit import LEAST_SCALE, RuptureFit, RuptureParameter
 
 GRADIENT_STEP, HESSIAN_STEP = 1e-5, 3e-4
@@ -94,7 +94,7 @@ def _hessian(cost: Cost, point: Floats) -> Floats:
     return np.asarray(matrix + np.tril(matrix, -1).T)
 
 
-def conditions_of(tests: RuptureTests, tensile: Callable[[Floats], Floats]) -> Conditions:
+def conditions_of(tests: RuptureTests, tensile: TensileStrength) -> Conditions:
     """The conditions of tests; tensile : of temperatures, where a test does not state its own."""
     strength = np.where(
         np.isfinite(tests.tensile_strength), tests.tensile_strength, tensile(np.asarray(tests.temperature))

@@ -27,7 +27,7 @@ Distribution = Literal["lognormal", "weibull"]
 
 DISTRIBUTIONS: tuple[Distribution, ...] = ("lognormal", "weibull")
 
-NODES = 9
+NODES = 15
 """Of Gauss-Hermite quadrature."""
 
 NEWTON_STEPS = 30
@@ -89,7 +89,8 @@ class GroupedTimes:
             value = np.where(broken, z - np.log(scale), 0.0) - growth
             return value, (growth - broken) / scale, -growth / scale**2
         lasting = log_ndtr(-z)
-        hazard = np.exp(-0.5 * z**2 - HALF_LOG_TAU - lasting)
+        exponent = np.minimum(-0.5 * z**2 - HALF_LOG_TAU - lasting, 700.0)
+        hazard = np.minimum(np.exp(exponent), np.maximum(z, 0.0) + 1.0)  # of which it never has more: rounding
         value = np.where(self.censored, lasting, -0.5 * z**2 - HALF_LOG_TAU - np.log(scale))
         first = np.where(self.censored, hazard, z) / scale
         second = -np.where(self.censored, hazard * (hazard - z), 1.0) / scale**2
@@ -142,7 +143,10 @@ class GroupedTimes:
         return np.asarray(value - 0.5 * np.linalg.slogdet(hessian)[1])
 
     def effects(self, mean: Floats, scale: float, scatter: Floats) -> list[Floats]:
-        """Modes of the effects given the estimates: (levels,) for each kind. mean : (tests,)."""
+        """Modes of the effects given the estimates: (levels,) for each kind.
+
+        mean : (tests,). scatter : (kinds,).
+        """
         if not self.members:
             return []
         sizes = [m.shape[1] for m in self.members]

@@ -58,7 +58,10 @@ class Centre:
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """log10 t = offset + (linear + k bilinear) coefficients. offset : (points,); others : (points, coefficients)."""
+    """log10 t = offset + (linear + k bilinear) coefficients.
+
+    offset : (points,). linear, bilinear : (points, coefficients).
+    """
 
     offset: Floats
     linear: Floats

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +13,9 @@ from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records import ZERO_CELSIUS, History
+
+TensileStrength = Callable[[Floats], Floats]
+"""MPa at temperatures in K, arrays of one shape; NaN where it is not known."""
 
 SECONDS_PER_HOUR = 3600.0
 
@@ -32,8 +35,8 @@ class RuptureTests:
     log_time : (tests,) log10 of the time to rupture, or to the end of a run-out, in hours. censored : (tests,)
     run-outs.
     stress : (tests,) MPa, constant and nominal. temperature : (tests,) K.
-    tensile_strength : (tests,) MPa at the temperature of the test, and minimum_rate : (tests,) 1/s; NaN where not
-    known.
+    tensile_strength : (tests,) MPa, at the temperature of the test; NaN where it is not known.
+    minimum_rate : (tests,) 1/s, the minimum creep rate; NaN where it is not known.
     groups : {"heat": (tests,) names, "laboratory": ...}, of labels that scatter.
     """
 
@@ -185,7 +188,7 @@ def _groups(histories: Sequence[History]) -> dict[str, tuple[str, ...]]:
 
 
 def tensile_strengths(tests: RuptureTests, stated: Mapping[float, float] | None) -> tuple[Floats, Floats]:
-    """Temperatures, K, ascending, and tensile strengths, MPa, to interpolate: as stated, else as tests have them.
+    """Tensile strengths to interpolate, (known,) K and MPa, by temperature: as stated, else as tests have them.
 
     Both are empty where nothing is known.
     """

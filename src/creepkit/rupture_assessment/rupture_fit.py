@@ -38,8 +38,8 @@ class RuptureFit:
     coefficients : (coefficients,), curvature : Manson-Haferd's k (0 elsewhere), of the basis of the method.
     scale : of log10 of the times of one heat; a standard deviation for lognormal times. scatter : {group: standard
     deviation of its effect}. levels : {group: how many}.
-    covariance : of coefficients, curvature where the method has one, scale and scatters, by observed information,
-    with the correction of `freedom` below.
+    covariance : (estimates, estimates) of coefficients, curvature where the method has one, scale and scatters, by
+    observed information, with the correction of `freedom` below.
     scale_corrected, scatter_corrected : with which predictions are made: scale^2 n / (n - p), scatter^2 h / (h - 1).
     freedom : tests that broke less location parameters, at least one. level : of intervals.
     """

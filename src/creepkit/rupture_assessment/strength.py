@@ -7,7 +7,7 @@ construction for a curve), so bounds exist only where that quantile falls with s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from creepkit.arrays import Floats
 from creepkit.rupture_assessment.log_time_distributions import LogTimeDistribution, MixedLogTime
 from creepkit.rupture_assessment.methods import Conditions
-from creepkit.rupture_assessment.observed_tests import RuptureTests, celsius
+from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength, celsius
 
 BOUND_KINDS = ("mean", "heat", "test")
 """Of the median time of the average heat; of the median time of a new heat; of one test of a new heat."""
@@ -76,7 +76,7 @@ def strength_estimates(
     models: WeightedModels,
     name: str,
     tests: RuptureTests,
-    tensile: Callable[[Floats], Floats],
+    tensile: TensileStrength,
     *,
     hours: Sequence[float],
     temperature: float,
