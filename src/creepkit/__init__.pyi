@@ -14,6 +14,7 @@ from .api.objects import law as law
 from .api.objects import load as load
 from .api.objects import load_plugin as load_plugin
 from .api.objects import load_ranking as load_ranking
+from .api.objects import load_rupture_assessment as load_rupture_assessment
 from .api.objects import specimen as specimen
 from .api.objects import surrogate as surrogate
 from .api.simulation import check_data_quality as check_data_quality
@@ -98,6 +99,8 @@ from .records.specimen_record import Load as Load
 from .records.specimen_record import Output as Output
 from .registry.arguments import read_frames as read_frames
 from .registry.arguments import read_histories as read_histories
+from .rupture_assessment.assess import rupture as rupture
+from .rupture_assessment.assessment import RuptureSettings as RuptureSettings
 from .sampling.conditions import TimeGrid as TimeGrid
 from .screening.planted import planted_plate as planted_plate
 from .screening.screen import ScreeningOptions as ScreeningOptions

@@ -78,10 +78,15 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "text": "creepkit.report.uncertainty:rate_band_text",
         "plot": "creepkit.report.uncertainty:rate_band_figure",
     },
-    # forecasts, screening, discovery, experiments
+    # forecasts, rupture assessments, screening, discovery, experiments
     "Forecast": {
         "text": "creepkit.report.forecast:forecast_text",
         "plot": "creepkit.report.forecast_plot:forecast_figure",
+    },
+    "RuptureAssessment": {
+        "text": "creepkit.report.rupture:rupture_text",
+        "plot": "creepkit.report.rupture_plot:rupture_figure",
+        "save": "creepkit.rupture_assessment.assessment_document:write_assessment",
     },
     "ScreeningResult": {
         "text": "creepkit.report.screening:screening_text",

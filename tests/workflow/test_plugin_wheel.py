@@ -156,6 +156,7 @@ STEPS = {
     "train": [["train", "set.h5", "--hidden", "4", "--layers", "1", "--epochs", "2", "--to", "net.safetensors"]],
     "sweep": [["sweep", "set.h5", "--hidden", "4", "--layers", "1", "--epochs", "1", "--to", "sweep"]],
     "reduced-model": [],  # has no law
+    "rupture": [],  # has no law
     "demo": [],  # has a law of its own
 }
 

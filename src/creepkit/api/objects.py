@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
     from creepkit.records import Predictor, Specimen
     from creepkit.registry import Plugin
+    from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 
 EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
@@ -73,6 +74,13 @@ def load(path: str | Path) -> Identification:
 def load_ranking(path: str | Path) -> ModelAverage:
     """Return the laws of a ranking.json with their weights, as forecasts take them; the files of laws lie beside it."""
     from creepkit.inverse.ranking_document import read_ranking as run
+
+    return run(path)
+
+
+def load_rupture_assessment(path: str | Path) -> RuptureAssessment:
+    """Return the rupture assessment saved in a JSON file: its fits predict, plot and state strengths as before."""
+    from creepkit.rupture_assessment.assessment_document import read_assessment as run
 
     return run(path)
 

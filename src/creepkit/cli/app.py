@@ -30,6 +30,7 @@ from creepkit.cli import (
     plugins,
     predict,
     reduced_model,
+    rupture,
     screen,
     simulate,
     specimens,
@@ -124,6 +125,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "confirm": confirm.command,
     "predict": predict.command,
     "design": design.command,
+    "rupture": rupture.command,
     "export": export.command,
     "demo": demo.command,
 }

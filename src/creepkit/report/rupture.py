@@ -1,0 +1,185 @@
+"""Text and JSON of a rupture assessment: verdict, methods, strengths with bounds, checks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.rupture_assessment.observed_tests import celsius
+
+if TYPE_CHECKING:
+    from creepkit.rupture_assessment.assessment import RuptureAssessment
+    from creepkit.rupture_assessment.rupture_fit import RuptureFit
+    from creepkit.rupture_assessment.strength import StrengthEstimate
+
+SHOWN_WEIGHT = 1e-3
+"""Fits of less weight are shown where they are the best of their method."""
+
+PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
+
+
+def rupture_text(assessment: RuptureAssessment) -> str:
+    """The verdict, then tables of methods, strengths and checks, and the notes."""
+    tests = assessment.tests
+    span = f"{_range(tests.stress)} MPa, {_range(tests.temperature - 273.15)} °C"
+    heats = "".join(f", {len(set(v))} {_plural(group)}" for group, v in tests.groups.items())
+    head = (
+        f"{len(tests)} rupture tests, {int(tests.censored.sum())} of them run-outs, {span}, up to "
+        f"{10 ** float(tests.log_time.max()):.4g} h{heats}"
+    )
+    best = assessment.best
+    lines = [
+        head,
+        assessment.verdict,
+        "",
+        *_aligned(
+            (
+                "method",
+                "weight",
+                f"{assessment.settings.criterion.upper().replace('AICC', 'AICc')} - best",
+                "scatter of a test",
+                "between heats",
+            ),
+            _method_rows(assessment),
+        ),
+        *(f"{name}: not ranked, for {why}" for name, why in assessment.rejected.items()),
+        "",
+        *_constants(best),
+    ]
+    if assessment.relation is not None:
+        lines += ["not ranked, for they use minimum rates:", *_constants(assessment.relation.times)]
+        lines += _constants(assessment.relation.rates)
+    lines += ["", *_strength_lines(assessment), "", f"checks of {best.name}:"]
+    lines += [f"- {PASSED[check.passed]}: {check.name}; {check.found}" for check in assessment.checks]
+    lines += [f"note: {note}" for note in assessment.notes]
+    return "\n".join(lines)
+
+
+def _plural(group: str) -> str:
+    return "laboratories" if group == "laboratory" else f"{group}s"
+
+
+def _range(values: Any) -> str:
+    low, high = f"{float(np.min(values)):.4g}", f"{float(np.max(values)):.4g}"
+    return low if low == high else f"{low} to {high}"
+
+
+def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(len(row[k]) for row in [heads, *rows]) for k in range(len(heads))]
+    return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in [heads, *rows]]
+
+
+def _method_rows(assessment: RuptureAssessment) -> list[tuple[str, ...]]:
+    best_of_method = {assessment[name].name for name in assessment.methods}
+    return [
+        (
+            one.fit.name,
+            f"{one.weight:.3f}",
+            f"{one.excess:.1f}",
+            f"factor {10**one.fit.scale_corrected:.2f}",
+            f"factor {10 ** one.fit.scatter_corrected['heat']:.2f}" if "heat" in one.fit.scatter else "-",
+        )
+        for one in assessment.ranked
+        if one.weight >= SHOWN_WEIGHT or one.fit.name in best_of_method
+    ]
+
+
+def _constants(fit: RuptureFit) -> list[str]:
+    from creepkit.rupture_assessment.methods import METHODS
+
+    given = "".join(f", {name} = {value:.6g} given" for name, value in fit.fixed.items())
+    head = f"{fit.name}: {METHODS[fit.method].equation}{given}"
+    return [
+        head,
+        *(f"  {p.name} = {p.value:.5g} [{p.low:.5g}, {p.high:.5g}] {p.unit}".rstrip() for p in fit.parameters),
+    ]
+
+
+def _strength_lines(assessment: RuptureAssessment) -> list[str]:
+    level = f"{100 * assessment.settings.level:g} %"
+    heads = (
+        "strength, MPa",
+        "temperature",
+        "time, h",
+        "value",
+        f"{level} of the mean",
+        "of a new heat",
+        "of one test",
+        "",
+    )
+    shown = [one for one in assessment.strengths if one.method == "average"]
+    if assessment.relation is not None:
+        shown += [one for one in assessment.strengths if one.method == assessment.relation.times.method]
+    rows = [
+        (
+            one.method,
+            celsius(one.temperature),
+            f"{one.hours:g}",
+            "none" if one.value is None else f"{one.value:.1f}",
+            _pair(one.mean),
+            _pair(one.heat),
+            _pair(one.test),
+            "; ".join(
+                text for text in (one.extrapolation and f"extrapolated: {one.extrapolation}", one.reason) if text
+            ),
+        )
+        for one in shown
+    ]
+    return _aligned(heads, rows)
+
+
+def _pair(ends: tuple[float | None, float | None]) -> str:
+    low, high = ("none" if end is None else f"{end:.1f}" for end in ends)
+    return f"[{low}, {high}]" if (low, high) != ("none", "none") else "none"
+
+
+def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
+    """The assessment as JSON-able data, without the tests and covariances that its file holds."""
+    return {
+        "verdict": assessment.verdict,
+        "decisive": assessment.decisive,
+        "tests": len(assessment.tests),
+        "run_outs": int(assessment.tests.censored.sum()),
+        "methods": [
+            {**_fit_to_json(one.fit), f"{assessment.settings.criterion}_excess": one.excess, "weight": one.weight}
+            for one in assessment.ranked
+        ],
+        "rejected": dict(assessment.rejected),
+        "relation": None
+        if assessment.relation is None
+        else [_fit_to_json(assessment.relation.times), _fit_to_json(assessment.relation.rates)],
+        "strengths": [_strength_to_json(one) for one in assessment.strengths],
+        "checks": [{"name": c.name, "passed": c.passed, "found": c.found} for c in assessment.checks],
+        "level": assessment.settings.level,
+        "notes": list(assessment.notes),
+        "provenance": dict(assessment.provenance),
+    }
+
+
+def _fit_to_json(fit: RuptureFit) -> dict[str, Any]:
+    return {
+        "method": fit.method,
+        "degree": fit.degree,
+        "parameters": {
+            p.name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit} for p in fit.parameters
+        },
+        "fixed": dict(fit.fixed),
+        "scale_log10": fit.scale,
+        "scatter_log10": dict(fit.scatter),
+        "log_likelihood": fit.log_likelihood,
+    }
+
+
+def _strength_to_json(one: StrengthEstimate) -> dict[str, Any]:
+    bounds = {of: list(getattr(one, of)) for of in ("mean", "heat", "test")}
+    return {
+        "method": one.method,
+        "hours": one.hours,
+        "temperature": one.temperature,
+        "strength": one.value,
+        **bounds,
+        "extrapolation": one.extrapolation,
+        "reason": one.reason,
+    }

@@ -1,0 +1,1 @@
+"""Rupture tests by time-temperature methods: one censored likelihood, ranking, strength with bounds, checks."""

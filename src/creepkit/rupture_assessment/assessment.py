@@ -1,0 +1,280 @@
+"""RuptureAssessment: methods with weights, strengths with bounds, checks, and a verdict no stronger than they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import FitError, nearest
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
+from creepkit.presentation import Presentable, present
+from creepkit.rupture_assessment.checks import AssessmentCheck
+from creepkit.rupture_assessment.likelihood import DISTRIBUTIONS, Distribution
+from creepkit.rupture_assessment.methods import METHODS, Conditions
+from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
+from creepkit.rupture_assessment.observed_tests import SECONDS_PER_HOUR, RuptureTests, celsius
+from creepkit.rupture_assessment.rupture_fit import RuptureFit
+from creepkit.rupture_assessment.strength import (
+    BOUND_KINDS,
+    StrengthEstimate,
+    WeightedModels,
+    extrapolation,
+    mixed,
+    strength_estimates,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+AVERAGE = "average"
+"""Name of the average over all ranked methods by their weights."""
+
+LEAST_WEIGHT = 1e-3
+"""In the average."""
+
+
+@dataclass(frozen=True)
+class RuptureSettings:
+    """How rupture tests are assessed.
+
+    degrees : of polynomials of log10 of the stress that are tried. distribution : of rupture times, "lognormal" or
+    "weibull". criterion : "bic" or "aicc", with as many observations as tests that broke.
+    fixed : {method: {constant: value}} that are given in the place of fitted ones, {"larson-miller": {"C": 20.0}}.
+    random_effects : whether heats and laboratories scatter. level : of intervals and bounds.
+    seed : of the tests that a check of repeatability leaves out.
+    """
+
+    degrees: tuple[int, ...] = (1, 2, 3)
+    distribution: Distribution = "lognormal"
+    criterion: Literal["bic", "aicc"] = "bic"
+    fixed: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    random_effects: bool = True
+    level: float = 0.95
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not self.degrees or any(type(d) is not int or not 1 <= d <= 5 for d in self.degrees):
+            raise FitError(f"degrees are {self.degrees!r:.40}; give whole numbers from 1 to 5, such as (1, 2, 3)")
+        if self.distribution not in DISTRIBUTIONS:
+            raise FitError(f"distribution is {self.distribution!r:.40}; allowed are {', '.join(DISTRIBUTIONS)}")
+        if self.criterion not in ("bic", "aicc"):
+            raise FitError(f"criterion is {self.criterion!r:.40}; allowed are bic and aicc")
+        if not (isinstance(self.level, float) and 0.5 <= self.level < 1.0):
+            raise FitError(f"level is {self.level!r:.40}; give a probability from 0.5 to below 1, such as 0.95")
+        for method, constants in self.fixed.items():
+            if method not in METHODS:
+                raise FitError(f"fixed= names a method '{method}'; {nearest(method, METHODS)}")
+            for name, value in constants.items():
+                if name not in METHODS[method].fixable:
+                    allowed = ", ".join(METHODS[method].fixable) or "none"
+                    raise FitError(f"fixed= gives {method} a constant '{name}'; those that may be given: {allowed}")
+                if not (isinstance(value, int | float) and np.isfinite(value)):
+                    raise FitError(f"fixed= gives {method} {name}={value!r:.40}; give a finite number")
+
+
+@dataclass(frozen=True)
+class RankedRuptureFit:
+    """A fitted method in the ranking: its criterion less the best, and its weight."""
+
+    fit: RuptureFit
+    excess: float
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class RuptureAssessment(Presentable):
+    """The result of rupture().
+
+    ranked : methods, each with every degree that was tried, best first. rejected : {method: why it is not ranked}.
+    relation : Monkman-Grant's, where rates are known; it is not ranked, for it uses rates that the others do not.
+    strengths : by the average, by the best fit of each method, and by the relation.
+    checks : post-assessment checks of the best fit. tensile_temperatures, tensile_strengths : (known,) K and
+    MPa, to interpolate.
+    """
+
+    tests: RuptureTests
+    settings: RuptureSettings
+    ranked: tuple[RankedRuptureFit, ...]
+    strengths: tuple[StrengthEstimate, ...]
+    checks: tuple[AssessmentCheck, ...]
+    tensile_temperatures: Floats
+    tensile_strengths: Floats
+    relation: MinimumRateRelation | None = None
+    rejected: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def best(self) -> RuptureFit:
+        """The fit of lowest criterion."""
+        return self.ranked[0].fit
+
+    @property
+    def methods(self) -> dict[str, float]:
+        """{method: weight of all its degrees together}, in the order of their best fits."""
+        weights: dict[str, float] = {}
+        for one in self.ranked:
+            weights[one.fit.method] = weights.get(one.fit.method, 0.0) + one.weight
+        return weights
+
+    def __getitem__(self, method: str) -> RuptureFit:
+        """The best fit of a method; of "monkman-grant" that of times by rates."""
+        for one in self.ranked:
+            if method in (one.fit.method, one.fit.name):
+                return one.fit
+        if self.relation is not None and method == self.relation.times.method:
+            return self.relation.times
+        raise FitError(f"there is no fit of '{method}'; {nearest(method, [*self.methods, *self.rejected])}")
+
+    @property
+    def decisive(self) -> bool:
+        """Whether one of several methods has 95 % of the weight and passes every check."""
+        first = self.methods[self.best.method]
+        return len(self.methods) > 1 and first > DECISIVE_WEIGHT and all(check.passed for check in self.checks)
+
+    @property
+    def verdict(self) -> str:
+        """One sentence: which method, or which the tests cannot tell apart, and which checks it fails."""
+        weights, best = self.methods, self.best.method
+        failed = [check.name for check in self.checks if check.passed is False]
+        open_ = [check.name for check in self.checks if check.passed is None]
+        if self.decisive:
+            return f"decisive: {best}, of {len(weights)} methods tried; it passes all {len(self.checks)} checks"
+        if len(weights) == 1:
+            what = f"only {best} was fitted"
+        elif weights[best] > DECISIVE_WEIGHT:
+            what = f"not decisive: of {len(weights)} methods tried {best} is best (weight {weights[best]:.2f})"
+        else:
+            credible = [f"{name} ({w:.2f})" for name, w in weights.items() if w > CREDIBLE_WEIGHT]
+            what = f"not decisive: these tests cannot tell apart {', '.join(credible)} by their weights"
+        if failed:
+            return f"{what}; {best} fails {len(failed)} of {len(self.checks)} checks: {'; '.join(failed)}"
+        if open_:
+            return f"{what}; {best} fails no check, but {len(open_)} cannot be made: {'; '.join(open_)}"
+        return f"{what}; {best} passes all {len(self.checks)} checks"
+
+    def models(self, method: str | None = None) -> WeightedModels:
+        """Fits with weights that add up to one: of the average (None), or of one method."""
+        if method is not None and method != AVERAGE:
+            is_relation = self.relation is not None and method == self.relation.times.method
+            model = self.relation if is_relation else self[method]
+            assert model is not None
+            return [(model, 1.0)]
+        kept = [(one.fit, one.weight) for one in self.ranked if one.weight >= LEAST_WEIGHT]
+        total = sum(weight for _, weight in kept)
+        return [(fit, weight / total) for fit, weight in kept]
+
+    def tensile(self, temperature: Floats) -> Floats:
+        """(...,) tensile strength, MPa; NaN where it is not known.
+
+        temperature : (...,) K.
+        """
+        return interpolated(self.tensile_temperatures, self.tensile_strengths, temperature)
+
+    def strength(self, hours: float, temperature: float, method: str | None = None) -> StrengthEstimate:
+        """The rupture strength at a time, h, and a temperature, K; by the average, or by one method."""
+        for one in self.strengths:
+            if one.method == (method or AVERAGE) and one.hours == hours and abs(one.temperature - temperature) < 1e-6:
+                return one
+        return self.strengths_at([hours], temperature, method or AVERAGE)[0]
+
+    def strengths_at(self, hours: list[float], temperature: float, method: str = AVERAGE) -> list[StrengthEstimate]:
+        """Strengths at several times, h, of one temperature, K."""
+        check_hours(hours)
+        check_temperatures([temperature])
+        models, unknown = self.models(method), (None, None)
+        reason = ""
+        if any(_needs(model, "tensile_strength") for model, _ in models) and not np.isfinite(
+            self.tensile(np.array([temperature]))[0]
+        ):
+            reason = f"no tensile strength is known at {celsius(temperature)}"
+        elif self.tests.isothermal and abs(temperature - self.tests.temperature.mean()) > ISOTHERMAL_TOLERANCE:
+            reason = f"all tests are at {celsius(float(self.tests.temperature.mean()))}"
+        if reason:
+            return [
+                StrengthEstimate(
+                    h,
+                    temperature,
+                    method,
+                    None,
+                    unknown,
+                    unknown,
+                    unknown,
+                    extrapolation(self.tests, h, temperature, None),
+                    reason,
+                )
+                for h in hours
+            ]
+        return strength_estimates(
+            models, method, self.tests, self.tensile, hours=hours, temperature=temperature, level=self.settings.level
+        )
+
+    def rupture_time(
+        self, stress: float, temperature: float, *, of: str = "test", method: str | None = None
+    ) -> tuple[float, float, float]:
+        """Rupture time at a stress, MPa, and a temperature, K: median, low and high, s.
+
+        of : "test", one test of a new heat; "heat", the median of a new heat; "mean", of the average heat.
+        """
+        if of not in BOUND_KINDS:
+            raise FitError(f"of is {of!r:.40}; allowed are {', '.join(BOUND_KINDS)}")
+        check_temperatures([temperature])
+        if not (np.isfinite(stress) and stress > 0):
+            raise FitError(f"stress is {stress!r:.40}; give MPa above zero")
+        T, s = np.array([float(temperature)]), np.array([float(stress)])
+        at = Conditions(s, T, self.tensile(T), np.full(1, np.nan))
+        times = mixed(self.models(method), at, of)
+        tail = 0.5 * (1.0 - self.settings.level)
+        median, low, high = (SECONDS_PER_HOUR * 10.0 ** float(times.quantile(p)[0]) for p in (0.5, tail, 1.0 - tail))
+        return median, low, high
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Isotherms with tests and bounds, the master curve, and predicted against measured times."""
+        return present(self, "plot", path)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the assessment to a JSON file."""
+        return present(self, "save", path)
+
+    def with_strengths(self, strengths: tuple[StrengthEstimate, ...]) -> RuptureAssessment:
+        """The same assessment with other strengths."""
+        return replace(self, strengths=strengths)
+
+
+ISOTHERMAL_TOLERANCE = 5.0
+"""K by which a strength may be asked for beside tests of one temperature."""
+
+
+def _needs(model: Any, what: str) -> bool:
+    return isinstance(model, RuptureFit) and METHODS[model.method].needs == what
+
+
+def interpolated(temperatures: Floats, strengths: Floats, at: Floats) -> Floats:
+    """(...,) linear between known temperatures, NaN more than 1 K beyond them.
+
+    temperatures, strengths : (known,) K and MPa. at : (...,) K.
+    """
+    at = np.asarray(at, float)
+    if not len(temperatures):
+        return np.full(at.shape, np.nan)
+    known = (at >= temperatures[0] - 1.0) & (at <= temperatures[-1] + 1.0)
+    return np.where(known, np.interp(at, temperatures, strengths), np.nan)
+
+
+def check_hours(hours: Any) -> None:
+    """FitError unless these are times, h, above zero."""
+    for one in hours:
+        if isinstance(one, bool) or not isinstance(one, int | float) or not (np.isfinite(one) and 0 < one < 1e12):
+            raise FitError(f"a strength is asked for at {one!r:.40} h; give numbers of hours above zero")
+
+
+def check_temperatures(temperatures: Any) -> None:
+    """FitError unless these are temperatures in K."""
+    for one in temperatures:
+        if isinstance(one, bool) or not isinstance(one, int | float) or not 0 < one < 1e4:
+            raise FitError(f"a temperature is {one!r:.40}; give K, above 0 and below 10000")

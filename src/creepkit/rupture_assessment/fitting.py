@@ -1,0 +1,292 @@
+"""Maximum likelihood of one method, and its observed information."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import stdtrit
+
+from creepkit.arrays import Floats
+from creepkit.errors import FitError
+from creepkit.rupture_assessment.likelihood import Distribution, GroupedTimes
+from creepkit.rupture_assessment.methods import Basis, Centre, Conditions, RuptureMethod
+from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
+from creepkit.rupture_assessment.rupture_fit import LEAST_SCALE, RuptureFit, RuptureParameter
+
+GRADIENT_STEP, HESSIAN_STEP = 1e-5, 3e-4
+"""Of central differences, in coordinates of order one."""
+
+CURVATURES = np.linspace(-0.98, 0.98, 41)
+"""Of Manson-Haferd's k tried as starts, between the values at which isotherms of the tests would meet."""
+
+NEWTON_STEPS = 6
+"""After the quasi-Newton method: to the last digits."""
+
+LEAST_INDEPENDENCE = 1e-9
+"""Smallest singular value of the scaled functions of a method at which its coefficients are determined."""
+
+
+Cost = Callable[[Floats], Floats]
+"""Negative log-likelihoods (candidates,) of estimates (candidates, estimates)."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Scaled:
+    """The problem in coordinates of order one: mean = offset + U c + k V c, with U orthogonal."""
+
+    times: GroupedTimes
+    offset: Floats
+    linear: Floats
+    bilinear: Floats | None
+    transform: Floats  # coefficients = transform @ scaled coefficients
+
+    @property
+    def location_count(self) -> int:
+        return int(self.linear.shape[1]) + (self.bilinear is not None)
+
+    def unit(self, scale: float) -> Floats:
+        """(estimates,) steps of one likelihood: of coefficients, Manson-Haferd's k, ln of the scale, and scatters."""
+        unit = np.full(self.location_count + 1 + len(self.times.members), scale)
+        unit[self.location_count] = 1.0
+        if self.bilinear is not None:
+            unit[self.location_count - 1] = 1.0 / max(float(np.abs(self.bilinear).max()), 1e-12)
+        return unit
+
+    def about(self, start: Floats, unit: Floats) -> Cost:
+        """The cost about a point, in units of each coordinate."""
+        return lambda candidates: self.cost(start + unit * candidates)
+
+    def mean(self, candidates: Floats) -> Floats:
+        count = self.linear.shape[1]
+        mean = self.offset + candidates[:, :count] @ self.linear.T
+        if self.bilinear is not None:
+            mean = mean + candidates[:, count, None] * (candidates[:, :count] @ self.bilinear.T)
+        return np.asarray(mean)
+
+    def cost(self, candidates: Floats) -> Floats:
+        """(candidates,) negative log-likelihoods; the scale enters as its logarithm."""
+        location = self.location_count
+        scale = np.exp(np.clip(candidates[:, location], -30.0, 10.0))
+        scatter = candidates[:, location + 1 :] * 1.0
+        value = -self.times.log_likelihood(self.mean(candidates), scale, scatter)
+        return np.where(np.isfinite(value), value, 1e30)
+
+
+def _gradient(cost: Cost, point: Floats) -> Floats:
+    steps = GRADIENT_STEP * np.eye(point.size)
+    values = cost(np.concatenate([point + steps, point - steps]))
+    return np.asarray((values[: point.size] - values[point.size :]) / (2.0 * GRADIENT_STEP))
+
+
+def _hessian(cost: Cost, point: Floats) -> Floats:
+    size, steps = point.size, HESSIAN_STEP * np.eye(point.size)
+    first, second = np.tril_indices(size)
+    signs = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+    values = cost(np.concatenate([point + a * steps[first] + b * steps[second] for a, b in signs]))
+    plus_plus, plus_minus, minus_plus, minus_minus = values.reshape(4, -1)
+    matrix = np.zeros((size, size))
+    matrix[first, second] = (plus_plus - plus_minus - minus_plus + minus_minus) / (4.0 * HESSIAN_STEP**2)
+    return np.asarray(matrix + np.tril(matrix, -1).T)
+
+
+def conditions_of(tests: RuptureTests, tensile: TensileStrength) -> Conditions:
+    """The conditions of tests; tensile : of temperatures, where a test does not state its own."""
+    strength = np.where(
+        np.isfinite(tests.tensile_strength), tests.tensile_strength, tensile(np.asarray(tests.temperature))
+    )
+    return Conditions(tests.stress, tests.temperature, strength, tests.minimum_rate)
+
+
+def centre_of(tests: RuptureTests) -> Centre:
+    """Means of the tests."""
+    return Centre(float(tests.temperature.mean()), float(np.log10(tests.stress).mean()))
+
+
+def fit_method(
+    method: RuptureMethod,
+    tests: RuptureTests,
+    at: Conditions,
+    *,
+    degree: int,
+    distribution: Distribution,
+    fixed: Mapping[str, float],
+    level: float,
+) -> RuptureFit:
+    """The maximum of the likelihood; FitError where the tests do not determine the coefficients."""
+    centre = centre_of(tests)
+    basis = method.basis(at, degree, fixed, centre)
+    times = GroupedTimes.of(tests.log_time, tests.censored, tests.groups, distribution)
+    problem = _scaled(method, basis, times, tests.ruptured)
+    point = _minimum(problem, _start(problem, tests))
+    return _result(method, problem, point, tests, degree=degree, fixed=fixed, centre=centre, level=level)
+
+
+def _scaled(method: RuptureMethod, basis: Basis, times: GroupedTimes, ruptured: int) -> _Scaled:
+    size = np.linalg.norm(basis.linear, axis=0)
+    count = basis.linear.shape[1] + method.bilinear
+    broken = (basis.linear / np.maximum(size, 1e-300))[~times.censored]
+    if ruptured < count + 1 or np.linalg.svd(broken, compute_uv=False)[-1] < LEAST_INDEPENDENCE:
+        raise FitError(
+            f"{ruptured} tests that broke do not determine the {count} constants of {method.name}; add tests at other "
+            "stresses or temperatures"
+        )
+    _, R = np.linalg.qr(basis.linear)
+    transform = np.linalg.inv(R) * np.sqrt(times.log_time.size)
+    bilinear = None if basis.bilinear is None else basis.bilinear @ transform
+    return _Scaled(times, basis.offset, basis.linear @ transform, bilinear, transform)
+
+
+def _start(problem: _Scaled, tests: RuptureTests) -> Floats:
+    """Least squares, run-outs taken as broken; Manson-Haferd's k from a line of values."""
+    target = problem.times.log_time - problem.offset
+    best: tuple[float, Any, float] | None = None
+    warmer = tests.temperature - tests.temperature.mean()
+    for share in CURVATURES if problem.bilinear is not None else (0.0,):
+        reach = -warmer.min() if share > 0 else warmer.max()
+        k = float(share / max(reach, 1e-9))
+        columns = problem.linear if problem.bilinear is None else problem.linear + k * problem.bilinear
+        coefficients, *_ = np.linalg.lstsq(columns, target, rcond=None)
+        squares = float(((target - columns @ coefficients) ** 2).sum())
+        if best is None or squares < best[0]:
+            best = squares, coefficients, k
+    assert best is not None
+    scale = max(np.sqrt(best[0] / target.size), LEAST_SCALE)
+    location = [*best[1], *([] if problem.bilinear is None else [best[2]])]
+    return np.array([*location, np.log(scale), *[0.5 * scale for _ in problem.times.members]])
+
+
+def _minimum(problem: _Scaled, start: Floats) -> Floats:
+    """By a quasi-Newton method, then Newton steps until they end; FitError where the scatter vanishes."""
+    unit, location = problem.unit(float(np.exp(start[problem.location_count]))), problem.location_count
+    cost = problem.about(start, unit)
+
+    def value(point: Floats) -> float:
+        return float(cost(point[None])[0])
+
+    options = {"gtol": 1e-5, "maxiter": 300}
+    point = minimize(value, np.zeros(start.size), jac=partial(_gradient, cost), method="BFGS", options=options).x
+    for _ in range(NEWTON_STEPS):
+        gradient, (values, vectors) = _gradient(cost, point), np.linalg.eigh(_hessian(cost, point))
+        step = -vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(values), 1e-6 * np.abs(values).max()))
+        if not value(point + step) <= value(point) + 1e-9:
+            break
+        point = point + step
+        if np.abs(step).max() < 1e-11:
+            break
+    point = start + unit * point
+    if np.exp(point[location]) < LEAST_SCALE:
+        raise FitError("the method passes through every rupture time, so there is no scatter to estimate; add tests")
+    return np.asarray(point)
+
+
+def _result(
+    method: RuptureMethod,
+    problem: _Scaled,
+    point: Floats,
+    tests: RuptureTests,
+    *,
+    degree: int,
+    fixed: Mapping[str, float],
+    centre: Centre,
+    level: float,
+) -> RuptureFit:
+    location, count = problem.location_count, problem.linear.shape[1]
+    scale, scatter = float(np.exp(point[location])), np.abs(point[location + 1 :])
+    freedom = float(max(tests.ruptured - location, 1))
+    levels = [m.shape[1] for m in problem.times.members]
+    scale_corrected = scale * float(np.sqrt(tests.ruptured / freedom))
+    scatter_corrected = scatter * np.sqrt([h / (h - 1.0) for h in levels])
+    corrected = np.array([*point[:location], np.log(scale_corrected), *scatter_corrected])
+    covariance = _covariance(problem, point, corrected)
+    # From scaled coordinates to those of the basis; the scale stands as its logarithm.
+    jacobian = np.eye(point.size)
+    jacobian[:count, :count] = problem.transform
+    jacobian[location, location] = scale
+    covariance = jacobian @ covariance @ jacobian.T
+    coefficients = problem.transform @ point[:count]
+    curvature = float(point[count]) if problem.bilinear is not None else 0.0
+    quantile = float(stdtrit(freedom, 0.5 + 0.5 * level))
+    mean = problem.mean(point[None])[0]
+    effects = problem.times.effects(mean, scale, scatter)
+    named = {
+        group: dict(zip(sorted(set(values)), map(float, modes), strict=True))
+        for (group, values), modes in zip(tests.groups.items(), effects, strict=True)
+    }
+    return RuptureFit(
+        method.name,
+        degree,
+        problem.times.distribution,
+        dict(fixed),
+        centre,
+        coefficients,
+        curvature,
+        scale,
+        dict(zip(tests.groups, map(float, scatter), strict=True)),
+        dict(zip(tests.groups, levels, strict=True)),
+        covariance,
+        scale_corrected,
+        dict(zip(tests.groups, map(float, scatter_corrected), strict=True)),
+        -float(problem.cost(point[None])[0]),
+        freedom,
+        tests.ruptured,
+        _parameters(method, degree, fixed, centre, coefficients, curvature, covariance, quantile),
+        named,
+        level,
+    )
+
+
+def _covariance(problem: _Scaled, point: Floats, corrected: Floats) -> Floats:
+    """Inverse of the observed information; of location parameters with scale and scatters corrected for freedom."""
+    location, unit = problem.location_count, problem.unit(float(np.exp(point[problem.location_count])))
+    full, at_corrected = (_hessian(problem.about(base, unit), np.zeros(point.size)) for base in (point, corrected))
+    covariance = _inverse(full)
+    more = _inverse(at_corrected[:location, :location]) - _inverse(full[:location, :location])
+    covariance[:location, :location] += more
+    return covariance * np.outer(unit, unit)
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Of a symmetric matrix; directions that are flat, or fall, get a large variance."""
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.asarray((vectors / np.maximum(values, 1e-8 * max(values.max(), 1e-300))) @ vectors.T)
+
+
+def _parameters(
+    method: RuptureMethod,
+    degree: int,
+    fixed: Mapping[str, float],
+    centre: Centre,
+    coefficients: Floats,
+    curvature: float,
+    covariance: Floats,
+    quantile: float,
+) -> tuple[RuptureParameter, ...]:
+    """Constants as the literature writes them, by the delta method."""
+    point = np.array([*coefficients, curvature] if method.bilinear else [*coefficients])
+
+    def values(p: Floats) -> dict[str, float]:
+        return method.parameters(
+            p[: coefficients.size], float(p[-1]) if method.bilinear else 0.0, degree, fixed, centre
+        )
+
+    spread = np.sqrt(np.maximum(np.diag(covariance)[: point.size], 0.0))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        at = values(point)
+        steps = [1e-3 * s * e for s, e in zip(spread, np.eye(point.size), strict=True)]
+        jacobian = [
+            (np.array([*values(point + h).values()]) - np.array([*values(point - h).values()]))
+            / (2e-3 * max(s, 1e-300))
+            for h, s in zip(steps, spread, strict=True)
+        ]
+        part = covariance[: point.size, : point.size]
+        variance = np.einsum("im,ij,jm->m", np.array(jacobian), part, np.array(jacobian))
+    half = quantile * np.sqrt(np.maximum(variance, 0.0))
+    return tuple(
+        RuptureParameter(name, value, value - float(h), value + float(h), method.units.get(name, ""))
+        for (name, value), h in zip(at.items(), half, strict=True)
+    )

@@ -1,0 +1,98 @@
+"""Distributions of log10 of a rupture time at many conditions: Student's, with a Weibull test, and mixtures of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.special import stdtr, stdtrit
+
+from creepkit.arrays import Floats
+
+BISECTIONS = 60
+"""Of a bracket some units of log10 wide: to 1e-15."""
+
+NODES = 21
+"""Of the quadrature over the normal part of a Weibull test's time."""
+
+
+class LogTimeDistribution(Protocol):
+    """Of log10 of a time in hours, at each point."""
+
+    def cumulative(self, log_time: Floats) -> Floats:
+        """(points,) probability of less than log_time (points,)."""
+        ...
+
+    def quantile(self, probability: float) -> Floats:
+        """(points,) the log time that is not reached with a probability."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class StudentLogTime:
+    """median, spread, freedom : (points,)."""
+
+    median: Floats
+    spread: Floats
+    freedom: Floats
+
+    def cumulative(self, log_time: Floats) -> Floats:
+        """(points,) probability of less than log_time (points,)."""
+        return np.asarray(stdtr(self.freedom, (log_time - self.median) / self.spread))
+
+    def quantile(self, probability: float) -> Floats:
+        """(points,) the log time that is not reached with a probability."""
+        return np.asarray(self.median + self.spread * stdtrit(self.freedom, probability))
+
+
+@dataclass(frozen=True, eq=False)
+class WeibullLogTime:
+    """A location that is normal, plus a scale times the smallest extreme value.
+
+    location, spread : (points,). scale : of log10 of time.
+    """
+
+    location: Floats
+    spread: Floats
+    scale: float
+
+    def cumulative(self, log_time: Floats) -> Floats:
+        """(points,) probability of less than log_time (points,)."""
+        nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
+        z = (np.asarray(log_time - self.location)[:, None] - self.spread[:, None] * nodes) / self.scale
+        return np.asarray(-np.expm1(-np.exp(np.clip(z, -700.0, 50.0))) @ (weights / weights.sum()))
+
+    def quantile(self, probability: float) -> Floats:
+        """(points,) the log time that is not reached with a probability."""
+        reach = 40.0 * self.scale + 10.0 * self.spread
+        return _halved(self, probability, self.location - reach, self.location + reach)
+
+
+@dataclass(frozen=True, eq=False)
+class MixedLogTime:
+    """Several distributions with weights that add up to one."""
+
+    parts: Sequence[LogTimeDistribution]
+    weights: Sequence[float]
+
+    def cumulative(self, log_time: Floats) -> Floats:
+        """(points,) probability of less than log_time (points,)."""
+        shares = [w * part.cumulative(log_time) for w, part in zip(self.weights, self.parts, strict=True)]
+        return np.asarray(np.sum(shares, axis=0))
+
+    def quantile(self, probability: float) -> Floats:
+        """(points,) the log time that is not reached with a probability."""
+        quantiles = np.array([part.quantile(probability) for part in self.parts])
+        if len(self.parts) == 1:
+            return np.asarray(quantiles[0])
+        return _halved(self, probability, quantiles.min(axis=0), quantiles.max(axis=0))
+
+
+def _halved(distribution: LogTimeDistribution, probability: float, low: Floats, high: Floats) -> Floats:
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        below = distribution.cumulative(middle) < probability
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray(0.5 * (low + high))

@@ -1,0 +1,184 @@
+"""Rupture strength: the stress at which a test lasts a given time, with bounds, of one method or an average of several.
+
+The distribution of log10 of the rupture time at a stress and temperature is a mixture over methods by their weights. A
+bound of the strength is the stress at which a quantile of that distribution is the time asked for (Fieller's
+construction for a curve), so bounds exist only where that quantile falls with stress down to the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from creepkit.arrays import Floats
+from creepkit.rupture_assessment.log_time_distributions import LogTimeDistribution, MixedLogTime
+from creepkit.rupture_assessment.methods import Conditions
+from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength, celsius
+
+BOUND_KINDS = ("mean", "heat", "test")
+"""Of the median time of the average heat; of the median time of a new heat; of one test of a new heat."""
+
+LOWEST_STRESS, HIGHEST_STRESS = 0.1, 3.0
+"""Of the lowest and the highest stress tested: between them strengths are looked for."""
+
+TENSILE_LIMIT = 0.999
+"""Of the tensile strength: above it no test is a creep test."""
+
+GRID_POINTS = 301
+
+LONGEST_EXTRAPOLATION = 3.0
+"""Times the longest test: estimates beyond it are flagged."""
+
+
+class LogTimeModel(Protocol):
+    """What predicts the distribution of rupture times."""
+
+    def log_time(self, at: Conditions, of: str) -> LogTimeDistribution:
+        """Distribution of log10 of a time in hours; of : one of BOUND_KINDS."""
+        ...
+
+
+WeightedModels = Sequence[tuple[LogTimeModel, float]]
+
+
+@dataclass(frozen=True)
+class StrengthEstimate:
+    """Rupture strength at a time and a temperature.
+
+    hours; temperature : K; method : or "average". value : MPa, at which the median time of the average heat is that
+    time.
+    mean : (low, high) of that value. heat : of a new heat. test : of one test of a new heat. None where it is not
+    bracketed.
+    extrapolation : what lies beyond the tests, "" where nothing does. reason : why a value or a bound is None, or "".
+    """
+
+    hours: float
+    temperature: float
+    method: str
+    value: float | None
+    mean: tuple[float | None, float | None]
+    heat: tuple[float | None, float | None]
+    test: tuple[float | None, float | None]
+    extrapolation: str = ""
+    reason: str = ""
+
+
+def mixed(models: WeightedModels, at: Conditions, of: str) -> MixedLogTime:
+    """The distribution of an average of methods."""
+    return MixedLogTime([model.log_time(at, of) for model, _ in models], [weight for _, weight in models])
+
+
+def strength_estimates(
+    models: WeightedModels,
+    name: str,
+    tests: RuptureTests,
+    tensile: TensileStrength,
+    *,
+    hours: Sequence[float],
+    temperature: float,
+    level: float,
+) -> list[StrengthEstimate]:
+    """Strengths at one temperature and several times, with all bounds, flags and reasons."""
+    limit = float(tensile(np.array([temperature]))[0])
+    lowest, highest = LOWEST_STRESS * float(tests.stress.min()), HIGHEST_STRESS * float(tests.stress.max())
+    if np.isfinite(limit):
+        highest = min(highest, TENSILE_LIMIT * limit)
+    stress = np.geomspace(lowest, highest, GRID_POINTS)
+    shape = stress.shape
+    at = Conditions(stress, np.full(shape, temperature), np.full(shape, limit), np.full(shape, np.nan))
+    tail = 0.5 * (1.0 - level)
+    by_kind = {of: mixed(models, at, of) for of in BOUND_KINDS}
+    branches = {
+        (of, p): _falling_branch(stress, by_kind[of].quantile(p), tests)
+        for of in BOUND_KINDS
+        for p in (tail, 1.0 - tail)
+    }
+    central = _falling_branch(stress, by_kind["mean"].quantile(0.5), tests)
+    return [_estimate(central, branches, name, tests, time, temperature) for time in hours]
+
+
+def _estimate(
+    central: _Branch,
+    branches: Mapping[tuple[str, float], _Branch],
+    name: str,
+    tests: RuptureTests,
+    hours: float,
+    temperature: float,
+) -> StrengthEstimate:
+    value, reason = central.stress_at(hours)
+    reasons = [reason] if reason else []
+    bounds: dict[str, list[float | None]] = {of: [] for of in BOUND_KINDS}
+    for k, ((of, _), branch) in enumerate(branches.items()):
+        bound, reason = branch.stress_at(hours) if value is not None else (None, "")
+        bounds[of].append(bound)
+        if reason:
+            reasons.append(f"no {'upper' if k % 2 else 'lower'} bound of the {of}: {reason}")
+    pairs = {of: (ends[0], ends[1]) for of, ends in bounds.items()}
+    flag = extrapolation(tests, hours, temperature, value)
+    return StrengthEstimate(hours, temperature, name, value, **pairs, extrapolation=flag, reason="; ".join(reasons))
+
+
+def extrapolation(tests: RuptureTests, hours: float, temperature: float, stress: float | None) -> str:
+    """What of a prediction lies beyond the tests, in words; "" where nothing does."""
+    longest = 10.0 ** float(tests.log_time.max())
+    parts = []
+    if hours > LONGEST_EXTRAPOLATION * longest:
+        parts.append(f"{hours / longest:.3g} times the longest test ({longest:.4g} h)")
+    low, high = float(tests.temperature.min()), float(tests.temperature.max())
+    if not low - 1.0 <= temperature <= high + 1.0:
+        span = celsius(low) if high - low < 1.0 else f"{celsius(low)} to {celsius(high)}"
+        parts.append(f"temperature outside the tested {span}")
+    if stress is not None and not 0.999 * tests.stress.min() <= stress <= 1.001 * tests.stress.max():
+        parts.append(f"stress outside the tested {tests.stress.min():.4g} to {tests.stress.max():.4g} MPa")
+    return "; ".join(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Branch:
+    """The part of a curve of log10 of time over stress that falls through the tests.
+
+    stress, log_time : (points,), one point where the curve does not fall. turns : whether it turns back at its ends.
+    """
+
+    stress: Floats
+    log_time: Floats
+    turns: tuple[bool, bool]
+
+    def stress_at(self, hours: float) -> tuple[float | None, str]:
+        """MPa at which the time is that, else None and the reason."""
+        low, high, target = self.stress[0], self.stress[-1], np.log10(hours)
+        if self.stress.size < 2:
+            return None, f"the time does not fall with stress about {low:.3g} MPa"
+        if target > self.log_time[0]:
+            if self.turns[0]:
+                return None, f"times turn back below {low:.3g} MPa, at {_hours(self.log_time[0])}"
+            return (
+                None,
+                f"only {_hours(self.log_time[0])} are reached at {low:.3g} MPa, a tenth of the lowest stress tested",
+            )
+        if target < self.log_time[-1]:
+            if self.turns[1]:
+                return None, f"times turn back above {high:.3g} MPa, at {_hours(self.log_time[-1])}"
+            return None, f"it lies above {high:.4g} MPa, up to which strengths are looked for"
+        inverse = PchipInterpolator(self.log_time[::-1], np.log(self.stress[::-1]))
+        return float(np.exp(inverse(target))), ""
+
+
+def _falling_branch(stress: Floats, log_time: Floats, tests: RuptureTests) -> _Branch:
+    """Of a curve (points,), from where its time is nearest to the median of the tests."""
+    first = last = int(np.nanargmin(np.abs(log_time - np.median(tests.log_time))))
+    falling = np.diff(log_time) < 0
+    while first > 0 and falling[first - 1]:
+        first -= 1
+    while last < stress.size - 1 and falling[last]:
+        last += 1
+    kept = slice(first, last + 1)
+    return _Branch(stress[kept], log_time[kept], (first > 0, last < stress.size - 1))
+
+
+def _hours(log_time: float) -> str:
+    return f"{10.0**log_time:.3g} h"

@@ -1,0 +1,131 @@
+"""The censored likelihood against closed forms, numerical integration, and published maximum likelihood estimates."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import multivariate_normal, norm
+
+from creepkit.rupture_assessment.fitting import conditions_of, fit_method
+from creepkit.rupture_assessment.likelihood import GroupedTimes
+from creepkit.rupture_assessment.methods import METHODS, Basis, RuptureMethod
+from creepkit.rupture_assessment.observed_tests import rupture_tests
+from helpers.planted_rupture import MOTORETTES, larson_miller, planted, rupture_test
+
+LN10 = np.log(10.0)
+
+
+def unknown(temperature):
+    return np.full(np.shape(temperature), np.nan)
+
+
+def fitted(method, histories, degree=2, distribution="lognormal", **fixed):
+    tests, _, _ = rupture_tests(histories)
+    at = conditions_of(tests, unknown)
+    return fit_method(method, tests, at, degree=degree, distribution=distribution, fixed=fixed, level=0.95), tests
+
+
+def test_without_heats_and_run_outs_it_is_least_squares():
+    fit, tests = fitted(METHODS["larson-miller"], planted(larson_miller, count=40))
+    x, T = np.log10(tests.stress), tests.temperature
+    X = np.column_stack([-np.ones(40), 1 / T, x / T, x**2 / T])
+    expected, (squares,), *_ = np.linalg.lstsq(X, tests.log_time, rcond=None)
+    np.testing.assert_allclose(fit.coefficients, expected, rtol=1e-8)
+    assert fit.scale == pytest.approx(np.sqrt(squares / 40), rel=1e-8)
+    covariance = squares / 36 * np.linalg.inv(X.T @ X)
+    np.testing.assert_allclose(np.diag(fit.covariance)[:4], np.diag(covariance), rtol=1e-4)
+    C = fit["C"]
+    assert C.value == pytest.approx(expected[0], rel=1e-8)
+    # Student's quantile at 36 degrees of freedom is 2.0281.
+    assert C.high - C.value == pytest.approx(2.0281 * np.sqrt(covariance[0, 0]), rel=1e-3)
+
+
+def test_balanced_heats_have_the_closed_form_of_a_mixed_model():
+    """Searle, Casella, McCulloch (1992), Variance components, 3.7: maximum likelihood of the balanced one-way model."""
+    rng, heats, each = np.random.default_rng(3), 6, 8
+    stress = np.geomspace(60.0, 200.0, each)
+    effects = 0.2 * rng.standard_normal(heats)
+    y = 9.0 - 3.0 * np.log10(stress) + effects[:, None] + 0.1 * rng.standard_normal((heats, each))
+    histories = [
+        rupture_test(f"{h} {k}", stress[k], 900.0, 10 ** y[h, k], labels={"heat": f"H{h}"})
+        for h in range(heats)
+        for k in range(each)
+    ]
+    fit, _ = fitted(METHODS["isothermal"], histories, degree=1)
+    x = np.log10(stress) - np.log10(stress).mean()
+    slope = (y @ x).mean() / (x @ x)
+    within = y - y.mean(axis=1, keepdims=True) - slope * x
+    variance = (within**2).sum() / (heats * (each - 1))
+    between = each * ((y.mean(axis=1) - y.mean()) ** 2).sum() / heats
+    assert fit["a_1"].value == pytest.approx(slope, rel=1e-8)
+    assert fit.scale**2 == pytest.approx(variance, rel=1e-7)
+    assert fit.scatter["heat"] ** 2 == pytest.approx((between - variance) / each, rel=1e-7)
+    assert fit.scatter_corrected["heat"] ** 2 == pytest.approx(fit.scatter["heat"] ** 2 * 6 / 5, rel=1e-9)
+
+
+@pytest.mark.parametrize("kinds", [1, 2])
+def test_effects_of_complete_data_integrate_to_a_normal_distribution(kinds):
+    rng, n = np.random.default_rng(5), 30
+    groups = {"heat": [f"H{k}" for k in rng.integers(0, 5, n)], "laboratory": [f"L{k}" for k in rng.integers(0, 3, n)]}
+    chosen = dict(list(groups.items())[:kinds])
+    y, mean, scatter = rng.normal(2.0, 0.5, n), rng.normal(2.0, 0.1, n), np.array([0.3, 0.15])[:kinds]
+    times = GroupedTimes.of(y, np.zeros(n, bool), chosen, "lognormal")
+    covariance = 0.2**2 * np.eye(n) + sum(
+        s**2 * members @ members.T for s, members in zip(scatter, times.members, strict=True)
+    )
+    value = times.log_likelihood(mean[None], np.array([0.2]), scatter[None])[0]
+    assert value == pytest.approx(multivariate_normal(mean, covariance).logpdf(y), abs=1e-9)
+
+
+@pytest.mark.parametrize("distribution", ["lognormal", "weibull"])
+def test_effects_of_run_outs_are_integrated(distribution):
+    y, censored = np.array([2.0, 2.2, 2.4, 2.4, 2.1, 2.5]), np.array([0, 0, 1, 1, 1, 1], bool)
+    heats, mean, s, tau = ["a", "a", "a", "a", "b", "b"], np.linspace(1.9, 2.5, 6), 0.12, 0.25
+    times = GroupedTimes.of(y, censored, {"heat": heats}, distribution)
+
+    def density(b, k):
+        z = (y[k] - mean[k] - b) / s
+        if distribution == "weibull":
+            return np.exp(-np.exp(z)) * (1.0 if censored[k] else np.exp(z) / s)
+        return norm.sf(z) if censored[k] else norm.pdf(z) / s
+
+    expected = 0.0
+    for members in ((0, 1, 2, 3), (4, 5)):
+        product = lambda b, members=members: norm.pdf(b, 0, tau) * np.prod([density(b, k) for k in members])  # noqa: E731
+        expected += np.log(quad(product, -2.0, 2.0, epsabs=1e-14, limit=200)[0])
+    value = times.log_likelihood(mean[None], np.array([s]), np.array([[tau]]))[0]
+    assert value == pytest.approx(expected, abs=2e-4)
+
+
+def motorettes(function):
+    """A method of one function of the temperature, and the motorette tests."""
+    method = RuptureMethod(
+        "motorettes",
+        "",
+        lambda at, *_: Basis(np.zeros(at.stress.shape), np.column_stack([np.ones(40), function(at.temperature)])),
+        lambda c, *_: {"b_0": float(c[0]), "b_1": float(c[1])},
+        {},
+    )
+    tests = [
+        rupture_test(f"{T:g} {k}", 1.0, T + 273.2, abs(h), end=abs(h) if h < 0 else np.inf)
+        for T, hours in MOTORETTES.items()
+        for k, h in enumerate(hours)
+    ]
+    return method, tests
+
+
+def test_motorettes_with_a_normal_distribution():
+    """log10 h = b_0 + b_1 1000 / (T + 273.2): -6.019, 4.311, sigma 0.2592 (Schmee, Hahn (1979); Tanner (1993), 4.2)."""
+    fit, _ = fitted(*motorettes(lambda T: 1000.0 / T))
+    assert fit["b_0"].value == pytest.approx(-6.019, abs=5e-4)
+    assert fit["b_1"].value == pytest.approx(4.311, abs=5e-4)
+    assert fit.scale == pytest.approx(0.2592, abs=5e-5)
+
+
+def test_motorettes_with_a_weibull_distribution():
+    """ln h = 16.3185 - 0.0453 T, scale 0.334, log-likelihood -147.4 (Venables, Ripley (2002), MASS, 13.2)."""
+    fit, tests = fitted(*motorettes(lambda T: T - 273.2), distribution="weibull")
+    assert LN10 * fit["b_0"].value == pytest.approx(16.3185, abs=5e-5)
+    assert LN10 * fit["b_1"].value == pytest.approx(-0.0453, abs=5e-5)
+    assert LN10 * fit.scale == pytest.approx(0.334, abs=5e-4)
+    in_hours = fit.log_likelihood - np.log(10.0 ** tests.log_time[~tests.censored] * LN10).sum()
+    assert in_hours == pytest.approx(-147.4, abs=0.05)

@@ -1,0 +1,248 @@
+"""Assessments of planted rupture tests: constants, ranking, strengths with bounds, flags, and what is refused."""
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+import creepkit as ck
+from creepkit.errors import FitError, HistoryError
+from creepkit.rupture_assessment.checks import physical_realism
+from creepkit.rupture_assessment.observed_tests import rupture_tests
+from helpers.planted_rupture import (
+    HOUR,
+    TENSILE,
+    larson_miller,
+    manson_haferd,
+    orr_sherby_dorn,
+    planted,
+    rupture_test,
+    wilshire,
+)
+
+NO_POLYNOMIAL_BUT_2 = ck.RuptureSettings(degrees=(2,))
+
+
+@pytest.fixture(scope="module")
+def with_heats():
+    """Seven heats with run-outs; their effects are such that the average heat has none."""
+    effects = np.array([-0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15])
+    tests = planted(larson_miller, count=84, heats=7, effects=effects, end=4000.0, seed=2)
+    return ck.rupture(tests, "larson-miller", settings=NO_POLYNOMIAL_BUT_2)
+
+
+def test_planted_constants_and_heats_are_recovered(with_heats):
+    assert int(with_heats.tests.censored.sum()) > 3
+    for name, value in {"C": 20.0, "a_0": 32000.0, "a_1": -2000.0, "a_2": -1900.0}.items():
+        estimate = with_heats.best[name]
+        assert estimate.low < value < estimate.high
+    assert with_heats.best.scale == pytest.approx(0.08, rel=0.25)
+    assert with_heats.best.scatter["heat"] == pytest.approx(0.1, rel=0.25)
+    effects = with_heats.best.effects["heat"]
+    assert [effects[f"H{k}"] for k in range(7)] == pytest.approx(np.linspace(-0.15, 0.15, 7), abs=0.06)
+
+
+@pytest.mark.parametrize(
+    ("mean", "method", "truth"),
+    [
+        (orr_sherby_dorn, "orr-sherby-dorn", {"Q": 330e3}),
+        (manson_haferd, "manson-haferd", {"T_a": 500.0, "log10 t_a": 14.0, "a_0": 0.02, "a_1": -0.024}),
+        (wilshire, "wilshire", {"Q": 280e3, "u": 0.16, "ln k_1": 6.0}),
+    ],
+)
+def test_planted_methods_are_found(mean, method, truth):
+    tests = planted(mean, count=60, scatter=0.02)
+    degrees = (1,) if method == "manson-haferd" else (2,)
+    found = ck.rupture(tests, tensile_strength=TENSILE, settings=ck.RuptureSettings(degrees=degrees))
+    assert found.best.method == method
+    assert found.methods[method] > 0.95
+    for name, value in truth.items():
+        assert found[method][name].low < value < found[method][name].high, name
+
+
+def test_bounds_of_a_strength_are_those_of_a_regression():
+    """Without heats: where the limits of the mean, and of one observation, of ordinary least squares are the time."""
+    assessment = ck.rupture(planted(larson_miller, count=40), "larson-miller", settings=NO_POLYNOMIAL_BUT_2)
+    tests = assessment.tests
+
+    def row(stress, T):
+        x = np.log10(stress)
+        return np.array([-np.ones(np.shape(T)), 1 / T, x / T, x**2 / T])
+
+    X = row(tests.stress, tests.temperature).T
+    coefficients, (squares,), *_ = np.linalg.lstsq(X, tests.log_time, rcond=None)
+    variance, inverse = squares / 36, np.linalg.inv(X.T @ X)
+    strength = assessment.strength(1e4, 873.15)
+    for bounds, own in ((strength.mean, 0.0), (strength.test, 1.0)):
+        for stress, sign in zip(bounds, (-1.0, 1.0), strict=True):
+            at = row(np.array(stress), np.array(873.15))
+            deviation = np.sqrt(variance * (own + at @ inverse @ at))
+            limit = at @ coefficients + sign * student.ppf(0.975, 36) * deviation
+            assert limit == pytest.approx(4.0, abs=1e-3)
+    assert row(np.array(strength.value), np.array(873.15)) @ coefficients == pytest.approx(4.0, abs=1e-6)
+    median, low, high = assessment.rupture_time(strength.value, 873.15)
+    assert median == pytest.approx(1e4 * HOUR, rel=1e-5)
+    assert low < median < high
+
+
+def test_extrapolation_is_flagged_and_what_is_not_bracketed_is_none(with_heats):
+    assert with_heats.strength(1e4, 873.15).extrapolation == ""
+    far = with_heats.strength(1e5, 873.15)
+    assert far.extrapolation.startswith("25 times the longest test (4000 h)")
+    assert "temperature outside" in with_heats.strength(1e4, 1000.0).extrapolation
+    assert far.test[0] < far.heat[0] < far.mean[0] < far.value < far.mean[1] < far.heat[1] < far.test[1]
+    longer = with_heats.strength(1e11, 1100.0)
+    assert longer.value is None
+    assert longer.mean == (None, None)
+    assert "a tenth of the lowest stress tested" in longer.reason or "turn back" in longer.reason
+
+
+def test_one_temperature_has_its_own_method():
+    tests = [t for t in planted(larson_miller, count=45) if t.temperature == 873.15]
+    assessment = ck.rupture(tests)
+    assert [*assessment.methods] == ["isothermal"]
+    assert not assessment.decisive
+    assert assessment.verdict.startswith("only isothermal was fitted")
+    assert assessment.strength(1e4, 900.0).reason == "all tests are at 600 °C"
+    given = ck.rupture(tests, "larson-miller", settings=ck.RuptureSettings(fixed={"larson-miller": {"C": 20.0}}))
+    assert given.strength(1e4, 873.15).value == pytest.approx(assessment.strength(1e4, 873.15).value, rel=0.02)
+
+
+def test_monkman_grant_predicts_by_rates_and_by_a_rate_law():
+    rng, tests = np.random.default_rng(1), []
+    for k in range(30):
+        T, stress = (900.0, 950.0)[k % 2], rng.uniform(60.0, 150.0)
+        rate = np.exp(2.0 + 5.0 * np.log(stress) - 300e3 / (8.314462618 * T) + 0.1 * rng.standard_normal())  # 1/h
+        hours = 10 ** (-1.2 - 0.9 * np.log10(rate) + 0.03 * rng.standard_normal())
+        tests.append(rupture_test(f"t{k}", stress, T, hours, minimum_rate=rate / HOUR))
+    assessment = ck.rupture(tests)
+    times, rates = assessment.relation.times, assessment.relation.rates
+    assert (times["c"].value, times["m"].value) == pytest.approx((-1.2, 0.9), abs=0.05)
+    assert rates["n"].low < 5.0 < rates["n"].high
+    assert rates["Q"].low < 300e3 < rates["Q"].high
+    assert "monkman-grant" not in assessment.methods
+    assert assessment.strength(1e3, 900.0, "monkman-grant").value == pytest.approx(
+        assessment.strength(1e3, 900.0).value, rel=0.03
+    )
+
+
+def test_laboratories_scatter_beside_heats():
+    rng = np.random.default_rng(4)
+    effect = {"north": -0.2, "south": 0.0, "west": 0.2}
+    tests = []
+    for k in range(54):
+        T, stress, laboratory = (850.0, 900.0)[k % 2], rng.uniform(80.0, 160.0), [*effect][k % 3]
+        log_time = larson_miller(np.log10(stress), T) + effect[laboratory] + 0.05 * rng.standard_normal()
+        labels = {"heat": f"H{k // 9}", "laboratory": laboratory}
+        tests.append(rupture_test(f"t{k}", stress, T, 10**log_time, labels=labels))
+    fit = ck.rupture(tests, "larson-miller", settings=ck.RuptureSettings(degrees=(1,))).best
+    assert fit.scatter["laboratory"] == pytest.approx(np.sqrt(2 / 3) * 0.2, rel=0.15)
+    assert fit.scatter["heat"] < 0.05
+
+
+def test_a_weibull_distribution_gives_the_same_strength(with_heats):
+    tests = planted(larson_miller, count=48, seed=7)
+    options = {"methods": "larson-miller", "hours": [1e3], "temperatures": [873.15]}
+    normal = ck.rupture(tests, **options, settings=NO_POLYNOMIAL_BUT_2).strength(1e3, 873.15)
+    settings = ck.RuptureSettings(degrees=(2,), distribution="weibull")
+    weibull = ck.rupture(tests, **options, settings=settings).strength(1e3, 873.15)
+    assert weibull.value == pytest.approx(normal.value, rel=0.01)
+    assert weibull.test[0] < weibull.mean[0] < weibull.value < weibull.mean[1] < weibull.test[1]
+
+
+def test_a_method_is_not_decisive_where_a_check_fails():
+    """Most tests are short, and the long ones break far too early: a tenth of the tests decides over the strength."""
+    tests = planted(larson_miller, count=60, scatter=0.02, seed=3)
+    early = [t.replace(times=[1.0], outputs={}, rupture_time=_shortened(t)) for t in tests]
+    assessment = ck.rupture(early, "larson-miller", settings=ck.RuptureSettings(degrees=(1,)))
+    assert not assessment.decisive
+    failed = [check for check in assessment.checks if check.passed is False]
+    assert failed
+    assert failed[0].name in assessment.verdict
+
+
+def _shortened(test):
+    hours = test.rupture_time / HOUR
+    return HOUR * (hours if hours < 300 else 300 * (hours / 300) ** 0.2)
+
+
+def test_isotherms_that_turn_back_within_the_tests_are_not_ranked():
+    x = np.linspace(1.7, 2.3, 12)
+    rising = 3.0 - 20.0 * (x - 1.9) ** 2 + 0.03 * np.cos(40.0 * x)
+    tests = [
+        rupture_test(f"{T:g} {k}", 10 ** x[k], T, 10 ** (rising[k] + 20000.0 * (1 / T - 1 / 900.0)))
+        for T in (880.0, 920.0)
+        for k in range(12)
+    ]
+    assessment = ck.rupture(tests, settings=ck.RuptureSettings(degrees=(1, 2)))
+    assert "rises with stress at" in assessment.rejected["larson-miller, degree 2"]
+    assert all(one.fit.degree == 1 for one in assessment.ranked)
+
+
+def test_crossing_isotherms_fail_a_check():
+    """T_a = 850 K lies among the temperatures tested: above it times rise with temperature."""
+    tests, _, _ = rupture_tests(planted(larson_miller, count=30))
+    assessment = ck.rupture(
+        planted(manson_haferd, count=30), "manson-haferd", settings=ck.RuptureSettings(degrees=(1,))
+    )
+    fit = assessment.best
+    object.__setattr__(fit, "curvature", 1.0 / (fit.centre.temperature - 850.0))
+    checks = physical_realism(fit, tests, lambda T: np.full(np.shape(T), np.nan), None)
+    assert not all(check.passed for check in checks)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            {"methods": "larson-miler"},
+            "there is no method 'larson-miler' of rupture times; did you mean 'larson-miller'",
+        ),
+        (
+            {"methods": "wilshire"},
+            "wilshire needs the tensile strength at 550 °C, 600 °C, 650 °C: give tensile_strength=",
+        ),
+        ({"methods": "monkman-grant"}, "no test has a minimum creep rate, which monkman-grant needs"),
+        ({"methods": "isothermal"}, "isothermal is for tests of one temperature; these have 3"),
+        ({"methods": "wilshire", "tensile_strength": dict.fromkeys(TENSILE, 50.0)}, "not below the tensile strength"),
+        ({"hours": []}, "no time is given"),
+        ({"hours": [-1.0]}, "a strength is asked for at -1.0 h"),
+        ({"temperatures": [20000.0]}, "a temperature is 20000.0; give K"),
+        ({"tensile_strength": {900.0: -5.0}}, "give numbers above zero: MPa by temperature"),
+    ],
+)
+def test_what_cannot_be_assessed_is_refused(arguments, message):
+    with pytest.raises((FitError, HistoryError), match=message.replace("(", r"\(")) as error:
+        ck.rupture(planted(larson_miller, count=20), **arguments)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"degrees": ()}, "degrees are"),
+        ({"distribution": "normal"}, "allowed are lognormal, weibull"),
+        ({"criterion": "aic"}, "allowed are bic and aicc"),
+        ({"level": 1.0}, "give a probability"),
+        ({"fixed": {"larson-miller": {"Q": 1.0}}}, "those that may be given: C"),
+        ({"fixed": {"larson": {"C": 1.0}}}, "did you mean 'larson-miller'"),
+    ],
+)
+def test_settings_are_checked(settings, message):
+    with pytest.raises(FitError, match=message):
+        ck.RuptureSettings(**settings)
+
+
+def test_tests_that_cannot_be_assessed_are_named():
+    good = planted(larson_miller, count=20)
+    stepped = good[0].replace(name="stepped", loading=ck.StressSteps(((0.0, 50.0), (3600.0, 60.0))))
+    with pytest.raises(HistoryError, match="leave out tests with steps of load"):
+        ck.rupture([*good, stepped])
+    with pytest.raises(HistoryError, match="none of 1 tests broke"):
+        ck.rupture([ck.History("a", [1.0], {}, ck.constant_stress(10.0), 900.0, unruptured=True)])
+    with pytest.raises(FitError, match="do not determine the 3 constants of larson-miller"):
+        ck.rupture(good[:3], "larson-miller", settings=ck.RuptureSettings(degrees=(1,)))
+    with pytest.raises(HistoryError, match="2 alloys"):
+        ck.rupture([good[0].replace(alloy="A"), good[1].replace(alloy="B")])
+    labelled = good[0].replace(labels={"tensile_strength_MPa": "strong"})
+    with pytest.raises(HistoryError, match="tensile_strength_MPa is 'strong'"):
+        ck.rupture([*good, labelled])
