@@ -10,13 +10,8 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError
-from creepkit.readers.conditions import (
-    END_OF_TEST_TERMS,
-    StatedConditions,
-    errors_located_at,
-    read_loading,
-    read_temperature,
-)
+from creepkit.readers.conditions import END_OF_TEST_TERMS, StatedConditions, errors_located_at
+from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records import History
@@ -34,13 +29,15 @@ def assemble_history(
     location: str,
     source: str,
     skipped_columns: Collection[str] = (),
+    columns_as_labels: bool = False,
 ) -> History:
     """Return the history of one test.
 
     entries : what is said once for the test; location : where that stands; table : its frames, without reading the
-    columns in `skipped_columns`; source : what the history says of its origin.
+    columns in `skipped_columns`; source : what the history says of its origin. columns_as_labels : whether entries that
+    resemble no key are labels, as columns of an index are.
     """
-    conditions = StatedConditions(entries, vocabulary, location)
+    conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
     frames = read_frames(table, vocabulary, conditions.terms, skipped_columns)
     columns = table.location(table.columns_line)
     loading = read_loading(conditions, frames)
