@@ -184,7 +184,8 @@ class Terms:
     @property
     def condition_kinds(self) -> dict[str, QuantityKind]:
         """The kinds of all numbers that stand once for a test."""
-        levels = {f"{name}_{k}": kind for name, kind in self.load_kinds.items() for k in range(1, HIGHEST_STEP + 1)}
+        stepped = {**self.number_kinds, "temperature": TEMPERATURE}
+        levels = {f"{name}_{k}": kind for name, kind in stepped.items() for k in range(1, HIGHEST_STEP + 1)}
         return {**CONDITION_KINDS, **self.load_kinds, **levels, **self._standard_deviation_kinds()}
 
     @property
@@ -220,10 +221,9 @@ class Terms:
             misspelt = [known for known in spellings if is_misspelling(plain, known)]
             if misspelt:
                 return spellings[get_close_matches(plain, misspelt, 1, cutoff=0.0)[0]]
-        stem, _, unit = plain.rpartition("_")
-        units = {plain_name(known): known for kind in self.condition_kinds.values() for known in kind.units}
-        near = [known for known in self.condition_kinds if unit in units and is_misspelling(stem, plain_name(known))]
-        return f"{near[0]}_{units[unit]}" if near else ""
+        words = {plain, plain.rpartition("_")[0]}
+        names = (*self.condition_kinds, *self.dimensions)
+        return next((name for name in names for word in words if is_misspelling(word, name.casefold())), "")
 
     def suggestion(self, name: str) -> str:
         """The key that an unknown name may have meant, "" where it resembles none."""

@@ -39,17 +39,17 @@ def test_none_of_600_misspelt_keys_is_accepted(template: str, specimen: str, tmp
 def test_an_index_refuses_misspelt_columns_too(tmp_path: Path):
     """A column of an index that resembles no key is a label; a misspelt key of seven letters or more is an error."""
     spellings = HeaderVocabulary().terms().spellings
-    keys = [key for key in spellings.values() if len(key) >= 7]
+    keys = [key for key in HeaderVocabulary().terms("uniaxial").spellings.values() if len(key) >= 7]
     (tmp_path / "curves.csv").write_text("key,time_s,strain_pct\na,0,0\na,10,0.1\n")
     index = "key,temperature_C,stress_MPa,{}\na,850,60,7\n"
-    accepted = []
+    accepted, refused = [], 0
     for key, wrong in misspelt_keys(keys, 200, 96, spellings):
         (tmp_path / "index.csv").write_text(index.format(f'"{wrong}"'))
         try:
             accepted += [(key, wrong, dict(h.labels)) for h in INDEXED_TABLE.read(tmp_path)]
         except HistoryError as error:
-            assert str(error).startswith(str(tmp_path / "index.csv")), (key, wrong)
-    assert accepted == []
+            refused += str(error).startswith(str(tmp_path / "index.csv"))
+    assert (accepted, refused) == ([], 200)
     (tmp_path / "index.csv").write_text(index.format("grain_size_um"))
     assert INDEXED_TABLE.read(tmp_path)[0].labels["grain_size_um"] == "7"
 
