@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from difflib import get_close_matches
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,18 +12,13 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError
-from creepkit.readers.conditions import (
-    END_OF_TEST_TERMS,
-    StatedConditions,
-    StatedNumber,
-    errors_located_at,
-    read_loading,
-    read_temperature,
-)
+from creepkit.readers.conditions import END_OF_TEST_TERMS, StatedConditions, StatedNumber, errors_located_at
+from creepkit.readers.imposed import read_loading, read_temperature
+from creepkit.readers.loading_strain import without_loading
 from creepkit.readers.standard_names import in_standard_names
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms
-from creepkit.records import UNKNOWN_DURATION, History
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
+from creepkit.records import UNKNOWN_DURATION, History, Loading, Program
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -37,26 +33,35 @@ def assemble_history(
     location: str,
     source: str,
     skipped_columns: Collection[str] = (),
+    columns_as_labels: bool = False,
 ) -> History:
     """Return the history of one test.
 
     entries : what is said once for the test; location : where that stands; table : its frames, without reading the
-    columns in `skipped_columns`; source : what the history says of its origin.
+    columns in `skipped_columns`; source : what the history says of its origin. columns_as_labels : whether entries that
+    resemble no key are labels, as columns of an index are.
     """
     entries, table = in_standard_names(entries, table, vocabulary)
-    conditions = StatedConditions(entries, vocabulary, location)
+    conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
+    table, marked = _without_readings_before_steps(table, vocabulary, conditions.terms)
     frames = read_frames(table, vocabulary, conditions.terms, skipped_columns)
     columns = table.location(table.columns_line)
-    loading = read_loading(conditions, frames)
+    loading = read_loading(conditions, frames, marked)
     specimen, outputs = _specimen_and_outputs(conditions, frames, loading.quantity, columns)
     strain_measure = conditions.take_choice(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
-    elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required="strain" in outputs)
-    temperature = read_temperature(conditions, frames)
-    used = _used_frames(conditions, frames)
+    temperature = read_temperature(conditions, frames, marked)
+    used, elastic = _used_frames(conditions, frames), _elastic(conditions)
+    if "strain" in outputs:
+        record = without_loading(
+            conditions, frames.times, outputs["strain"], used, _elastic_strain(loading, temperature, elastic)
+        )
+        outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
+    else:
+        elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
     minimum_rate, minimum_rate_sd = _minimum_rate(conditions)
     rupture_time, unruptured = _end_of_test(conditions, frames, used)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
@@ -67,9 +72,9 @@ def assemble_history(
         loading=loading,
         temperature=temperature,
         specimen=specimen,
-        elastic=_elastic(conditions),
+        elastic=elastic,
         strain_measure="engineering" if strain_measure == "engineering" else "logarithmic",
-        includes_elastic=elastic_included == "yes",
+        includes_elastic=elastic_included,
         standard_deviation=_standard_deviations(conditions, frames, outputs),
         used=used,
         geometry=conditions.geometry,
@@ -161,6 +166,39 @@ def _refuse_unknown_specimen(named: str, terms: Terms, location: str) -> None:
         raise HistoryError(f"{location}: there is no specimen '{named}'; did you mean '{near[0]}'?")
 
 
+def _without_readings_before_steps(
+    table: TextTable, vocabulary: HeaderVocabulary, terms: Terms
+) -> tuple[TextTable, set[int]]:
+    """The table with the later of two rows of one time that differ in load, temperature or step; their lines.
+
+    A reading before a change of load and one after it state when it was; the mean of both would be neither.
+    """
+    kinds = terms.column_kinds
+    found = [split_unit(terms.spelled(vocabulary.synonyms.get(name, name)), kinds) for name in table.columns]
+    quantities = ["" if one is None else one[0] for one in found]
+    imposed = [k for k, q in enumerate(quantities) if q in {*terms.number_kinds, "temperature", "step"}]
+    if "time" not in quantities or not imposed:
+        return table, set()
+    clock, rows = quantities.index("time"), table.rows
+    before = [
+        k
+        for k, (one, next_) in enumerate(pairwise(rows))
+        if one.cells[clock] == next_.cells[clock] and any(one.cells[i] != next_.cells[i] for i in imposed)
+    ]
+    if not before:
+        return table, set()
+    dropped = set(before)
+    return table.with_rows([row for k, row in enumerate(rows) if k not in dropped]), {rows[k + 1].line for k in before}
+
+
+def _elastic_strain(loading: Loading, temperature: float | Program, elastic: Elastic | None) -> float | None:
+    """Stress over modulus at the beginning, None where one of them is not known."""
+    if elastic is None or loading.quantity != "stress":
+        return None
+    start = temperature.values[0] if isinstance(temperature, Program) else temperature
+    return float(loading.program().values[0]) / float(elastic.at(float(start)).E)
+
+
 def _merge_label(frames: TableFrames) -> dict[str, str]:
     return {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
 
@@ -197,7 +235,7 @@ def _unidentified(named: str, present: Sequence[str], terms: Terms, location: st
 
 def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], location: str) -> None:
     """Refuse a column that would go unread, such as a pressure beside a stress."""
-    unread = [name for name in frames.values if name.removesuffix("_sd") not in {"time", "used", *read_columns}]
+    unread = [name for name in frames.values if name.removesuffix("_sd") not in {"time", "used", "step", *read_columns}]
     if unread:
         read_text = ", ".join(sorted(read_columns))
         raise HistoryError(f"{location}: a column of {unread[0]} has no meaning beside {read_text}; remove it")

@@ -1,6 +1,6 @@
-"""Test conditions stated beside the frames: numbers, texts and labels, the loading and the temperature.
+"""What is stated once for a test beside its frames: numbers, texts, lengths and labels.
 
-Nothing that a file states goes unread.
+Nothing that a file states goes unread, and no key is guessed: an unknown one is an error, never a label.
 """
 
 from __future__ import annotations
@@ -9,22 +9,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Literal, TypeVar
-
-import numpy as np
+from typing import TypeVar
 
 from creepkit.errors import CreepkitError, HistoryError, nearest
-from creepkit.readers.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATURE_RECORD_TOLERANCE, recorded_program
-from creepkit.readers.text_tables import SourceText, TableFrames
+from creepkit.readers.text_tables import SourceText
 from creepkit.readers.vocabulary import (
-    COMPONENT_LOADING_KINDS,
+    CLOSE_SPELLING,
+    LABEL_KEYS,
     SPECIMEN_NAME_PATTERN,
     HeaderVocabulary,
     Terms,
+    is_misspelling,
+    plain_name,
     split_unit,
 )
-from creepkit.records import Loading, PointLoading, Program, TwoLevels, loading_of
-from creepkit.records.quantities import LENGTH, TEMPERATURE, TIME, QuantityKind
+from creepkit.records import Program
+from creepkit.records.quantities import LENGTH, TIME, QuantityKind
 
 _ALLOWED_COMBINATIONS = (
     "give one of stress, stress_steps, stress_program, or stress_1 with stress_2 and jump_time (the same for other "
@@ -32,21 +32,11 @@ _ALLOWED_COMBINATIONS = (
 )
 
 
-_PROGRAM_FORMS = ("steps", "program")
-
-
-_LOADING_SUFFIXES = ("", "_1", *(f"_{form}" for form in _PROGRAM_FORMS))
-
-
 END_OF_TEST_TERMS = ("ruptured", "stopped")
 """How a test may have ended: by rupture, or before it."""
 
 
 _T = TypeVar("_T")
-
-
-CLOSE_SPELLING = 0.8
-"""Similarity above which an unknown name is a misspelt one."""
 
 
 TimeValuePairs = tuple[tuple[float, float], ...]
@@ -62,9 +52,20 @@ class StatedNumber:
 
 
 class StatedConditions:
-    """The entries of one test: numbers, texts, geometry and labels; numbers and texts are taken, one by one."""
+    """The entries of one test: numbers, texts, geometry and labels; numbers and texts are taken, one by one.
 
-    def __init__(self, entries: Mapping[str, SourceText], vocabulary: HeaderVocabulary, location: str) -> None:
+    columns_as_labels : whether entries that resemble no key are labels, as columns of an index are; such keys of a head
+        are errors.
+    """
+
+    def __init__(
+        self,
+        entries: Mapping[str, SourceText],
+        vocabulary: HeaderVocabulary,
+        location: str,
+        *,
+        columns_as_labels: bool = False,
+    ) -> None:
         self.location = location
         self.geometry: dict[str, float] = {}
         self.labels: dict[str, str] = {}
@@ -79,8 +80,12 @@ class StatedConditions:
         self._texts: dict[str, SourceText] = {}
         self._assumptions: list[str] = []
         self._locations: dict[str, str] = {}
-        for key, entry in entries.items():
-            self._classify(key, entry)
+        unknown = {key: entry for key, entry in entries.items() if not self._classify(key, entry)}
+        refused = [key for key in unknown if not columns_as_labels or not key.strip() or self.terms.misspelt(key)]
+        if refused:
+            raise _unknown_key(refused, unknown, self.terms.suggestion(refused[0]))
+        for key, entry in unknown.items():
+            _put_once(self.labels, key, entry.text, entry.location)
 
     def take_number(self, quantity: str) -> StatedNumber | None:
         """Take a number, if it was given."""
@@ -90,6 +95,10 @@ class StatedConditions:
         """Take a text; the default stands in for a missing or empty one."""
         entry = self._texts.pop(key, None)
         return default if entry is None else entry.text or default
+
+    def states(self, key: str) -> bool:
+        """Whether a number or text is given that nothing has taken yet."""
+        return key in self._numbers or key in self._texts
 
     def take_choice(self, key: str, allowed: Sequence[str], required: bool) -> str:
         """Take one of the allowed texts; '' when it was not given, or what the layout assumes when it is needed."""
@@ -124,8 +133,8 @@ class StatedConditions:
         return next((self._locations[key] for key in keys if key in self._locations), self.location)
 
     def missing_error(self, what: str, advice: str) -> HistoryError:
-        """The error that says what is missing, and which keys were kept as labels (perhaps misspelt)."""
-        label_note = f" (keys not understood: {', '.join(self.labels)})" if self.labels else ""
+        """The error that says what is missing, and what was kept as labels."""
+        label_note = f" (kept as labels: {', '.join(self.labels)})" if self.labels else ""
         return HistoryError(f"{self.location}: no {what}{label_note}; {advice}")
 
     def all_labels(self) -> dict[str, str]:
@@ -136,35 +145,56 @@ class StatedConditions:
             raise HistoryError(
                 f"{location}: '{key}' has no meaning beside the other conditions; {_ALLOWED_COMBINATIONS}"
             )
-        assumed = {"assumed": ", ".join(self._assumptions)} if self._assumptions else {}
-        return {**self.labels, **assumed}
+        earlier = [self.labels["assumed"]] if self.labels.get("assumed") else []
+        assumed = ", ".join(dict.fromkeys([*earlier, *self._assumptions]))
+        return {**self.labels, **({"assumed": assumed} if assumed else {})}
 
-    def _classify(self, key: str, entry: SourceText) -> None:
+    def _classify(self, key: str, entry: SourceText) -> bool:
+        """Put an entry where it belongs; False where nothing is known of its key."""
         name = self._vocabulary.synonyms.get(key, key)
-        result = split_unit(name, self._kinds)
-        if name.startswith("label "):
-            _put_once(self.labels, name.removeprefix("label ").strip(), entry.text, entry.location)
-        elif name.startswith("geometry "):
-            _put_once(self.geometry, *_specimen_dimension(name, entry), entry.location)
+        kept_as_label = name in self._vocabulary.labels
+        name = name if kept_as_label else self.terms.spelled(name)
+        result = None if kept_as_label else split_unit(name, self._kinds)
+        word, _, rest = name.strip().partition(" ")
+        if kept_as_label or name in LABEL_KEYS:
+            _put_once(self.labels, LABEL_KEYS.get(name, name), entry.text, entry.location)
+        elif word.casefold() == "label" and rest.strip():
+            _put_once(self.labels, rest.strip(), entry.text, entry.location)
+        elif word.casefold() == "geometry" and rest.strip():
+            _put_once(self.geometry, *_specimen_dimension(rest.strip(), entry, self.terms), entry.location)
         elif name == "ended" or (result and result[0] == "rupture" and entry.text in self._end_of_test_terms):
-            _put_once(
-                self._texts,
-                "ended",
-                SourceText(self._end_of_test_terms.get(entry.text, entry.text), entry.location),
-                entry.location,
-            )
-        elif name in self._text_keys and (name != "specimen" or SPECIMEN_NAME_PATTERN.fullmatch(entry.text)):
+            ended = SourceText(self._end_of_test_terms.get(entry.text, entry.text), entry.location)
+            _put_once(self._texts, "ended", ended, entry.location)
+        elif name == "specimen":
+            self._name_specimen(entry)
+        elif name in self._text_keys:
             _put_once(self._texts, name, entry, entry.location)
             self._locations[name] = entry.location
         elif dimension := _dimension_with_unit(name, self.terms.dimensions):
             value = LENGTH.convert(entry.number(key), dimension[1], entry.location, key)
             _put_once(self.geometry, dimension[0], value, entry.location)
-        elif result is None:
+        elif result is None or self._is_misspelt_text(name):
             _refuse_misread_length(name, entry, self.terms)
-            _put_once(self.labels, name, entry.text, entry.location)
+            return False
         else:
             _put_once(self._numbers, result[0], self._stated_number(result, key, entry), entry.location)
             self._locations[result[0]] = entry.location
+        return True
+
+    def _name_specimen(self, entry: SourceText) -> None:
+        """A text that is no name, such as `Round bar, 6 mm`, is a label, unless it is a misspelt name."""
+        if SPECIMEN_NAME_PATTERN.fullmatch(entry.text) or entry.text.casefold() in self.terms.outputs:
+            _put_once(self._texts, "specimen", SourceText(entry.text.casefold(), entry.location), entry.location)
+            self._locations["specimen"] = entry.location
+            return
+        near = get_close_matches(entry.text.casefold(), self.terms.outputs, 1, cutoff=CLOSE_SPELLING)
+        if near:
+            raise HistoryError(f"{entry.location}: there is no specimen '{entry.text}'; did you mean '{near[0]}'?")
+        _put_once(self.labels, "specimen", entry.text, entry.location)
+
+    def _is_misspelt_text(self, name: str) -> bool:
+        """Whether what begins like a number, such as `strain_mesure`, is a misspelt text."""
+        return any(is_misspelling(plain_name(name), text) for text in self._text_keys)
 
     def _stated_number(self, found: tuple[str, str], key: str, entry: SourceText) -> StatedNumber:
         quantity, suffix = found
@@ -175,8 +205,18 @@ class StatedConditions:
 
 def _stated_specimen(entries: Mapping[str, SourceText], vocabulary: HeaderVocabulary) -> str:
     """The specimen that a file names, "" where it names none."""
-    named = [e.text for key, e in entries.items() if vocabulary.synonyms.get(key, key) == "specimen"]
+    synonyms = vocabulary.synonyms
+    named = [e.text.casefold() for key, e in entries.items() if plain_name(synonyms.get(key, key)) == "specimen"]
     return named[0] if named else vocabulary.default_texts.get("specimen", "")
+
+
+def _unknown_key(refused: Sequence[str], unknown: Mapping[str, SourceText], suggestion: str) -> HistoryError:
+    """The error about unknown keys: what the first may have meant, and which others there are."""
+    key, others = refused[0], refused[1:]
+    advice = f"did you mean '{suggestion}'? A label is written" if suggestion else "a label is written"
+    places = (f"'{other}' in line {unknown[other].location.rpartition(':')[2]}" for other in others)
+    also = f"; unknown too: {', '.join(places)}" if others else ""
+    return HistoryError(f"{unknown[key].location}: unknown key '{key}'; {advice} 'label {key or 'NAME'}'{also}")
 
 
 def _dimension_with_unit(name: str, dimensions: Mapping[str, str]) -> tuple[str, str] | None:
@@ -215,14 +255,17 @@ def _put_once(target: dict[str, _T], key: str, value: _T, location: str) -> None
     target[key] = value
 
 
-def _specimen_dimension(name: str, entry: SourceText) -> tuple[str, float]:
+def _specimen_dimension(stem: str, entry: SourceText, terms: Terms) -> tuple[str, float]:
     """A measure of the specimen, `geometry apex_thickness_mm`: a length in any unit, or a bare number."""
-    stem = name.removeprefix("geometry ").strip()
     base, _, suffix = stem.rpartition("_")
-    number = entry.number(stem)
-    if base and suffix in LENGTH.units:
-        return base, LENGTH.convert(number, suffix, entry.location, stem)
-    return stem, number
+    number, has_unit = entry.number(stem), bool(base) and suffix in LENGTH.units
+    name, known = (base if has_unit else stem), terms.own_dimensions or terms.dimensions
+    misspelt = [dimension for dimension in known if is_misspelling(plain_name(name), plain_name(dimension))]
+    if misspelt and name not in known:
+        raise HistoryError(
+            f"{entry.location}: no length of the test piece is called '{name}'; did you mean '{misspelt[0]}'?"
+        )
+    return (base, LENGTH.convert(number, suffix, entry.location, stem)) if has_unit else (stem, number)
 
 
 def _time_value_pair(item: str, key: str, kind: QuantityKind, location: str) -> tuple[float, float]:
@@ -236,149 +279,3 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, location: str) -> 
         )
     time, value = (SourceText(word, location).number(key) for word in (parts[0], parts[2]))
     return TIME.convert(time, parts[1], location, key), kind.convert(value, parts[3], location, key)
-
-
-def read_temperature(conditions: StatedConditions, frames: TableFrames) -> float | Program:
-    """The temperature, K."""
-    result = _stated_loading(conditions, frames, "temperature")
-    if result is None:
-        raise conditions.missing_error("temperature", "write temperature_C or temperature_K, or a column of that name")
-    return Program.steps(result) if isinstance(result, tuple) else result
-
-
-def read_loading(conditions: StatedConditions, frames: TableFrames) -> Loading:
-    """The loading: by components, by what has steps and programs alone, else by the first load that is stated."""
-    terms, load_kinds = conditions.terms, conditions.terms.load_kinds
-    quantities = (*load_kinds, *COMPONENT_LOADING_KINDS)
-    with errors_located_at(
-        conditions.location_of(*(f"{quantity}{form}" for quantity in quantities for form in _LOADING_SUFFIXES))
-    ):
-        loading = _component_loading(conditions)
-        likely = {load for one in conditions.terms.specimens_with(frames.values) for load in terms.loads.get(one, ())}
-        for name in sorted(load_kinds, key=lambda name: (name in terms.number_kinds, name not in likely)):
-            loading = loading or _loading_by(name, conditions, frames)
-    if loading is None:
-        stated = sorted(likely) or [*load_kinds]
-        wanted = " or ".join(name for name in stated if name in load_kinds)
-        raise conditions.missing_error(f"loading (no {wanted})", _loading_advice(terms, stated))
-    return loading
-
-
-def _loading_advice(terms: Terms, loads: Sequence[str]) -> str:
-    """What to write, for each of these loads."""
-    forms = []
-    for name in (load for load in loads if load in terms.load_kinds):
-        unit = next(iter(terms.load_kinds[name].units))
-        forms.append(
-            f"{name}_{unit}, {name}_steps, or {name}_1_{unit}, {name}_2_{unit} and jump_time_h"
-            if unit
-            else f"{name}_steps"
-        )
-    return f"write {'; or '.join(forms)}"
-
-
-def _loading_by(quantity: str, conditions: StatedConditions, frames: TableFrames) -> Loading | None:
-    """The loading by one quantity, if it is stated."""
-    kind = conditions.terms.load_kinds[quantity]
-    if quantity not in conditions.terms.number_kinds:
-        value: float | TimeValuePairs | Program | TwoLevels | None = _steps_or_program(conditions, quantity, kind)
-    else:
-        value = _stated_loading(conditions, frames, quantity)
-    value = _step_change(conditions, quantity) if value is None else value
-    return None if value is None else _loading_of(conditions, quantity, value, float(frames.times[-1]))
-
-
-def _loading_of(
-    conditions: StatedConditions, quantity: str, value: float | TimeValuePairs | Program | TwoLevels, end: float
-) -> Loading:
-    control: Literal["load", "stress"] = "load"
-    if quantity == "stress" and _control(conditions) == "stress":
-        control = "stress"
-    ramp = None if isinstance(value, (Program, tuple)) else conditions.take_number("ramp")
-    return loading_of(quantity, value, control=control, ramp=None if ramp is None else ramp.value, end=end)
-
-
-def _component_loading(conditions: StatedConditions) -> Loading | None:
-    """The stresses and strains of a material point."""
-    programs: dict[str, dict[str, Program]] = {"stress": {}, "strain": {}}
-    for name, kind in COMPONENT_LOADING_KINDS.items():
-        result = _steps_or_program(conditions, name, kind)
-        if result is not None:
-            quantity, _, component = name.partition("_")
-            programs[quantity][component] = Program.steps(result) if isinstance(result, tuple) else result
-    return PointLoading(**programs) if programs["stress"] or programs["strain"] else None
-
-
-def _steps_or_program(
-    conditions: StatedConditions, quantity: str, kind: QuantityKind
-) -> TimeValuePairs | Program | None:
-    """Steps or a program that stand in the head."""
-    steps, breakpoints = (conditions.take_pairs(f"{quantity}_{form}", kind) for form in ("steps", "program"))
-    if steps is not None and breakpoints is not None:
-        raise HistoryError(f"{conditions.location}: {quantity} has both steps and a program; keep one")
-    return steps if breakpoints is None else Program(*np.array(breakpoints).T)
-
-
-def _control(conditions: StatedConditions) -> str:
-    return conditions.take_choice("control", ("load", "stress"), required=True)
-
-
-def _step_change(conditions: StatedConditions, quantity: str) -> TwoLevels | None:
-    """First value, second value and time of the change, when all three are given."""
-    names = (f"{quantity}_1", f"{quantity}_2", "jump_time")
-    first = conditions.take_number(names[0])
-    if first is None:
-        return None
-    second, time = (_required_number(conditions, name, first) for name in names[1:])
-    return TwoLevels(first.value, second.value, time.value)
-
-
-def _required_number(conditions: StatedConditions, name: str, companion: StatedNumber) -> StatedNumber:
-    result = conditions.take_number(name)
-    if result is None:
-        raise HistoryError(
-            f"{companion.location}: '{companion.key}' needs {name} beside it (with its unit), which is missing"
-        )
-    return result
-
-
-def _stated_loading(
-    conditions: StatedConditions, frames: TableFrames, quantity: str
-) -> float | TimeValuePairs | Program | None:
-    """The value given for a quantity: a number, steps as (time, value), or a Program.
-
-    A column that differs from what is stated beside it is what was recorded, and is used; the rest is kept as stated.
-    """
-    kind = TEMPERATURE if quantity == "temperature" else conditions.terms.load_kinds[quantity]
-    number = conditions.take_number(quantity)
-    steps = conditions.take_pairs(f"{quantity}_steps", kind)
-    breakpoints = conditions.take_pairs(f"{quantity}_program", kind)
-    forms = [form for form in (number, steps, breakpoints) if form is not None]
-    if len(forms) > 1:
-        raise HistoryError(
-            f"{conditions.location}: the {quantity} is given {len(forms)} times over, as a number, {quantity}_steps "
-            f"or {quantity}_program; keep one"
-        )
-    stated: float | TimeValuePairs | Program | None = number.value if number is not None else steps
-    if breakpoints is not None:
-        stated = Program(*np.array(breakpoints).T)
-    earlier = conditions.take_pairs(f"stated_{quantity}_program", kind)
-    if earlier is not None:
-        conditions.stated[quantity] = Program(*np.array(earlier).T)
-    column = frames.values.get(quantity)
-    if column is None or (number is not None and np.allclose(column, number.value, rtol=1e-9, atol=0.0)):
-        return stated
-    if stated is None:
-        jump = _step_change(conditions, quantity) if quantity != "temperature" else None
-        stated = None if jump is None else _loading_of(conditions, quantity, jump, jump.time).program()
-    if stated is not None:
-        conditions.stated[quantity] = _as_program(stated)
-    is_temperature = quantity == "temperature"
-    tolerance = TEMPERATURE_RECORD_TOLERANCE if is_temperature else LOAD_RECORD_TOLERANCE * float(column.max())
-    return float(column[0]) if np.ptp(column) == 0.0 else recorded_program(frames.times, column, tolerance)
-
-
-def _as_program(stated: float | TimeValuePairs | Program) -> Program:
-    if isinstance(stated, Program):
-        return stated
-    return Program.steps(stated) if isinstance(stated, tuple) else Program.constant(stated)

@@ -9,13 +9,14 @@
     0,0
     0.5,0.013
 
-Keys and columns carry their units (`words.py` lists them, `units.py` their units). A bulge test has the columns
+Keys and columns carry their units (`vocabulary.py` lists them). A bulge test has the columns
 `time_s,amplitude_mm,width_mm,shape` and the keys pressure_1_MPa, pressure_2_MPa, jump_time_h. Anything imposed may
 change: `# stress_steps: 0 s 100 MPa; 1 h 120 MPa` jumps, `# temperature_program: 0 s 700 C; 2 h 720 C` is piecewise
 linear, and a column of that name was recorded: it is used, thinned to 0.25 K or 0.2 % of the load, and what is stated
 beside it is kept for the check of data quality. `_sd` names a standard deviation, `used` (0 or 1) marks frames,
 `# minimum_rate_1/h: 2.1e-6` and `# rupture_h: 8200` are known beside the frames, or without any: a test may be a head
-alone. `# geometry apex_thickness_mm: 0.48` measures of the specimen, `# label heat: X7` and unknown keys are labels.
+alone. `# geometry apex_thickness_mm: 0.48` measures of the specimen, `# label furnace: 4` a label; an unknown key is an
+error.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Folders with an index, one line a test, beside the frames: in one file for all tests, or in one file a test.
 
 A laboratory's layout is a declaration of IndexedFolder; INDEXED_TABLE and INDEXED_FILES are two of them. Columns of
-the index that are no condition known by name become labels, as they stand.
+the index that are no condition known by name become labels, as they stand; one that is nearly such a name is an error.
 """
 
 from __future__ import annotations
@@ -116,7 +116,14 @@ class IndexedFolderReader:
         entries.setdefault("alloy", SourceText(frames.path.absolute().parent.name, location))
         source = f"{frames.path} ({key})" if self._has_common_frames_file else str(frames.path)
         return assemble_history(
-            key, entries, frames, self.vocabulary, location=location, source=source, skipped_columns=(self.key_column,)
+            key,
+            entries,
+            frames,
+            self.vocabulary,
+            location=location,
+            source=source,
+            skipped_columns=(self.key_column,),
+            columns_as_labels=True,
         )
 
 
@@ -128,6 +135,7 @@ INDEXED_TABLE = IndexedFolderReader(
     vocabulary=HeaderVocabulary(
         synonyms={"youngs_MPa": "modulus_MPa", "state": "ended", "strain": "strain_1"},
         end_of_test_terms={"Ruptured": "ruptured", "Discontinued": "stopped"},
+        labels=("environment", "product", "file", "t_end_s", "strain_end", "strain_max", "min_rate_est_per_s"),
     ),
 )
 """How the creep curves of Alloy 617 in the moga_neml repository are kept (ACME-MG, github.com)."""
@@ -142,6 +150,7 @@ INDEXED_FILES = IndexedFolderReader(
         synonyms={"creep_extension_pct": "strain_pct"},
         end_of_test_terms={"Not applicable": "stopped"},
         averaged_columns={"measured_temperature_C": ("T_top_C", "T_mid_C", "T_bot_C")},
+        labels=("orientation_deg", "gauge_Le_mm", "duration_h", "elong_pct", "elastic_ext_pct", "init_plastic_pct"),
     ),
 )
 """How BAM keeps the creep curves of CMSX-6, with three thermocouples (doi 10.5281/zenodo.13937986)."""

@@ -6,12 +6,16 @@ A name such as `stress_MPa` states quantity and unit; inside there are only MPa,
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import cached_property, lru_cache
 
 from creepkit.records import TENSOR_COMPONENTS, dimensions_of, known_specimens, loads_of, outputs_of
 from creepkit.records.quantities import (
+    COUNT,
     FLAG,
+    LENGTH,
     MODULUS,
     POISSON,
     RATE,
@@ -21,6 +25,39 @@ from creepkit.records.quantities import (
     TIME,
     QuantityKind,
 )
+
+
+@lru_cache(maxsize=4096)
+def plain_name(name: str) -> str:
+    """A name in small letters, with underscores for blanks, hyphens and what sets a unit apart: `Stress [MPa]`."""
+    return re.sub(r"[\s_\-()\[\],]+", "_", name.strip().casefold()).strip("_")
+
+
+def is_misspelling(name: str, known: str) -> bool:
+    """Whether a name is a known one but for few letters that were left out, added, changed or swapped.
+
+    One letter of three to six, two of seven to nine, three of more (a swap over a missing letter counts as three).
+    """
+    allowed = 0 if len(known) < 3 else 1 if len(known) < 7 else 2 if len(known) < 10 else 3
+    if name == known or abs(len(name) - len(known)) > allowed or len(set(name) ^ set(known)) > 2 * allowed:
+        return False
+    return _edit_distance(name, known, allowed) <= allowed
+
+
+def _edit_distance(first: str, second: str, limit: int) -> int:
+    """Letters left out, added, changed, or swapped with their neighbour; more than `limit` where it is more."""
+    before: list[int] = []
+    row = list(range(len(second) + 1))
+    for i, letter in enumerate(first, 1):
+        last, before, row = before, row, [i]
+        for j, other in enumerate(second, 1):
+            cost = min(before[j] + 1, row[j - 1] + 1, before[j - 1] + (letter != other))
+            if i > 1 and j > 1 and letter == second[j - 2] and first[i - 2] == other:
+                cost = min(cost, last[j - 2] + 1)
+            row.append(cost)
+        if min(row) > limit and min(before) > limit:
+            return limit + 1
+    return row[-1]
 
 
 def split_unit(name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str] | None:
@@ -40,7 +77,8 @@ COMPONENT_LOADING_KINDS: Mapping[str, QuantityKind] = {
 
 CONDITION_KINDS: Mapping[str, QuantityKind] = {
     "temperature": TEMPERATURE,
-    **dict.fromkeys(("jump_time", "end_time", "ramp", "rupture"), TIME),
+    **dict.fromkeys(("jump_time", "end_time", "ramp", "rupture", "loading_time"), TIME),
+    "loading_strain": STRAIN,
     "modulus": MODULUS,
     "poisson": POISSON,
     "minimum_rate": RATE,
@@ -49,12 +87,30 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 """Numbers that stand once for a whole test, beside its loads."""
 
 
-TEXT_KEYS = ("name", "alloy", "specimen", "operator", "control", "strain_measure", "includes_elastic", "ended")
-"""Words that stand once for a whole test, beside steps and programs; every other key becomes a label."""
+TEXT_KEYS = (
+    *("name", "alloy", "specimen", "operator", "control", "strain_measure", "stress_measure"),
+    *("includes_elastic", "includes_loading", "ended"),
+)
+"""Words that stand once for a whole test, beside steps and programs."""
+
+
+LABEL_KEYS: Mapping[str, str] = {
+    **dict.fromkeys(("heat", "cast", "batch"), "heat"),
+    **dict.fromkeys(("laboratory", "lab"), "laboratory"),
+}
+"""{key: label} of what tests share with others: a forecast tells the scatter between heats and laboratories apart."""
+
+
+HIGHEST_STEP = 9
+"""Levels of a load that keys may number, `stress_1_MPa` to `stress_9_MPa`."""
+
+
+CLOSE_SPELLING = 0.8
+"""Similarity above which an unknown name is a misspelt one."""
 
 
 SPECIMEN_NAME_PATTERN = re.compile(r"[a-z][a-z0-9_-]*")
-"""Pattern of the name of a specimen; any other text after `specimen` is a label."""
+"""Pattern of the name of a specimen; any other text after `specimen` is a label, unless it is nearly such a name."""
 
 
 CREEP_MACHINE_DEFAULTS: Mapping[str, str] = {
@@ -75,6 +131,7 @@ class HeaderVocabulary:
     outputs : {specimen: {output: kind}} that its files hold beside those of the registered specimens.
     end_of_test_terms : {its word: "ruptured" or "stopped"} for how a test ended, beside these two themselves; in a
         column of rupture times such a word may stand in the place of a number.
+    labels : its keys and columns that are kept as labels though nothing is known of them.
     """
 
     synonyms: Mapping[str, str] = field(default_factory=dict)
@@ -82,6 +139,7 @@ class HeaderVocabulary:
     averaged_columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     outputs: Mapping[str, Mapping[str, QuantityKind]] = field(default_factory=dict)
     end_of_test_terms: Mapping[str, str] = field(default_factory=dict)
+    labels: Collection[str] = ()
 
     def terms(self, specimen: str = "") -> Terms:
         """What headers and columns of a file may say; specimen : that the file names, whose own terms then count most.
@@ -97,6 +155,7 @@ class HeaderVocabulary:
             own_outputs=outputs.get(specimen, {}),
             loads={specimen: [load.name for load in loads_of(one)] for specimen, one in known.items()},
             load_kinds={name: kind for name, kind in loads.items() if name != "components"},
+            own_loads=[load.name for one in named.values() for load in loads_of(one) if specimen in known],
             dimensions={name: d.name for one in named.values() for d in dimensions_of(one) for name in d.names},
             own_dimensions=[name for d in dimensions_of(known.get(specimen)) for name in d.names],
         )
@@ -107,7 +166,8 @@ class Terms:
     """What the headers and columns of one file may say.
 
     outputs : {specimen: {output: kind}}; own_outputs : those of the specimen that the file names, {} where it names
-    none. loads : {specimen: names}. load_kinds : {load: kind} of those that are stated by one number or program.
+    none. loads : {specimen: names}. load_kinds : {load: kind} of those that are stated by one number or program;
+    own_loads : those of the specimen that the file names, none where it names none.
     dimensions : {name or alias: length of a test piece}; own_dimensions : of the specimen that the file names.
     """
 
@@ -115,19 +175,21 @@ class Terms:
     own_outputs: Mapping[str, QuantityKind]
     loads: Mapping[str, Sequence[str]]
     load_kinds: Mapping[str, QuantityKind]
+    own_loads: Sequence[str]
     dimensions: Mapping[str, str]
     own_dimensions: Sequence[str]
 
     @property
     def number_kinds(self) -> dict[str, QuantityKind]:
-        """Loads that a number may state; without a unit in its key it would be taken for a label or an output."""
+        """Loads whose column is a record of what was imposed, whichever specimen it was: none of those without unit."""
         return {name: kind for name, kind in self.load_kinds.items() if "" not in kind.units}
 
     @property
     def condition_kinds(self) -> dict[str, QuantityKind]:
         """The kinds of all numbers that stand once for a test."""
-        levels = {f"{name}_{k}": kind for name, kind in self.number_kinds.items() for k in (1, 2)}
-        return {**CONDITION_KINDS, **self.number_kinds, **levels, **self._standard_deviation_kinds()}
+        stepped = {**self.number_kinds, "temperature": TEMPERATURE}
+        levels = {f"{name}_{k}": kind for name, kind in stepped.items() for k in range(1, HIGHEST_STEP + 1)}
+        return {**CONDITION_KINDS, **self.load_kinds, **levels, **self._standard_deviation_kinds()}
 
     @property
     def column_kinds(self) -> dict[str, QuantityKind]:
@@ -135,7 +197,7 @@ class Terms:
         return {
             **{"time": TIME, **self.output_kinds(), **self._standard_deviation_kinds(), **self.number_kinds},
             **self.own_outputs,
-            **{"temperature": TEMPERATURE, "used": FLAG},
+            **{"temperature": TEMPERATURE, "used": FLAG, "step": COUNT},
         }
 
     @property
@@ -144,6 +206,56 @@ class Terms:
         programs = (*self.load_kinds, "temperature", *COMPONENT_LOADING_KINDS)
         forms = {f"{name}_{form}" for name in programs for form in ("steps", "program")}
         return {*TEXT_KEYS, *forms, *(f"stated_{name}_program" for name in (*self.number_kinds, "temperature"))}
+
+    @cached_property
+    def spellings(self) -> dict[str, str]:
+        """{name in small letters with underscores: key} of every key that a head may hold, units included."""
+        return {plain_name(key): key for key in self._keys(self.condition_kinds, self.dimensions)}
+
+    def spelled(self, name: str) -> str:
+        """The key that a name is but for capitals, blanks, hyphens and brackets; the name itself where it is none."""
+        return self.spellings.get(plain_name(name), name)
+
+    def misspelt(self, name: str) -> str:
+        """The key of which an unknown name is a misspelling, first of those of the file's own specimen; "" for none."""
+        plain = plain_name(name)
+        for kinds, dimensions in self._vocabularies():
+            spellings = {plain_name(key): key for key in self._keys(kinds, dimensions)}
+            misspelt = [known for known in spellings if is_misspelling(plain, known)]
+            if misspelt:
+                return spellings[get_close_matches(plain, misspelt, 1, cutoff=0.0)[0]]
+        words = {plain, plain.rpartition("_")[0]}
+        names = (*self.condition_kinds, *self.dimensions)
+        return next((name for name in names for word in words if is_misspelling(word, name.casefold())), "")
+
+    def suggestion(self, name: str) -> str:
+        """The key that an unknown name may have meant, "" where it resembles none."""
+        keys = {plain_name(key): key for terms in self._vocabularies() for key in self._keys(*terms)}
+        near = get_close_matches(plain_name(name), keys, 1, cutoff=CLOSE_SPELLING)
+        return self.misspelt(name) or (keys[near[0]] if near else "")
+
+    def _vocabularies(self) -> list[tuple[Mapping[str, QuantityKind], Collection[str]]]:
+        """Kinds and lengths of the file's own specimen, then those of all."""
+        return [(self._own_kinds(), self.own_dimensions), (self.condition_kinds, self.dimensions)]
+
+    def _own_kinds(self) -> dict[str, QuantityKind]:
+        """The kinds of numbers that mean something for the specimen that the file names; of all where it names none."""
+        foreign = self.load_kinds.keys() - set(self.own_loads) if self.own_loads else set()
+        outputs = self.own_outputs or self.output_kinds()
+        return {
+            name: kind
+            for name, kind in self.condition_kinds.items()
+            if re.sub("_[0-9]$", "", name) not in foreign and not (name.endswith("_sd") and name[:-3] not in outputs)
+        }
+
+    def _keys(self, kinds: Mapping[str, QuantityKind], dimensions: Collection[str]) -> Iterator[str]:
+        """Keys of numbers with their units, of texts, of lengths and of labels, creepkit's own units first."""
+        for quantity, kind in kinds.items():
+            yield from (f"{quantity}_{unit}" if unit else quantity for unit in kind.units)
+        yield from sorted(self.text_keys)
+        yield from LABEL_KEYS
+        for dimension in dimensions:
+            yield from (f"{dimension}_{unit}" for unit in LENGTH.units)
 
     def specimens_with(self, columns: Collection[str]) -> list[str]:
         """The specimens of which some output is among the columns."""

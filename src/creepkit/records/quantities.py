@@ -188,6 +188,9 @@ TEMPERATURE = QuantityKind(
 FLAG = QuantityKind("flag", NUMBER.units, low=0.0, high=1.0)
 
 
+COUNT = QuantityKind("number from 1 on", NUMBER.units, low=1.0, high=1e6)
+
+
 FORCE = QuantityKind(
     "force", {"N": UnitConversion(1.0), "kN": UnitConversion(1e3), "lbf": UnitConversion(4.4482216152605)}
 )

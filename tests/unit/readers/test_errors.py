@@ -68,8 +68,12 @@ CASES = {
     "quantity twice": (HEAD + "time_s,time_h,strain_1\n0,0,0\n", "x.csv:3: two columns hold the time; keep one"),
     "nameless column": (HEAD + "time_s,,strain\n0,0,0\n", "x.csv:3: a column has no name"),
     "no loading": (
+        "# temperature_C: 850\n# label furnace: 4\n" + BODY,
+        r"x.csv: no loading \(no .*stress\) \(kept as labels: furnace\); write .*stress_MPa, stress_steps",
+    ),
+    "misspelt loading": (
         "# temperature_C: 850\n# stres_MPa: 60\n" + BODY,
-        r"x.csv: no loading \(no .*stress\) \(keys not understood: stres_MPa\); write .*stress_MPa, stress_steps",
+        r"x.csv:2: unknown key 'stres_MPa'; did you mean 'stress_MPa'\? A label is written 'label stres_MPa'",
     ),
     "no temperature": ("# stress_MPa: 60\n" + BODY, "x.csv: no temperature; write temperature_C or temperature_K"),
     "negative stress": (

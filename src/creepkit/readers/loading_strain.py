@@ -1,0 +1,150 @@
+"""What a strain record holds of the loading: elastic and initial plastic strain, and frames taken while the load rose.
+
+Creep strain is zero when the load has been reached. A record of total strain is not, and its first frame after time
+zero is often not the end of loading. ISO 204 calls the strain at the end of loading the initial total extension; keys
+state it (`loading_strain`, `includes_loading`), and when loading ended (`loading_time`). Where a file states neither
+these nor `includes_elastic`, the first frames decide:
+
+- a strain at time zero that is the stress over the modulus is elastic, any other is subtracted;
+- a strain that jumps to about the stress over the modulus from less than half of it, and then stays while time
+  trebles, is elastic strain at the end of loading. Creep rises in that time by 44 % or more: as the cube root of time,
+  or faster.
+
+What was decided is recorded. A file that states `includes_elastic` is taken at its word.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats
+from creepkit.errors import HistoryError
+from creepkit.readers.conditions import StatedConditions
+
+ELASTIC_RANGE = (0.6, 1.6)
+"""Ratios of a strain to the stress over the modulus at which it is elastic: moduli of creep tests are uncertain."""
+
+
+PLATEAU_GROWTH, PLATEAU_TIMES = 0.25, 3.0
+"""By less than this fraction a strain grows after the end of loading while time grows by this factor."""
+
+
+JUMP_FROM, LARGEST_NOISE = 0.5, 0.2
+"""Of the strain at the end of loading: the strain in the frame before, and the noise in which a jump is seen."""
+
+
+SEARCHED_FRAMES = 20
+"""Frames among which the end of loading is looked for."""
+
+
+SMALLEST_STRAIN, NOISE_FACTOR = 2e-5, 6.0
+"""A strain at time zero below it, or below so many standard deviations of the noise, is none."""
+
+
+@dataclass(frozen=True)
+class StrainRecord:
+    """A strain record without what loading left in it.
+
+    strain, used : (frames,). includes_elastic : whether the strain still holds the elastic one.
+    """
+
+    strain: Floats
+    used: Bools
+    includes_elastic: bool
+
+
+def without_loading(
+    conditions: StatedConditions, times: Floats, strain: Floats, used: Bools, elastic_strain: float | None
+) -> StrainRecord:
+    """The strain as its model means it.
+
+    times : (frames,) s. strain : (frames,). used : (frames,) which may be fitted. elastic_strain : stress over modulus
+    at the beginning, None where the modulus is not known.
+    """
+    location = conditions.location_of("includes_loading", "loading_strain", "loading_time", "includes_elastic")
+    total, end = conditions.take_number("loading_strain"), conditions.take_number("loading_time")
+    includes_loading = conditions.take_choice("includes_loading", ("yes", "no"), required=False)
+    stated = conditions.states("includes_elastic")
+    if end is not None:
+        used = used & (times >= end.value * (1 - 1e-9))
+        if not used.any():
+            raise HistoryError(f"{end.location}: every frame lies before '{end.key}', {end.value:g} s; correct it")
+        conditions.record_assumption(f"frames before the end of loading at {end.value:g} s not used")
+    if total is not None:
+        conditions.labels["loading_strain"] = f"{total.value:.6g}"
+    if not (stated or includes_loading or total is not None):
+        return _decided(conditions, times, strain, used, elastic_strain)
+    elastic = conditions.take_choice("includes_elastic", ("yes", "no"), required=not includes_loading and total is None)
+    first = int(np.argmax(used))
+    if total is not None and not (includes_loading or stated):
+        includes_loading = "yes" if strain[first] > 0.5 * total.value else "no"
+        contained = "contained" if includes_loading == "yes" else "not contained"
+        conditions.record_assumption(f"loading strain {contained}, for the first strain is {strain[first]:.3g}")
+    if includes_loading != "yes":
+        return StrainRecord(strain, used, elastic == "yes")
+    if elastic == "yes":
+        raise HistoryError(
+            f"{location}: includes_loading is yes, so the strain at the end of loading is subtracted and no elastic "
+            "strain is left; leave out includes_elastic: yes"
+        )
+    if total is None and end is None and times[first] > 0.0:
+        raise HistoryError(
+            f"{location}: includes_loading is yes, but not by how much; state loading_strain_pct, the strain at the "
+            "end of loading, or loading_time_s, when it ended"
+        )
+    subtracted = strain[first] if total is None else total.value
+    conditions.record_assumption(f"loading strain {subtracted:.3g} subtracted")
+    return StrainRecord(strain - subtracted, used, includes_elastic=False)
+
+
+def _decided(
+    conditions: StatedConditions, times: Floats, strain: Floats, used: Bools, elastic_strain: float | None
+) -> StrainRecord:
+    """What the first frames say, where the file says nothing."""
+    frames = np.flatnonzero(used)
+    if frames.size > 2 and times[frames[0]] == 0.0:
+        first = float(strain[frames[0]])
+        if first > max(SMALLEST_STRAIN, NOISE_FACTOR * _noise(strain[frames[:SEARCHED_FRAMES]])):
+            if elastic_strain and _is_elastic(first, elastic_strain):
+                ratio = f"{first / elastic_strain:.2f} of stress over modulus"
+                conditions.record_assumption(f"includes_elastic yes, for the strain at time 0 is {ratio}")
+                return StrainRecord(strain, used, includes_elastic=True)
+            conditions.record_assumption(f"includes_elastic no, loading strain {first:.3g} at time 0 subtracted")
+            return StrainRecord(strain - first, used, includes_elastic=False)
+        end = _end_of_loading(times[frames], strain[frames], elastic_strain) if elastic_strain else None
+        if end is not None and elastic_strain:
+            ratio, time = strain[frames[end]] / elastic_strain, times[frames[end]]
+            conditions.record_assumption(
+                f"includes_elastic yes and frames before {time:g} s not used, for the strain then stays at {ratio:.2f} "
+                "of stress over modulus"
+            )
+            return StrainRecord(strain, used & (times >= time), includes_elastic=True)
+    included = conditions.take_choice("includes_elastic", ("yes", "no"), required=True)
+    return StrainRecord(strain, used, included == "yes")
+
+
+def _end_of_loading(times: Floats, strain: Floats, elastic_strain: float) -> int | None:
+    """The first frame of a plateau of about the elastic strain, None where the strain shows none."""
+    noise = _noise(strain[:SEARCHED_FRAMES])
+    for k in range(1, min(SEARCHED_FRAMES, times.size - 2)):
+        if not _is_elastic(float(strain[k]), elastic_strain):
+            continue
+        if max(strain[k - 1], noise * JUMP_FROM / LARGEST_NOISE) > JUMP_FROM * strain[k]:
+            return None
+        after = slice(k + 1, int(np.searchsorted(times, PLATEAU_TIMES * times[k], side="right")))
+        covered = times[after].size >= 2 and times[after][-1] >= 0.5 * PLATEAU_TIMES * times[k]
+        growth = float(np.median(strain[after][-2:])) - strain[k] if covered else np.inf
+        return k if abs(growth) < PLATEAU_GROWTH * strain[k] else None
+    return None
+
+
+def _is_elastic(strain: float, elastic_strain: float) -> bool:
+    return ELASTIC_RANGE[0] * elastic_strain <= strain <= ELASTIC_RANGE[1] * elastic_strain
+
+
+def _noise(strain: Floats) -> float:
+    """Standard deviation of white noise by the median of second differences; 0 of fewer than three values."""
+    differences = np.abs(np.diff(strain, 2))
+    return float(1.4826 * np.median(differences) / 6**0.5) if differences.size else 0.0
