@@ -29,6 +29,8 @@ from creepkit.records.known_specimens import (
     output_named,
     output_unit,
     outputs_of,
+    outputs_of_test,
+    outputs_of_tests,
     remember_specimen,
     specimen_of,
 )
@@ -154,6 +156,8 @@ __all__ = [
     "output_named",
     "output_unit",
     "outputs_of",
+    "outputs_of_test",
+    "outputs_of_tests",
     "predict_with",
     "remember_specimen",
     "specimen_of",
