@@ -155,7 +155,7 @@ class PlannedOutcomes:
             noise = {n: float(base.noise[base.outputs.index(n)]) for n in names if n in base.outputs}
             sd = {n: np.full(history.times.size, max(v, 1e-300)) for n, v in noise.items()}
             zero = {n: np.zeros(history.times.size) for n in noise}
-            planned.append(replace(history, outputs=zero, standard_deviation=sd, rupture_time=None, unruptured=False))
+            planned.append(history.replace(outputs=zero, standard_deviation=sd, rupture_time=None, unruptured=False))
         observations = ObservationVector.from_histories(planned, predictor)
         position = [base.outputs.index(name) for name in observations.outputs]
         return replace(

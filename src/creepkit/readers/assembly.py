@@ -18,6 +18,7 @@ from creepkit.readers.conditions import (
     read_loading,
     read_temperature,
 )
+from creepkit.readers.noise_correlation import read_noise_correlation
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records import History, outputs_of_test, specimen_of
@@ -73,6 +74,7 @@ def assemble_history(
         rupture_time=rupture_time,
         unruptured=unruptured,
         stated=conditions.stated,
+        noise_correlation=read_noise_correlation(conditions, outputs),
         # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
     )

@@ -29,6 +29,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history
+from creepkit.readers.noise_correlation import noise_correlation_text
 from creepkit.readers.text_tables import peek_columns, read_table
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (
@@ -117,6 +118,8 @@ def _header_lines(history: History) -> Iterator[tuple[str, str]]:
         yield "ended", "stopped"
     if history.operator:
         yield "operator", history.operator
+    if history.outputs and history.noise_correlation:
+        yield "noise_correlation", noise_correlation_text(history.noise_correlation)
     for key, value in history.geometry.items():
         # A bare number is read as it stands, but a name that ends in a unit would lose it.
         unit = "_mm" if key.rpartition("_")[2] in LENGTH.units else ""

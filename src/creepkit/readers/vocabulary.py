@@ -37,7 +37,10 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 """Numbers that stand once for a whole test, beside its loads."""
 
 
-TEXT_KEYS = ("name", "alloy", "specimen", "operator", "control", "strain_measure", "includes_elastic", "ended")
+TEXT_KEYS = (
+    *("name", "alloy", "specimen", "operator", "control", "strain_measure", "includes_elastic", "ended"),
+    "noise_correlation",
+)
 """Words that stand once for a whole test, beside steps and programs; every other key becomes a label."""
 
 
