@@ -47,9 +47,6 @@ _FEWEST, _MOST = 8, 2000
 _TEXT = re.compile(r"\s*(\w+)\s+0\s*(?:-|to)\s*(\S+)\s*mm\s*(?:,\s*(\d+)\s+radii\s*)?")
 
 
-_RINGS_TEXT = re.compile(r"\s*rings\s+(\S+(?:\s*,\s*\S+)*)\s+mm\s*")
-
-
 class ProfileSampling(NamedTuple):
     """What follows from an operator and a set of nodes.
 
@@ -102,10 +99,10 @@ class Observation:
     @classmethod
     def from_text(cls, text: str) -> Observation:
         """The operator that `str` wrote, as in 'profile 0-7.5 mm', 'field 0-5 mm, 30 radii' or 'rings 0, 2, 4 mm'."""
-        result, rings = _TEXT.fullmatch(text), _RINGS_TEXT.fullmatch(text)
+        result, words = _TEXT.fullmatch(text), text.split()
         try:
-            if rings is not None:
-                return cls("rings", radii=tuple(float(word) for word in rings[1].split(",")))
+            if words[:1] == ["rings"] and words[-1] == "mm" and "_" not in text:
+                return cls("rings", radii=tuple(float(radius) for radius in " ".join(words[1:-1]).split(",")))
             if result is None or result[1] == "rings":
                 raise ValueError(text)
             window, points = float(result[2]), None if result[3] is None else int(result[3])

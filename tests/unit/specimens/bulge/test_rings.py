@@ -40,7 +40,8 @@ def test_text_and_operator_are_one(text: str) -> None:
 @pytest.mark.parametrize(
     "text",
     ["rings", "rings mm", "rings 0, 2, 4", "rings 2, 0 mm", "rings 0, 0 mm", "rings -1, 2 mm", "rings 0, nan mm",
-     "rings 0, 2, mm", "rings 0 2 mm", "rings 0-7.5 mm", "rings 0, 1, 2, 3, 4, 5, 6, 7, 7.2 mm", "rings 0, inf mm"],
+     "rings 0, 2, mm", "rings 0 2 mm", "rings 0-7.5 mm", "rings 0, 1, 2, 3, 4, 5, 6, 7, 7.2 mm", "rings 0, inf mm",
+     "rings 0, 1_0 mm", "rings " + "0," * 5000 + " mm"],
 )  # fmt: skip
 def test_other_texts_are_refused_in_one_sentence(text: str) -> None:
     with pytest.raises(SolveError, match=r"^observation: .*rings 0, 2, 4 mm|^observation: rings have the radii"):
