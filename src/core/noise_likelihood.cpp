@@ -12,7 +12,8 @@ constexpr int64_t NOT_POSITIVE_DEFINITE = 1, NO_MEMORY = 2, BAD_COUNT = 3;
 constexpr double LEAST_PIVOT = 1e-15;
 
 bool has_valid_counts(const NoiseObservations& observations) {
-    if (observations.tests < 0 || observations.outputs < 1 || observations.effects < 0) return false;
+    if (observations.tests < 0 || observations.outputs < 1) return false;
+    if (observations.effects < 0 || observations.factors < 0) return false;
     if (observations.starts[0] != 0) return false;
     for (int64_t t = 0; t < observations.tests; ++t)
         if (observations.starts[t + 1] < observations.starts[t]) return false;
@@ -194,11 +195,24 @@ void add_gradient(const NoiseObservations& observations, const NoiseStates& mode
         const double* own = model.components + OUTPUT_COMPONENTS * output;
         double* own_gradient = gradient + OUTPUT_COMPONENTS * output;
         const double noise = own[NOISE] * known[WHITE_LOADING];
-        own_gradient[NOISE] += by_white * noise * noise;
+        own_gradient[NOISE] += by_white * NoiseStates::own_share(observations, known) * noise * noise;
         own_gradient[MISFIT] += by_white * own[MISFIT] * own[MISFIT];
         for (int64_t j = 0; j < m; ++j) {
             const NoiseState& state = model.states[j];
-            if (state.size < 0) continue;
+            if (state.size < 0 || NoiseStates::is_of_another(state, output)) continue;
+            if (state.is_factor) {
+                // Its size is that of the output it is seen in: by the loading z itself, the covariance of the state
+                // with C^-1 less C^-1 y y'C^-1 at this observation, before it was seen: P (z D - N k) less that of y.
+                double by_loading = 0.0;
+                for (int64_t l = 0; l < m; ++l) {
+                    double weight = inverse_diagonal * z[l] - h[l];
+                    for (int64_t c = 0; c < C; ++c) weight += u[c] * r[l * C + c];
+                    by_loading += P[j * m + l] * weight;
+                }
+                for (int64_t c = 0; c < C; ++c) by_loading -= u[c] * scratch.state[j * C + c];
+                own_gradient[NOISE] += z[j] * by_loading;
+                continue;
+            }
             // A size acts as a variance of the state and of what transitions add to it would, and on the jitter.
             double by_variance = N[j * m + j];
             for (int64_t c = 0; c < C; ++c) by_variance -= r[j * C + c] * r[j * C + c];
@@ -248,13 +262,13 @@ struct LikelihoodMemory {
 // Observations as NoiseObservations has them; components : (5 outputs + 3,) see OutputComponent, SharedComponent.
 // log_determinant : ln|C| over all tests. Returns 0; 1 where C is not positive definite, 2 without memory, 3 where
 // counts contradict each other.
-CREEPKIT_API int64_t creepkit_noise_whiten(int64_t tests, int64_t outputs, int64_t effects, const int64_t* starts,
-                                           const int64_t* output, const double* loadings, const double* test_weights,
-                                           const double* components, int64_t columns, int64_t inverse, double* values,
-                                           double* log_determinant) {
-    const NoiseObservations observations{tests, outputs, effects, starts, output, loadings, test_weights};
+CREEPKIT_API int64_t creepkit_noise_whiten(int64_t tests, int64_t outputs, int64_t effects, int64_t factors,
+                                           const int64_t* starts, const int64_t* output, const double* loadings,
+                                           const double* test_weights, const double* components, int64_t columns,
+                                           int64_t inverse, double* values, double* log_determinant) {
+    const NoiseObservations observations{tests, outputs, effects, factors, starts, output, loadings, test_weights};
     if (!has_valid_counts(observations) || columns < 0) return BAD_COUNT;
-    const int64_t longest = longest_test(observations), most_states = 4 + effects;
+    const int64_t longest = longest_test(observations), most_states = observations.most_states();
     Workspace memory;
     NoiseState* states;
     FilteredTest test;
@@ -292,19 +306,19 @@ CREEPKIT_API int64_t creepkit_noise_whiten(int64_t tests, int64_t outputs, int64
 // without unknowns b it is the plain one. values : (observations, 1 + unknowns) y and X. precision, prior_residual :
 // (unknowns,) the diagonal of P, and e. gradient : (5 outputs + 3,). The others, and what is returned, as above.
 CREEPKIT_API int64_t creepkit_restricted_likelihood(int64_t tests, int64_t outputs, int64_t effects,
-                                                    const int64_t* starts, const int64_t* output,
+                                                    int64_t factors, const int64_t* starts, const int64_t* output,
                                                     const double* loadings, const double* test_weights,
                                                     const double* components, int64_t unknowns, const double* values,
                                                     const double* precision, const double* prior_residual,
                                                     double* value, double* gradient) {
-    const NoiseObservations observations{tests, outputs, effects, starts, output, loadings, test_weights};
+    const NoiseObservations observations{tests, outputs, effects, factors, starts, output, loadings, test_weights};
     if (!has_valid_counts(observations) || unknowns < 0) return BAD_COUNT;
     const int64_t p = unknowns, width = p + 1;
     Workspace lists;
     NoiseState* states;
     int64_t *columns, *column_counts;
     for (int turn = 0; turn < 2; ++turn) {
-        states = lists.array<NoiseState>(4 + effects);
+        states = lists.array<NoiseState>(observations.most_states());
         columns = lists.array<int64_t>(tests * width);
         column_counts = lists.array<int64_t>(tests);
         if (turn == 0 && !lists.allocate()) return NO_MEMORY;

@@ -8,7 +8,12 @@
 // where all x have unit variance. x1 and x2 are Ornstein-Uhlenbeck processes with correlation exp(-lag / length), drawn
 // anew for each output, as is the offset x3; x4 and the random effects x_k are one for the whole test. Each is a state
 // of the model, with the transition phi = exp(-lag / length) (1: constant, 0: drawn anew) and the variance 1 - phi^2 of
-// what the transition adds. The innovations v of the filter and their variances S are those of the Cholesky factor
+// what the transition adds. White noise of one output may be correlated with that of others in the same frame: it is then
+//
+//     noise_o w_i (sum_k l_ik f_k + sqrt(1 - sum_k l_ik^2) of its own),
+//
+// with factors f_k of unit variance that are drawn anew for each frame. The observations of a test are then in the order
+// of its frames, and each output has states of its own. The innovations v of the filter and their variances S are those of the Cholesky factor
 // L of the covariance C, in the order of the observations: L^-1 y = v / sqrt(S), ln|C| = sum of ln S.
 //
 // Durbin & Koopman (2012), Time Series Analysis by State Space Methods, chapters 4 and 7; Koopman & Shephard (1992),
@@ -26,34 +31,40 @@ namespace creepkit {
 constexpr double ABSOLUTE_JITTER = 1e-10, RELATIVE_JITTER = 1e-9;
 
 // Columns of what is known of an observation: lag to the previous one of its output (negative: it is the first), w, s,
-// u, d, then e.
+// u, d, then e; where there are factors, whether the observation is the first of its frame (1 or 0), then l.
 enum Loading { LAG, WHITE_LOADING, OFFSET_LOADING, DISCREPANCY_LOADING, RATE_LOADING, FIRST_EFFECT };
 
 // Components of one output; behind those of all outputs the shared ones.
 enum OutputComponent { NOISE, MISFIT, OFFSET, DRIFT, CORRELATION_LENGTH, OUTPUT_COMPONENTS };
 enum SharedComponent { RATE, DISCREPANCY, DISCREPANCY_LENGTH, SHARED_COMPONENTS };
 
-// Observations of all tests, those of a test by output and in order of time.
+// Observations of all tests, those of a test by output and in order of time, or with factors by frame.
 //
 // starts : (tests + 1,) first observation of each test. output : (observations,) position of its output. loadings :
-// (observations, 5 + effects) see Loading. test_weights : (tests,) -, by which the covariance of a test is divided; it
+// (observations, 5 + effects), with factors (observations, 6 + effects + factors), see Loading. test_weights : (tests,) -, by which the covariance of a test is divided; it
 // is used for the determinant only, values are given times the root of it.
 struct NoiseObservations {
-    int64_t tests, outputs, effects;
+    int64_t tests, outputs, effects, factors;
     const int64_t* starts;
     const int64_t* output;
     const double* loadings;
     const double* test_weights;
 
     int64_t count() const { return starts[tests]; }
-    const double* of(int64_t observation) const { return loadings + observation * (FIRST_EFFECT + effects); }
+    int64_t first_of_frame() const { return FIRST_EFFECT + effects; }
+    int64_t columns() const { return first_of_frame() + (factors > 0 ? 1 + factors : 0); }
+    const double* of(int64_t observation) const { return loadings + observation * columns(); }
+    int64_t most_states() const { return (factors > 0 ? 3 * outputs : 3) + 1 + effects + factors; }
 };
 
 // One state: positions of its size and of its correlation length among the components, of those of an output where
-// `of_output`, and its column of the loadings. Negative: a size of one, a constant, a loading of one.
+// `of_output`, and its column of the loadings. Negative: a size of one, a constant, a loading of one. output : that it
+// belongs to alone, negative for none. is_factor : of the white noise, drawn anew for each frame.
 struct NoiseState {
     int64_t size, length, loading;
     bool of_output;
+    int64_t output = -1;
+    bool is_factor = false;
 };
 
 // The states that a noise model has, for given components (OUTPUT_COMPONENTS * outputs + SHARED_COMPONENTS,).
@@ -67,12 +78,34 @@ public:
             drifts = drifts || components[OUTPUT_COMPONENTS * o + DRIFT] > 0.0;
             offsets = offsets || components[OUTPUT_COMPONENTS * o + OFFSET] > 0.0;
         }
-        if (drifts) states[count++] = {DRIFT, CORRELATION_LENGTH, -1, true};
-        if (components[shared + DISCREPANCY] > 0.0)
-            states[count++] = {shared + DISCREPANCY, shared + DISCREPANCY_LENGTH, DISCREPANCY_LOADING, false};
-        if (offsets) states[count++] = {OFFSET, -1, OFFSET_LOADING, true};
+        // Observations by output share the states of outputs, which are drawn anew for each.
+        const bool shares = observations.factors == 0;
+        for (int64_t o = 0; o < (shares ? 1 : outputs); ++o) {
+            const int64_t own = shares ? -1 : o;
+            if (drifts) states[count++] = {DRIFT, CORRELATION_LENGTH, -1, true, own};
+            if (components[shared + DISCREPANCY] > 0.0)
+                states[count++] = {shared + DISCREPANCY, shared + DISCREPANCY_LENGTH, DISCREPANCY_LOADING, false, own};
+            if (offsets) states[count++] = {OFFSET, -1, OFFSET_LOADING, true, own};
+        }
         if (components[shared + RATE] > 0.0) states[count++] = {shared + RATE, -1, RATE_LOADING, false};
         for (int64_t k = 0; k < observations.effects; ++k) states[count++] = {-1, -1, FIRST_EFFECT + k, false};
+        for (int64_t k = 0; k < observations.factors; ++k)
+            states[count++] = {NOISE, -1, observations.first_of_frame() + 1 + k, true, -1, true};
+    }
+
+    // Whether a state belongs to another output than this one.
+    static bool is_of_another(const NoiseState& state, int64_t output) {
+        return state.output >= 0 && state.output != output;
+    }
+
+    // The share of the white noise of an observation, a variance, that no factor has.
+    static double own_share(const NoiseObservations& observations, const double* known) {
+        double share = 1.0;
+        for (int64_t k = 0; k < observations.factors; ++k) {
+            const double l = known[observations.first_of_frame() + 1 + k];
+            share -= l * l;
+        }
+        return share;
     }
 
     // Positions of the size and of the length of a state at an observation of this output.
@@ -93,11 +126,24 @@ public:
         double correlated = 0.0;
         for (int64_t j = 0; j < count; ++j) {
             const NoiseState& state = states[j];
+            if (is_of_another(state, output)) {
+                z[j] = 0.0;
+                phi[j] = 1.0;
+                q[j] = 0.0;
+                continue;
+            }
             const double size = state.size < 0 ? 1.0 : components[size_position(state, output)];
+            if (state.is_factor) {
+                const bool is_new = first || known[observations.first_of_frame()] > 0.0;
+                z[j] = size * known[WHITE_LOADING] * known[state.loading];
+                phi[j] = is_new ? 0.0 : 1.0;
+                q[j] = is_new ? 1.0 : 0.0;
+                continue;
+            }
             z[j] = state.loading < 0 ? size : size * known[state.loading];
             correlated += z[j] * z[j];
-            const bool once_an_output = state.of_output || state.length >= 0;
-            if (first || (once_an_output && known[LAG] < 0.0)) {
+            const bool once_an_output = state.of_output || state.length >= 0;  // and so drawn with its first datum
+            if ((first && state.output < 0) || (once_an_output && known[LAG] < 0.0)) {
                 phi[j] = 0.0;
                 q[j] = 1.0;
             } else if (state.length >= 0) {
@@ -109,8 +155,8 @@ public:
                 q[j] = 0.0;
             }
         }
-        const double noise = own[NOISE] * known[WHITE_LOADING];
-        return noise * noise + own[MISFIT] * own[MISFIT] + ABSOLUTE_JITTER + RELATIVE_JITTER * correlated;
+        const double noise = own[NOISE] * known[WHITE_LOADING], share = own_share(observations, known);
+        return share * noise * noise + own[MISFIT] * own[MISFIT] + ABSOLUTE_JITTER + RELATIVE_JITTER * correlated;
     }
 
     const double* components;

@@ -75,6 +75,7 @@ BENCHMARKS = {
     "forecast_coverage": Benchmark(50),
     "forecast_measured": Benchmark(12, needs=DATA),
     "weights": Benchmark(8),
+    "noise_correlation": Benchmark(4),
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "structure": Benchmark(0.1),
 }

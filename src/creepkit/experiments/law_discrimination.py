@@ -323,7 +323,7 @@ def _as_if_made(truth: KnownLaw, deviation: Floats, planned: Sequence[History]) 
         values = {name: prediction.of(k)[:, j] for j, name in enumerate(prediction.outputs) if name in base.outputs}
         sd = {name: np.full(history.times.size, float(base.noise[base.outputs.index(name)])) for name in values}
         finite = np.asarray(np.isfinite(np.stack([*values.values()])).all(axis=0), bool)
-        made.append(replace(history, outputs=values, standard_deviation=sd, used=finite))
+        made.append(history.replace(outputs=values, standard_deviation=sd, used=finite))
     return [history for history in made if history.used.any()]
 
 

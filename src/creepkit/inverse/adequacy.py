@@ -207,13 +207,14 @@ def adequacy_of(
     solution = _within_bounds(judged_problem, CovarianceFactor.of_residuals(residuals, independent))
     share_of_freedom = _freedom(judged_problem, solution) / float(known.judged.sum())
     contributions = solution.residuals * solution.weighted_residuals
+    marginal = _marginal_contributions(residuals, solution, independent)
     outputs = []
     for position, name in enumerate(observations.outputs):
         mask = known.judged & (observations.output_index == position)
         if not mask.any():
             continue
         freedom = share_of_freedom * float(mask.sum())
-        reduced = float(contributions[mask].sum()) / freedom
+        reduced = float(marginal[mask].sum()) / freedom
         p_value = known.chance_of_larger(reduced, share_of_freedom, mask)
         noise = float(np.median(known.sd[mask]))
         discrepancy = noise * float(np.sqrt(max(reduced - 1.0, 0.0))) if p_value < SIGNIFICANCE else 0.0
@@ -314,6 +315,21 @@ def _independent_noise(
     return NoiseModel(outputs, noise_model.rate)
 
 
+def _marginal_contributions(residuals: Residuals, solution: LinearSolution, noise_model: NoiseModel) -> Floats:
+    """(tests, observations) whose sum over an output is its own chi-square.
+
+    That of outputs whose noise is correlated is not a sum of theirs: each is then taken as if it alone were known.
+    """
+    if residuals.shared_noise is None:
+        return solution.residuals * solution.weighted_residuals
+    out = np.zeros_like(solution.residuals)
+    for position in range(len(noise_model.outputs)):
+        mask = residuals.present & (residuals.output_index == position)
+        factor = CovarianceFactor.of_residuals(replace(residuals, present=mask), noise_model)
+        out[mask] = factor.whiten(solution.residuals)[mask] ** 2
+    return out
+
+
 def _within_bounds(linear: LinearisedProblem, factor: CovarianceFactor) -> LinearSolution:
     """The optimum of the linear problem within its bounds, or the point itself where the step gains nothing."""
     solution, residuals = linear.solve(factor), linear.residuals
@@ -351,8 +367,8 @@ def _correlation(noise_model: NoiseModel) -> float:
 
 def _white_part(residuals: Residuals, solution: LinearSolution, noise_model: NoiseModel) -> Floats:
     """(tests, observations) what is left in the output's unit once offsets and rates of tests are taken out."""
-    noise = noise_model.per_observation(residuals.output_index, "noise") * residuals.relative_noise
-    return np.asarray(noise**2 * residuals.offset_sensitivity * solution.weighted_residuals)
+    white = residuals.white_covariance_times(solution.weighted_residuals, noise_model)
+    return np.asarray(white / np.where(residuals.offset_sensitivity > 0, residuals.offset_sensitivity, 1.0))
 
 
 def _largest_deviation(

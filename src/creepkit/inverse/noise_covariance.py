@@ -81,7 +81,7 @@ class CovarianceFactor:
         rate, discrepancy, _ = self.components[-len(SHARED_COMPONENTS) :]
         _, white, offset_effect, unit, rate_effect = series.loadings[:, :5].T
         correlated = drift**2 + (offset * offset_effect) ** 2 + (discrepancy * unit) ** 2 + (rate * rate_effect) ** 2
-        correlated += (series.loadings[:, 5:] ** 2).sum(axis=1)
+        correlated += (series.loadings[:, 5 : 5 + series.effects] ** 2).sum(axis=1)
         out = np.ones(series.shape)
         variance = correlated * (1.0 + RELATIVE_JITTER) + (noise * white) ** 2 + misfit**2 + ABSOLUTE_JITTER
         out.flat[series.places] = variance / series.root_weights[:, 0] ** 2

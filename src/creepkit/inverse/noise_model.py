@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.inverse.observation_series import ObservationSeries
+from creepkit.inverse.observation_series import ObservationSeries, SharedNoise
 from creepkit.inverse.observation_vector import SINGLE_VALUES, ObservationVector
 from creepkit.records import Nuisance
 
@@ -37,6 +37,7 @@ class Residuals:
         effects, or None.
     discrepancy_unit : (tests, observations) -, what a model discrepancy of one is in the transformed output: the stated
         or estimated noise of the frame; 1 % where the transform is logarithmic; 0 where there can be none.
+    shared_noise : how the noise of the outputs of a frame is correlated; None where it is not.
     """
 
     values: Floats
@@ -50,6 +51,7 @@ class Residuals:
     test_weights: Floats
     random_effect_sensitivities: Floats | None = None
     discrepancy_unit: Floats | None = None
+    shared_noise: SharedNoise | None = None
 
     def with_test_weights(self, test_weights: Floats) -> Residuals:
         """The same with other weights of tests."""
@@ -68,8 +70,23 @@ class Residuals:
         stacked = np.stack(effects, axis=-1)
         stacked = stacked if further is None else np.concatenate([stacked, further], axis=-1)
         return ObservationSeries.of_observations(
-            self.present, self.output_index, self.correlation_coordinate, stacked, self.test_weights
+            self.present, self.output_index, self.correlation_coordinate, stacked, self.test_weights, self.shared_noise
         )
+
+    def white_noise(self, noise_model: NoiseModel) -> Floats:
+        """(tests, observations) - standard deviation of the noise of each observation, in the transformed output."""
+        noise = noise_model.per_observation(self.output_index, "noise")
+        return np.asarray(noise * self.relative_noise * self.offset_sensitivity)
+
+    def white_covariance_times(self, values: Floats, noise_model: NoiseModel) -> Floats:
+        """W v, (tests, observations), W the covariance of the noise of frames.
+
+        values : (tests, observations) v, zero where no data are.
+        """
+        noise = self.white_noise(noise_model)
+        if self.shared_noise is None:
+            return np.asarray(noise**2 * values)
+        return self.shared_noise.own_share * noise**2 * values + self.shared_noise.shared_with_frame(noise, values)
 
 
 MINIMUM_TESTS = 3
@@ -226,6 +243,8 @@ def covariance(residuals: Residuals, noise_model: NoiseModel) -> Floats:
     c += noise_model.rate**2 * d[:, :, None] * d[:, None, :]
     if residuals.random_effect_sensitivities is not None:
         c += residuals.random_effect_sensitivities @ np.swapaxes(residuals.random_effect_sensitivities, 1, 2)
+    if residuals.shared_noise is not None:
+        c += residuals.shared_noise.covariance(residuals.white_noise(noise_model))
     k = np.arange(s.shape[1])
     noise = noise_model.per_observation(output, "noise") * residuals.relative_noise
     c[:, k, k] = (

@@ -1,4 +1,7 @@
-"""Observations as the compiled covariance takes them: those that are data, by test and output and in order of time."""
+"""Observations as the compiled covariance takes them: those that are data, by test and output and in order of time.
+
+Where the noise of outputs is correlated they are by test and frame: see SharedNoise.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +16,70 @@ from creepkit.core import address
 
 
 @dataclass(frozen=True, eq=False)
+class SharedNoise:
+    """White noise that the outputs of one frame share: their correlation by factors, R = L L' + diag(1 - row sums).
+
+    frame : (tests, observations) the frame of each. loadings : (tests, observations, factors) - its row of L.
+    """
+
+    frame: Ints
+    loadings: Floats
+
+    @classmethod
+    def of_correlations(cls, correlations: Floats, output_index: Ints, frame: Ints) -> SharedNoise | None:
+        """The factors of correlation matrices; None where all outputs err independently.
+
+        correlations : (tests, outputs, outputs) -, of the noise of two outputs in one frame.
+        output_index, frame : (tests, observations).
+        """
+        identity = np.eye(correlations.shape[1])
+        if np.array_equal(correlations, np.broadcast_to(identity, correlations.shape)):
+            return None
+        # R - c I with c the least eigenvalue has a rank below the number of outputs
+        values, vectors = np.linalg.eigh(correlations)
+        roots = np.sqrt(np.maximum(values - values[:, :1], 0.0))[:, None, :] * vectors
+        kept = np.abs(roots).max(axis=(0, 1)) > SMALLEST_LOADING
+        return cls(frame, roots[..., kept][np.arange(len(output_index))[:, None], output_index])
+
+    def shared_with_frame(self, noise: Floats, values: Floats) -> Floats:
+        """The part of W v that frames share, W the covariance of white noise; (tests, observations).
+
+        noise : (tests, observations) its standard deviation. values : (tests, observations) v.
+        """
+        out = np.zeros_like(values)
+        for test, frame in enumerate(self.frame):
+            loadings = noise[test, :, None] * self.loadings[test]
+            sums = np.zeros((int(frame.max(initial=0)) + 1, loadings.shape[1]))
+            np.add.at(sums, frame, loadings * values[test, :, None])
+            out[test] = (loadings * sums[frame]).sum(axis=1)
+        return out
+
+    @property
+    def own_share(self) -> Floats:
+        """(tests, observations) - share of the variance that an observation shares with no other."""
+        return np.asarray(1.0 - (self.loadings**2).sum(axis=-1))
+
+    def covariance(self, noise: Floats) -> Floats:
+        """(tests, observations, observations) off its diagonal; noise : (tests, observations) standard deviations."""
+        loadings = noise[..., None] * self.loadings
+        same = (self.frame[:, :, None] == self.frame[:, None, :]) & ~np.eye(self.frame.shape[1], dtype=bool)
+        return np.where(same, loadings @ np.swapaxes(loadings, 1, 2), 0.0)
+
+
+SMALLEST_LOADING = 1e-9
+"""A factor that no output has more of is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
 class ObservationSeries:
     """What the covariance of residuals depends on beside the noise model (see src/core/noise_likelihood.hpp).
 
     shape : (tests, observations) of the residuals. places : (data,) which of them are data, in order. starts :
     (tests + 1,) first datum of each test; output : (data,). loadings : (data, 5 + effects) lag to the previous datum of
     the output (-1: it is the first), then what a white error, an offset, a discrepancy, ln of the rate and each further
-    random effect of one does. test_weights : (tests,) -; root_weights : (data, 1) their roots.
+    random effect of one does; with factors, (data, 6 + effects + factors), whether the datum is the first of its frame,
+    and the factors of its white error. effects, factors : how many. test_weights : (tests,) -; root_weights : (data, 1)
+    their roots.
     """
 
     shape: tuple[int, int]
@@ -29,30 +89,50 @@ class ObservationSeries:
     loadings: Floats
     test_weights: Floats
     root_weights: Floats
+    effects: int = 0
+    factors: int = 0
 
     @classmethod
     def of_observations(
-        cls, present: Bools, output_index: Ints, time: Floats, effects: Floats, test_weights: Floats
+        cls,
+        present: Bools,
+        output_index: Ints,
+        time: Floats,
+        effects: Floats,
+        test_weights: Floats,
+        shared_noise: SharedNoise | None = None,
     ) -> ObservationSeries:
         """The series of observations.
 
         present, output_index, time : (tests, observations) which are data, of which output, and correlation time.
         effects : (tests, observations, 4 + effects) the columns of the loadings behind the lag.
-        test_weights : (tests,) -.
+        test_weights : (tests,) -. shared_noise : of outputs whose noise is correlated.
         """
         tests, observations = present.shape
         places = np.flatnonzero(present)
         test, output, times = places // max(observations, 1), output_index.ravel()[places], time.ravel()[places]
-        order = np.lexsort((times, output, test))
+        order = np.lexsort(((time if shared_noise is None else shared_noise.frame).ravel()[places], output, test))
         places, test, output, times = places[order], test[order], output[order], times[order]
         follows = np.zeros(places.size, bool)
         follows[1:] = (np.diff(test) == 0) & (np.diff(output) == 0)
         lags = np.where(follows, np.diff(times, prepend=0.0), -1.0)
         loadings = np.concatenate([lags[:, None], effects.reshape(present.size, -1)[places]], axis=1)
+        factors = 0
+        if shared_noise is not None:
+            frame, factors = shared_noise.frame.ravel()[places], shared_noise.loadings.shape[2]
+            order = np.lexsort((output, frame, test))
+            places, test, output, frame = places[order], test[order], output[order], frame[order]
+            is_new = np.ones((places.size, 1))
+            is_new[1:, 0] = (np.diff(test) != 0) | (np.diff(frame) != 0)
+            own = shared_noise.loadings.reshape(present.size, factors)[places]
+            loadings = np.concatenate([loadings[order], is_new, own], axis=1)
         weights = np.ascontiguousarray(test_weights, float)
         starts = np.searchsorted(test, np.arange(tests + 1)).astype(np.int64)
         root_weights = np.sqrt(weights)[test][:, None]
-        return cls((tests, observations), places, starts, output.astype(np.int64), loadings, weights, root_weights)
+        return cls(
+            (tests, observations), places, starts, output.astype(np.int64), np.ascontiguousarray(loadings), weights,
+            root_weights, effects.shape[-1] - 4, factors,
+        )  # fmt: skip
 
     def rows(self, values: Floats) -> Floats:
         """(data, columns) of values (tests, observations, columns), times the roots of the weights of their tests."""
@@ -63,6 +143,6 @@ class ObservationSeries:
 
         components : (5 outputs + 3,) as NoiseModel.components has them.
         """
-        outputs, effects = (components.size - 3) // 5, self.loadings.shape[1] - 5
+        counts = (self.shape[0], (components.size - 3) // 5, self.effects, self.factors)
         arrays = (self.starts, self.output, self.loadings, self.test_weights, components)
-        return (*(ctypes.c_int64(n) for n in (self.shape[0], outputs, effects)), *(address(array) for array in arrays))
+        return (*(ctypes.c_int64(n) for n in counts), *(address(array) for array in arrays))

@@ -15,6 +15,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
 from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
+from creepkit.inverse.observation_series import SharedNoise
 from creepkit.inverse.output_transforms import (
     LinearTransform,
     LogTransform,
@@ -176,6 +177,7 @@ class ObservationVector:
     stated : (outputs,) whether every history states the noise of its frames; else it is estimated from neighbours.
     followed_to_rupture : (tests,) which tests are compared up to rupture.
     censored : (tests,) which of them were stopped before rupture.
+    noise_correlation : (tests, outputs, outputs) - of the noise of two outputs in one frame, as histories state it.
     """
 
     outputs: tuple[str, ...]
@@ -191,6 +193,7 @@ class ObservationVector:
     stated: Bools
     followed_to_rupture: Bools
     censored: Bools
+    noise_correlation: Floats
 
     @classmethod
     def from_histories(
@@ -232,6 +235,7 @@ class ObservationVector:
             np.array([_states_noise([histories[k] for k in tests_by_output[name]], name) for name in outputs]),
             followed_to_rupture,
             followed_to_rupture & np.array([h.unruptured for h in histories]),
+            np.stack([_correlation_matrix(h, outputs) for h in histories]),
         )
         for k, (history, row) in enumerate(zip(histories, rows, strict=True)):
             observations._fill_test(k, history, row, noise_levels)
@@ -300,6 +304,11 @@ class ObservationVector:
         ]
         logarithmic = self.per_observation([float(is_logarithmic(name)) for name in self.outputs]) > 0
         return self.per_observation(units) * np.where(logarithmic, 1.0, self.relative_noise)
+
+    @cached_property
+    def shared_noise(self) -> SharedNoise | None:
+        """The factors of the correlated noise of frames; None where outputs err independently."""
+        return SharedNoise.of_correlations(self.noise_correlation, self.output_index, self.frame_index)
 
     @property
     def log_times(self) -> Floats:
@@ -372,6 +381,16 @@ class ObservationVector:
             mask = self.output_index == position
             out[..., mask] = method(transform)(y[..., mask])
         return out
+
+
+def _correlation_matrix(history: History, outputs: Sequence[str]) -> Floats:
+    """(outputs, outputs) correlation of the noise of a frame."""
+    matrix = np.eye(len(outputs))
+    for pair, correlation in history.noise_correlation.items():
+        if set(pair) <= set(outputs):
+            first, second = (outputs.index(name) for name in pair)
+            matrix[first, second] = matrix[second, first] = correlation
+    return matrix
 
 
 def _states_noise(histories: Sequence[History], name: str) -> bool:

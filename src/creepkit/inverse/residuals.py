@@ -243,6 +243,7 @@ def _masked_residuals(
         output_index=observations.output_index,
         relative_noise=observations.relative_noise,
         discrepancy_unit=np.where(mask, observations.discrepancy_unit, 0.0),
+        shared_noise=observations.shared_noise,
         test_weights=np.ones(len(mask)),
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
@@ -11,14 +12,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, SolveError
 from creepkit.readers.conditions import END_OF_TEST_TERMS, StatedConditions, StatedNumber, errors_located_at
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.loading_strain import without_loading
+from creepkit.readers.noise_correlation import read_noise_correlation
 from creepkit.readers.standard_names import in_standard_names
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
-from creepkit.records import UNKNOWN_DURATION, History, Loading, Program
+from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, outputs_of_test, specimen_of
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -65,7 +67,7 @@ def assemble_history(
     minimum_rate, minimum_rate_sd = _minimum_rate(conditions)
     rupture_time, unruptured = _end_of_test(conditions, frames, used)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
-    return History(
+    history = History(
         name=conditions.take_text("name", name),
         times=frames.times,
         outputs=outputs,
@@ -86,9 +88,20 @@ def assemble_history(
         minimum_rate=minimum_rate,
         minimum_rate_sd=minimum_rate_sd,
         stated=conditions.stated,
+        noise_correlation=read_noise_correlation(conditions, outputs),
         # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
     )
+    _check_operator(history, columns)
+    return history
+
+
+def _check_operator(history: History, location: str) -> None:
+    """HistoryError where the operator of a test does not give the outputs that its columns hold."""
+    try:
+        outputs_of_test(specimen_of(history), replace(history, source=location))
+    except SolveError as error:
+        raise HistoryError(str(error)) from error
 
 
 def assemble_without_frames(

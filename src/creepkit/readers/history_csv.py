@@ -33,6 +33,7 @@ from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid, peek_columns, read_head_alone, read_text_grid
 from creepkit.readers.column_names import KnownNames
+from creepkit.readers.noise_correlation import noise_correlation_text
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (
@@ -167,6 +168,8 @@ def _header_lines(history: History) -> Iterator[tuple[str, str]]:
             yield f"{key}_1/s", _number_text(rate)
     if history.operator:
         yield "operator", history.operator
+    if history.outputs and history.noise_correlation:
+        yield "noise_correlation", noise_correlation_text(history.noise_correlation)
     for key, value in history.geometry.items():
         # A bare number is read as it stands, but a name that ends in a unit would lose it.
         unit = "_mm" if key.rpartition("_")[2] in LENGTH.units else ""

@@ -89,7 +89,7 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 
 TEXT_KEYS = (
     *("name", "alloy", "specimen", "operator", "control", "strain_measure", "stress_measure"),
-    *("includes_elastic", "includes_loading", "ended"),
+    *("includes_elastic", "includes_loading", "ended", "noise_correlation"),
 )
 """Words that stand once for a whole test, beside steps and programs."""
 

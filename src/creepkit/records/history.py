@@ -48,7 +48,7 @@ class History:
     unruptured : whether the test was stopped, at its last time, before the specimen broke. A test with neither says
         nothing of how it ended.
     noise_correlation : {(output, output): correlation} of the noise of two outputs in one frame, -1 to 1; pairs
-        that are not given err independently.
+        that are not given err independently. A plan, with outputs {}, keeps those of the test it was made from.
     minimum_rate : 1/s, the smallest creep rate of the test, where it is all or part of what is known; minimum_rate_sd :
         its standard deviation, 1/s. A test of which only that, or only its end, is known has outputs {} and one time.
     stated : {"temperature", "stress" or "pressure": program} that was stated of a quantity whose record is used, K and
@@ -131,17 +131,20 @@ class History:
 
     def _checked_correlation(self, origin: str) -> dict[tuple[str, str], float]:
         """Correlations by pair, in the order of the outputs; HistoryError for what cannot be one."""
+        # a plan without outputs keeps what will be known of their noise
         order = list(self.outputs)
         correlations: dict[tuple[str, str], float] = {}
         for pair, value in self.noise_correlation.items():
-            if len(set(pair)) != 2 or not set(pair) <= set(order):
+            if len(set(pair)) != 2 or (order and not set(pair) <= set(order)):
                 names = " and ".join(str(name) for name in pair)
                 raise HistoryError(
                     f"{origin}: a noise_correlation of {names}; give it of two of its outputs: {', '.join(order)}"
                 )
-            correlations[min(pair, key=order.index), max(pair, key=order.index)] = float(value)
+            first, second = sorted(pair, key=order.index) if order else pair
+            correlations[first, second] = float(value)
         if not correlations:
             return correlations
+        order = order or list(dict.fromkeys(name for pair in correlations for name in pair))
         matrix = np.eye(len(order))
         for (first, second), value in correlations.items():
             i, j = order.index(first), order.index(second)
@@ -190,10 +193,14 @@ class History:
     def replace(self, **changes: Any) -> History:
         """The same history with some fields changed.
 
-        New times are all used, and say nothing of how the test ended, unless that is given too.
+        New times are all used, and say nothing of how the test ended, unless that is given too. Outputs that are left
+        out take the correlations of their noise with them.
         """
         if "times" in changes:
             changes = {"used": EVERY_FRAME, "rupture_time": None, "unruptured": False, **changes}
+        if changes.get("outputs") and "noise_correlation" not in changes:
+            kept = {p: rho for p, rho in self.noise_correlation.items() if set(p) <= set(changes["outputs"])}
+            changes = {**changes, "noise_correlation": kept}
         return replace(self, **changes)
 
     def __reduce__(self) -> tuple[Any, ...]:

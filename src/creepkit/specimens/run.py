@@ -75,7 +75,9 @@ def run_from_outputs(
         )
     known = {f.name: getattr(plan, f.name) for f in fields(History)}
     outputs = {name: rows[reached, k] for k, name in enumerate(names)}
+    correlation = {pair: rho for pair, rho in plan.noise_correlation.items() if set(pair) <= set(names)}
     frames = {"times": plan.times[reached], "used": plan.used[reached], "outputs": outputs, "labels": labels}
+    frames["noise_correlation"] = correlation
     ends = {"rupture_time": end_time if status is Status.RUPTURED else None, "unruptured": False}
     return kind(**{**known, **frames, **ends, **more}, status=status, end_time=end_time, reason=reason)
 

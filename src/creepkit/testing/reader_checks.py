@@ -149,7 +149,7 @@ def history_difference(first: History, second: History) -> str:
         a, b = getattr(first, field), getattr(second, field)
         if a != b:
             return f"{field} is {a!r} and {b!r}"
-    for field in ("geometry", "labels"):
+    for field in ("geometry", "labels", "noise_correlation"):
         a, b = dict(getattr(first, field)), dict(getattr(second, field))
         if a != b:
             return f"{field} is {a} and {b}"

@@ -16,12 +16,21 @@ from creepkit.inverse.noise_model import (
     Residuals,
     covariance,
 )
+from creepkit.inverse.observation_series import SharedNoise
 
 NAMES = ("amplitude", "width", "rupture_time")
+CORRELATIONS = np.array([
+    [[1.0, 0.9, 0.3], [0.9, 1.0, 0.1], [0.3, 0.1, 1.0]],
+    np.eye(3),
+    [[1.0, -0.6, 0.0], [-0.6, 1.0, 0.0], [0.0, 0.0, 1.0]],
+])  # fmt: skip
+"""Of the noise of the outputs of a frame, for each test."""
 
 
-def example(seed=0, frames=5, tests=3):
+def example(seed=0, frames=5, tests=3, correlated=False):
     """Tests of two outputs and one rupture time each, with every source of scatter, and residuals of three unknowns.
+
+    correlated : whether the noise of the outputs of a frame is.
 
     Absent frames, one of them the whole second output of a test; two frames at one time; tests of different weight; the
     third unknown belongs to the first test alone.
@@ -31,6 +40,7 @@ def example(seed=0, frames=5, tests=3):
     times[0, 2] = times[0, 1]
     clock = np.concatenate([times, times, times[:, -1:] + 0.3], axis=1)
     output = np.tile(np.repeat([0, 1, 2], [frames, frames, 1]), (tests, 1))
+    frame = np.tile([*range(frames), *range(frames), 0], (tests, 1))
     present = np.ones((tests, count), bool)
     present[0, 1] = present[-1, count - 1] = False
     present[1, frames : 2 * frames] = False
@@ -49,12 +59,13 @@ def example(seed=0, frames=5, tests=3):
         test_weights=np.linspace(0.3, 1.0, tests),
         random_effect_sensitivities=0.3 * rng.normal(size=(tests, count, 2)) * present[..., None],
         discrepancy_unit=np.where(output == 2, 0.0, np.abs(unit)),
+        shared_noise=SharedNoise.of_correlations(CORRELATIONS, output, frame) if correlated else None,
     )
     noise = NoiseModel(
         {
             "amplitude": OutputNoise(0.1, 0.05, 0.7, 0.4, 0.6),
             "width": OutputNoise(0.3, 0.0, 0.2, 0.9, 2.0),
-            "rupture_time": OutputNoise(0.0, 0.4, 0.0, 0.0, 1.0),
+            "rupture_time": OutputNoise(0.2 if correlated else 0.0, 0.4, 0.0, 0.0, 1.0),
         },
         rate=0.5,
         discrepancy=1.3,
@@ -97,7 +108,13 @@ def exact_covariance(residuals, sizes, test):
                 entry += (
                     sizes["", "discrepancy"] ** 2 * u[i] * u[j] * mpmath.exp(-lag / sizes["", "discrepancy_length"])
                 )
+            if i != j and r.shared_noise is not None and r.shared_noise.frame[test, i] == r.shared_noise.frame[test, j]:
+                pair = [r.output_index[test, k] for k in (i, j)]
+                rho = mpmath.mpf(CORRELATIONS[test][pair[0], pair[1]])
+                noises = [sizes[NAMES[o], "noise"] * w[k] * s[k] for o, k in zip(pair, (i, j), strict=True)]
+                entry += rho * noises[0] * noises[1]
             if i == j:
+                own = NAMES[r.output_index[test, i]]
                 entry *= 1 + mpmath.mpf(1e-9)
                 entry += (sizes[own, "noise"] * w[i] * s[i]) ** 2 + sizes[own, "misfit"] ** 2 + mpmath.mpf(1e-10)
             c[a, b] = entry
@@ -136,9 +153,9 @@ def exact_sizes(noise):
 
 
 @pytest.mark.usefixtures("fifty_digits")
-@pytest.mark.parametrize("restricted", [True, False])
-def test_value_and_gradient_are_those_of_fifty_digits(restricted):
-    residuals, noise = example()
+@pytest.mark.parametrize(("restricted", "correlated"), [(True, False), (False, False), (True, True)])
+def test_value_and_gradient_are_those_of_fifty_digits(restricted, correlated):
+    residuals, noise = example(correlated=correlated)
     precision, prior_residual = ((0.1, 0.0, 2.0), (0.2, 0.0, -0.4)) if restricted else ((), ())
     residuals = residuals if restricted else replace(residuals, jacobian=residuals.jacobian[..., :0])
     value, gradient = likelihood_of(residuals, noise, precision, prior_residual)(noise.components)
@@ -177,15 +194,44 @@ def test_offsets_far_above_the_noise_cost_no_digits(noise_of_offsets):
 # ---- one factor ------------------------------------------------------------------------------------------------------
 
 
-def test_whitening_is_by_the_cholesky_factor_and_solving_by_the_inverse():
-    residuals, noise = example(frames=12)
+@pytest.mark.parametrize("correlated", [False, True])
+def test_whitening_is_by_the_cholesky_factor_and_solving_by_the_inverse(correlated):
+    """Of observations by output, or by frame where the noise of a frame is correlated."""
+    residuals, noise = example(frames=12, correlated=correlated)
     c, factor = covariance(residuals, noise), CovarianceFactor.of_residuals(residuals, noise)
     values = np.random.default_rng(3).normal(size=(*residuals.values.shape, 4))
-    np.testing.assert_allclose(factor.whiten(values), np.linalg.solve(np.linalg.cholesky(c), values), rtol=1e-8)
+    order = np.lexsort((residuals.output_index[0], residuals.shared_noise.frame[0])) if correlated else slice(None)
+    root = np.linalg.cholesky(c[:, order][:, :, order])
+    np.testing.assert_allclose(factor.whiten(values)[:, order], np.linalg.solve(root, values[:, order]), rtol=1e-8)
     np.testing.assert_allclose(factor.inverse_times(values), np.linalg.solve(c, values), rtol=1e-7)
     np.testing.assert_array_equal(factor.whiten(values[..., 1]), factor.whiten(values)[..., 1])
     assert factor.log_determinant == pytest.approx(np.linalg.slogdet(c)[1].sum(), rel=1e-10)
     np.testing.assert_allclose(factor.variances, np.diagonal(c, axis1=1, axis2=2), rtol=1e-12)
+
+
+def test_correlations_are_those_of_their_factors():
+    output, frame = np.tile([0, 1, 2], (3, 2)), np.tile([0, 0, 0, 1, 1, 1], (3, 1))
+    shared = SharedNoise.of_correlations(CORRELATIONS, output, frame)
+    found = shared.covariance(np.ones(output.shape))
+    np.testing.assert_allclose(found[:, :3, :3] + np.eye(3), CORRELATIONS, atol=1e-12)
+    assert not found[:, :3, 3:].any()
+    vector = np.random.default_rng(2).normal(size=output.shape)
+    noise = 1.0 + np.random.default_rng(3).random(output.shape)
+    expected = noise**2 * vector + np.einsum("tij,tj->ti", shared.covariance(noise), vector)
+    times = shared.own_share * noise**2 * vector + shared.shared_with_frame(noise, vector)
+    np.testing.assert_allclose(times, expected, rtol=1e-12)
+    assert SharedNoise.of_correlations(np.tile(np.eye(3), (3, 1, 1)), output, frame) is None
+
+
+def test_correlated_noise_at_a_correlation_of_zero_is_no_other():
+    """The states by frame and by output give one likelihood."""
+    residuals, noise = example(frames=9)
+    none = np.zeros((*residuals.values.shape, 1))
+    frame = np.tile([*range(9), *range(9), 0], (3, 1))
+    by_frame = replace(residuals, shared_noise=SharedNoise(frame, none))
+    ends = [likelihood_of(one, noise)(noise.components) for one in (residuals, by_frame)]
+    assert ends[0][0] == pytest.approx(ends[1][0], rel=1e-12)
+    np.testing.assert_allclose(ends[0][1], ends[1][1], rtol=1e-9)
 
 
 def test_the_likelihood_is_scipys():
@@ -198,12 +244,16 @@ def test_the_likelihood_is_scipys():
     assert log_likelihood(residuals, noise) == pytest.approx(truth, rel=1e-10)
 
 
-def test_the_order_of_observations_does_not_matter():
+@pytest.mark.parametrize("correlated", [False, True])
+def test_the_order_of_observations_does_not_matter(correlated):
     """Frames shuffled, and outputs among each other: the same likelihood, and a whitening of the same squares."""
-    residuals, noise = example(frames=7)
+    residuals, noise = example(frames=7, correlated=correlated)
     order = np.random.default_rng(4).permutation(residuals.values.shape[1])
     arrays = {name: v[:, order] for name, v in vars(residuals).items() if isinstance(v, np.ndarray) and v.ndim > 1}
     shuffled = replace(residuals, **arrays)
+    if correlated:
+        own = residuals.shared_noise
+        shuffled = replace(shuffled, shared_noise=SharedNoise(own.frame[:, order], own.loadings[:, order]))
     ends = [likelihood_of(one, noise)(noise.components) for one in (residuals, shuffled)]
     assert ends[0][0] == pytest.approx(ends[1][0], rel=1e-12)
     np.testing.assert_allclose(ends[0][1], ends[1][1], rtol=1e-10)
@@ -212,8 +262,9 @@ def test_the_order_of_observations_does_not_matter():
     assert (factor.whiten(shuffled.values) ** 2).sum() == pytest.approx(expected, rel=1e-9)
 
 
-def test_an_observation_without_data_is_left_as_it_is():
-    residuals, noise = example()
+@pytest.mark.parametrize("correlated", [False, True])
+def test_an_observation_without_data_is_left_as_it_is(correlated):
+    residuals, noise = example(correlated=correlated)
     values = np.ones(residuals.values.shape)
     for found in (CovarianceFactor.of_residuals(residuals, noise).whiten(values),
                   CovarianceFactor.of_residuals(residuals, noise).inverse_times(values)):  # fmt: skip
