@@ -39,6 +39,7 @@ BENCHMARKS = {
     "import_time": Benchmark(0.1),
     "core_speed": Benchmark(2),
     "core_random_cases": Benchmark(4),
+    "camera_reading": Benchmark(0.5),
     "user_costs": Benchmark(2, needs=DATA),
     "kernel_speed": Benchmark(1, ((), ("1000",)), "numba, for the hand-written code beside ours"),
     "kernel_start": Benchmark(1),

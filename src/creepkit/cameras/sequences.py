@@ -42,7 +42,7 @@ def in_order(files: Sequence[Path]) -> list[Path]:
 
 
 def _check_one_sequence(ordered: Sequence[Path]) -> None:
-    """Refuse results of several cameras or regions side by side, such as cam0_001.csv and cam1_001.csv."""
+    """Refuse results of several cameras or regions in one folder, such as cam0_001.csv and cam1_001.csv."""
     numbers = [numbers_in(file.name) for file in ordered]
     for first, second in pairwise(ordered):
         if numbers_in(first.name) == numbers_in(second.name):
@@ -58,7 +58,7 @@ def _check_one_sequence(ordered: Sequence[Path]) -> None:
     if len(varying) == 2 and 2 <= len(sets) <= MOST_SEQUENCES and len(sets[0]) > 1 and all(s == sets[0] for s in sets):
         raise HistoryError(
             f"{ordered[0].parent}: {ordered[0].name} and {ordered[len(sets[0])].name} look like {len(sets)} sequences "
-            "side by side; name a pattern that has one of them, or a list of the files in order"
+            "in one folder; name a pattern that has one of them, or a list of the files in order"
         )
 
 

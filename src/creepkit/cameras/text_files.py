@@ -17,6 +17,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import Dialect, decode_text, split_line
 from creepkit.files.reading import FileKind, read_bytes, read_range
+from creepkit.records.camera_format import shown
 
 FRAME_FILE = FileKind("a frame of cameras", HistoryError, "name a table of points", maximum_bytes=200_000_000)
 
@@ -192,12 +193,10 @@ class TextTable:
                 f"{self.path}:{number}: number of cells {cells}, of columns {len(self.names)}; a row has one cell a "
                 "column, so the file may be cut off or damaged"
             )
-        shown = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in found[:41])
-        shown = shown if len(found) <= 40 else f"{shown[:37]}..."
         sign = "comma" if decimal == "," else "point"
         return (
-            f"{self.path}:{number}: '{self.names[column].strip()}' is '{shown}'; write a finite number with a decimal "
-            f"{sign}, or nan for a lost point"
+            f"{self.path}:{number}: '{shown(self.names[column])}' is '{shown(found)}'; write a finite number with a "
+            f"decimal {sign}, or nan for a lost point"
         )
 
 

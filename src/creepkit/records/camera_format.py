@@ -58,6 +58,13 @@ def _plain(name: str) -> str:
     return " ".join(re.split(r"[\s._:\-]+", name.strip())).strip()
 
 
+def shown(text: str) -> str:
+    """A name or a cell of a file as messages show it: without unprintable signs, and not longer than 40."""
+    text = text.strip()
+    plain = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text[:41])
+    return plain if len(text) <= 40 else f"{plain[:37]}..."
+
+
 @dataclass(frozen=True)
 class LostRule:
     """A column and what it holds for points that are lost: "< 0", "== -1"."""

@@ -82,7 +82,7 @@ def test_an_image_that_comes_twice_in_a_file_of_a_folder(tmp_path: Path) -> None
     ("names", "message"),
     [
         (["left_1.txt", "left_2.txt", "right_1.txt"], "left_#.txt and right_#.txt, are no one sequence"),
-        (["cam0_1.txt", "cam0_2.txt", "cam1_1.txt", "cam1_2.txt"], "look like 2 sequences side by side"),
+        (["cam0_1.txt", "cam0_2.txt", "cam1_1.txt", "cam1_2.txt"], "look like 2 sequences in one folder"),
         (["f_1.txt", "f_01.txt"], "have the same number"),
     ],
 )
