@@ -5,8 +5,9 @@
 Frames of 10,424 points in 14 columns, of which seven are read: as DICe writes them (five digits), as tables of Python
 (17 digits), as VIC-3D with semicolons and decimal commas, and as packed rows of pyvale (25 columns). CPU time is that
 of the process, the least of three runs, for a sequence of one file a frame: for finding and ordering the files, and for
-each frame, which is read, checked and turned into points, displacements and marks of validity. np.loadtxt reads the same seven columns to an array, and is
-given the delimiter and the first row. Memory is the largest that Python had allocated while it went through all frames.
+each frame, which is read, checked and turned into points, displacements and marks of validity. np.loadtxt reads the
+same seven columns to an array, and is given the delimiter and the first row. Memory is the largest that Python had
+allocated while it went through all frames.
 """
 
 from __future__ import annotations

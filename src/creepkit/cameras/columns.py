@@ -149,6 +149,9 @@ def frame_of(
         if quantity in columns.quantities:
             factor = columns.factors[quantity] * format.axes[k % 3]
             np.multiply(values[:, columns.quantities[quantity]], factor, out=lengths[:, k])
+    if format.deformed:
+        with np.errstate(invalid="ignore"):
+            lengths[:, :3] -= lengths[:, 3:]
     valid &= ~np.isnan(lengths).any(axis=1)
     _check_sizes(columns, values, lengths, valid, locate)
     confidence = np.full(len(values), np.nan)
@@ -158,7 +161,10 @@ def frame_of(
 
 
 def time_in(columns: FrameColumns, values: Floats) -> float:
-    """The time, s, of a table (points, columns that are read) with a column for it: that of its first row; else NaN."""
+    """The time, s, of a table with a column for it: that of its first row; else NaN.
+
+    values : (points, columns that are read).
+    """
     if "time" not in columns.quantities or not len(values):
         return float("nan")
     return float(values[0, columns.quantities["time"]]) * columns.factors["time"]

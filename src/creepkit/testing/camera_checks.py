@@ -164,6 +164,8 @@ def _difference(format: CameraFormat, version: Mapping[str, tuple[str, ...]], pa
     planted, flat = _planted(), "w" not in version
     turned = np.array([*format.axes, *format.axes])
     meant = np.stack([planted[q] for q in (*COORDINATES, *DISPLACEMENTS)], axis=1) * turned
+    if format.deformed:
+        meant[:, :3] -= meant[:, 3:]
     if flat:
         meant[:, [2, 5]] = 0.0
     sound: Bools = np.ones(POINTS, dtype=bool)
