@@ -1,6 +1,6 @@
 """Amplitudes of a dome from rendered pairs of speckle images, correlated by pyvale.
 
-    python tests/benchmarks/rendered_speckle.py --python PYTHON_WITH_PYVALE [--points-step 10] [--write]
+    python tests/benchmarks/rendered_speckle.py [--python PYTHON_WITH_PYVALE] [--points-step 10] [--write]
 
 A plate with a dome of known shape, A (1 - (r / 6.5 mm)^2)^3, moves as a rigid body (by 0.3 mm in all, and 0.2 degrees)
 while the dome grows. Two pinhole cameras, 300 mm off and 20 degrees apart, see it at 0.03 mm a pixel; each pixel is the
@@ -134,7 +134,7 @@ def without_rigid_motion(points: np.ndarray, moved: np.ndarray, plate: np.ndarra
 
 def main() -> None:
     parser = arguments(__doc__)
-    parser.add_argument("--python", required=True, help="Python that has pyvale")
+    parser.add_argument("--python", default=sys.executable, help="a Python that has pyvale, by default this one")
     parser.add_argument("--points-step", type=int, default=10, help="pixels from one subset to the next")
     options = parser.parse_args()
     page = Page("rendered_speckle", __doc__)
