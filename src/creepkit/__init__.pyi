@@ -114,6 +114,7 @@ from .specimens.test_piece import TestPiece as TestPiece
 from .specimens.test_piece import dimension as dimension
 from .surrogates.parameter_gru import ParameterGru as ParameterGru
 from .surrogates.recipe import Training as Training
+from .testing import check_camera_format as check_camera_format
 from .testing import check_exporter as check_exporter
 from .testing import check_law as check_law
 from .testing import check_predictor as check_predictor

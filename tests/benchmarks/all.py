@@ -39,6 +39,8 @@ BENCHMARKS = {
     "import_time": Benchmark(0.1),
     "core_speed": Benchmark(2),
     "core_random_cases": Benchmark(4),
+    "camera_reading": Benchmark(0.5),
+    "rendered_speckle": Benchmark(1, needs="pyvale 2026.10, here or in the Python of the option --python"),
     "user_costs": Benchmark(2, needs=DATA),
     "kernel_speed": Benchmark(1, ((), ("1000",)), "numba, for the hand-written code beside ours"),
     "kernel_start": Benchmark(1),

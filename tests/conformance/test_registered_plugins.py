@@ -3,10 +3,18 @@
 import pytest
 
 from creepkit.registry import default_registry
-from creepkit.testing import check_exporter, check_named, check_predictor, check_reader, check_specimen
+from creepkit.testing import (
+    check_camera_format,
+    check_exporter,
+    check_named,
+    check_predictor,
+    check_reader,
+    check_specimen,
+)
 
 SPECIMENS = sorted(default_registry().specimens())
 READERS = sorted(default_registry().readers())
+CAMERAS = sorted(default_registry().cameras())
 EXPORTERS = sorted(default_registry().exporters())
 FORMS = sorted(default_registry().temperature_forms())
 
@@ -14,6 +22,7 @@ FORMS = sorted(default_registry().temperature_forms())
 def test_there_is_something_to_judge() -> None:
     assert {"uniaxial", "relaxation", "point", "bulge"} <= {*SPECIMENS}
     assert {"csv", "indexed-table", "indexed-files"} <= {*READERS}
+    assert {"vic-3d", "vic-3d-mat", "dice", "matchid", "zeiss", "pyvale", "pyvale-binary"} <= {*CAMERAS}
     assert {"python", "c", "mfront", "latex"} <= {*EXPORTERS}
     assert {"arrhenius", "linear"} <= {*FORMS}
 
@@ -34,6 +43,13 @@ def test_the_reduced_order_model_of_the_dimple_conforms_as_a_predictor() -> None
 @pytest.mark.parametrize("name", READERS)
 def test_a_registered_reader_conforms(name: str) -> None:
     report = check_reader(default_registry().reader(name))
+
+    assert report.passed, str(report)
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_a_registered_camera_format_conforms(name: str) -> None:
+    report = check_camera_format(default_registry().camera(name))
 
     assert report.passed, str(report)
 

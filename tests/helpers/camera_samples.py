@@ -148,12 +148,13 @@ INTEGERS = {"subset_x": "<i4", "subset_y": "<i4", "num_iter": "<i4", "stereo_num
 
 
 def _pyvale_rows(frame: Dome) -> np.ndarray:
-    """Axes of camera 0, which stands 300 mm off: y down, z away from it."""
+    """Where points are now, in axes of camera 0, which stands 300 mm off: y down, z away from it."""
     rows = np.zeros(len(frame.sigma), dtype=[(name, INTEGERS.get(name, "<f8")) for name in PYVALE_COLUMNS])
     points = frame.points * [1, -1, -1] + [0, 0, 300.0]
     moved = frame.displacements * [1, -1, -1]
     for k, axis in enumerate("xyz"):
-        rows[f"stereo_{axis}_mm"], rows[f"stereo_disp_{'uvw'[k]}_mm"] = points[:, k], moved[:, k]
+        rows[f"stereo_{axis}_mm"] = points[:, k] + moved[:, k]
+        rows[f"stereo_disp_{'uvw'[k]}_mm"] = moved[:, k]
     rows["converged"] = rows["stereo_converged"] = 1
     rows["stereo_cost_zncc"] = 0.998
     rows["stereo_converged"][LOST[0]] = 0

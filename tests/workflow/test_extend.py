@@ -17,7 +17,7 @@ from helpers.paths import ROOT
 
 GUIDE = ROOT / "docs" / "extend"
 
-PLUGINS = {"law": 3, "specimen": 2, "reader": 3, "exporter": 3, "temperature_form": 2, "command": 2}
+PLUGINS = {"law": 3, "specimen": 2, "reader": 3, "camera_format": 2, "exporter": 3, "temperature_form": 2, "command": 2}
 """{kind: examples on its page, each longer than the one before}."""
 
 
@@ -210,6 +210,26 @@ def test_the_recorders_reader_says_where_a_file_is_wrong(line: int, wrong: str) 
     Path("b7.log").write_text("\n".join(lines))
     with pytest.raises(HistoryError, match=f"b7.log, line {line}: found '{wrong}'"):
         contributed("reader")[-1].read(Path("b7.log"))
+
+
+# ---- camera formats ------------------------------------------------------------------------------------------------
+
+
+def test_camera_formats_read_the_frames_that_are_shown() -> None:
+    (text,) = blocks("write_a_camera_format", "text")
+    ours, system = contributed("camera_format")
+    for format in (ours, system):
+        report = ck.check_camera_format(format)
+        assert report.passed, str(report)
+    ck.load_plugin("example_0.py")
+    Path("run").mkdir()
+    for k in range(2):
+        Path(f"run/frame_{k}.csv").write_text(text)
+    frames = ck.read_frames("run")
+    assert frames.system == ck.available("cameras")["our-program"].title
+    assert frames[1].valid.tolist() == [True, False]
+    np.testing.assert_allclose(frames[1].points[0], [-2.5, 1.0, 0.1])
+    np.testing.assert_allclose(frames[1].displacements[0], [0.003, -0.001, 0.1205])
 
 
 # ---- exporters -----------------------------------------------------------------------------------------------------

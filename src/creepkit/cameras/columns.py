@@ -20,6 +20,7 @@ from creepkit.records.camera_format import (
     TIME_UNITS,
     CameraFormat,
     ColumnName,
+    shown,
 )
 
 LARGEST_LENGTH = 1e6
@@ -103,7 +104,7 @@ def columns_of(format: CameraFormat, names: Sequence[str], location: str) -> Fra
         if len({k for k, _ in found}) > 1:  # the same in the image and on the surface, as of pyvale
             found = [(k, word) for k, word in found if parsed[k].unit.casefold() not in PIXELS] or found
         if len({k for k, _ in found}) > 1:
-            both = " and ".join(f"'{names[k].strip()}'" for k in sorted({k for k, _ in found})[:2])
+            both = " and ".join(f"'{shown(names[k])}'" for k in sorted({k for k, _ in found})[:2])
             raise HistoryError(f"{location}: {both} both are the column {quantity} of {format}; keep one of them")
         if found:
             places[quantity], spelt[quantity] = found[0][0], ColumnName.of(found[0][1])
@@ -112,7 +113,7 @@ def columns_of(format: CameraFormat, names: Sequence[str], location: str) -> Fra
     wanted = {q: k for q, k in places.items() if q not in ("image_x", "image_y")}
     units = {q: parsed[k].unit or spelt[q].unit for q, k in wanted.items()}
     factors = {
-        q: _factor(format, q, units[q], names[k].strip(), location) for q, k in wanted.items() if q != "confidence"
+        q: _factor(format, q, units[q], shown(names[k]), location) for q, k in wanted.items() if q != "confidence"
     }
     positions = list(wanted.values())
     rules = []
@@ -148,6 +149,9 @@ def frame_of(
         if quantity in columns.quantities:
             factor = columns.factors[quantity] * format.axes[k % 3]
             np.multiply(values[:, columns.quantities[quantity]], factor, out=lengths[:, k])
+    if format.deformed:
+        with np.errstate(invalid="ignore"):
+            lengths[:, :3] -= lengths[:, 3:]
     valid &= ~np.isnan(lengths).any(axis=1)
     _check_sizes(columns, values, lengths, valid, locate)
     confidence = np.full(len(values), np.nan)
@@ -157,7 +161,10 @@ def frame_of(
 
 
 def time_in(columns: FrameColumns, values: Floats) -> float:
-    """The time, s, of a table (points, columns that are read) with a column for it: that of its first row; else NaN."""
+    """The time, s, of a table with a column for it: that of its first row; else NaN.
+
+    values : (points, columns that are read).
+    """
     if "time" not in columns.quantities or not len(values):
         return float("nan")
     return float(values[0, columns.quantities["time"]]) * columns.factors["time"]
@@ -173,7 +180,7 @@ def _check_sizes(
     row, k = (int(one) for one in np.argwhere(wrong)[0])
     place = columns.quantities[(*COORDINATES, *DISPLACEMENTS)[k]]
     raise HistoryError(
-        f"{locate(row)}: '{columns.name_of(place).strip()}' is {values[row, place]:g}; a length is a finite number of "
+        f"{locate(row)}: '{shown(columns.name_of(place))}' is {values[row, place]:g}; a length is a finite number of "
         f"at most {LARGEST_LENGTH:g} mm, or nan for a lost point"
     )
 
@@ -213,7 +220,7 @@ def _missing(format: CameraFormat, names: Sequence[str], quantity: str, spelling
             "a table of a two-dimensional correlation, which has no out-of-plane displacement; export a stereo one, or "
             "name x, y, u and v alone with format=ck.CameraFormat(...)"
         )
-    listed = ", ".join(name.strip() for name in names[:20])
+    listed = ", ".join(shown(name) for name in names[:20])
     return f"missing column '{spellings[0]}' ({quantity} of {format}); found: {listed:.400}"
 
 
@@ -231,4 +238,4 @@ def _factor(format: CameraFormat, quantity: str, unit: str, name: str, location:
             f"{location}: the unit of '{name}' is not stated; write '{name} [{wanted}]', or say it by "
             f"format=dataclasses.replace(format, unit='mm')"
         )
-    raise HistoryError(f"{location}: '{name}' has the unit '{unit}'; allowed are {', '.join(units)}")
+    raise HistoryError(f"{location}: '{name}' has the unit '{shown(unit)}'; allowed are {', '.join(units)}")

@@ -1,9 +1,9 @@
 """The camera systems that creepkit knows, one declaration each.
 
 Names of columns are those of the systems' own exports. Axes depend on how a system was set up: VIC-3D, Zeiss and DICe
-are read as they are, as of a plane whose z was laid towards the cameras; y of MatchID points down; pyvale writes the
-axes of camera 0 (x to the right, y down, z away from it). Where a surface that bulges towards the cameras comes out
-negative, z points away, as it does in the plane that DICe fits to its own examples: read it with
+are read as they are, as of a plane whose z was laid towards the cameras; y of MatchID points down; pyvale writes where
+points are now, in the axes of camera 0 (x to the right, y down, z away from it). Where a surface that bulges towards
+the cameras comes out negative, z points away, as it does in the plane that DICe fits to its own examples: read it with
 `dataclasses.replace(format, axes=(1, -1, -1))`.
 """
 
@@ -105,6 +105,7 @@ PYVALE = CameraFormat(
     "pyvale",
     "pyvale, CSV of a stereo correlation",
     _PYVALE_COLUMNS,
+    deformed=True,
     axes=(1, -1, -1),
     lost={"converged": "== 0", "stereo_converged": "== 0"},
     confidence_unit="ZNCC",
@@ -116,6 +117,7 @@ PYVALE_BINARY = CameraFormat(
     "pyvale-binary",
     "pyvale, binary *.dic3d of a stereo correlation",
     _PYVALE_COLUMNS,
+    deformed=True,
     axes=(1, -1, -1),
     lost={"converged": "== 0", "stereo_converged": "== 0"},
     confidence_unit="ZNCC",

@@ -19,8 +19,8 @@ from creepkit.cameras.recognition import Recognised, recognise
 from creepkit.cameras.sequences import in_order, missing_numbers, numbers_in, skeleton
 from creepkit.cameras.text_files import (
     FRAME_FILE,
+    FrameText,
     TextHead,
-    TextTable,
     frame_ranges,
     head_bytes,
     table_in_file,
@@ -37,7 +37,7 @@ FormatLike = CameraFormat | str | Mapping[str, Any] | None
 FramePath = str | Path | Iterable[str | Path]
 
 
-Table = TextTable | ArrayTable
+Table = FrameText | ArrayTable
 
 
 def read_frames(
@@ -164,7 +164,7 @@ class _FileSequence:
             return self.table(index)
         content = head_bytes(path)
         head = self.first.find_head(content, path)
-        return TextTable(path, _first_row(content[head.end :]), head.delimiter, head.names, lambda: head.number + 1)
+        return FrameText(path, _first_row(content[head.end :]), head.delimiter, head.names, lambda: head.number + 1)
 
     def source(self, index: int) -> str:
         return str(self.files[index])
@@ -197,7 +197,7 @@ class _ImagesInFile:
     def beginning(self, index: int) -> Table:
         start, end = self.ranges[index]
         table = table_in_range(self.path, self.head, start, min(end, start + 65536), is_last=True)
-        return TextTable(self.path, _first_row(table.rows), table.delimiter, table.names, table.first_line)
+        return FrameText(self.path, _first_row(table.rows), table.delimiter, table.names, table.first_line)
 
     def source(self, index: int) -> str:
         return str(self.path) if len(self.ranges) == 1 else f"{self.path}, image {index + 1}"

@@ -12,7 +12,7 @@ from creepkit.cameras.columns import columns_of, count_of_columns, fits, looks_p
 from creepkit.cameras.text_files import FRAME_FILE, TextHead, candidate_heads, head_bytes
 from creepkit.errors import HistoryError
 from creepkit.files.reading import read_bytes
-from creepkit.records.camera_format import CameraFormat
+from creepkit.records.camera_format import CameraFormat, shown
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,10 @@ class Recognised:
             )
         different = {*found.names} ^ {*self.head.names}
         if different:
+            one = shown(sorted(different)[0])
             raise HistoryError(
-                f"{found.location(path)}: its columns are not those of {self.path.name} ('{sorted(different)[0]}' "
-                "stands in one of them only); all frames of a sequence must have the same"
+                f"{found.location(path)}: its columns are not those of {self.path.name} ('{one}' stands in one of them "
+                "only); all frames of a sequence must have the same"
             )
         return found
 
@@ -127,7 +128,7 @@ def _explain_near_misses(path: Path, heads: Sequence[TextHead], formats: Sequenc
 
 
 def _unknown(names: Sequence[str], formats: Sequence[CameraFormat], what: str) -> str:
-    listed = ", ".join(name.strip() for name in names[:12])
+    listed = ", ".join(shown(name) for name in names[:12])
     found = f"(found: {listed:.300})" if listed else "(it has none)"
     known = ", ".join(one.name for one in formats)
     return (

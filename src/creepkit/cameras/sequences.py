@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -28,7 +28,11 @@ def numbers_in(name: str) -> tuple[int, ...]:
 
 
 def in_order(files: Sequence[Path]) -> list[Path]:
-    """The files by the numbers in their names; HistoryError where they are no one sequence."""
+    """The files by the numbers in their names; HistoryError where they are no one sequence.
+
+    One file of another name that says it is the reference ("ref") comes first.
+    """
+    reference, files = _reference_apart(files)
     kinds = sorted({skeleton(file.name) for file in files})
     folder = files[0].parent
     if len(files) > 1 and len(kinds) > 1:
@@ -38,11 +42,20 @@ def in_order(files: Sequence[Path]) -> list[Path]:
         )
     ordered = sorted(files, key=lambda file: (numbers_in(file.name), file.name))
     _check_one_sequence(ordered)
-    return ordered
+    return [*reference, *ordered]
+
+
+def _reference_apart(files: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    """The one file of its name that says that it is the reference, if there are others; and the others."""
+    counts = Counter(skeleton(file.name) for file in files)
+    lone = [file for file in files if counts[skeleton(file.name)] == 1 and "ref" in file.name.lower()]
+    if len(lone) != 1 or len(files) == 1:
+        return [], list(files)
+    return lone, [file for file in files if file != lone[0]]
 
 
 def _check_one_sequence(ordered: Sequence[Path]) -> None:
-    """Refuse results of several cameras or regions side by side, such as cam0_001.csv and cam1_001.csv."""
+    """Refuse results of several cameras or regions in one folder, such as cam0_001.csv and cam1_001.csv."""
     numbers = [numbers_in(file.name) for file in ordered]
     for first, second in pairwise(ordered):
         if numbers_in(first.name) == numbers_in(second.name):
@@ -58,15 +71,18 @@ def _check_one_sequence(ordered: Sequence[Path]) -> None:
     if len(varying) == 2 and 2 <= len(sets) <= MOST_SEQUENCES and len(sets[0]) > 1 and all(s == sets[0] for s in sets):
         raise HistoryError(
             f"{ordered[0].parent}: {ordered[0].name} and {ordered[len(sets[0])].name} look like {len(sets)} sequences "
-            "side by side; name a pattern that has one of them, or a list of the files in order"
+            "in one folder; name a pattern that has one of them, or a list of the files in order"
         )
 
 
 def missing_numbers(ordered: Sequence[Path]) -> tuple[int, ...]:
     """The numbers that are missing between the first and the last file; () where names do not count in one place."""
-    numbers = [numbers_in(file.name) for file in ordered]
+    _, counted_files = _reference_apart(ordered)
+    if len({skeleton(file.name) for file in counted_files}) > 1:
+        return ()
+    numbers = [numbers_in(file.name) for file in counted_files]
     varying = [k for k in range(len(numbers[0])) if len({one[k] for one in numbers}) > 1]
-    if len(varying) != 1 or len({skeleton(file.name) for file in ordered}) > 1:
+    if len(varying) != 1:
         return ()
     counted = [one[varying[0]] for one in numbers]
     step = math.gcd(*(b - a for a, b in pairwise(counted)))

@@ -17,6 +17,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import Dialect, decode_text, split_line
 from creepkit.files.reading import FileKind, read_bytes, read_range
+from creepkit.records.camera_format import shown
 
 FRAME_FILE = FileKind("a frame of cameras", HistoryError, "name a table of points", maximum_bytes=200_000_000)
 
@@ -111,11 +112,10 @@ def _names(text: str, delimiter: str) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class TextTable:
+class FrameText:
     """The table of one frame: the bytes of its rows, and where they stand.
 
-    rows : bytes of the rows. columns : cells in each. first_line : number of the line of the first row, or what counts
-    it, which only a message needs.
+    rows : bytes of the rows. names : of all columns. first_line : counts to the line of the first row, for messages.
     """
 
     path: Path
@@ -192,12 +192,10 @@ class TextTable:
                 f"{self.path}:{number}: number of cells {cells}, of columns {len(self.names)}; a row has one cell a "
                 "column, so the file may be cut off or damaged"
             )
-        shown = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in found[:41])
-        shown = shown if len(found) <= 40 else f"{shown[:37]}..."
         sign = "comma" if decimal == "," else "point"
         return (
-            f"{self.path}:{number}: '{self.names[column].strip()}' is '{shown}'; write a finite number with a decimal "
-            f"{sign}, or nan for a lost point"
+            f"{self.path}:{number}: '{shown(self.names[column])}' is '{shown(found)}'; write a finite number with a "
+            f"decimal {sign}, or nan for a lost point"
         )
 
 
@@ -205,7 +203,7 @@ def _cells_at(cells: Sequence[str], positions: Sequence[int]) -> list[str]:
     return [cells[k] for k in positions if k < len(cells)]
 
 
-def table_in_file(path: Path, find: Callable[[bytes], TextHead]) -> TextTable:
+def table_in_file(path: Path, find: Callable[[bytes], TextHead]) -> FrameText:
     """The table of a file with one frame.
 
     find : the line of columns in the beginning of a file; HistoryError where it has none.
@@ -218,7 +216,7 @@ def table_in_file(path: Path, find: Callable[[bytes], TextHead]) -> TextTable:
             f"{path}:{content[:again].count(10) + 1}: the line of columns comes again, as in a file of several images; "
             "give such a file by its own name, or one image a file"
         )
-    return TextTable(path, content[head.end :], head.delimiter, head.names, lambda: head.number + 1)
+    return FrameText(path, content[head.end :], head.delimiter, head.names, lambda: head.number + 1)
 
 
 def _is_line(content: bytes, start: int, line: bytes) -> bool:
@@ -249,7 +247,7 @@ def frame_ranges(path: Path, head: TextHead, mark: int) -> list[tuple[int, int]]
         position += CHUNK_BYTES - 1
 
 
-def table_in_range(path: Path, head: TextHead, start: int, end: int, is_last: bool) -> TextTable:
+def table_in_range(path: Path, head: TextHead, start: int, end: int, is_last: bool) -> FrameText:
     """The table of one image in a file of several: its bytes, less the title lines of the next image."""
     if end - start > FRAME_FILE.maximum_bytes:
         raise HistoryError(f"{path}: one image of {(end - start) / 1e6:.0f} MB, larger than any; is it a table?")
@@ -264,7 +262,7 @@ def table_in_range(path: Path, head: TextHead, start: int, end: int, is_last: bo
         feeds, returns = (sum(pair[k] for pair in counts) for k in (0, 1))
         return 1 + (feeds or returns)
 
-    return TextTable(path, rows, head.delimiter, head.names, first_line)
+    return FrameText(path, rows, head.delimiter, head.names, first_line)
 
 
 def _without_titles(rows: bytes, head: TextHead) -> bytes:

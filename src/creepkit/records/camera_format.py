@@ -58,6 +58,13 @@ def _plain(name: str) -> str:
     return " ".join(re.split(r"[\s._:\-]+", name.strip())).strip()
 
 
+def shown(text: str) -> str:
+    """A name or a cell of a file as messages show it: without unprintable signs, and not longer than 40."""
+    text = text.strip()
+    plain = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text[:41])
+    return plain if len(text) <= 40 else f"{plain[:37]}..."
+
+
 @dataclass(frozen=True)
 class LostRule:
     """A column and what it holds for points that are lost: "< 0", "== -1"."""
@@ -77,6 +84,7 @@ class CameraFormat:
         image_y (pixels) where only they tell the system from another one. Without z and w the format is that of a flat
         surface that moves in its plane.
     unit : of lengths where the head of the file states none; "" makes that an error.
+    deformed : whether x y z are where the points are now, rather than where they were in the reference image.
     axes : factors of x, y, z, each 1 or -1, that turn them into right-handed axes whose z points to the cameras.
     lost : {column: rule} of points that the correlation lost, such as {"sigma": "< 0"}; NaN is one in all systems.
     confidence_unit : of the column confidence, where the head states none.
@@ -91,6 +99,7 @@ class CameraFormat:
     title: str
     columns: Mapping[str, str | tuple[str, ...]] | tuple[Mapping[str, str | tuple[str, ...]], ...]
     unit: str = ""
+    deformed: bool = False
     axes: tuple[int, int, int] = (1, 1, 1)
     lost: Mapping[str, str] | tuple[LostRule, ...] = ()
     confidence_unit: str = ""

@@ -8,6 +8,7 @@ planned from its own record: its loads, ranges of conditions and lengths.
 """
 
 from creepkit.testing.kits import (
+    check_camera_format,
     check_exporter,
     check_law,
     check_named,
@@ -26,6 +27,7 @@ __all__ = [
     "ConformanceCheck",
     "ConformanceReport",
     "LawSamples",
+    "check_camera_format",
     "check_exporter",
     "check_law",
     "check_named",

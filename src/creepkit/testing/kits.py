@@ -13,9 +13,19 @@ from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, 
 from creepkit.kernels.lowering import lower
 from creepkit.language import arrhenius
 from creepkit.language.law import CreepLaw
-from creepkit.records import Exporter, History, Predictor, Reader, Specimen, predict_with, remember_specimen
+from creepkit.records import (
+    CameraFormat,
+    Exporter,
+    History,
+    Predictor,
+    Reader,
+    Specimen,
+    predict_with,
+    remember_specimen,
+)
 from creepkit.registry import Plugin, default_registry
 from creepkit.testing import (
+    camera_checks,
     exporter_checks,
     law_behaviour,
     law_checks,
@@ -24,6 +34,7 @@ from creepkit.testing import (
     reader_checks,
     specimen_checks,
 )
+from creepkit.testing.camera_checks import CameraFormatCase
 from creepkit.testing.exporter_checks import ExporterCase
 from creepkit.testing.predictor_checks import PredictorCase, default_histories
 from creepkit.testing.reader_checks import ReaderCase
@@ -165,6 +176,23 @@ def check_reader(reader: Reader, path: str | Path | None = None) -> ConformanceR
     return ConformanceReport(reader, tuple(_all_findings(checks, case)), "reader")
 
 
+def check_camera_format(format: CameraFormat, path: str | Path | None = None) -> ConformanceReport:
+    """Run every check on a camera format: tables in its own words are read as they were meant, and taken by it alone.
+
+    path : an example file or folder.
+    """
+    if not isinstance(format, CameraFormat):
+        raise HistoryError(f"check_camera_format() takes a ck.CameraFormat, found {format!r:.40}")
+    case = CameraFormatCase(format, None if path is None else Path(path))
+    checks = {
+        "name and title": lambda case: specimen_checks.check_record_name(case.format, "camera format"),
+        "its own tables": camera_checks.check_own_tables,
+        "foreign files": camera_checks.check_foreign_files,
+        "example": camera_checks.check_example,
+    }
+    return ConformanceReport(format, tuple(_all_findings(checks, case)), "camera format")
+
+
 def check_exporter(exporter: Exporter) -> ConformanceReport:
     """Run every check on an exporter, with every registered law."""
     if isinstance(exporter, type) or not hasattr(exporter, "text"):
@@ -191,6 +219,7 @@ _KITS: dict[str, Callable[[Any], ConformanceReport]] = {
     "law": check_law,
     "specimen": check_specimen,
     "reader": check_reader,
+    "camera format": check_camera_format,
     "exporter": check_exporter,
 }
 
@@ -207,8 +236,8 @@ def check_plugin(plugin: Plugin) -> list[ConformanceReport]:
     reports += [check_temperature_form(*named) for named in forms.items()]
     if not reports:
         raise PluginError(
-            f"{plugin.provenance} offers no law, specimen, reader, exporter or temperature form; return one from a "
-            "hook such as creepkit_laws"
+            f"{plugin.provenance} offers no law, specimen, reader, exporter, camera format or temperature form; return "
+            "one from a hook such as creepkit_laws"
         )
     return reports
 
@@ -220,6 +249,7 @@ def check_named(name: str) -> list[ConformanceReport]:
         "law": registry.laws(),
         "specimen": registry.specimens(),
         "reader": registry.readers(),
+        "camera format": registry.cameras(),
         "exporter": registry.exporters(),
     }
     reports = [_KITS[kind](known[name].value) for kind, known in offered.items() if name in known]

@@ -82,13 +82,21 @@ def test_an_image_that_comes_twice_in_a_file_of_a_folder(tmp_path: Path) -> None
     ("names", "message"),
     [
         (["left_1.txt", "left_2.txt", "right_1.txt"], "left_#.txt and right_#.txt, are no one sequence"),
-        (["cam0_1.txt", "cam0_2.txt", "cam1_1.txt", "cam1_2.txt"], "look like 2 sequences side by side"),
+        (["cam0_1.txt", "cam0_2.txt", "cam1_1.txt", "cam1_2.txt"], "look like 2 sequences in one folder"),
         (["f_1.txt", "f_01.txt"], "have the same number"),
     ],
 )
 def test_files_that_are_no_one_sequence(names: list[str], message: str, tmp_path: Path) -> None:
     with pytest.raises(HistoryError, match=message):
         ck.read_frames(folder_of(tmp_path / "test", names))
+
+
+def test_the_reference_comes_first(tmp_path: Path) -> None:
+    """As pyvale calls it, beside the numbered frames."""
+    names = ["dic_results_ref_img.csv", *(f"dic_results_def_img_{k}.csv" for k in (1, 2, 10, 12))]
+    frames = ck.read_frames(folder_of(tmp_path / "test", names, pyvale))
+    assert apexes(frames) == [0.0, 0.1, 0.2, 0.3, 0.4]
+    assert frames.missing == (3, 4, 5, 6, 7, 8, 9, 11)
 
 
 def test_patterns_and_lists(tmp_path: Path) -> None:

@@ -1,0 +1,48 @@
+"""Numbers of a text table are those that Python reads, to the last bit."""
+
+from __future__ import annotations
+
+import random
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from creepkit.cameras.text_files import FrameText
+
+
+def read(rows: bytes, delimiter: str = ",", columns: int = 1) -> np.ndarray:
+    names = tuple(f"c{k}" for k in range(columns))
+    return FrameText(Path("table.csv"), rows, delimiter, names, lambda: 1).numbers(range(columns))
+
+
+def numbers_as_text(count: int) -> list[str]:
+    """Short and long ones, those halfway between two doubles, and the ends of the range."""
+    generator = random.Random(3)
+    words = ["0", "-0.0", "0e400", "5e-324", "2.2250738585072011e-308", "1.7976931348623157e308", "9007199254740993"]
+    words += ["9007199254740992.5", "1" * 400, "0." + "0" * 300 + "1", "123456789012345678901234567890", "+.5", "7."]
+    for _ in range(count):
+        bits = generator.getrandbits(64)
+        value = struct.unpack("d", struct.pack("Q", bits))[0]
+        halfway = 2 * (generator.getrandbits(53) | 1 << 52) + 1
+        words += [f"{halfway}{generator.choice(['', 'e3', 'e-3', '.0', '.00000'])}"]
+        words += [
+            f"{generator.gauss(0, 10):.{generator.randrange(20)}e}",
+            f"{generator.gauss(0, 1):.{generator.randrange(18)}f}",
+        ]
+        words += [repr(value)] if np.isfinite(value) else []
+    return words
+
+
+def test_numbers_are_rounded_to_the_nearest() -> None:
+    words = numbers_as_text(3000)
+    found = read("\n".join(words).encode())[:, 0]
+    expected = np.array([float(word) for word in words])
+    assert [word for word, a, b in zip(words, found, expected, strict=True) if a != b] == []
+    commas = read("\n".join(words).replace(".", ",").encode(), ";")[:, 0]
+    np.testing.assert_array_equal(commas, expected)
+
+
+def test_fortran_exponents_blank_lines_and_remarks() -> None:
+    rows = b'  1.5D-3  2 \r\n\r\n# a remark\r\n\t"3"   -4E+2\r\n'
+    assert read(rows, " ", 2).tolist() == [[0.0015, 2.0], [3.0, -400.0]]
