@@ -74,6 +74,8 @@ BENCHMARKS = {
     "measured_creep": Benchmark(90, needs=DATA),
     "whole_life": Benchmark(60, needs=DATA),
     "rupture_coverage": Benchmark(4),
+    "rupture_methods": Benchmark(3, needs=DATA),
+    "rupture_strength_coverage": Benchmark(3, (("--sets", "40"),)),
     "forecast_coverage": Benchmark(50),
     "forecast_measured": Benchmark(12, needs=DATA),
     "weights": Benchmark(8),

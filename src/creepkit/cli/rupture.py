@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from creepkit.cli.identification_options import OnlyOption, select_by_label
 from creepkit.cli.options import check_file
 from creepkit.report.terminal import print_json
 
@@ -17,6 +18,7 @@ def command(
     tables: Annotated[
         list[str], typer.Argument(metavar="TABLE...", help="Tables of rupture tests, test files, folders or patterns.")
     ],
+    only: OnlyOption = None,
     method: Annotated[
         list[str] | None,
         typer.Option(help="larson-miller, orr-sherby-dorn, manson-haferd, wilshire, monkman-grant or isothermal."),
@@ -64,7 +66,7 @@ def command(
         level=level,
     )
     assessment = ck.rupture(
-        ck.read_histories(tables),
+        select_by_label(ck.read_histories(tables), only),
         method,
         hours=[_hours(text) for text in times.split(",")],
         temperatures=None if temperature is None else [_kelvin(text) for text in temperature.split(",")],

@@ -40,7 +40,7 @@ def rupture_text(assessment: RuptureAssessment) -> str:
                 "weight",
                 f"{assessment.settings.criterion.upper().replace('AICC', 'AICc')} - best",
                 "scatter of a test",
-                "between heats",
+                *(f"between {_plural(group)}" for group in tests.groups),
             ),
             _method_rows(assessment),
         ),
@@ -79,7 +79,7 @@ def _method_rows(assessment: RuptureAssessment) -> list[tuple[str, ...]]:
             f"{one.weight:.3f}",
             f"{one.excess:.1f}",
             f"factor {10**one.fit.scale_corrected:.2f}",
-            f"factor {10 ** one.fit.scatter_corrected['heat']:.2f}" if "heat" in one.fit.scatter else "-",
+            *(f"factor {10**scatter:.2f}" for scatter in one.fit.scatter_corrected.values()),
         )
         for one in assessment.ranked
         if one.weight >= SHOWN_WEIGHT or one.fit.name in best_of_method

@@ -13,7 +13,8 @@ groups:
    tenth of the tests at the lowest stresses of each main temperature, the strength at the longest time changes by at
    most 10 %.
 
-Here the longest time is that asked for (ECCC: 300,000 h), the stresses of group 1 start at 0.9 of the lowest tested or
+The figures are as they are commonly quoted: no copy of the recommendations was at hand to compare them with. Here the
+longest time is that asked for (ECCC: 300,000 h), the stresses of group 1 start at 0.9 of the lowest tested or
 at the strength at the longest time, whichever is lower, and the main temperatures have a tenth of the tests each, or
 are the lowest and the highest. Of few tests one may always lie beyond 2.5 standard deviations. Run-outs are left out of
 group 2, since their rupture times are not known.

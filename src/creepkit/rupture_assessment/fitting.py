@@ -24,6 +24,9 @@ GRADIENT_STEP, HESSIAN_STEP = 1e-5, 3e-4
 CURVATURES = np.linspace(-0.98, 0.98, 41)
 """Of Manson-Haferd's k tried as starts, between the values at which isotherms of the tests would meet."""
 
+MOST_NUMBERS = 200_000
+"""Candidates times tests whose likelihood is found at once: some 100 MB."""
+
 NEWTON_STEPS = 6
 """After the quasi-Newton method: to the last digits."""
 
@@ -72,8 +75,10 @@ class _Scaled:
         """(candidates,) negative log-likelihoods; the scale enters as its logarithm."""
         location = self.location_count
         scale = np.exp(np.clip(candidates[:, location], -30.0, 10.0))
-        scatter = candidates[:, location + 1 :] * 1.0
-        value = -self.times.log_likelihood(self.mean(candidates), scale, scatter)
+        scatter, mean = candidates[:, location + 1 :], self.mean(candidates)
+        rows = max(MOST_NUMBERS // mean.shape[1], 1)
+        parts = [slice(k, k + rows) for k in range(0, len(candidates), rows)]
+        value = -np.concatenate([self.times.log_likelihood(mean[p], scale[p], scatter[p]) for p in parts])
         return np.where(np.isfinite(value), value, 1e30)
 
 

@@ -92,12 +92,15 @@ def strength_estimates(
     at = Conditions(stress, np.full(shape, temperature), np.full(shape, limit), np.full(shape, np.nan))
     tail = 0.5 * (1.0 - level)
     by_kind = {of: mixed(models, at, of) for of in BOUND_KINDS}
+    median = by_kind["mean"].quantile(0.5)
+    tested = (stress >= 0.99 * tests.stress.min()) & (stress <= 1.01 * tests.stress.max())
+    start = int(np.argmin(np.where(tested, np.abs(median - np.median(tests.log_time)), np.inf)))
+    central = _falling_branch(stress, median, start)
     branches = {
-        (of, p): _falling_branch(stress, by_kind[of].quantile(p), tests)
+        (of, p): _falling_branch(stress, by_kind[of].quantile(p), start)
         for of in BOUND_KINDS
         for p in (tail, 1.0 - tail)
     }
-    central = _falling_branch(stress, by_kind["mean"].quantile(0.5), tests)
     return [_estimate(central, branches, name, tests, time, temperature) for time in hours]
 
 
@@ -168,9 +171,9 @@ class _Branch:
         return float(np.exp(inverse(target))), ""
 
 
-def _falling_branch(stress: Floats, log_time: Floats, tests: RuptureTests) -> _Branch:
-    """Of a curve (points,), from where its time is nearest to the median of the tests."""
-    first = last = int(np.nanargmin(np.abs(log_time - np.median(tests.log_time))))
+def _falling_branch(stress: Floats, log_time: Floats, start: int) -> _Branch:
+    """Of a curve (points,), about the point at a place, which lies among the tests."""
+    first = last = start
     falling = np.diff(log_time) < 0
     while first > 0 and falling[first - 1]:
         first -= 1
