@@ -14,7 +14,7 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from creepkit.errors import CreepkitError, HistoryError, nearest
-from creepkit.readers.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATURE_RECORD_TOLERANCE, recorded_program
+from creepkit.records.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATURE_RECORD_TOLERANCE, recorded_program
 from creepkit.readers.text_tables import SourceText, TableFrames
 from creepkit.readers.vocabulary import (
     COMPONENT_LOADING_KINDS,

@@ -1,7 +1,9 @@
 """The records that the public functions take and return. Frozen; MPa, mm, s, K throughout."""
 
 from creepkit.records.camera_frames import CameraFrame, Frames
+from creepkit.records.clock_alignment import ClockAlignment
 from creepkit.records.history import EVERY_FRAME, History
+from creepkit.records.instrument_record import Channel, InstrumentRecord
 from creepkit.records.interfaces import (
     Exporter,
     Predictor,
@@ -91,11 +93,14 @@ __all__ = [
     "TENSOR_COMPONENTS",
     "ZERO_CELSIUS",
     "CameraFrame",
+    "Channel",
+    "ClockAlignment",
     "Dimension",
     "Exporter",
     "Frames",
     "History",
     "HistoryPrediction",
+    "InstrumentRecord",
     "LawWithValues",
     "Load",
     "Loading",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.records import Program
+from creepkit.records.loading import Program
 
 TEMPERATURE_RECORD_TOLERANCE, LOAD_RECORD_TOLERANCE = 0.25, 0.002
 """K, and fraction of the largest load, by which a program may be off its record: 1 % of a creep rate at 400 kJ/mol and
@@ -26,7 +26,7 @@ def recorded_program(times: Floats, values: Floats, tolerance: float) -> Program
     the record's noise are more, that is taken. Breakpoints are frames (Douglas and Peucker's choice), and where noise
     decides their values are the least-squares ones of all frames.
     """
-    noise = _noise(values)
+    noise = noise_of_readings(values)
     noisy = NOISE_FACTOR * noise > tolerance and values.size > _MEDIAN_FRAMES
     followed = _running_median(values) if noisy else values
     kept = _breakpoints(times, followed, max(tolerance, NOISE_FACTOR * noise) if noisy else tolerance)
@@ -39,7 +39,7 @@ def recorded_program(times: Floats, values: Floats, tolerance: float) -> Program
     return Program(np.append(0.0, times[kept]), np.append(at_breakpoints[0], at_breakpoints))
 
 
-def _noise(values: Floats) -> float:
+def noise_of_readings(values: Floats) -> float:
     """Standard deviation of white noise by the median of second differences; 0 of fewer than three values."""
     differences = np.abs(np.diff(values, 2))
     return float(1.4826 * np.median(differences) / 6**0.5) if differences.size else 0.0
@@ -51,7 +51,7 @@ def _running_median(values: Floats) -> Floats:
 
 
 def _breakpoints(times: Floats, values: Floats, tolerance: float) -> Ints:
-    """TableFrames between which straight lines stay within the tolerance."""
+    """Frames between which straight lines stay within the tolerance."""
     kept, spans = {0, values.size - 1}, [(0, values.size - 1)]
     while spans:
         first, last = spans.pop()

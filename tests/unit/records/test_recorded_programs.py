@@ -6,7 +6,7 @@ import pytest
 import creepkit as ck
 from creepkit.quality import check_data_quality
 from creepkit.readers.history_csv import HISTORY_CSV, history_text
-from creepkit.readers.recorded_programs import recorded_program
+from creepkit.records.recorded_programs import recorded_program
 from creepkit.records import Program, RecordedLoading
 
 TIMES = 60.0 * np.arange(1, 241)
