@@ -47,8 +47,13 @@ SPIKE = 8.0
 """Standard deviations by which a single frame that falls back at once is off."""
 
 
-COARSE_LAGS, FINE_LAGS, CANDIDATES, MOST_FRAMES = 2000, 2400, 3, 1500
+COARSE_LAGS, FINE_LAGS, CANDIDATES, MOST_FRAMES = 2000, 1200, 3, 1500
 """Lags of the first search and of the second, candidates kept between them, and frames that are used at most."""
+
+
+MODEL_LAGS, MOST_MODELS, MODEL_ITERATIONS, ITERATIONS = 5, 3, 2, 8
+"""Lags at which the scales of the model are estimated, how many of these models are averaged, in how many of the
+iterations that close in on the posterior they are estimated, and iterations at most."""
 
 
 BLOCKS, DRIFTS, RESOLVED, NEGLIGIBLE = 60, 31, 30, 12.0
@@ -74,6 +79,13 @@ class _Task:
     def best_model(self, lag: float) -> ResponseModel:
         """The most likely model at one lag."""
         return best_model(self.driving.response(self.times, np.array([lag])), self.displacements, self.noise)
+
+    def models(self, lags: Floats) -> list[ResponseModel]:
+        """The most likely models at several lags, each once, but for those that are nowhere as likely as others."""
+        found = list(dict.fromkeys(self.best_model(float(lag)) for lag in lags))
+        totals = np.array([self.terms(lags, model).sum(axis=0) for model in found])
+        good = totals.max(axis=1) > totals.max() - NEGLIGIBLE
+        return [found[k] for k in np.argsort(-totals.max(axis=1)) if good[k]][:MOST_MODELS]
 
     def subset(self, kept: Floats) -> _Task:
         """The same with some of its frames."""
@@ -244,15 +256,17 @@ def _posterior(
     span = float(task.times[-1] - task.times[0])
     middle, gain = float(task.times.mean()), 0.0
     half, gain_half = 1.5 * task.interval, 3.5 * drift
-    for _ in range(12):
+    models: list[ResponseModel] = []
+    for iteration in range(ITERATIONS):
         warped = replace(task, times=task.times + gain * (task.times - middle))
-        model = warped.best_model(lag)
+        if iteration < MODEL_ITERATIONS:
+            models = warped.models(lag + half * np.linspace(-0.9, 0.9, MODEL_LAGS))
         reach = half + 0.5 * gain_half * span
         lags = lag + np.linspace(-reach, reach, FINE_LAGS)
-        terms = warped.terms(lags, model, lags[1] - lags[0])
         inner = lags[np.abs(lags - lag) <= half]
         gains = gain + np.linspace(-gain_half, gain_half, DRIFTS if drift else 1)
-        logs = _joint(terms, lags, inner, task.times[1:] - middle, gains - gain)
+        terms = [warped.terms(lags, model, lags[1] - lags[0]) for model in models]
+        logs = np.logaddexp.reduce([_joint(one, lags, inner, task.times[1:] - middle, gains - gain) for one in terms])
         if drift:
             logs -= 0.5 * (gains[:, None] / drift) ** 2
         logs[:, (inner < search[0]) | (inner > search[1])] = -np.inf
@@ -278,7 +292,7 @@ def _posterior(
             task.times + mean[1] * (task.times - middle), mean[:1]
         ),
         task.displacements,
-        model,
+        models[0],
     )
     by_lag, by_gain = weights.sum(axis=0), weights.sum(axis=1)
     return replace(
@@ -291,7 +305,7 @@ def _posterior(
         lags=inner,
         probability=by_lag,
         residual=float(np.sqrt(np.mean(residual**2))),
-        noise=float(model.noise),
+        noise=float(models[0].noise),
     )
 
 

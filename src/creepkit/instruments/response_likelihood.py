@@ -1,9 +1,10 @@
 """How likely displacements are at every lag between two clocks: a Kalman filter, run at many lags at once.
 
-Between two frames the displacement grows by k dp + q dm + c dt: k is the compliance, q that of first loading (m is the
-largest pressure so far; plastic flow), c the creep rate. All walk at random, k and q with the pressure that has changed,
-c with that and with time, so that stiffening, plastic flow and creep of any law are followed; what cannot be followed
-is a jump of the displacement in another interval between frames than that of the pressure.
+Between two frames the displacement grows by k dp + q dm + c dt + transients: k is the compliance, q that of first
+loading (m is the largest load so far; plastic flow), c the creep rate. All walk at random, k and q with the load that
+has changed, c with that and with time; each change of load starts transients of primary creep of random size that fade
+within one and within six intervals. So stiffening, plastic flow and creep of any law are followed; what cannot be
+followed is a jump of the displacement in another interval between frames than that of the load.
 """
 
 from __future__ import annotations
@@ -18,8 +19,12 @@ from creepkit.arrays import Floats
 from creepkit.records import InstrumentRecord, Program
 from creepkit.records.recorded_programs import recorded_program
 
-STATES = 4
-"""Displacement, compliance, that of first loading, creep rate."""
+STATES = 6
+"""Displacement, compliance, that of first loading, creep rate, what is left of two transients."""
+
+
+TRANSIENTS = (1.0, 6.0)
+"""Time constants of the transients in median intervals between frames."""
 
 
 RECORD_TOLERANCE = 0.002
@@ -115,7 +120,8 @@ class ResponseModel:
 
     noise : mm. compliance : mm over the range of the load, rate : mm over the whole time, prior standard deviations.
     compliance_walk : mm over the range of the load, by which the compliance walks over that range. rate_walk : mm over
-    the whole time, by which the creep rate walks over the whole time, and over the range of the load.
+    the whole time, by which the creep rate walks over the whole time, and over the range of the load. transient : mm,
+    standard deviation of each transient after a change of the load by its whole range.
     """
 
     noise: Floats | float
@@ -123,16 +129,19 @@ class ResponseModel:
     rate: float
     compliance_walk: Floats | float
     rate_walk: Floats | float
+    transient: Floats | float
 
 
-COMPLIANCE_WALKS, RATE_WALKS, NOISES = (0.003, 0.03, 0.3, 3.0), (0.01, 0.1, 1.0, 10.0, 100.0), (0.4, 0.65, 1.0, 1.5)
-"""Fractions of the range of the displacements, and of its noise from frame to frame, that are tried."""
+TRIED = ((0.003, 0.03, 0.3, 3.0), (0.01, 0.1, 1.0, 10.0, 100.0), (0.001, 0.01, 0.1), (0.4, 0.65, 1.0, 1.5))
+"""Walks of compliance and rate and transients, as fractions of the range of the displacements, and fractions of their
+noise from frame to frame, that are tried."""
 
 
 def trial_models(displacements: Floats, noise: float) -> list[ResponseModel]:
     """Few models that together fit most tests, for a first search."""
     size = float(np.ptp(displacements))
-    return [ResponseModel(noise, size, 10 * size, k * size, c * size) for k, c in product((0.03, 1.0), (0.3, 10.0))]
+    walks = product((0.03, 1.0), (0.3, 10.0))
+    return [ResponseModel(noise, size, 10 * size, k * size, c * size, 0.03 * size) for k, c in walks]
 
 
 def best_model(response: Response, displacements: Floats, noise: float) -> ResponseModel:
@@ -141,20 +150,21 @@ def best_model(response: Response, displacements: Floats, noise: float) -> Respo
     response : at that lag alone. noise : mm, a first estimate.
     """
     size = float(np.ptp(displacements))
-    scales = np.array([size, size, noise])
-    grid = np.array(list(product(COMPLIANCE_WALKS, RATE_WALKS, NOISES)))
-    for step in (10.0**0.5, 10.0**0.25, 10.0**0.125):
+    scales = np.array([size, size, size, noise])
+    grid = np.array(list(product(*TRIED)))
+    for step in (10.0**0.5, 10.0**0.25):
         values = np.maximum(grid * scales, 1e-12)
         repeated = replace(
             response,
             loads=np.repeat(response.loads, len(grid), axis=1),
             maxima=np.repeat(response.maxima, len(grid), axis=1),
         )
-        tried = ResponseModel(values[:, 2], size, 10 * size, values[:, 0], values[:, 1])
+        tried = ResponseModel(values[:, 3], size, 10 * size, values[:, 0], values[:, 1], values[:, 2])
         best = grid[int(np.argmax(log_likelihoods(repeated, displacements, tried).sum(axis=0)))]
-        grid = best * np.array(list(product((1 / step, 1.0, step), (1 / step, 1.0, step), (step**-0.4, 1.0, step**0.4))))
-    k, c, e = best * scales
-    return ResponseModel(float(e), size, 10 * size, float(k), float(c))
+        factors = (1 / step, 1.0, step)
+        grid = best * np.array(list(product(factors, factors, factors, (step**-0.4, 1.0, step**0.4))))
+    k, c, u, e = (float(x) for x in best * scales)
+    return ResponseModel(e, size, 10 * size, k, c, u)
 
 
 def log_likelihoods(response: Response, displacements: Floats, model: ResponseModel) -> Floats:
@@ -183,19 +193,30 @@ def _innovations(response: Response, displacements: Floats, model: ResponseModel
     for state, sd in enumerate((model.noise, model.compliance, model.compliance, model.rate)):
         spread[state, state] = np.square(sd)
     changes, first_loading = np.diff(response.loads, axis=0), np.diff(response.maxima, axis=0)
-    noise, compliance_walk, rate_walk = (np.square(x) for x in (model.noise, model.compliance_walk, model.rate_walk))
-    ones = np.ones(lags)
+    noise, compliance_walk, rate_walk, transient = (
+        np.square(x) for x in (model.noise, model.compliance_walk, model.rate_walk, model.transient)
+    )
+    constants = np.array(TRANSIENTS) * np.median(response.intervals)
+    gain = np.ones((STATES, lags))
     for k, dt in enumerate(response.intervals):
         change = np.abs(changes[k])
         spread[1, 1] += compliance_walk * change
         spread[2, 2] += compliance_walk * first_loading[k]
         spread[3, 3] += rate_walk * (dt + change)
-        gain = np.stack([ones, changes[k], first_loading[k], dt * ones])
+        left = np.exp(-dt / constants)
+        gain[1], gain[2], gain[3] = changes[k], first_loading[k], dt
+        for state, fraction in zip((4, 5), left, strict=True):
+            spread[state, state] += transient * change
+            gain[state] = 1.0 - fraction
         mean[0] = (gain * mean).sum(axis=0)
         row = (gain[:, None] * spread).sum(axis=0)
         spread[0] = row
         spread[:, 0] = row
         spread[0, 0] = (gain * row).sum(axis=0)
+        for state, fraction in zip((4, 5), left, strict=True):
+            mean[state] *= fraction
+            spread[state] *= fraction
+            spread[:, state] *= fraction
         variance = spread[0, 0] + noise
         innovation = displacements[k + 1] - mean[0]
         yield innovation, variance
