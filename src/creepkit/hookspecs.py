@@ -10,6 +10,7 @@ import pluggy
 if TYPE_CHECKING:
     import typer
 
+    from creepkit.instruments.formats import InstrumentFormat
     from creepkit.language.law import CreepLaw
     from creepkit.records import Exporter, Reader, Specimen
 
@@ -36,6 +37,11 @@ def creepkit_specimens() -> Sequence[Specimen]:  # type: ignore[empty-body]
 @hookspec
 def creepkit_readers() -> Sequence[Reader]:  # type: ignore[empty-body]
     """Return readers that turn measured files into histories."""
+
+
+@hookspec
+def creepkit_instruments() -> Sequence[InstrumentFormat]:  # type: ignore[empty-body]
+    """Return formats of instruments' records: how columns are called, and what their heads leave out."""
 
 
 @hookspec

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     import typer
 
+    from creepkit.instruments.formats import InstrumentFormat
     from creepkit.language.law import CreepLaw
     from creepkit.records import Exporter, Reader, Specimen
 
@@ -74,7 +75,8 @@ class Registered(Generic[_T]):
 class Plugin:
     """One plugin: where it came from, and what it offers or why it cannot be used.
 
-    contributions : {kind: {name: object}} with the kinds "law", "specimen", "reader", "exporter", "temperature form".
+    contributions : {kind: {name: object}} with the kinds "law", "specimen", "reader", "exporter", "instrument format",
+        "temperature form".
     commands : whether it adds commands to the command line.
     problem : one sentence when the plugin is broken, else empty.
     """
@@ -127,6 +129,10 @@ class Registry:
     def exporters(self) -> dict[str, Registered[Exporter]]:
         """Return {name: registered exporter}."""
         return self._all(plugin_sources.EXPORTER)
+
+    def instruments(self) -> dict[str, Registered[InstrumentFormat]]:
+        """Return {name: registered format of instruments' records}."""
+        return self._all(plugin_sources.INSTRUMENT)
 
     def temperature_forms(self) -> dict[str, Registered[Callable[..., Any]]]:
         """Return {name: registered function of T_ref that gives a form or a factor}."""

@@ -221,10 +221,15 @@ READER = ContributionKind("reader", "creepkit_readers", HistoryError, "creepkit.
 EXPORTER = ContributionKind("exporter", "creepkit_exporters", ExportError, "creepkit.records", "Exporter")
 
 
+INSTRUMENT = ContributionKind(
+    "instrument format", "creepkit_instruments", HistoryError, "creepkit.instruments.formats", "InstrumentFormat"
+)
+
+
 TEMPERATURE_FORM = TemperatureFormKind("temperature form", "creepkit_temperature_forms", LawError, "", "function")
 
 
-CONTRIBUTION_KINDS = (LAW, SPECIMEN, READER, EXPORTER, TEMPERATURE_FORM)
+CONTRIBUTION_KINDS = (LAW, SPECIMEN, READER, EXPORTER, INSTRUMENT, TEMPERATURE_FORM)
 
 
 def check_signatures(provenance: Provenance, plugin: object) -> None:
