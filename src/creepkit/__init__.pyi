@@ -77,6 +77,7 @@ from .readers.history_csv import write_history as write_history
 from .records.clock_alignment import ClockAlignment as ClockAlignment
 from .records.history import History as History
 from .records.history_selection import select_tests as select_tests
+from .records.instrument_format import InstrumentFormat as InstrumentFormat
 from .records.instrument_record import Channel as Channel
 from .records.instrument_record import InstrumentRecord as InstrumentRecord
 from .records.interfaces import Predictor as Predictor

@@ -10,9 +10,8 @@ import pluggy
 if TYPE_CHECKING:
     import typer
 
-    from creepkit.instruments.formats import InstrumentFormat
     from creepkit.language.law import CreepLaw
-    from creepkit.records import Exporter, Reader, Specimen
+    from creepkit.records import Exporter, InstrumentFormat, Reader, Specimen
 
 
 PROJECT = "creepkit"

@@ -31,7 +31,10 @@ def specimen(name: str) -> Specimen:
 
 
 def available(kind: str) -> dict[str, Any]:
-    """Return all that is registered of a kind, {name: value}: "laws", "specimens", "exporters", "readers" or "instruments"."""
+    """Return all that is registered of a kind, {name: value}.
+
+    kind : "laws", "specimens", "exporters", "readers" or "instruments".
+    """
     kinds = ("laws", "specimens", "exporters", "readers", "instruments")
     if kind not in kinds:
         raise PluginError(f"'{kind}' is no kind of plugin; choose one of {', '.join(kinds)}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Floats
+from creepkit.arrays import ArrayLike, Floats, Ints
 from creepkit.errors import HistoryError
 from creepkit.instruments.response_likelihood import (
     DrivingRecord,
@@ -43,12 +43,20 @@ LARGEST_OTHER = 0.025
 """Posterior probability of other lags, apart from the best ones, beyond which the answer is ambiguous."""
 
 
+RAMP_SHARE = 0.3
+"""Share of the time in which the load would change by its whole range at its fastest, see _Task.reach."""
+
+
 SPIKE = 8.0
 """Standard deviations by which a single frame that falls back at once is off."""
 
 
 COARSE_LAGS, FINE_LAGS, CANDIDATES, MOST_FRAMES = 2000, 1200, 3, 1500
 """Lags of the first search and of the second, candidates kept between them, and frames that are used at most."""
+
+
+LOOSER = 3.0
+"""Factor of the walks of models that are averaged with the most likely ones, which tend to know too much."""
 
 
 MODEL_LAGS, MOST_MODELS, MODEL_ITERATIONS, ITERATIONS = 5, 3, 2, 8
@@ -85,9 +93,19 @@ class _Task:
         found = list(dict.fromkeys(self.best_model(float(lag)) for lag in lags))
         totals = np.array([self.terms(lags, model).sum(axis=0) for model in found])
         good = totals.max(axis=1) > totals.max() - NEGLIGIBLE
-        return [found[k] for k in np.argsort(-totals.max(axis=1)) if good[k]][:MOST_MODELS]
+        chosen = [found[k] for k in np.argsort(-totals.max(axis=1)) if good[k]][:MOST_MODELS]
+        first = chosen[0]
+        walks = [(LOOSER, 1.0), (1.0, LOOSER), (LOOSER, LOOSER)]
+        return chosen + [
+            replace(first, compliance_walk=k * first.compliance_walk, rate_walk=c * first.rate_walk) for k, c in walks
+        ]
 
-    def subset(self, kept: Floats) -> _Task:
+    @property
+    def reach(self) -> float:
+        """s about a candidate within which its posterior lies: frames do not tell lags apart, nor do slow ramps."""
+        return max(1.5 * self.interval, RAMP_SHARE / self.driving.steepest)
+
+    def subset(self, kept: Ints) -> _Task:
         """The same with some of its frames."""
         return replace(self, times=self.times[kept], displacements=self.displacements[kept])
 
@@ -188,22 +206,20 @@ def _thinned(task: _Task, lag: float | None) -> _Task:
     if lag is None:
         return task.subset(np.unique(even))
     reach = 3.0 * (task.times[-1] - task.times[0]) / MOST_FRAMES + 3.0 * task.interval
-    loads = np.interp(
-        task.times[:, None] + lag + np.linspace(-reach, reach, 9), task.driving.times, task.driving.loads
-    )
+    loads = np.interp(task.times[:, None] + lag + np.linspace(-reach, reach, 9), task.driving.times, task.driving.loads)
     near = np.argsort(-np.ptp(loads, axis=1), kind="stable")[: MOST_FRAMES // 2]
     return task.subset(np.union1d(even, near))
 
 
 def _candidates(task: _Task, low: float, high: float) -> list[float]:
-    """The most likely lags, apart from each other by three intervals at least; the most likely one first."""
+    """The most likely lags, apart from each other by two reaches at least; the most likely one first."""
     step = max(task.interval / 3.0, (high - low) / COARSE_LAGS)
     lags = np.linspace(low, high, int((high - low) / step) + 2)
     models = trial_models(task.displacements, task.noise)
     totals = np.max([task.terms(lags, model, step).sum(axis=0) for model in models], axis=0)
     chosen: list[float] = []
     for k in np.argsort(-totals):
-        if all(abs(lags[k] - one) > 3.0 * max(task.interval, step) for one in chosen):
+        if all(abs(lags[k] - one) > 2.0 * max(task.reach, 1.5 * step) for one in chosen):
             chosen.append(float(lags[k]))
         if len(chosen) == CANDIDATES:
             break
@@ -216,8 +232,8 @@ def _checked_best(task: _Task, candidates: Sequence[float], search: tuple[float,
     found: list[tuple[float, float]] = []
     models = trial_models(task.displacements, task.noise)
     for lag in candidates:
-        fine = min(step / 100.0, 0.2 / task.driving.steepest)
-        lags = np.linspace(lag - 1.5 * step, lag + 1.5 * step, min(FINE_LAGS, int(3.0 * step / fine) + 2))
+        fine, reach = min(step / 100.0, 0.2 / task.driving.steepest), max(task.reach, 1.5 * step)
+        lags = np.linspace(lag - reach, lag + reach, min(FINE_LAGS, int(2.0 * reach / fine) + 2))
         lags = lags[(lags >= search[0]) & (lags <= search[1])]
         totals = np.max([task.terms(lags, m, lags[1] - lags[0]).sum(axis=0) for m in models], axis=0)
         best = float(lags[np.argmax(totals)])
@@ -229,7 +245,9 @@ def _checked_best(task: _Task, candidates: Sequence[float], search: tuple[float,
             _check_response(task, model, peak)
     found.sort(reverse=True)
     weights = np.exp([evidence - found[0][0] for evidence, _ in found])
-    others = [f"{lag:.3g}" for (_, lag), w in zip(found[1:], weights[1:] / weights.sum(), strict=True) if w > LARGEST_OTHER]
+    others = [
+        f"{lag:.3g}" for (_, lag), w in zip(found[1:], weights[1:] / weights.sum(), strict=True) if w > LARGEST_OTHER
+    ]
     if others:
         raise HistoryError(
             f"{task.name}: lags of {found[0][1]:.3g} s and {' and '.join(others)} s fit about as well; say between "
@@ -255,7 +273,7 @@ def _posterior(
     """Posterior of lag and drift on a grid that closes in on them."""
     span = float(task.times[-1] - task.times[0])
     middle, gain = float(task.times.mean()), 0.0
-    half, gain_half = 1.5 * task.interval, 3.5 * drift
+    half, gain_half = task.reach, 3.5 * drift
     models: list[ResponseModel] = []
     for iteration in range(ITERATIONS):
         warped = replace(task, times=task.times + gain * (task.times - middle))
@@ -278,6 +296,10 @@ def _posterior(
         covariance = float(((gains - mean[1])[:, None] * (inner - mean[0]) * weights).sum())
         variance = float(weights.sum(axis=1) @ (gains - mean[1]) ** 2)
         shift = -covariance / variance if variance > 0 else 0.0
+        cut_off = lag_range[0] == 0 or lag_range[-1] == inner.size - 1
+        if cut_off and iteration < ITERATIONS // 2 and half < search[1] - search[0]:
+            half *= 2.0
+            continue
         resolved = np.ptp(lag_range) >= RESOLVED and (not drift or np.ptp(gain_range) >= RESOLVED // 3)
         if resolved and abs(shift) <= 0.02 * span:
             break
@@ -287,13 +309,8 @@ def _posterior(
         lag = 0.5 * float(inner[lag_range[0]] + inner[lag_range[-1]]) + shift * (mean[1])
         middle += shift
         gain = 0.5 * float(gains[gain_range[0]] + gains[gain_range[-1]])
-    residual, sd = innovations(
-        replace(task, times=task.times + mean[1] * (task.times - middle)).driving.response(
-            task.times + mean[1] * (task.times - middle), mean[:1]
-        ),
-        task.displacements,
-        models[0],
-    )
+    warped = replace(task, times=task.times + mean[1] * (task.times - middle))
+    residual, _ = innovations(warped.driving.response(warped.times, mean[:1]), task.displacements, models[0])
     by_lag, by_gain = weights.sum(axis=0), weights.sum(axis=1)
     return replace(
         alignment,
@@ -315,7 +332,7 @@ def _joint(terms: Floats, lags: Floats, inner: Floats, offsets: Floats, gains: F
     Frames are taken in blocks, each at the time of those in it that decide most.
     """
     if gains.size == 1:
-        return terms[:, np.isin(lags, inner)].sum(axis=0)[None]
+        return np.asarray(terms[:, np.isin(lags, inner)].sum(axis=0)[None])
     edges = np.unique(np.linspace(0, len(terms), BLOCKS + 1).astype(int))[:-1]
     weights = np.ptp(terms, axis=1) + 1e-12
     centres = np.add.reduceat(weights * offsets, edges) / np.add.reduceat(weights, edges)

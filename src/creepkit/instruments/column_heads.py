@@ -91,7 +91,25 @@ def channel_unit(text: str) -> ChannelUnit | None:
 
 def known_units() -> list[str]:
     """The units of channels, for errors."""
-    return ["psi", "psig", "psia", "bar", "barg", "MPa", "kPa", "Torr", "C", "F", "K", "mm", "um", "in", "N", "kN", "lbf"]
+    return [
+        "psi",
+        "psig",
+        "psia",
+        "bar",
+        "barg",
+        "MPa",
+        "kPa",
+        "Torr",
+        "C",
+        "F",
+        "K",
+        "mm",
+        "um",
+        "in",
+        "N",
+        "kN",
+        "lbf",
+    ]
 
 
 def split_head(head: str) -> tuple[str, str]:

@@ -65,8 +65,8 @@ def imposed(
     """Load and temperature of one specimen on the clock of its frames, as programs of few straight pieces.
 
     specimen : its name, such as "D1", from which the record's format knows its channels; or the names of the channels
-    of load and temperature. frame_times : (frames,) s on the camera's clock, with any zero. alignment : of align_clocks;
-    None: both clocks agree, which needs a record and frames with absolute times. load_tolerance : MPa, by default 0.002
+    of load and temperature. frame_times : (frames,) s on the camera's clock, with any zero. alignment : by
+    align_clocks; None: both clocks agree, which needs a record and frames with absolute times. load_tolerance : MPa, by default 0.002
     of the largest load; temperature_tolerance : K, by default 0.25. Three standard deviations of the noise are taken
     where they are more; the programs follow its mean.
     """
@@ -128,7 +128,9 @@ def _channel_names(record: InstrumentRecord, specimen: str | tuple[str, str]) ->
                 for one in record.channels
                 if one.startswith(front) and one.endswith(back)
             ]
-            raise HistoryError(f"{record.origin}: it has no channel '{name}' of '{specimen}'; {nearest(specimen, known)}")
+            raise HistoryError(
+                f"{record.origin}: it has no channel '{name}' of '{specimen}'; {nearest(specimen, known)}"
+            )
     return wanted
 
 
@@ -151,8 +153,8 @@ def _checked_channels(record: InstrumentRecord, load: Channel, temperature: Chan
         )
     if load.quantity == "pressure" and not load.reference:
         raise HistoryError(
-            f"{record.origin}: whether the channel '{load.name}' holds gauge or absolute pressures is not stated; state "
-            "pressure_reference='gauge' or 'absolute' to read_record()"
+            f"{record.origin}: whether the channel '{load.name}' holds gauge or absolute pressures is not stated; "
+            "state pressure_reference='gauge' or 'absolute' to read_record()"
         )
     notes = []
     for channel in (load, temperature):

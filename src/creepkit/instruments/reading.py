@@ -12,11 +12,10 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest
-from creepkit.instruments.column_heads import TIME_UNITS, ChannelUnit, channel_unit, known_units, split_head
-from creepkit.instruments.formats import InstrumentFormat
+from creepkit.instruments.column_heads import TIME_UNITS, ChannelUnit, channel_unit, split_head
 from creepkit.instruments.record_tables import MISSING, KeptColumns, TableHead, block_means, find_head, numbered_lines
 from creepkit.instruments.time_stamps import ResolvedTimes, resolve
-from creepkit.records import Channel, InstrumentRecord
+from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
 
 TIME_NAMES = (
     *("time", "timestamp", "time stamp", "datetime", "date time", "date/time", "date and time", "t", "clock", "zeit"),
@@ -64,7 +63,9 @@ class ReadingOptions:
         if self.time_unit and self.time_unit not in TIME_UNITS:
             raise HistoryError(f"time_unit is '{self.time_unit}'; {nearest(self.time_unit, TIME_UNITS)}")
         if isinstance(self.channels, str):
-            raise HistoryError(f"channels is '{self.channels:.40}'; give a list of names: channels=['{self.channels:.40}']")
+            raise HistoryError(
+                f"channels is '{self.channels:.40}'; give a list of names: channels=['{self.channels:.40}']"
+            )
 
     @classmethod
     def of(cls, options: Mapping[str, Any]) -> ReadingOptions:
@@ -94,9 +95,7 @@ def read_record(
     return layout.record(kept)
 
 
-def _format_of(
-    path: Path, head: TableHead, formats: Sequence[InstrumentFormat], name: str | None
-) -> InstrumentFormat:
+def _format_of(path: Path, head: TableHead, formats: Sequence[InstrumentFormat], name: str | None) -> InstrumentFormat:
     if name is not None:
         known = {one.name: one for one in formats}
         if name not in known:
@@ -113,7 +112,9 @@ def _format_of(
         )
     general = [one for one in formats if not one.required]
     if not accepting and not general:
-        raise HistoryError(f"{path}: no format of instruments accepts it; known are {', '.join(o.name for o in formats)}")
+        raise HistoryError(
+            f"{path}: no format of instruments accepts it; known are {', '.join(o.name for o in formats)}"
+        )
     return (accepting or general)[0]
 
 
@@ -141,7 +142,10 @@ class _Layout:
         split = [split_head(text) for text in head.names]
         names = [name for name, _ in split]
         written = [head.units[k] or unit for k, (_, unit) in enumerate(split)]
-        times = _time_columns(place, head.names, names, options.time or chosen.time, options.date or chosen.date)
+        plain = ["" if channel_unit(unit) else name for name, unit in zip(names, written, strict=True)]
+        clock = _named(place, options.time or chosen.time, head.names, names)
+        day = _named(place, options.date or chosen.date, head.names, names)
+        times = _time_columns(place, head.names, plain, clock, day)
         unit = written[times[-1]]
         seconds = unit if unit in TIME_UNITS else options.time_unit or chosen.time_unit
         channels = [k for k in range(len(names)) if k not in times]
@@ -154,7 +158,9 @@ class _Layout:
             declared = next((u for pattern, u in chosen.units.items() if re.fullmatch(pattern, head.names[k])), "")
             written[k] = written[k] or units.get(names[k], declared)
             if names[k] in units and channel_unit(units[names[k]]) is None:
-                raise HistoryError(f"the unit '{units[names[k]]}' of '{names[k]}' is not known; {', '.join(known_units())}")
+                raise HistoryError(
+                    f"the unit '{units[names[k]]}' of '{names[k]}' is not known; {', '.join(known_units())}"
+                )
         if options.channels is not None:
             channels = [_position(place, name, head.names, names, channels) for name in options.channels]
         return cls(
@@ -243,11 +249,12 @@ class _Layout:
             reference = reference or self.options.pressure_reference or self.format.pressure_reference
             if reference == "absolute" and self.options.ambient_pressure is not None:
                 values, reference = values - self.options.ambient_pressure, "gauge"
-                notes.append(f"{name}: absolute; {self.options.ambient_pressure:g} MPa of ambient pressure were taken off")
-        low, high = {
-            "pressure": (-LARGEST_PRESSURE, LARGEST_PRESSURE),
-            "temperature": TEMPERATURES,
-        }.get(unit.quantity, (-np.inf, np.inf))
+                notes.append(
+                    f"{name}: absolute; {self.options.ambient_pressure:g} MPa of ambient pressure were taken off"
+                )
+        low, high = {"pressure": (-LARGEST_PRESSURE, LARGEST_PRESSURE), "temperature": TEMPERATURES}.get(
+            unit.quantity, (-np.inf, np.inf)
+        )
         with np.errstate(invalid="ignore"):
             faults = (values <= low) | (values >= high)
         if faults.any():
@@ -259,25 +266,34 @@ class _Layout:
         return Channel(name, unit.quantity, values, reference, written), notes
 
 
-def _time_columns(place: str, heads: Sequence[str], names: Sequence[str], time: str, date: str) -> tuple[int, ...]:
-    """Position of the column of time, with that of the date in front where there is one."""
-    plain = [name.lower().replace("_", " ").strip() for name in names]
+def _named(place: str, wanted: str, heads: Sequence[str], names: Sequence[str]) -> int | None:
+    """Position of the column that is called so; None where no name is given."""
+    if not wanted:
+        return None
+    for known in (heads, names):
+        if wanted in known:
+            return list(known).index(wanted)
+    raise HistoryError(f"{place}: there is no column '{wanted}'; {nearest(wanted, heads)}")
 
-    def position(wanted: str, usual: Sequence[str]) -> int | None:
-        if wanted:
-            for known in (heads, names):
-                if wanted in known:
-                    return list(known).index(wanted)
-            raise HistoryError(f"{place}: there is no column '{wanted}'; {nearest(wanted, heads)}")
-        return next((plain.index(one) for one in usual if one in plain), None)
 
-    clock, day = position(time, TIME_NAMES), position(date, DATE_NAMES)
-    if clock is None and day is None:
-        found = ", ".join(heads)
-        raise HistoryError(f"{place}: no column of time among {found:.200}; name one time, or state time='its name'")
-    if clock is None or day is None or clock == day:
-        return (clock if clock is not None else day,)  # type: ignore[return-value]
-    return day, clock
+def _time_columns(
+    place: str, heads: Sequence[str], names: Sequence[str], clock: int | None, day: int | None
+) -> tuple[int, ...]:
+    """Position of the column of time, with that of the date in front where there is one.
+
+    names : of columns that may be one of them, "" for the others. clock, day : where they are known.
+    """
+    plain = [name if name == "T" else name.lower().replace("_", " ").strip() for name in names]
+    if clock is None:
+        clock = next((plain.index(one) for one in TIME_NAMES if one in plain), None)
+    if day is None:
+        day = next((plain.index(one) for one in DATE_NAMES if one in plain), None)
+    found = tuple(dict.fromkeys(k for k in (day, clock) if k is not None))
+    if not found:
+        raise HistoryError(
+            f"{place}: no column of time among {', '.join(heads):.200}; name one time, or state time='its name'"
+        )
+    return found
 
 
 def _position(place: str, wanted: str, heads: Sequence[str], names: Sequence[str], channels: Sequence[int]) -> int:

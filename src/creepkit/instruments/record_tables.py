@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,7 +77,9 @@ def numbered_lines(path: Path) -> Iterator[list[tuple[int, str]]]:
             content = rest + part
             cut = len(content) if not part or content[:2] in (b"\xff\xfe", b"\xfe\xff") else _last_line_end(content)
             if cut == 0 and len(content) > LONGEST_LINE:
-                raise HistoryError(f"{path}:{number}: a line of more than {LONGEST_LINE} characters; save it as a table")
+                raise HistoryError(
+                    f"{path}:{number}: a line of more than {LONGEST_LINE} characters; save it as a table"
+                )
             if cut:
                 lines = _decoded_lines(content[:cut], path, number)
                 if cut < len(content) or (part and content[cut - 1 : cut] in b"\r\n"):
@@ -182,10 +184,8 @@ class KeptColumns:
         self.numbers: list[Floats] = []
         self.values: list[list[Floats]] = [[] for _ in self.columns]
         self.lines: list[Ints] = []
-        self.lost: dict[int, tuple[int, int]] = {}
         self.incomplete = 0
         self._pending: list[tuple[int, list[str]]] = []
-        self._joined = False
         self._rows = 0
 
     def add(self, lines: Sequence[tuple[int, str]], last: bool) -> None:
@@ -195,7 +195,10 @@ class KeptColumns:
         for number, line in lines:
             if number < first or not line.strip() or line.lstrip()[0] == "#":
                 continue
-            cells = _cells(line, dialect, f"{self.path}:{number}")
+            if '"' in line or dialect.delimiter == " ":
+                cells = _cells(line, dialect, f"{self.path}:{number}")
+            else:
+                cells = line.split(dialect.delimiter)  # blanks are taken off those that are read
             if len(cells) != count:
                 cells = self._fitted(cells, number, count, last and number == lines[-1][0])
                 if not cells:
@@ -208,7 +211,7 @@ class KeptColumns:
 
     def _fitted(self, cells: list[str], number: int, count: int, is_last: bool) -> list[str]:
         """The cells of a row, one for each name; [] for a last one that was cut off."""
-        if len(cells) == count + 1 and not cells[-1]:
+        if len(cells) == count + 1 and not cells[-1].strip():
             return cells[:-1]
         if self.head.dialect.delimiter == " " and len(cells) == count + 1 and is_clock_time(" ".join(cells[:2])):
             return [" ".join(cells[:2]), *cells[2:]]
@@ -231,14 +234,14 @@ class KeptColumns:
         self.lines.append(np.array(numbers, dtype=np.int64))
         self._read_times(rows)
         for k, column in enumerate(self.columns):
-            self.values[k].append(self._averaged(self._column(rows, column)))
+            self.values[k].append(block_means(self._column(rows, column), self.every))
 
     def _read_times(self, rows: list[tuple[int, list[str]]]) -> None:
         column = self.times[-1]
         if len(self.times) == 2:
-            texts = [f"{cells[self.times[0]]} {cells[column]}" for _, cells in rows]
+            texts = [f"{cells[self.times[0]].strip()} {cells[column].strip()}" for _, cells in rows]
         else:
-            texts = [cells[column] for _, cells in rows]
+            texts = [cells[column].strip() for _, cells in rows]
         if self.clock is None and not self.numbers and is_clock_time(texts[0]):
             self.clock = ClockColumn()
         if self.clock is not None:
@@ -246,11 +249,11 @@ class KeptColumns:
             return
         self.numbers.append(parse_numbers(texts, self.head.dialect, self._place(rows, column), self.head.names[column]))
 
-    def _place(self, rows: list[tuple[int, list[str]]], column: int):  # type: ignore[no-untyped-def]
+    def _place(self, rows: list[tuple[int, list[str]]], column: int) -> Callable[[int], str]:
         return lambda k: f"{self.path}:{rows[k][0]}, column {column + 1}"
 
     def _column(self, rows: list[tuple[int, list[str]]], column: int) -> Floats:
-        texts = [cells[column] for _, cells in rows]
+        texts = [cells[column].strip() for _, cells in rows]
         values = parse_numbers(
             texts, self.head.dialect, self._place(rows, column), self.head.names[column], self.missing
         )
@@ -258,9 +261,6 @@ class KeptColumns:
         if lost.any():
             values = np.where(lost, np.nan, values)
         return values
-
-    def _averaged(self, values: Floats) -> Floats:
-        return block_means(values, self.every)
 
 
 def block_means(values: Floats, every: int) -> Floats:

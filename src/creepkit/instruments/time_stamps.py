@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from datetime import date, datetime, timedelta, timezone, tzinfo
+from datetime import UTC, date, datetime, timedelta, timezone, tzinfo
 
 import numpy as np
 
@@ -176,13 +176,15 @@ def _days(
         ordinals = [_ordinal(text, order) for text in column.dates]
         if None in ordinals:
             k = ordinals.index(None)
-            problem = f"{places[k]}: '{list(column.dates)[k]:.30}' is no date{f' with the {order}' if date_order else ''}"
+            problem = (
+                f"{places[k]}: '{list(column.dates)[k]:.30}' is no date{f' with the {order}' if date_order else ''}"
+            )
         else:
             possible[order] = np.array([day for day in ordinals if day is not None], dtype=np.int64) - EPOCH
     if not possible:
         raise HistoryError(f"{problem}; write dates such as 2025-08-18")
     values = list(possible.values())
-    if len(possible) == 1 or np.array_equal(*values):
+    if len(possible) == 1 or np.array_equal(values[0], values[-1]):
         note = "" if date_order or len(possible) == 2 else f"its dates have the {next(iter(possible))}"
         return values[0], note
     gaps = [np.diff((days - days[0])[numbers] * DAY + seconds) for days in values]
@@ -209,7 +211,9 @@ def _ordinal(text: str, order: str) -> int | None:
         year, month, day = int(c), a, int(b)
     else:
         year, month, day = int(c), b, int(a)
-    number = int(month) if month.isdigit() else _MONTHS.index(month[:3].lower()) + 1 if month[:3].lower() in _MONTHS else 0
+    number = (
+        int(month) if month.isdigit() else _MONTHS.index(month[:3].lower()) + 1 if month[:3].lower() in _MONTHS else 0
+    )
     if len(a) < 3 and len(c) < 3:
         year += 2000
     try:
@@ -243,7 +247,7 @@ def _shift_of_zone(local: Floats, base: float, path: str, lines: Ints, zone: tzi
             aware = moment.replace(tzinfo=zone, fold=fold)
             offset = aware.utcoffset() or timedelta()
             shifts[fold, k] = -offset.total_seconds()
-            back = (moment - offset).replace(tzinfo=timezone.utc).astimezone(zone).replace(tzinfo=None)
+            back = (moment - offset).replace(tzinfo=UTC).astimezone(zone).replace(tzinfo=None)
             if back != moment:
                 row = int(np.argmax(inverse == k))
                 raise HistoryError(

@@ -14,7 +14,6 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from creepkit.errors import CreepkitError, HistoryError, nearest
-from creepkit.records.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATURE_RECORD_TOLERANCE, recorded_program
 from creepkit.readers.text_tables import SourceText, TableFrames
 from creepkit.readers.vocabulary import (
     COMPONENT_LOADING_KINDS,
@@ -25,6 +24,7 @@ from creepkit.readers.vocabulary import (
 )
 from creepkit.records import Loading, PointLoading, Program, TwoLevels, loading_of
 from creepkit.records.quantities import LENGTH, TEMPERATURE, TIME, QuantityKind
+from creepkit.records.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATURE_RECORD_TOLERANCE, recorded_program
 
 _ALLOWED_COMBINATIONS = (
     "give one of stress, stress_steps, stress_program, or stress_1 with stress_2 and jump_time (the same for other "

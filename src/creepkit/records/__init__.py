@@ -3,6 +3,7 @@
 from creepkit.records.camera_frames import CameraFrame, Frames
 from creepkit.records.clock_alignment import ClockAlignment
 from creepkit.records.history import EVERY_FRAME, History
+from creepkit.records.instrument_format import InstrumentFormat
 from creepkit.records.instrument_record import Channel, InstrumentRecord
 from creepkit.records.interfaces import (
     Exporter,
@@ -100,6 +101,7 @@ __all__ = [
     "Frames",
     "History",
     "HistoryPrediction",
+    "InstrumentFormat",
     "InstrumentRecord",
     "LawWithValues",
     "Load",

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import Floats, frozen
 from creepkit.errors import HistoryError, nearest
-from creepkit.presentation import Presentable
+from creepkit.presentation import Presentable, present
 from creepkit.records.loading import Program
 from creepkit.records.recorded_programs import recorded_program
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 GAP_FACTOR = 5.0
 """A gap is an interval between two rows that is longer than so many median intervals."""
@@ -134,3 +139,7 @@ class InstrumentRecord(Presentable):
         if not later.any():
             raise HistoryError(f"{self.origin}: channel '{channel}' holds no reading after time zero")
         return recorded_program(times[later], values[later], tolerance)
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Every channel over time, one panel for each quantity; written to a file if a path is given."""
+        return present(self, "plot", path)

@@ -28,9 +28,8 @@ if TYPE_CHECKING:
 
     import typer
 
-    from creepkit.instruments.formats import InstrumentFormat
     from creepkit.language.law import CreepLaw
-    from creepkit.records import Exporter, Reader, Specimen
+    from creepkit.records import Exporter, InstrumentFormat, Reader, Specimen
 
 
 LAWS_BY_PACKAGE = {

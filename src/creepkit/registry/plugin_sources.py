@@ -222,7 +222,7 @@ EXPORTER = ContributionKind("exporter", "creepkit_exporters", ExportError, "cree
 
 
 INSTRUMENT = ContributionKind(
-    "instrument format", "creepkit_instruments", HistoryError, "creepkit.instruments.formats", "InstrumentFormat"
+    "instrument format", "creepkit_instruments", HistoryError, "creepkit.records", "InstrumentFormat"
 )
 
 
