@@ -10,8 +10,8 @@ instrument is ahead by 0.1 s to 5 min, of either sign, and gains a normal deviat
 record meet is searched.
 
 Columns: tests; those refused because several lags fit; answers whose 95 % intervals hold the planted lag and the
-planted drift (with 95 % binomial bounds); the median error of the lag, the median width of its interval, CPU time of one
-alignment. The frames do not tell lags apart that put every ramp between the same frames, so that an interval is often
+planted drift (with 95 % binomial bounds); the median error of the lag, the median width of its interval, CPU time of
+one alignment. The frames do not tell lags apart that put every ramp between the same frames, so that an interval is often
 nearly as wide as that of the frames.
 
 The last section compares with the alignment by hand of the static test of dimple D1 (shared/data/cameras/dabi_static):
@@ -21,6 +21,7 @@ channels of temperature.
 
 from __future__ import annotations
 
+import csv
 import time
 from dataclasses import dataclass
 from pathlib import Path

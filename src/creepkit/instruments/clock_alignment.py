@@ -51,7 +51,7 @@ SPIKE = 8.0
 """Standard deviations by which a single frame that falls back at once is off."""
 
 
-COARSE_LAGS, FINE_LAGS, CANDIDATES, MOST_FRAMES = 2000, 1200, 3, 1500
+COARSE_LAGS, FINE_LAGS, CANDIDATES, MOST_FRAMES = 2000, 500, 3, 500
 """Lags of the first search and of the second, candidates kept between them, and frames that are used at most."""
 
 
@@ -59,7 +59,7 @@ LOOSER = 3.0
 """Factor of the walks of models that are averaged with the most likely ones, which tend to know too much."""
 
 
-MODEL_LAGS, MOST_MODELS, MODEL_ITERATIONS, ITERATIONS = 5, 3, 2, 8
+MODEL_LAGS, MOST_MODELS, MODEL_ITERATIONS, ITERATIONS = 3, 2, 2, 7
 """Lags at which the scales of the model are estimated, how many of these models are averaged, in how many of the
 iterations that close in on the posterior they are estimated, and iterations at most."""
 
@@ -95,10 +95,8 @@ class _Task:
         good = totals.max(axis=1) > totals.max() - NEGLIGIBLE
         chosen = [found[k] for k in np.argsort(-totals.max(axis=1)) if good[k]][:MOST_MODELS]
         first = chosen[0]
-        walks = [(LOOSER, 1.0), (1.0, LOOSER), (LOOSER, LOOSER)]
-        return chosen + [
-            replace(first, compliance_walk=k * first.compliance_walk, rate_walk=c * first.rate_walk) for k, c in walks
-        ]
+        looser = replace(first, compliance_walk=LOOSER * first.compliance_walk, rate_walk=LOOSER * first.rate_walk)
+        return [*chosen, looser]
 
     @property
     def reach(self) -> float:

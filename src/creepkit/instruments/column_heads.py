@@ -78,7 +78,7 @@ TIME_UNITS = {
 _BRACKETED = re.compile(r"(?P<name>[^()\[\]]*[^()\[\]\s])\s*[(\[](?P<unit>[^\[\]]{1,30}?)[)\]]")
 
 
-_BEHIND = re.compile(r"(?P<name>.*\S)(?:\s*[/,]\s*|\s+|_)(?P<unit>[^\s_/,]{1,12})")
+_BEHIND = re.compile(r"(?P<name>.*[^\s/,_])(?:\s*[/,]\s*|\s+|_)(?P<unit>[^\s_/,]{1,12})")
 
 
 def channel_unit(text: str) -> ChannelUnit | None:
@@ -89,27 +89,8 @@ def channel_unit(text: str) -> ChannelUnit | None:
     return None if unit[:3] == "mPa" else _ANY_CASE.get(unit.lower())
 
 
-def known_units() -> list[str]:
-    """The units of channels, for errors."""
-    return [
-        "psi",
-        "psig",
-        "psia",
-        "bar",
-        "barg",
-        "MPa",
-        "kPa",
-        "Torr",
-        "C",
-        "F",
-        "K",
-        "mm",
-        "um",
-        "in",
-        "N",
-        "kN",
-        "lbf",
-    ]
+KNOWN_UNITS = ("psi", "psig", "psia", "bar", "barg", "MPa", "kPa", "Torr", "C", "F", "K", "mm", "um", "in", "N", "kN")
+"""Units of channels, for errors."""
 
 
 def split_head(head: str) -> tuple[str, str]:

@@ -66,9 +66,9 @@ def imposed(
 
     specimen : its name, such as "D1", from which the record's format knows its channels; or the names of the channels
     of load and temperature. frame_times : (frames,) s on the camera's clock, with any zero. alignment : by
-    align_clocks; None: both clocks agree, which needs a record and frames with absolute times. load_tolerance : MPa, by default 0.002
-    of the largest load; temperature_tolerance : K, by default 0.25. Three standard deviations of the noise are taken
-    where they are more; the programs follow its mean.
+    align_clocks; None: both clocks agree, which needs a record and frames with absolute times. load_tolerance : MPa, by
+    default 0.002 of the largest load; temperature_tolerance : K, by default 0.25. Three standard deviations of the
+    noise are taken where they are more; the programs follow its mean.
     """
     times = np.asarray(frame_times, dtype=float)
     if times.ndim != 1 or times.size < 2 or not np.isfinite(times).all() or (np.diff(times) <= 0).any():

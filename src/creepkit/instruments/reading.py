@@ -159,7 +159,7 @@ class _Layout:
             written[k] = written[k] or units.get(names[k], declared)
             if names[k] in units and channel_unit(units[names[k]]) is None:
                 raise HistoryError(
-                    f"the unit '{units[names[k]]}' of '{names[k]}' is not known; {', '.join(known_units())}"
+                    f"the unit '{units[names[k]]}' of '{names[k]}' is not known; {', '.join(KNOWN_UNITS)}"
                 )
         if options.channels is not None:
             channels = [_position(place, name, head.names, names, channels) for name in options.channels]

@@ -1,8 +1,8 @@
 """How likely displacements are at every lag between two clocks: a Kalman filter, run at many lags at once.
 
-Between two frames the displacement grows by k dp + q dm + c dt + transients: k is the compliance, q that of first
-loading (m is the largest load so far; plastic flow), c the creep rate. All walk at random, k and q with the load that
-has changed, c with that and with time; each change of load starts transients of primary creep of random size that fade
+Between two frames the displacement grows by k dp + q dm + (c + b p^4) dt + transients: k is the compliance, q that of
+first loading (m is the largest load so far; plastic flow), c and b p^4 are creep rates. All walk at random, k and q with
+the load that has changed, c with that and with time, b with time; each change of load starts transients of primary creep of random size that fade
 within one and within six intervals. So stiffening, plastic flow and creep of any law are followed; what cannot be
 followed is a jump of the displacement in another interval between frames than that of the load.
 """
@@ -19,8 +19,13 @@ from creepkit.arrays import Floats
 from creepkit.records import InstrumentRecord, Program
 from creepkit.records.recorded_programs import recorded_program
 
-STATES = 6
-"""Displacement, compliance, that of first loading, creep rate, what is left of two transients."""
+STATES = 7
+"""Displacement, compliance, that of first loading, creep rate, what is left of two transients, creep rate at the whole
+range of the load that falls with LOAD_EXPONENT."""
+
+
+LOAD_EXPONENT = 4
+"""Of the creep rate on the load, as alloys have about; the rest is left to the random walks."""
 
 
 TRANSIENTS = (1.0, 6.0)
@@ -192,6 +197,8 @@ def _innovations(response: Response, displacements: Floats, model: ResponseModel
     spread = np.zeros((STATES, STATES, lags))
     for state, sd in enumerate((model.noise, model.compliance, model.compliance, model.rate)):
         spread[state, state] = np.square(sd)
+    spread[6, 6] = np.square(model.rate)
+    powers = np.maximum(0.5 * (response.loads[1:] + response.loads[:-1]), 0.0) ** LOAD_EXPONENT
     changes, first_loading = np.diff(response.loads, axis=0), np.diff(response.maxima, axis=0)
     noise, compliance_walk, rate_walk, transient = (
         np.square(x) for x in (model.noise, model.compliance_walk, model.rate_walk, model.transient)
@@ -203,8 +210,9 @@ def _innovations(response: Response, displacements: Floats, model: ResponseModel
         spread[1, 1] += compliance_walk * change
         spread[2, 2] += compliance_walk * first_loading[k]
         spread[3, 3] += rate_walk * (dt + change)
+        spread[6, 6] += rate_walk * dt
         left = np.exp(-dt / constants)
-        gain[1], gain[2], gain[3] = changes[k], first_loading[k], dt
+        gain[1], gain[2], gain[3], gain[6] = changes[k], first_loading[k], dt, dt * powers[k]
         for state, fraction in zip((4, 5), left, strict=True):
             spread[state, state] += transient * change
             gain[state] = 1.0 - fraction
