@@ -11,8 +11,8 @@ record meet is searched.
 
 Columns: tests; those refused because several lags fit; answers whose 95 % intervals hold the planted lag and the
 planted drift (with 95 % binomial bounds); the median error of the lag, the median width of its interval, CPU time of
-one alignment. The frames do not tell lags apart that put every ramp between the same frames, so that an interval is often
-nearly as wide as that of the frames.
+one alignment. The frames do not tell lags apart that put every ramp between the same frames, so that an interval is
+often nearly as wide as that of the frames.
 
 The last section compares with the alignment by hand of the static test of dimple D1 (shared/data/cameras/dabi_static):
 its lag is read from the file by finding at which lag the record gives the aligned values; that is repeated for ten

@@ -43,6 +43,10 @@ LARGEST_OTHER = 0.025
 """Posterior probability of other lags, apart from the best ones, beyond which the answer is ambiguous."""
 
 
+SHARP = 0.1
+"""Fraction of its range by which the load may change between two lags without being averaged between them."""
+
+
 RAMP_SHARE = 0.3
 """Share of the time in which the load would change by its whole range at its fastest, see _Task.reach."""
 
@@ -82,7 +86,8 @@ class _Task:
 
     def terms(self, lags: Floats, model: ResponseModel, width: float = 0.0) -> Floats:
         """(frames - 1, lags) terms of the logarithm of the likelihood; width : s, between the lags."""
-        return log_likelihoods(self.driving.response(self.times, lags, width), self.displacements, model)
+        blurred = width if width * self.driving.steepest > SHARP else 0.0
+        return log_likelihoods(self.driving.response(self.times, lags, blurred), self.displacements, model)
 
     def best_model(self, lag: float) -> ResponseModel:
         """The most likely model at one lag."""

@@ -1,10 +1,11 @@
 """How likely displacements are at every lag between two clocks: a Kalman filter, run at many lags at once.
 
 Between two frames the displacement grows by k dp + q dm + (c + b p^4) dt + transients: k is the compliance, q that of
-first loading (m is the largest load so far; plastic flow), c and b p^4 are creep rates. All walk at random, k and q with
-the load that has changed, c with that and with time, b with time; each change of load starts transients of primary creep of random size that fade
-within one and within six intervals. So stiffening, plastic flow and creep of any law are followed; what cannot be
-followed is a jump of the displacement in another interval between frames than that of the load.
+first loading (m is the largest load so far; plastic flow), c and b p^4 are creep rates. All walk at random, k and q
+with the load that has changed, c with that and with time, b with time; each change of load starts transients of primary
+creep of random size that fade within one and within six intervals. So stiffening, plastic flow and creep of any law are
+followed; what cannot be followed is a jump of the displacement in another interval between frames than that of the
+load.
 """
 
 from __future__ import annotations

@@ -13,10 +13,20 @@ from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, 
 from creepkit.kernels.lowering import lower
 from creepkit.language import arrhenius
 from creepkit.language.law import CreepLaw
-from creepkit.records import Exporter, History, Predictor, Reader, Specimen, predict_with, remember_specimen
+from creepkit.records import (
+    Exporter,
+    History,
+    InstrumentFormat,
+    Predictor,
+    Reader,
+    Specimen,
+    predict_with,
+    remember_specimen,
+)
 from creepkit.registry import Plugin, default_registry
 from creepkit.testing import (
     exporter_checks,
+    instrument_checks,
     law_behaviour,
     law_checks,
     law_declarations,
@@ -180,6 +190,15 @@ def check_exporter(exporter: Exporter) -> ConformanceReport:
     return ConformanceReport(exporter, tuple(_all_findings(checks, case)), "exporter")
 
 
+def check_instrument_format(declared: InstrumentFormat) -> ConformanceReport:
+    """Run every check on a format of instruments' records."""
+    checks = {
+        "name and title": lambda one: specimen_checks.check_record_name(one, "instrument format"),
+        "declaration": instrument_checks.check_declaration,
+    }
+    return ConformanceReport(declared, tuple(_all_findings(checks, declared)), "instrument format")
+
+
 def check_temperature_form(name: str, form: Callable[..., Any]) -> ConformanceReport:
     """Run every check on a temperature form or factor, a function of T_ref."""
     subject = TemperatureFormCase(name, form)
@@ -192,6 +211,7 @@ _KITS: dict[str, Callable[[Any], ConformanceReport]] = {
     "specimen": check_specimen,
     "reader": check_reader,
     "exporter": check_exporter,
+    "instrument format": check_instrument_format,
 }
 
 
@@ -207,8 +227,8 @@ def check_plugin(plugin: Plugin) -> list[ConformanceReport]:
     reports += [check_temperature_form(*named) for named in forms.items()]
     if not reports:
         raise PluginError(
-            f"{plugin.provenance} offers no law, specimen, reader, exporter or temperature form; return one from a "
-            "hook such as creepkit_laws"
+            f"{plugin.provenance} offers no law, specimen, reader, exporter, format of instruments or temperature "
+            "form; return one from a hook such as creepkit_laws"
         )
     return reports
 
@@ -221,6 +241,7 @@ def check_named(name: str) -> list[ConformanceReport]:
         "specimen": registry.specimens(),
         "reader": registry.readers(),
         "exporter": registry.exporters(),
+        "instrument format": registry.instruments(),
     }
     reports = [_KITS[kind](known[name].value) for kind, known in offered.items() if name in known]
     forms = registry.temperature_forms()

