@@ -39,7 +39,7 @@ LEAST_GAIN = 10.0
 """Natural logarithm of the likelihood by which the best lag must beat a displacement that knows no load."""
 
 
-LARGEST_OTHER = 0.025
+LARGEST_OTHER = 1e-3
 """Posterior probability of other lags, apart from the best ones, beyond which the answer is ambiguous."""
 
 

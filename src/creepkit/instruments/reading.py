@@ -14,7 +14,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest
 from creepkit.instruments.column_heads import KNOWN_UNITS, TIME_UNITS, ChannelUnit, channel_unit, split_head
 from creepkit.instruments.record_tables import MISSING, KeptColumns, TableHead, block_means, find_head, numbered_lines
-from creepkit.instruments.time_stamps import ResolvedTimes, resolve
+from creepkit.instruments.time_stamps import DATE_ORDERS, ResolvedTimes, resolve
 from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
 
 TIME_NAMES = (
@@ -54,6 +54,7 @@ class ReadingOptions:
     missing: Sequence[str] = ()
 
     def __post_init__(self) -> None:
+        self._check_types()
         if isinstance(self.every, bool) or not isinstance(self.every, int) or not 1 <= self.every <= 100_000:
             raise HistoryError(f"every={self.every!r:.40}; give a number of rows from 1 to 100000")
         if self.pressure_reference not in ("", "gauge", "absolute"):
@@ -66,6 +67,22 @@ class ReadingOptions:
             raise HistoryError(
                 f"channels is '{self.channels:.40}'; give a list of names: channels=['{self.channels:.40}']"
             )
+
+    def _check_types(self) -> None:
+        for name in ("time", "date", "time_unit", "date_order", "time_zone", "pressure_reference"):
+            if not isinstance(getattr(self, name), str):
+                raise HistoryError(f"{name} is {getattr(self, name)!r:.40}; give a text")
+        if not isinstance(self.units, Mapping) or not all(isinstance(unit, str) for unit in self.units.values()):
+            raise HistoryError(f"units is {self.units!r:.40}; give {{channel: unit}}, such as {{'P1': 'bar'}}")
+        if isinstance(self.missing, str) or not isinstance(self.missing, Sequence):
+            raise HistoryError(f"missing is {self.missing!r:.40}; give a list of texts, such as ['n.a.']")
+        if self.channels is not None and not isinstance(self.channels, Sequence):
+            raise HistoryError(f"channels is {self.channels!r:.40}; give a list of names")
+        ambient = self.ambient_pressure
+        if ambient is not None and (isinstance(ambient, bool) or not isinstance(ambient, (int, float))):
+            raise HistoryError(f"ambient_pressure is {ambient!r:.40}; give a number of MPa, such as 0.1013")
+        if self.date_order and self.date_order not in DATE_ORDERS:
+            raise HistoryError(f"date_order is '{self.date_order:.40}'; write 'month first' or 'day first'")
 
     @classmethod
     def of(cls, options: Mapping[str, Any]) -> ReadingOptions:
@@ -81,7 +98,10 @@ def read_record(
     path: str | Path, formats: Sequence[InstrumentFormat], format: str | None, options: Mapping[str, Any]
 ) -> InstrumentRecord:
     """The record in a file, read part by part; the public function with this name says what the options are."""
-    given, path = ReadingOptions.of(options), Path(path).expanduser()
+    given = ReadingOptions.of(options)
+    if not isinstance(path, (str, Path)):
+        raise HistoryError(f"read_record() takes the path of a file, found {path!r:.40}")
+    path = Path(path).expanduser()
     parts = numbered_lines(path)
     ahead = next(parts, [])
     head = find_head(path, ahead)
@@ -156,6 +176,10 @@ class _Layout:
                 raise HistoryError(f"{place}: units of '{name}', which is no channel; {nearest(name, names)}")
         for k in channels:
             declared = next((u for pattern, u in chosen.units.items() if re.fullmatch(pattern, head.names[k])), "")
+            if names[k] in units and written[k] not in ("", units[names[k]]):
+                raise HistoryError(
+                    f"{place}: the head of '{names[k]}' states {written[k]}, units= says {units[names[k]]}; keep one"
+                )
             written[k] = written[k] or units.get(names[k], declared)
             if names[k] in units and channel_unit(units[names[k]]) is None:
                 raise HistoryError(

@@ -167,8 +167,6 @@ def _days(
     """(dates,) days since 1970 of each text of a date, and a sentence where its order was decided."""
     first = {n: int(k) for n, k in zip(*np.unique(numbers, return_index=True), strict=True)}
     places = [f"{path}:{lines[first[n]]}" for n in range(len(column.dates))]
-    if date_order and date_order not in DATE_ORDERS:
-        raise HistoryError(f"date_order is '{date_order:.40}'; write 'month first' or 'day first'")
     orders = [date_order] if date_order else list(DATE_ORDERS)
     possible: dict[str, Ints] = {}
     problem = ""
