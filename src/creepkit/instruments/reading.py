@@ -142,7 +142,8 @@ def _format_of(path: Path, head: TableHead, formats: Sequence[InstrumentFormat],
 class _Layout:
     """Which column is what.
 
-    columns, names, units : of the channels that are kept. times : positions of date and time, or of time alone.
+    columns, names, written : positions, names and units of the channels that are kept. times : positions of date
+    and time, or of time alone.
     time_unit : of the head or the options, "" where neither says.
     """
 

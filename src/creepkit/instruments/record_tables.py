@@ -264,7 +264,7 @@ class KeptColumns:
 
 
 def block_means(values: Floats, every: int) -> Floats:
-    """Means of `every` values after each other, NaN left out; the last of what is left."""
+    """(blocks,) means of `every` of the values (rows,) after each other, NaN left out; the last of what is left."""
     if every == 1:
         return values
     edges = np.arange(0, values.size, every)

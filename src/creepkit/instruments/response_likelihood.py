@@ -63,9 +63,10 @@ class DrivingRecord:
     steepest: float
 
     def response(self, frame_times: Floats, lags: Floats, width: float = 0.0) -> Response:
-        """Load and maximum at frames (frames,) s for lags (lags,) s.
+        """Load and maximum at every frame for every lag.
 
-        width : s, over which both are averaged; a jump that is sharper than lags lie apart would be missed.
+        frame_times : (frames,) s. lags : (lags,) s. width : s, over which both are averaged; a jump that is sharper
+        than lags lie apart would be missed.
         """
         wanted = frame_times[:, None] + lags
         span = float(np.ptp(frame_times))
@@ -124,10 +125,11 @@ def _averaged(times: Floats, values: Floats, width: float, wanted: Floats) -> Fl
 class ResponseModel:
     """Scales of the prior and of the random walks; each a number, or (lags,) of them.
 
-    noise : mm. compliance : mm over the range of the load, rate : mm over the whole time, prior standard deviations.
-    compliance_walk : mm over the range of the load, by which the compliance walks over that range. rate_walk : mm over
-    the whole time, by which the creep rate walks over the whole time, and over the range of the load. transient : mm,
-    standard deviation of each transient after a change of the load by its whole range.
+    noise : number or (lags,) mm. compliance : mm over the range of the load, rate : mm over the whole time, prior
+    standard deviations. compliance_walk : number or (lags,) mm over the range of the load, by which the compliance
+    walks over that range. rate_walk : number or (lags,) mm over the whole time, by which the creep rate walks over the
+    whole time, and over the range of the load. transient : number or (lags,) mm, standard deviation of each transient
+    after a change of the load by its whole range.
     """
 
     noise: Floats | float
@@ -144,7 +146,10 @@ noise from frame to frame, that are tried."""
 
 
 def trial_models(displacements: Floats, noise: float) -> list[ResponseModel]:
-    """Few models that together fit most tests, for a first search."""
+    """Few models that together fit most tests, for a first search.
+
+    displacements : (frames,) mm. noise : mm.
+    """
     size = float(np.ptp(displacements))
     walks = product((0.03, 1.0), (0.3, 10.0))
     return [ResponseModel(noise, size, 10 * size, k * size, c * size, 0.03 * size) for k, c in walks]
@@ -153,7 +158,7 @@ def trial_models(displacements: Floats, noise: float) -> list[ResponseModel]:
 def best_model(response: Response, displacements: Floats, noise: float) -> ResponseModel:
     """The most likely model at one lag.
 
-    response : at that lag alone. noise : mm, a first estimate.
+    response : at that lag alone. displacements : (frames,) mm. noise : mm, a first estimate.
     """
     size = float(np.ptp(displacements))
     scales = np.array([size, size, size, noise])
@@ -185,7 +190,10 @@ def log_likelihoods(response: Response, displacements: Floats, model: ResponseMo
 
 
 def innovations(response: Response, displacements: Floats, model: ResponseModel) -> tuple[Floats, Floats]:
-    """(frames - 1, lags) mm, by which displacements differ from what was expected before, and standard deviations."""
+    """(frames - 1, lags) mm, by which displacements differ from what was expected before, and standard deviations.
+
+    displacements : (frames,) mm.
+    """
     pairs = list(_innovations(response, displacements, model))
     return np.array([one for one, _ in pairs]), np.sqrt([variance for _, variance in pairs])
 

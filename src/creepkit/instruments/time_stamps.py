@@ -33,10 +33,11 @@ _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct",
 
 @dataclass
 class ClockColumn:
-    """A column of clock times, as it is read row by row.
+    """A column of clock times, as it is read part by part.
 
-    dates : {text: its number}, in the order in which they come. rows : of each the number of its date (-1: none).
-    seconds : since midnight. offset : s, of the zone that stands in the stamps; NaN without one.
+    dates : {text: its number}, in the order in which they come. rows : parts of (rows,), of each row the number of its
+    date (-1: none). seconds : parts of (rows,) since midnight. offsets : parts of (rows,) s, of the zone that stands in
+    the stamps; NaN without one.
     """
 
     dates: dict[str, int] = field(default_factory=dict)

@@ -54,11 +54,17 @@ class ClockAlignment(Presentable):
         return cls(zero, lag, drift, zero, (lag, lag), (drift, drift))
 
     def record_time(self, camera_times: ArrayLike) -> Floats:
-        """(...,) s on the record's own clock of camera times (...,) s."""
+        """(...,) s on the record's own clock.
+
+        camera_times : (...,) s on the camera's clock.
+        """
         times = np.asarray(camera_times, dtype=float)
         return np.asarray(times - self.zero + self.lag + self.drift * (times - self.middle))
 
     def camera_time(self, record_times: ArrayLike) -> Floats:
-        """(...,) s on the camera's clock of times (...,) s on the record's own clock."""
+        """(...,) s on the camera's clock.
+
+        record_times : (...,) s on the record's own clock.
+        """
         times = np.asarray(record_times, dtype=float)
         return np.asarray((times - self.lag - self.drift * (self.zero - self.middle)) / (1.0 + self.drift) + self.zero)

@@ -53,13 +53,16 @@ def _least_squares(times: Floats, values: Floats, kept: Ints) -> Floats:
 
 
 def noise_of_readings(values: Floats) -> float:
-    """Standard deviation of white noise by the median of second differences; 0 of fewer than three values."""
+    """Standard deviation of white noise by the median of second differences; 0 of fewer than three values.
+
+    values : (frames,) in any unit.
+    """
     differences = np.abs(np.diff(values, 2))
     return float(1.4826 * np.median(differences) / 6**0.5) if differences.size else 0.0
 
 
 def running_median(values: Floats) -> Floats:
-    """(frames,) medians of five values about each."""
+    """(frames,) medians of five about each of the values (frames,)."""
     padded = np.pad(values, _MEDIAN_FRAMES // 2, mode="edge")
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, _MEDIAN_FRAMES), axis=-1))
 
