@@ -34,6 +34,8 @@ from .fem.section import Section as Section
 from .forecasts.forecast import Forecast as Forecast
 from .forecasts.forecast import forecast as forecast
 from .hookspecs import hookimpl as hookimpl
+from .instruments.clock_alignment import align_clocks as align_clocks
+from .instruments.imposed import imposed as imposed
 from .inverse.cross_validation import cross_validate as cross_validate
 from .inverse.goodness_of_fit import relative_squared_error as relative_squared_error
 from .inverse.reference_conditions import with_arrhenius as with_arrhenius
@@ -75,8 +77,12 @@ from .language.temperature_forms import linear as linear
 from .readers.history_csv import write_history as write_history
 from .records.camera_format import CameraFormat as CameraFormat
 from .records.camera_frames import Frames as Frames
+from .records.clock_alignment import ClockAlignment as ClockAlignment
 from .records.history import History as History
 from .records.history_selection import select_tests as select_tests
+from .records.instrument_format import InstrumentFormat as InstrumentFormat
+from .records.instrument_record import Channel as Channel
+from .records.instrument_record import InstrumentRecord as InstrumentRecord
 from .records.interfaces import Predictor as Predictor
 from .records.interfaces import Specimen as Specimen
 from .records.law_with_values import LawWithValues as LawWithValues
@@ -99,6 +105,7 @@ from .records.specimen_record import Load as Load
 from .records.specimen_record import Output as Output
 from .registry.arguments import read_frames as read_frames
 from .registry.arguments import read_histories as read_histories
+from .registry.arguments import read_record as read_record
 from .rupture_assessment.assess import rupture as rupture
 from .rupture_assessment.assessment import RuptureSettings as RuptureSettings
 from .sampling.conditions import TimeGrid as TimeGrid

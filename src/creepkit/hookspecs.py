@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import typer
 
     from creepkit.language.law import CreepLaw
-    from creepkit.records import CameraFormat, Exporter, Reader, Specimen
+    from creepkit.records import CameraFormat, Exporter, InstrumentFormat, Reader, Specimen
 
 
 PROJECT = "creepkit"
@@ -41,6 +41,11 @@ def creepkit_readers() -> Sequence[Reader]:  # type: ignore[empty-body]
 @hookspec
 def creepkit_cameras() -> Sequence[CameraFormat]:  # type: ignore[empty-body]
     """Return camera formats: how a system writes the frames that it measured."""
+
+
+@hookspec
+def creepkit_instruments() -> Sequence[InstrumentFormat]:  # type: ignore[empty-body]
+    """Return formats of instruments' records: how columns are called, and what their heads leave out."""
 
 
 @hookspec

@@ -23,6 +23,13 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "plot": "creepkit.report.simulation:outputs_figure",
         "section": "creepkit.report.simulation:section_figure",
     },
+    # records of instruments
+    "InstrumentRecord": {
+        "text": "creepkit.report.instrument_records:record_text",
+        "plot": "creepkit.report.instrument_records:record_figure",
+    },
+    "ClockAlignment": {"text": "creepkit.report.instrument_records:alignment_text"},
+    "Imposed": {"text": "creepkit.report.instrument_records:imposed_text"},
     # sampling, data sets, surrogates
     "Acceptance": {
         "text": "creepkit.report.sampling:acceptance_text",

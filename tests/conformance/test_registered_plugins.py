@@ -16,6 +16,7 @@ SPECIMENS = sorted(default_registry().specimens())
 READERS = sorted(default_registry().readers())
 CAMERAS = sorted(default_registry().cameras())
 EXPORTERS = sorted(default_registry().exporters())
+INSTRUMENTS = sorted(default_registry().instruments())
 FORMS = sorted(default_registry().temperature_forms())
 
 
@@ -24,6 +25,7 @@ def test_there_is_something_to_judge() -> None:
     assert {"csv", "indexed-table", "indexed-files"} <= {*READERS}
     assert {"vic-3d", "vic-3d-mat", "dice", "matchid", "zeiss", "pyvale", "pyvale-binary"} <= {*CAMERAS}
     assert {"python", "c", "mfront", "latex"} <= {*EXPORTERS}
+    assert {"plate-of-dimples", "table"} <= {*INSTRUMENTS}
     assert {"arrhenius", "linear"} <= {*FORMS}
 
 
@@ -59,6 +61,14 @@ def test_a_registered_exporter_conforms(name: str) -> None:
     report = check_exporter(default_registry().exporter(name))
 
     assert report.passed, str(report)
+
+
+@pytest.mark.parametrize("name", INSTRUMENTS)
+def test_a_registered_format_of_instruments_conforms(name: str) -> None:
+    reports = check_named(name)
+
+    assert [report.kind for report in reports] == ["instrument format"]
+    assert all(report.passed for report in reports), str(reports)
 
 
 @pytest.mark.parametrize("name", FORMS)

@@ -17,7 +17,16 @@ from helpers.paths import ROOT
 
 GUIDE = ROOT / "docs" / "extend"
 
-PLUGINS = {"law": 3, "specimen": 2, "reader": 3, "camera_format": 2, "exporter": 3, "temperature_form": 2, "command": 2}
+PLUGINS = {
+    "law": 3,
+    "specimen": 2,
+    "reader": 3,
+    "camera_format": 2,
+    "exporter": 3,
+    "instrument_format": 1,
+    "temperature_form": 2,
+    "command": 2,
+}
 """{kind: examples on its page, each longer than the one before}."""
 
 
@@ -233,6 +242,18 @@ def test_camera_formats_read_the_frames_that_are_shown() -> None:
 
 
 # ---- exporters -----------------------------------------------------------------------------------------------------
+
+
+def test_the_format_of_instruments_reads_its_example():
+    Path("our_format.py").write_text(examples("instrument_format")[0])
+    ck.load_plugin("our_format.py")
+    Path("furnace.csv").write_text(blocks("write_an_instrument_format", "text")[0], encoding="utf-8")
+    record = ck.read_record("furnace.csv")
+    assert record.channel("P1").reference == "gauge"
+    np.testing.assert_allclose(record.channel("P1").values, [0.002, 1.25, 4.0])
+    np.testing.assert_allclose(record.channel("T1").values[0], 1053.25)
+    found = ck.imposed(record, "1", [1.0, 2.0], ck.ClockAlignment.stated(0.0))
+    assert found.channels == ("P1", "T1")
 
 
 def test_exporters_write_what_is_shown() -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from creepkit.errors import CreepkitError
 
@@ -67,6 +70,17 @@ def read_range(path: Path, kind: FileKind, start: int, count: int) -> bytes:
         with os.fdopen(descriptor, "rb") as stream:
             stream.seek(start)
             return stream.read(count)
+    except OSError as error:
+        raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
+
+
+@contextmanager
+def open_binary(path: Path, kind: FileKind) -> Iterator[BinaryIO]:
+    """A regular file of at most `kind.maximum_bytes`, open for reading part by part; its error where reading fails."""
+    descriptor = _open_regular(path, kind)
+    try:
+        with os.fdopen(descriptor, "rb") as stream:
+            yield stream
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
 

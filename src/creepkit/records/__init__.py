@@ -2,7 +2,10 @@
 
 from creepkit.records.camera_format import CameraFormat
 from creepkit.records.camera_frames import CameraFrame, Frames
+from creepkit.records.clock_alignment import ClockAlignment
 from creepkit.records.history import EVERY_FRAME, UNKNOWN_DURATION, History
+from creepkit.records.instrument_format import InstrumentFormat
+from creepkit.records.instrument_record import Channel, InstrumentRecord
 from creepkit.records.interfaces import (
     Exporter,
     Predictor,
@@ -96,11 +99,15 @@ __all__ = [
     "ZERO_CELSIUS",
     "CameraFormat",
     "CameraFrame",
+    "Channel",
+    "ClockAlignment",
     "Dimension",
     "Exporter",
     "Frames",
     "History",
     "HistoryPrediction",
+    "InstrumentFormat",
+    "InstrumentRecord",
     "LawWithValues",
     "Load",
     "Loading",

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from creepkit.arrays import ArrayLike
 from creepkit.cameras import reading as camera_reading
 from creepkit.errors import FitError, LawError, SolveError
+from creepkit.instruments import reading as instrument_files
 from creepkit.readers import reading
-from creepkit.records import Frames, History, Predictor, Specimen, known_specimens, remember_specimen
+from creepkit.records import Frames, History, InstrumentRecord, Predictor, Specimen, known_specimens, remember_specimen
 from creepkit.registry.plugin_registry import default_registry
 
 if TYPE_CHECKING:
@@ -96,3 +97,16 @@ def read_frames(
     """
     formats = [entry.value for entry in default_registry().cameras().values()]
     return camera_reading.read_frames(path, formats, format, times)
+
+
+def read_record(path: str | Path, format: str | None = None, **options: Any) -> InstrumentRecord:
+    """Read the record of an instrument: channels of pressure, temperature and others over one clock.
+
+    format : name of one of `available("instruments")`; by default the one whose columns are there. options : time, date
+    (names of their columns), time_unit, date_order ("month first" or "day first"), time_zone ("America/Chicago",
+    "+01:00"), channels (names of those that are kept), every (rows that are averaged to one), units ({channel: unit}),
+    pressure_reference ("gauge" or "absolute"), ambient_pressure (MPa, to be taken off absolute pressures), missing
+    (texts in the place of a reading).
+    """
+    formats = [entry.value for entry in default_registry().instruments().values()]
+    return instrument_files.read_record(path, formats, format, options)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import typer
 
     from creepkit.language.law import CreepLaw
-    from creepkit.records import CameraFormat, Exporter, Reader, Specimen
+    from creepkit.records import CameraFormat, Exporter, InstrumentFormat, Reader, Specimen
 
 
 LAWS_BY_PACKAGE = {
@@ -74,7 +74,8 @@ class Registered(Generic[_T]):
 class Plugin:
     """One plugin: where it came from, and what it offers or why it cannot be used.
 
-    contributions : {kind: {name: object}} with the kinds "law", "specimen", "reader", "camera format", "exporter",
+    contributions : {kind: {name: object}} with the kinds "law", "specimen", "reader", "camera format",
+        "instrument format", "exporter",
         "temperature form".
     commands : whether it adds commands to the command line.
     problem : one sentence when the plugin is broken, else empty.
@@ -132,6 +133,10 @@ class Registry:
     def exporters(self) -> dict[str, Registered[Exporter]]:
         """Return {name: registered exporter}."""
         return self._all(plugin_sources.EXPORTER)
+
+    def instruments(self) -> dict[str, Registered[InstrumentFormat]]:
+        """Return {name: registered format of instruments' records}."""
+        return self._all(plugin_sources.INSTRUMENT)
 
     def temperature_forms(self) -> dict[str, Registered[Callable[..., Any]]]:
         """Return {name: registered function of T_ref that gives a form or a factor}."""

@@ -224,10 +224,15 @@ CAMERA_FORMAT = ContributionKind("camera format", "creepkit_cameras", HistoryErr
 EXPORTER = ContributionKind("exporter", "creepkit_exporters", ExportError, "creepkit.records", "Exporter")
 
 
+INSTRUMENT = ContributionKind(
+    "instrument format", "creepkit_instruments", HistoryError, "creepkit.records", "InstrumentFormat"
+)
+
+
 TEMPERATURE_FORM = TemperatureFormKind("temperature form", "creepkit_temperature_forms", LawError, "", "function")
 
 
-CONTRIBUTION_KINDS = (LAW, SPECIMEN, READER, CAMERA_FORMAT, EXPORTER, TEMPERATURE_FORM)
+CONTRIBUTION_KINDS = (LAW, SPECIMEN, READER, CAMERA_FORMAT, INSTRUMENT, EXPORTER, TEMPERATURE_FORM)
 
 
 def check_signatures(provenance: Provenance, plugin: object) -> None:

@@ -17,6 +17,7 @@ from creepkit.records import (
     CameraFormat,
     Exporter,
     History,
+    InstrumentFormat,
     Predictor,
     Reader,
     Specimen,
@@ -27,6 +28,7 @@ from creepkit.registry import Plugin, default_registry
 from creepkit.testing import (
     camera_checks,
     exporter_checks,
+    instrument_checks,
     law_behaviour,
     law_checks,
     law_declarations,
@@ -208,6 +210,15 @@ def check_exporter(exporter: Exporter) -> ConformanceReport:
     return ConformanceReport(exporter, tuple(_all_findings(checks, case)), "exporter")
 
 
+def check_instrument_format(declared: InstrumentFormat) -> ConformanceReport:
+    """Run every check on a format of instruments' records."""
+    checks = {
+        "name and title": lambda one: specimen_checks.check_record_name(one, "instrument format"),
+        "declaration": instrument_checks.check_declaration,
+    }
+    return ConformanceReport(declared, tuple(_all_findings(checks, declared)), "instrument format")
+
+
 def check_temperature_form(name: str, form: Callable[..., Any]) -> ConformanceReport:
     """Run every check on a temperature form or factor, a function of T_ref."""
     subject = TemperatureFormCase(name, form)
@@ -221,6 +232,7 @@ _KITS: dict[str, Callable[[Any], ConformanceReport]] = {
     "reader": check_reader,
     "camera format": check_camera_format,
     "exporter": check_exporter,
+    "instrument format": check_instrument_format,
 }
 
 
@@ -236,8 +248,8 @@ def check_plugin(plugin: Plugin) -> list[ConformanceReport]:
     reports += [check_temperature_form(*named) for named in forms.items()]
     if not reports:
         raise PluginError(
-            f"{plugin.provenance} offers no law, specimen, reader, exporter, camera format or temperature form; return "
-            "one from a hook such as creepkit_laws"
+            f"{plugin.provenance} offers no law, specimen, reader, camera format, instrument format, exporter or "
+            "temperature form; return one from a hook such as creepkit_laws"
         )
     return reports
 
@@ -251,6 +263,7 @@ def check_named(name: str) -> list[ConformanceReport]:
         "reader": registry.readers(),
         "camera format": registry.cameras(),
         "exporter": registry.exporters(),
+        "instrument format": registry.instruments(),
     }
     reports = [_KITS[kind](known[name].value) for kind, known in offered.items() if name in known]
     forms = registry.temperature_forms()

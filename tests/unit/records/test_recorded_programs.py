@@ -6,8 +6,8 @@ import pytest
 import creepkit as ck
 from creepkit.quality import check_data_quality
 from creepkit.readers.history_csv import HISTORY_CSV, history_text
-from creepkit.readers.recorded_programs import recorded_program
 from creepkit.records import Program, RecordedLoading
+from creepkit.records.recorded_programs import recorded_program
 
 TIMES = 60.0 * np.arange(1, 241)
 NORTON = {"A": 1e-16, "n": 5.0}

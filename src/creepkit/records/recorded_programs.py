@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.records import Program
+from creepkit.records.loading import Program
 
 TEMPERATURE_RECORD_TOLERANCE, LOAD_RECORD_TOLERANCE = 0.25, 0.002
 """K, and fraction of the largest load, by which a program may be off its record: 1 % of a creep rate at 400 kJ/mol and
@@ -26,32 +26,49 @@ def recorded_program(times: Floats, values: Floats, tolerance: float) -> Program
     the record's noise are more, that is taken. Breakpoints are frames (Douglas and Peucker's choice), and where noise
     decides their values are the least-squares ones of all frames.
     """
-    noise = _noise(values)
+    noise = noise_of_readings(values)
     noisy = NOISE_FACTOR * noise > tolerance and values.size > _MEDIAN_FRAMES
-    followed = _running_median(values) if noisy else values
+    followed = running_median(values) if noisy else values
     kept = _breakpoints(times, followed, max(tolerance, NOISE_FACTOR * noise) if noisy else tolerance)
     at_breakpoints: Floats = values[kept]
     if noisy:
-        hats = np.stack([np.interp(times, times[kept], row) for row in np.eye(kept.size)], axis=1)
-        at_breakpoints = np.asarray(np.linalg.lstsq(hats, values, rcond=None)[0], dtype=float)
+        at_breakpoints = _least_squares(times, values, kept)
     if times[0] == 0.0:
         return Program(times[kept], at_breakpoints)
     return Program(np.append(0.0, times[kept]), np.append(at_breakpoints[0], at_breakpoints))
 
 
-def _noise(values: Floats) -> float:
-    """Standard deviation of white noise by the median of second differences; 0 of fewer than three values."""
+def _least_squares(times: Floats, values: Floats, kept: Ints) -> Floats:
+    """Values at breakpoints of the polygon with the least sum of squares; its normal equations are tridiagonal."""
+    from scipy.linalg import solveh_banded
+
+    count = kept.size
+    piece = np.clip(np.searchsorted(times[kept], times, side="right") - 1, 0, count - 2)
+    right = (times - times[kept][piece]) / np.diff(times[kept])[piece]
+    left = 1.0 - right
+    diagonal = np.bincount(piece, left**2, count) + np.bincount(piece + 1, right**2, count)
+    beside = np.bincount(piece, left * right, count - 1)
+    sums = np.bincount(piece, left * values, count) + np.bincount(piece + 1, right * values, count)
+    return np.asarray(solveh_banded(np.stack([np.append(0.0, beside), diagonal]), sums), dtype=float)
+
+
+def noise_of_readings(values: Floats) -> float:
+    """Standard deviation of white noise by the median of second differences; 0 of fewer than three values.
+
+    values : (frames,) in any unit.
+    """
     differences = np.abs(np.diff(values, 2))
     return float(1.4826 * np.median(differences) / 6**0.5) if differences.size else 0.0
 
 
-def _running_median(values: Floats) -> Floats:
+def running_median(values: Floats) -> Floats:
+    """(frames,) medians of five about each of the values (frames,)."""
     padded = np.pad(values, _MEDIAN_FRAMES // 2, mode="edge")
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, _MEDIAN_FRAMES), axis=-1))
 
 
 def _breakpoints(times: Floats, values: Floats, tolerance: float) -> Ints:
-    """TableFrames between which straight lines stay within the tolerance."""
+    """Frames between which straight lines stay within the tolerance."""
     kept, spans = {0, values.size - 1}, [(0, values.size - 1)]
     while spans:
         first, last = spans.pop()

@@ -1,0 +1,1 @@
+"""Records of instruments: formats as declarations, clocks aligned with those of cameras, and what was imposed."""

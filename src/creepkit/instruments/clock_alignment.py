@@ -1,0 +1,359 @@
+"""Lag and drift between the clock of a camera and that of an instrument, from the response to changes of load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats, Ints
+from creepkit.errors import HistoryError
+from creepkit.instruments.response_likelihood import (
+    DrivingRecord,
+    Response,
+    ResponseModel,
+    best_model,
+    driving_record,
+    innovations,
+    log_likelihoods,
+    trial_models,
+)
+from creepkit.records import ClockAlignment, InstrumentRecord
+from creepkit.records.recorded_programs import noise_of_readings
+
+FEWEST_FRAMES = 8
+UNIX_TIME = 1e8
+"""s; larger times of a camera count from 1970: no test lasts three years."""
+
+
+DRIFT_SD = 1e-4
+"""s/s, standard deviation that is expected of the gain of one clock on the other: 9 s a day, a poor quartz."""
+
+
+LEAST_RANGE = 10.0
+"""Standard deviations of a reading by which a channel must change for an alignment."""
+
+
+LEAST_GAIN = 10.0
+"""Natural logarithm of the likelihood by which the best lag must beat a displacement that knows no load."""
+
+
+LARGEST_OTHER = 1e-3
+"""Posterior probability of other lags, apart from the best ones, beyond which the answer is ambiguous."""
+
+
+SHARP = 0.1
+"""Fraction of its range by which the load may change between two lags without being averaged between them."""
+
+
+RAMP_SHARE = 0.3
+"""Share of the time in which the load would change by its whole range at its fastest, see _Task.reach."""
+
+
+SPIKE = 8.0
+"""Standard deviations by which a single frame that falls back at once is off."""
+
+
+COARSE_LAGS, FINE_LAGS, CANDIDATES, MOST_FRAMES = 2000, 500, 3, 500
+"""Lags of the first search and of the second, candidates kept between them, and frames that are used at most."""
+
+
+LOOSER = 3.0
+"""Factor of the walks of models that are averaged with the most likely ones, which tend to know too much."""
+
+
+MODEL_LAGS, MOST_MODELS, MODEL_ITERATIONS, ITERATIONS = 3, 2, 2, 7
+"""Lags at which the scales of the model are estimated, how many of these models are averaged, in how many of the
+iterations that close in on the posterior they are estimated, and iterations at most."""
+
+
+BLOCKS, DRIFTS, RESOLVED, NEGLIGIBLE = 60, 31, 30, 12.0
+"""Blocks of frames with one lag, drifts that are tried at once, grid points within a posterior that resolve it, and
+the fall of a log likelihood beyond which nothing counts."""
+
+
+@dataclass(frozen=True)
+class _Task:
+    """times, displacements : (frames,) s from the nominal zero, and mm. noise : mm. interval : s, median of frames."""
+
+    driving: DrivingRecord
+    times: Floats
+    displacements: Floats
+    noise: float
+    interval: float
+    name: str
+
+    def terms(self, lags: Floats, model: ResponseModel, width: float = 0.0) -> Floats:
+        """(frames - 1, lags) terms of the logarithm of the likelihood; width : s, between the lags."""
+        blurred = width if width * self.driving.steepest > SHARP else 0.0
+        return log_likelihoods(self.driving.response(self.times, lags, blurred), self.displacements, model)
+
+    def best_model(self, lag: float) -> ResponseModel:
+        """The most likely model at one lag."""
+        return best_model(self.driving.response(self.times, np.array([lag])), self.displacements, self.noise)
+
+    def models(self, lags: Floats) -> list[ResponseModel]:
+        """The most likely models at several lags, each once, but for those that are nowhere as likely as others."""
+        found = list(dict.fromkeys(self.best_model(float(lag)) for lag in lags))
+        totals = np.array([self.terms(lags, model).sum(axis=0) for model in found])
+        good = totals.max(axis=1) > totals.max() - NEGLIGIBLE
+        chosen = [found[k] for k in np.argsort(-totals.max(axis=1)) if good[k]][:MOST_MODELS]
+        first = chosen[0]
+        looser = replace(first, compliance_walk=LOOSER * first.compliance_walk, rate_walk=LOOSER * first.rate_walk)
+        return [*chosen, looser]
+
+    @property
+    def reach(self) -> float:
+        """s about a candidate within which its posterior lies: frames do not tell lags apart, nor do slow ramps."""
+        return max(1.5 * self.interval, RAMP_SHARE / self.driving.steepest)
+
+    def subset(self, kept: Ints) -> _Task:
+        """The same with some of its frames."""
+        return replace(self, times=self.times[kept], displacements=self.displacements[kept])
+
+
+def align_clocks(
+    record: InstrumentRecord,
+    channel: str,
+    frame_times: ArrayLike,
+    displacement: ArrayLike,
+    *,
+    camera_start: float | None = None,
+    search: tuple[float, float] | None = None,
+    drift: float = DRIFT_SD,
+) -> ClockAlignment:
+    """The lag of an instrument's clock on a camera's, at which displacements jump where the pressure does.
+
+    channel : of the pressure, or of another load, that the displacement follows. frame_times : (frames,) s on the
+    camera's clock; above 1e8 they are unix times. displacement : (frames,) mm of the apex, or of any point; NaN where
+    it is lost. camera_start : unix time, s, of the camera's time zero. search : s, least and largest lag; by default
+    all at which frames and record meet. drift : standard deviation that is expected of it; 0 where both clocks run
+    alike.
+
+    Every lag is equally likely beforehand; intervals hold 95 % of the posterior probability. Creep and plastic flow
+    do not bias it, see response_likelihood. HistoryError where no change of load decides, or where several lags fit
+    about as well.
+    """
+    times, displacements = _checked_frames(record, frame_times, displacement)
+    zero = _nominal_zero(record, times, camera_start)
+    task = _Task(
+        driving_record(record, channel),
+        times - zero,
+        displacements,
+        max(noise_of_readings(displacements), 1e-4 * float(np.ptp(displacements))),
+        float(np.median(np.diff(times))),
+        f"{record.origin}: channel '{channel}'",
+    )
+    _check_range(task, record.readings(channel)[1])
+    low, high = search or (record.times[0] - task.times[-1], record.times[-1] - task.times[0])
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise HistoryError(f"search from {low:g} to {high:g} s of lag; give two finite numbers, the smaller one first")
+    if not (np.isfinite(drift) and 0.0 <= drift <= 0.01):
+        raise HistoryError(f"an expected drift of {drift:g}; give a standard deviation from 0 to 0.01, such as 1e-4")
+    candidates = _candidates(_thinned(task, None), low, high)
+    task = _thinned(task, candidates[0])
+    lag = _checked_best(task, candidates, (low, high))
+    return _posterior(task, lag, drift, (low, high), ClockAlignment(zero=zero, channel=channel, frames=times.size))
+
+
+def _checked_frames(record: InstrumentRecord, frame_times: ArrayLike, displacement: ArrayLike) -> tuple[Floats, Floats]:
+    """Times and displacements of the frames that hold one, without spikes of single frames."""
+    times, values = np.asarray(frame_times, dtype=float), np.asarray(displacement, dtype=float)
+    if times.ndim != 1 or times.shape != values.shape:
+        raise HistoryError(f"frame_times and displacement have the shapes {times.shape} and {values.shape}; give both")
+    seen = np.isfinite(values)
+    times, values = times[seen], values[seen]
+    if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise HistoryError("the times of the frames must be finite and increase; read them from the camera's files")
+    if times.size >= 3:
+        before, after = np.diff(values)[:-1], np.diff(values)[1:]
+        smaller = np.minimum(np.abs(before), np.abs(after))
+        spikes = (before * after < 0) & (smaller > SPIKE * max(noise_of_readings(values), 1e-12))
+        kept = ~np.concatenate([[False], spikes, [False]])
+        times, values = times[kept], values[kept]
+    if times.size < FEWEST_FRAMES:
+        raise HistoryError(
+            f"{record.origin}: {times.size} frames hold a displacement; an alignment needs at least {FEWEST_FRAMES}"
+        )
+    if float(np.ptp(values)) == 0.0:
+        raise HistoryError(f"{record.origin}: the displacement is the same in all frames; there is nothing to align")
+    return times, values
+
+
+def _nominal_zero(record: InstrumentRecord, times: Floats, camera_start: float | None) -> float:
+    """Camera time at which the record's time is zero if both clocks are right, or, not knowing, by the first frame."""
+    absolute = times[0] > UNIX_TIME
+    if absolute and camera_start is not None:
+        raise HistoryError(f"frame_times begin with {times[0]:g} s, which is a unix time; leave camera_start away")
+    if record.start is not None and (absolute or camera_start is not None):
+        return record.start - (camera_start or 0.0)
+    return float(times[0]) if absolute else 0.0
+
+
+def _check_range(task: _Task, values: Floats) -> None:
+    size, noise = float(np.ptp(values)), noise_of_readings(values)
+    if not size > LEAST_RANGE * noise:
+        raise HistoryError(
+            f"{task.name} changes by {size:g}, with noise of {noise:g}: there is no step to align clocks on; give the "
+            "record of a time in which the load changes, or state the lag by ck.ClockAlignment.stated(lag)"
+        )
+
+
+def _thinned(task: _Task, lag: float | None) -> _Task:
+    """At most MOST_FRAMES of the frames: evenly, or where the load changes if it is known by about which lag."""
+    count = task.times.size
+    if count <= MOST_FRAMES:
+        return task
+    even = np.linspace(0, count - 1, MOST_FRAMES // 2).astype(int)
+    if lag is None:
+        return task.subset(np.unique(even))
+    reach = 3.0 * (task.times[-1] - task.times[0]) / MOST_FRAMES + 3.0 * task.interval
+    loads = np.interp(task.times[:, None] + lag + np.linspace(-reach, reach, 9), task.driving.times, task.driving.loads)
+    near = np.argsort(-np.ptp(loads, axis=1), kind="stable")[: MOST_FRAMES // 2]
+    return task.subset(np.union1d(even, near))
+
+
+def _candidates(task: _Task, low: float, high: float) -> list[float]:
+    """The most likely lags, apart from each other by two reaches at least; the most likely one first."""
+    step = max(task.interval / 3.0, (high - low) / COARSE_LAGS)
+    lags = np.linspace(low, high, int((high - low) / step) + 2)
+    models = trial_models(task.displacements, task.noise)
+    totals = np.max([task.terms(lags, model, step).sum(axis=0) for model in models], axis=0)
+    chosen: list[float] = []
+    for k in np.argsort(-totals):
+        if all(abs(lags[k] - one) > 2.0 * max(task.reach, 1.5 * step) for one in chosen):
+            chosen.append(float(lags[k]))
+        if len(chosen) == CANDIDATES:
+            break
+    return chosen
+
+
+def _checked_best(task: _Task, candidates: Sequence[float], search: tuple[float, float]) -> float:
+    """The most likely lag; HistoryError where none beats a displacement without a load, or another one is as likely."""
+    step = max(task.interval / 3.0, (search[1] - search[0]) / COARSE_LAGS)
+    found: list[tuple[float, float]] = []
+    models = trial_models(task.displacements, task.noise)
+    for lag in candidates:
+        fine, reach = min(step / 100.0, 0.2 / task.driving.steepest), max(task.reach, 1.5 * step)
+        lags = np.linspace(lag - reach, lag + reach, min(FINE_LAGS, int(2.0 * reach / fine) + 2))
+        lags = lags[(lags >= search[0]) & (lags <= search[1])]
+        totals = np.max([task.terms(lags, m, lags[1] - lags[0]).sum(axis=0) for m in models], axis=0)
+        best = float(lags[np.argmax(totals)])
+        model = task.best_model(best)
+        totals = task.terms(lags, model).sum(axis=0)
+        peak = float(totals.max())
+        found.append((peak + float(np.log(np.exp(totals - peak).sum() * (lags[1] - lags[0]))), best))
+        if lag == candidates[0]:
+            _check_response(task, model, peak)
+    found.sort(reverse=True)
+    weights = np.exp([evidence - found[0][0] for evidence, _ in found])
+    others = [
+        f"{lag:.3g}" for (_, lag), w in zip(found[1:], weights[1:] / weights.sum(), strict=True) if w > LARGEST_OTHER
+    ]
+    if others:
+        raise HistoryError(
+            f"{task.name}: lags of {found[0][1]:.3g} s and {' and '.join(others)} s fit about as well; say between "
+            "which the lag lies, search=(least, largest)"
+        )
+    return found[0][1]
+
+
+def _check_response(task: _Task, model: ResponseModel, peak: float) -> None:
+    nothing = np.zeros((task.times.size, 1))
+    silent = Response(nothing, nothing, np.diff(task.times) / np.ptp(task.times))
+    alone = log_likelihoods(silent, task.displacements, best_model(silent, task.displacements, task.noise)).sum()
+    if not peak - alone > LEAST_GAIN:
+        raise HistoryError(
+            f"{task.name}: the displacement does not follow it at any lag; choose the channel of this specimen, give "
+            "frames from a time in which it changes, or state the lag by ck.ClockAlignment.stated(lag)"
+        )
+
+
+def _posterior(
+    task: _Task, lag: float, drift: float, search: tuple[float, float], alignment: ClockAlignment
+) -> ClockAlignment:
+    """Posterior of lag and drift on a grid that closes in on them."""
+    span = float(task.times[-1] - task.times[0])
+    middle, gain = float(task.times.mean()), 0.0
+    half, gain_half = task.reach, 3.5 * drift
+    models: list[ResponseModel] = []
+    for iteration in range(ITERATIONS):
+        warped = replace(task, times=task.times + gain * (task.times - middle))
+        if iteration < MODEL_ITERATIONS:
+            models = warped.models(lag + half * np.linspace(-0.9, 0.9, MODEL_LAGS))
+        reach = half + 0.5 * gain_half * span
+        lags = lag + np.linspace(-reach, reach, FINE_LAGS)
+        inner = lags[np.abs(lags - lag) <= half]
+        gains = gain + np.linspace(-gain_half, gain_half, DRIFTS if drift else 1)
+        terms = [warped.terms(lags, model, lags[1] - lags[0]) for model in models]
+        logs = np.logaddexp.reduce([_joint(one, lags, inner, task.times[1:] - middle, gains - gain) for one in terms])
+        if drift:
+            logs -= 0.5 * (gains[:, None] / drift) ** 2
+        logs[:, (inner < search[0]) | (inner > search[1])] = -np.inf
+        weights = np.exp(logs - logs.max())
+        weights /= weights.sum()
+        relevant = logs > logs.max() - NEGLIGIBLE
+        lag_range, gain_range = np.flatnonzero(relevant.any(axis=0)), np.flatnonzero(relevant.any(axis=1))
+        mean = np.array([weights.sum(axis=0) @ inner, weights.sum(axis=1) @ gains])
+        covariance = float(((gains - mean[1])[:, None] * (inner - mean[0]) * weights).sum())
+        variance = float(weights.sum(axis=1) @ (gains - mean[1]) ** 2)
+        shift = -covariance / variance if variance > 0 else 0.0
+        cut_off = lag_range[0] == 0 or lag_range[-1] == inner.size - 1
+        if cut_off and iteration < ITERATIONS // 2 and half < search[1] - search[0]:
+            half *= 2.0
+            continue
+        resolved = np.ptp(lag_range) >= RESOLVED and (not drift or np.ptp(gain_range) >= RESOLVED // 3)
+        if resolved and abs(shift) <= 0.02 * span:
+            break
+        step, gain_step = inner[1] - inner[0], (gains[1] - gains[0] if drift else 0.0)
+        half = max(0.6 * (np.ptp(inner[lag_range]) + 2 * step), 1e-9) + abs(shift) * gain_half
+        gain_half = 0.6 * (np.ptp(gains[gain_range]) + 2 * gain_step)
+        lag = 0.5 * float(inner[lag_range[0]] + inner[lag_range[-1]]) + shift * (mean[1])
+        middle += shift
+        gain = 0.5 * float(gains[gain_range[0]] + gains[gain_range[-1]])
+    warped = replace(task, times=task.times + mean[1] * (task.times - middle))
+    residual, _ = innovations(warped.driving.response(warped.times, mean[:1]), task.displacements, models[0])
+    by_lag, by_gain = weights.sum(axis=0), weights.sum(axis=1)
+    return replace(
+        alignment,
+        lag=float(mean[0]),
+        drift=float(mean[1]),
+        middle=middle + alignment.zero,
+        lag_interval=_interval(inner, by_lag),
+        drift_interval=_interval(gains, by_gain) if drift else (0.0, 0.0),
+        lags=inner,
+        probability=by_lag,
+        residual=float(np.sqrt(np.mean(residual**2))),
+        noise=float(models[0].noise),
+    )
+
+
+def _joint(terms: Floats, lags: Floats, inner: Floats, offsets: Floats, gains: Floats) -> Floats:
+    """(gains, lags) logarithm of the likelihood; frames at offsets (frames - 1,) s have the lag plus gain * offset.
+
+    Frames are taken in blocks, each at the time of those in it that decide most.
+    """
+    if gains.size == 1:
+        return np.asarray(terms[:, np.isin(lags, inner)].sum(axis=0)[None])
+    edges = np.unique(np.linspace(0, len(terms), BLOCKS + 1).astype(int))[:-1]
+    weights = np.ptp(terms, axis=1) + 1e-12
+    centres = np.add.reduceat(weights * offsets, edges) / np.add.reduceat(weights, edges)
+    blocks = np.add.reduceat(terms, edges, axis=0)
+    return np.array(
+        [
+            sum(np.interp(inner + gain * centre, lags, block) for centre, block in zip(centres, blocks, strict=True))
+            for gain in gains
+        ]
+    )
+
+
+def _interval(values: Floats, weights: Floats) -> tuple[float, float]:
+    """Bounds of 95 % of the probability of grid cells about values (points,)."""
+    if values.size < 2:
+        return float(values[0]), float(values[0])
+    half = 0.5 * (values[1] - values[0])
+    edges = np.append(values - half, values[-1] + half)
+    cumulative = np.append(0.0, np.cumsum(weights)) / weights.sum()
+    low, high = np.interp((0.025, 0.975), cumulative, edges)
+    return float(low), float(high)

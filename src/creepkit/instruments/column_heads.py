@@ -1,0 +1,108 @@
+"""Heads of columns: name and unit of a channel, and what a number in that unit is in MPa, K, mm or N."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+PSI = 6.894757293168361e-3
+"""MPa."""
+
+
+@dataclass(frozen=True)
+class ChannelUnit:
+    """A unit of a channel: factor * number + offset is in MPa, K, mm or N; reference : of a pressure, where it says."""
+
+    quantity: str
+    factor: float = 1.0
+    offset: float = 0.0
+    reference: str = ""
+
+
+_PRESSURES = {
+    "psi": PSI,
+    "ksi": 1e3 * PSI,
+    "bar": 0.1,
+    "mbar": 1e-4,
+    "Pa": 1e-6,
+    "hPa": 1e-4,
+    "kPa": 1e-3,
+    "MPa": 1.0,
+    "atm": 0.101325,
+    "Torr": 0.101325 / 760.0,
+    "mmHg": 0.101325 / 760.0,
+}
+
+
+_REFERENCES = {"": "", "g": "gauge", "a": "absolute", "(g)": "gauge", "(a)": "absolute"}
+
+
+_UNITS: dict[str, ChannelUnit] = {
+    **{
+        f"{unit}{suffix}": ChannelUnit("pressure", factor, reference=reference)
+        for unit, factor in _PRESSURES.items()
+        for suffix, reference in _REFERENCES.items()
+    },
+    **{unit: ChannelUnit("temperature") for unit in ("K", "Kelvin", "degK")},
+    **{
+        unit: ChannelUnit("temperature", 1.0, 273.15)
+        for unit in ("C", "°C", "degC", "deg C", "deg. C", "Celsius", "oC", "℃")
+    },
+    **{
+        unit: ChannelUnit("temperature", 5.0 / 9.0, 459.67 * 5.0 / 9.0)
+        for unit in ("F", "°F", "degF", "deg F", "deg. F", "Fahrenheit", "oF")
+    },
+    **{"mm": ChannelUnit("length"), "m": ChannelUnit("length", 1e3), "cm": ChannelUnit("length", 10.0)},
+    **{unit: ChannelUnit("length", 1e-3) for unit in ("um", "µm", "μm", "micron")},
+    **{unit: ChannelUnit("length", 25.4) for unit in ("in", "inch")},
+    **{"N": ChannelUnit("force"), "kN": ChannelUnit("force", 1e3), "lbf": ChannelUnit("force", 4.4482216152605)},
+}
+
+
+_ANY_CASE = {unit.lower(): found for unit, found in _UNITS.items() if len(unit) > 1}
+"""Units of several letters, which no capitals tell apart; mPa would be, and is refused."""
+
+
+TIME_UNITS = {
+    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "S", "Sec"), 1.0),
+    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
+    **dict.fromkeys(("us", "µs", "μs", "microseconds"), 1e-6),
+    **dict.fromkeys(("ns", "nanoseconds"), 1e-9),
+    **dict.fromkeys(("min", "mins", "minute", "minutes"), 60.0),
+    **dict.fromkeys(("h", "hr", "hrs", "hour", "hours", "Std"), 3600.0),
+    **dict.fromkeys(("d", "day", "days"), 86400.0),
+}
+"""{unit: s}."""
+
+
+_BRACKETED = re.compile(r"(?P<name>[^()\[\]]*[^()\[\]\s])\s*[(\[](?P<unit>[^\[\]]{1,30}?)[)\]]")
+
+
+_BEHIND = re.compile(r"(?P<name>.*[^\s/,_])(?:\s*[/,]\s*|\s+|_)(?P<unit>[^\s_/,]{1,12})")
+
+
+def channel_unit(text: str) -> ChannelUnit | None:
+    """The unit of a channel that a text names; None where it names none."""
+    unit = " ".join(text.split())
+    if unit in _UNITS:
+        return _UNITS[unit]
+    return None if unit[:3] == "mPa" else _ANY_CASE.get(unit.lower())
+
+
+KNOWN_UNITS = ("psi", "psig", "psia", "bar", "barg", "MPa", "kPa", "Torr", "C", "F", "K", "mm", "um", "in", "N", "kN")
+"""Units of channels, for errors."""
+
+
+def split_head(head: str) -> tuple[str, str]:
+    """Name and unit of a column's head, such as "P1 [bar]", "Temp.(C)", "pressure_MPa" or "p / kPa"; unit "" if none.
+
+    In brackets anything is a unit; behind a blank, a comma, a slash or `_` only a unit that is known.
+    """
+    text = head.strip()
+    if len(text) > 200:
+        return text, ""
+    if match := _BRACKETED.fullmatch(text):
+        return match["name"], match["unit"].strip()
+    if (match := _BEHIND.fullmatch(text)) and (channel_unit(match["unit"]) or match["unit"] in TIME_UNITS):
+        return match["name"].rstrip(":"), match["unit"]
+    return text, ""

@@ -1,0 +1,345 @@
+"""An instrument's record from its file: the format that accepts it, its channels in MPa, K, mm, its clock."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from creepkit.arrays import Floats, Ints
+from creepkit.errors import HistoryError, nearest
+from creepkit.instruments.column_heads import KNOWN_UNITS, TIME_UNITS, ChannelUnit, channel_unit, split_head
+from creepkit.instruments.record_tables import MISSING, KeptColumns, TableHead, block_means, find_head, numbered_lines
+from creepkit.instruments.time_stamps import DATE_ORDERS, ResolvedTimes, resolve
+from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
+
+TIME_NAMES = (
+    *("time", "timestamp", "time stamp", "datetime", "date time", "date/time", "date and time", "t", "clock", "zeit"),
+    *("elapsed", "elapsed time", "unix", "unix time", "epoch", "epoch time", "uhrzeit", "zeitstempel", "test time"),
+)
+DATE_NAMES = ("date", "datum", "day")
+UNIX_SCALES = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
+"""Numbers above the first are unix times in units of the second, s; below 1e8 they are none."""
+
+
+LARGEST_PRESSURE, TEMPERATURES = 1e5, (0.0, 1e4)
+"""MPa and K beyond which a reading is a fault of the instrument."""
+
+
+@dataclass(frozen=True)
+class ReadingOptions:
+    """What a caller says about a record.
+
+    time, date : names of their columns. time_unit : "s", "ms", "min", "h" of times without a unit. date_order : "month
+    first" or "day first". time_zone : such as "America/Chicago" or "+01:00". channels : names of those that are kept;
+    None keeps all. every : rows that are averaged to one. units : {channel: unit} of heads without one.
+    pressure_reference : "gauge" or "absolute", of pressures whose unit does not say. ambient_pressure : MPa, that turns
+    absolute pressures into gauge pressures. missing : texts that mean a lost reading, beside the usual ones.
+    """
+
+    time: str = ""
+    date: str = ""
+    time_unit: str = ""
+    date_order: str = ""
+    time_zone: str = ""
+    channels: Sequence[str] | None = None
+    every: int = 1
+    units: Mapping[str, str] = field(default_factory=dict)
+    pressure_reference: str = ""
+    ambient_pressure: float | None = None
+    missing: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        self._check_types()
+        if isinstance(self.every, bool) or not isinstance(self.every, int) or not 1 <= self.every <= 100_000:
+            raise HistoryError(f"every={self.every!r:.40}; give a number of rows from 1 to 100000")
+        if self.pressure_reference not in ("", "gauge", "absolute"):
+            raise HistoryError(f"pressure_reference is '{self.pressure_reference}'; write 'gauge' or 'absolute'")
+        if self.ambient_pressure is not None and not 0.0 <= self.ambient_pressure <= 10.0:
+            raise HistoryError(f"ambient_pressure is {self.ambient_pressure} MPa; give 0 to 10, such as 0.1013")
+        if self.time_unit and self.time_unit not in TIME_UNITS:
+            raise HistoryError(f"time_unit is '{self.time_unit}'; {nearest(self.time_unit, TIME_UNITS)}")
+        if isinstance(self.channels, str):
+            raise HistoryError(
+                f"channels is '{self.channels:.40}'; give a list of names: channels=['{self.channels:.40}']"
+            )
+
+    def _check_types(self) -> None:
+        for name in ("time", "date", "time_unit", "date_order", "time_zone", "pressure_reference"):
+            if not isinstance(getattr(self, name), str):
+                raise HistoryError(f"{name} is {getattr(self, name)!r:.40}; give a text")
+        if not isinstance(self.units, Mapping) or not all(isinstance(unit, str) for unit in self.units.values()):
+            raise HistoryError(f"units is {self.units!r:.40}; give {{channel: unit}}, such as {{'P1': 'bar'}}")
+        if isinstance(self.missing, str) or not isinstance(self.missing, Sequence):
+            raise HistoryError(f"missing is {self.missing!r:.40}; give a list of texts, such as ['n.a.']")
+        if self.channels is not None and not isinstance(self.channels, Sequence):
+            raise HistoryError(f"channels is {self.channels!r:.40}; give a list of names")
+        ambient = self.ambient_pressure
+        if ambient is not None and (isinstance(ambient, bool) or not isinstance(ambient, (int, float))):
+            raise HistoryError(f"ambient_pressure is {ambient!r:.40}; give a number of MPa, such as 0.1013")
+        if self.date_order and self.date_order not in DATE_ORDERS:
+            raise HistoryError(f"date_order is '{self.date_order:.40}'; write 'month first' or 'day first'")
+
+    @classmethod
+    def of(cls, options: Mapping[str, Any]) -> ReadingOptions:
+        """Options by name; HistoryError for one that there is not."""
+        known = [one.name for one in fields(cls)]
+        for name in options:
+            if name not in known:
+                raise HistoryError(f"read_record() has no option '{name}'; {nearest(name, known)}")
+        return cls(**options)
+
+
+def read_record(
+    path: str | Path, formats: Sequence[InstrumentFormat], format: str | None, options: Mapping[str, Any]
+) -> InstrumentRecord:
+    """The record in a file, read part by part; the public function with this name says what the options are."""
+    given = ReadingOptions.of(options)
+    if not isinstance(path, (str, Path)):
+        raise HistoryError(f"read_record() takes the path of a file, found {path!r:.40}")
+    path = Path(path).expanduser()
+    parts = numbered_lines(path)
+    ahead = next(parts, [])
+    head = find_head(path, ahead)
+    chosen = _format_of(path, head, formats, format)
+    layout = _Layout.of(path, head, chosen, given)
+    kept = KeptColumns(path, head, layout.columns, layout.times, given.every, layout.missing)
+    for part in parts:
+        kept.add(ahead, last=False)
+        ahead = part
+    kept.add(ahead, last=True)
+    return layout.record(kept)
+
+
+def _format_of(path: Path, head: TableHead, formats: Sequence[InstrumentFormat], name: str | None) -> InstrumentFormat:
+    if name is not None:
+        known = {one.name: one for one in formats}
+        if name not in known:
+            raise HistoryError(f"no format of instruments is called '{name}'; {nearest(name, known)}")
+        if not known[name].accepts(head.names):
+            raise HistoryError(
+                f"{path}:{head.names_line}: the format '{name}' wants columns named {', '.join(known[name].required)}"
+            )
+        return known[name]
+    accepting = [one for one in formats if one.required and one.accepts(head.names)]
+    if len(accepting) > 1:
+        raise HistoryError(
+            f"{path}: the formats {' and '.join(one.name for one in accepting)} both accept it; say which, format='...'"
+        )
+    general = [one for one in formats if not one.required]
+    if not accepting and not general:
+        raise HistoryError(
+            f"{path}: no format of instruments accepts it; known are {', '.join(o.name for o in formats)}"
+        )
+    return (accepting or general)[0]
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Which column is what.
+
+    columns, names, written : positions, names and units of the channels that are kept. times : positions of date
+    and time, or of time alone.
+    time_unit : of the head or the options, "" where neither says.
+    """
+
+    path: Path
+    head: TableHead
+    format: InstrumentFormat
+    options: ReadingOptions
+    columns: tuple[int, ...]
+    names: tuple[str, ...]
+    written: tuple[str, ...]
+    times: tuple[int, ...]
+    time_unit: str
+
+    @classmethod
+    def of(cls, path: Path, head: TableHead, chosen: InstrumentFormat, options: ReadingOptions) -> _Layout:
+        place = f"{path}:{head.names_line}"
+        split = [split_head(text) for text in head.names]
+        names = [name for name, _ in split]
+        written = [head.units[k] or unit for k, (_, unit) in enumerate(split)]
+        plain = ["" if channel_unit(unit) else name for name, unit in zip(names, written, strict=True)]
+        clock = _named(place, options.time or chosen.time, head.names, names)
+        day = _named(place, options.date or chosen.date, head.names, names)
+        times = _time_columns(place, head.names, plain, clock, day)
+        unit = written[times[-1]]
+        seconds = unit if unit in TIME_UNITS else options.time_unit or chosen.time_unit
+        channels = [k for k in range(len(names)) if k not in times]
+        _check_names(place, [names[k] or f"column {k + 1}" for k in channels])
+        units = dict(options.units)
+        for name in units:
+            if name not in names:
+                raise HistoryError(f"{place}: units of '{name}', which is no channel; {nearest(name, names)}")
+        for k in channels:
+            declared = next((u for pattern, u in chosen.units.items() if re.fullmatch(pattern, head.names[k])), "")
+            if names[k] in units and written[k] not in ("", units[names[k]]):
+                raise HistoryError(
+                    f"{place}: the head of '{names[k]}' states {written[k]}, units= says {units[names[k]]}; keep one"
+                )
+            written[k] = written[k] or units.get(names[k], declared)
+            if names[k] in units and channel_unit(units[names[k]]) is None:
+                raise HistoryError(
+                    f"the unit '{units[names[k]]}' of '{names[k]}' is not known; {', '.join(KNOWN_UNITS)}"
+                )
+        if options.channels is not None:
+            channels = [_position(place, name, head.names, names, channels) for name in options.channels]
+        return cls(
+            path,
+            head,
+            chosen,
+            options,
+            tuple(channels),
+            tuple(names[k] or f"column {k + 1}" for k in channels),
+            tuple(written[k] for k in channels),
+            times,
+            seconds,
+        )
+
+    @property
+    def missing(self) -> frozenset[str]:
+        """Texts in the place of a reading."""
+        return MISSING | {*self.format.missing, *self.options.missing}
+
+    def record(self, kept: KeptColumns) -> InstrumentRecord:
+        """The record of the rows that were read."""
+        if not kept.lines:
+            raise HistoryError(f"{self.path}:{self.head.names_line}: no rows below the names; a record needs some")
+        lines = np.concatenate(kept.lines)
+        resolved = self._times(kept, lines)
+        notes = [*resolved.notes]
+        if kept.incomplete:
+            notes.append(f"its last line, {kept.incomplete}, is cut off and was left out")
+        times = block_means(resolved.times, self.options.every)
+        if self.options.every > 1:
+            notes.append(f"each row is the mean of {self.options.every} rows of the file")
+        first = np.flatnonzero(np.concatenate([[True], np.diff(times) > 0]))
+        if first.size < times.size:
+            notes.append(f"{times.size - first.size} rows with the time of the row before were averaged with it")
+        channels: dict[str, Channel] = {}
+        for name, written, parts in zip(self.names, self.written, kept.values, strict=True):
+            values = np.concatenate(parts)
+            if first.size < times.size:
+                values = _merged(values, first)
+            channels[name], remarks = self._channel(name, written, values)
+            notes += remarks
+        shift = times[0] if resolved.start is not None else 0.0
+        return InstrumentRecord(
+            self.path.stem,
+            times[first] - shift,
+            channels,
+            None if resolved.start is None else resolved.start + shift,
+            self.format.channel_patterns,
+            tuple(notes),
+            str(self.path),
+        )
+
+    def _times(self, kept: KeptColumns, lines: Ints) -> ResolvedTimes:
+        """Seconds; those of a column of numbers keep its zero, unless they are unix times."""
+        order = self.options.date_order or self.format.date_order
+        zone = self.options.time_zone or self.format.time_zone
+        if kept.clock is not None:
+            return resolve(kept.clock, str(self.path), lines, order, zone)
+        numbers = np.concatenate(kept.numbers)
+        factor = TIME_UNITS.get(self.time_unit)
+        if factor is None:
+            factor = next((scale for limit, scale in UNIX_SCALES if numbers[0] > limit), None)
+        if factor is None:
+            raise HistoryError(
+                f"{self.path}:{self.head.names_line}: the unit of '{self.head.names[self.times[-1]]}' is not stated; "
+                "write it into its name, such as time_s, or state time_unit='s', 'ms', 'min' or 'h'"
+            )
+        falls = np.diff(numbers) < 0
+        if falls.any():
+            row = int(np.argmax(falls)) + 1
+            raise HistoryError(
+                f"{self.path}:{lines[row]}: time falls from {numbers[row - 1]:g} to {numbers[row]:g}; it must never "
+                "decrease"
+            )
+        if numbers[0] * factor > UNIX_SCALES[-1][0]:
+            return ResolvedTimes((numbers - numbers[0]) * factor, float(numbers[0] * factor))
+        return ResolvedTimes(numbers * factor, None)
+
+    def _channel(self, name: str, written: str, numbers: Floats) -> tuple[Channel, list[str]]:
+        """A channel in creepkit's unit, and what was found about it."""
+        unit = channel_unit(written) if written else None
+        unit = unit or ChannelUnit("number")
+        values = unit.factor * numbers + unit.offset
+        reference, notes = unit.reference, []
+        if unit.quantity == "pressure":
+            reference = reference or self.options.pressure_reference or self.format.pressure_reference
+            if reference == "absolute" and self.options.ambient_pressure is not None:
+                values, reference = values - self.options.ambient_pressure, "gauge"
+                notes.append(
+                    f"{name}: absolute; {self.options.ambient_pressure:g} MPa of ambient pressure were taken off"
+                )
+        low, high = {"pressure": (-LARGEST_PRESSURE, LARGEST_PRESSURE), "temperature": TEMPERATURES}.get(
+            unit.quantity, (-np.inf, np.inf)
+        )
+        with np.errstate(invalid="ignore"):
+            faults = (values <= low) | (values >= high)
+        if faults.any():
+            values = np.where(faults, np.nan, values)
+            notes.append(f"{name}: {int(faults.sum())} impossible readings are marked as missing")
+        lost = int(np.isnan(values).sum() - faults.sum())
+        if lost:
+            notes.append(f"{name}: {lost} of {values.size} readings are missing")
+        return Channel(name, unit.quantity, values, reference, written), notes
+
+
+def _named(place: str, wanted: str, heads: Sequence[str], names: Sequence[str]) -> int | None:
+    """Position of the column that is called so; None where no name is given."""
+    if not wanted:
+        return None
+    for known in (heads, names):
+        if wanted in known:
+            return list(known).index(wanted)
+    raise HistoryError(f"{place}: there is no column '{wanted}'; {nearest(wanted, heads)}")
+
+
+def _time_columns(
+    place: str, heads: Sequence[str], names: Sequence[str], clock: int | None, day: int | None
+) -> tuple[int, ...]:
+    """Position of the column of time, with that of the date in front where there is one.
+
+    names : of columns that may be one of them, "" for the others. clock, day : where they are known.
+    """
+    plain = [name if name == "T" else name.lower().replace("_", " ").strip() for name in names]
+    if clock is None:
+        clock = next((plain.index(one) for one in TIME_NAMES if one in plain), None)
+    if day is None:
+        day = next((plain.index(one) for one in DATE_NAMES if one in plain), None)
+    found = tuple(dict.fromkeys(k for k in (day, clock) if k is not None))
+    if not found:
+        raise HistoryError(
+            f"{place}: no column of time among {', '.join(heads):.200}; name one time, or state time='its name'"
+        )
+    return found
+
+
+def _position(place: str, wanted: str, heads: Sequence[str], names: Sequence[str], channels: Sequence[int]) -> int:
+    for known in (names, heads):
+        for k in channels:
+            if known[k] == wanted:
+                return k
+    raise HistoryError(f"{place}: there is no channel '{wanted}'; {nearest(str(wanted), [names[k] for k in channels])}")
+
+
+def _check_names(place: str, names: Sequence[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise HistoryError(f"{place}: the channel '{name:.60}' stands there twice; rename one of them")
+        seen.add(name)
+
+
+def _merged(values: Floats, first: Ints) -> Floats:
+    """Means of the rows of equal time."""
+    seen = ~np.isnan(values)
+    counts = np.add.reduceat(seen.astype(float), first)
+    sums = np.add.reduceat(np.where(seen, values, 0.0), first)
+    return np.asarray(np.divide(sums, counts, out=np.full(counts.size, np.nan), where=counts > 0))

@@ -1,0 +1,96 @@
+"""What was imposed on one specimen: programs on the clock of its frames, with a stated error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import HistoryError
+from creepkit.records import Channel, ClockAlignment, InstrumentRecord, Program
+
+TIMES = np.arange(0.0, 4000.0, 1.0)
+LOAD = Program(np.array([0.0, 500, 520, 4000]), np.array([0.0, 0, 8, 8]))
+FURNACE = Program(np.array([0.0, 2500, 2600, 4000]), np.array([1050.0, 1050, 1040, 1040]))
+FRAMES = np.arange(100.0, 3500.0, 100.0)
+
+
+def record(noise: float = 0.0, reference: str = "gauge", *, quantity: str = "temperature") -> InstrumentRecord:
+    rng = np.random.default_rng(3)
+    load = LOAD.at(TIMES) + noise * rng.standard_normal(TIMES.size)
+    furnace = FURNACE.at(TIMES) + 10 * noise * rng.standard_normal(TIMES.size)
+    channels = [Channel("D1: P", "pressure", load, reference), Channel("D1: T", quantity, furnace)]
+    patterns = {"pressure": "{}: P", "temperature": "{}: T"}
+    return InstrumentRecord("test", TIMES, {one.name: one for one in channels}, channel_patterns=patterns)
+
+
+def test_programs_are_on_the_clock_of_the_history_which_starts_with_the_first_ramp() -> None:
+    found = ck.imposed(record(), "D1", FRAMES, ClockAlignment.stated(50.0))
+    assert found.time_zero == pytest.approx(450.0, abs=1.5)  # 500 s of the record, which is 50 s ahead
+    seen = np.arange(0.0, 3000.0, 10.0)
+    np.testing.assert_allclose(found.load.at(seen), LOAD.at(seen + found.time_zero + 50.0), atol=0.1)
+    np.testing.assert_allclose(found.temperature.at(seen), FURNACE.at(seen + found.time_zero + 50.0), atol=0.25)
+    assert found.load.times.size < 8
+    assert found.load_error <= 0.002 * 8.0
+
+
+def test_noise_is_not_followed_and_its_size_is_stated() -> None:
+    found = ck.imposed(record(noise=0.05), "D1", FRAMES, ClockAlignment.stated(0.0))
+    assert found.load_noise == pytest.approx(0.05, rel=0.15)
+    assert found.temperature_noise == pytest.approx(0.5, rel=0.15)
+    held = np.arange(100.0, 2900.0, 10.0)
+    np.testing.assert_allclose(found.load.at(held), 8.0, atol=0.1)
+    assert found.load.times.size < 60
+
+
+def test_a_simulation_takes_what_was_imposed() -> None:
+    found = ck.imposed(record(), "D1", FRAMES, ClockAlignment.stated(0.0))
+    history = ck.History(
+        "D1",
+        (FRAMES - found.time_zero)[found.time_zero + 1.0 < FRAMES],
+        {},
+        ck.RecordedLoading(found.load, "pressure"),
+        found.temperature,
+        "bulge",
+        ck.Elastic(150e3),
+    )
+    assert history.loading.program().values.max() == pytest.approx(8.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("changed", "specimen", "message"),
+    [
+        (record(reference="absolute"), "D1", "holds absolute pressures"),
+        (record(reference=""), "D1", "gauge or absolute pressures is not stated"),
+        (record(quantity="number"), "D1", "'D1: T' is no temperature, for its unit is not stated"),
+        (record(), "D2", "no channel 'D2: P' of 'D2'"),
+        (record(), ("D1: P", "D1: X"), "there is no channel 'D1: X'"),
+        (record().between(0.0, 2000.0), "D1", "it covers 0 to 2000"),
+    ],
+)
+def test_what_is_not_known_is_asked_for(
+    changed: InstrumentRecord, specimen: str | tuple[str, str], message: str
+) -> None:
+    with pytest.raises(HistoryError) as caught:
+        ck.imposed(changed, specimen, FRAMES, ClockAlignment.stated(0.0))
+    assert message in str(caught.value)
+
+
+def test_a_record_in_the_zone_of_the_frames_needs_no_alignment() -> None:
+    known = InstrumentRecord("test", TIMES, record().channels, 1.7e9, record().channel_patterns)
+    assert ck.imposed(known, "D1", FRAMES + 1.7e9).time_zero == pytest.approx(1.7e9 + 500.0, abs=1.5)
+    with pytest.raises(HistoryError, match="not known to agree"):
+        ck.imposed(record(), "D1", FRAMES)
+
+
+def test_records_are_cut_and_thinned_and_gaps_are_found() -> None:
+    one = record()
+    part = one.between(490.0, 600.0)
+    assert part.times[[0, -1]].tolist() == [490.0, 600.0]
+    program = one.program("D1: P", 0.01)
+    np.testing.assert_allclose(program.at(TIMES), LOAD.at(TIMES), atol=0.01)
+    rows = np.delete(np.arange(TIMES.size), slice(1000, 1100))
+    cut = InstrumentRecord("cut", TIMES[rows], {"P": Channel("P", "pressure", LOAD.at(TIMES[rows]))})
+    assert cut.gaps.tolist() == [[999.0, 1100.0]]
+    with pytest.raises(HistoryError, match="no row from 5000 to 6000 s"):
+        one.between(5000.0, 6000.0)

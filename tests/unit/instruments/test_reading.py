@@ -1,0 +1,229 @@
+"""Records of data loggers: what is written in many ways is read as one thing; what may mean two is asked for."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import HistoryError
+from creepkit.instruments.column_heads import split_head
+from helpers.instrument_samples import samples
+from helpers.paths import SHARED, needs_shared_data
+
+FILES = samples()
+PSI = 0.45359237 * 9.80665 / 0.0254**2 * 1e-6
+"""MPa, from the definitions of pound, standard gravity and inch."""
+
+
+def written(folder: Path, content: bytes | str, name: str = "x.csv") -> Path:
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def table(stamps: list[str], head: str = "time") -> str:
+    return "\n".join([f"{head},p_barg", *(f"{stamp},{k}" for k, stamp in enumerate(stamps))]) + "\n"
+
+
+def test_the_record_of_the_rig(tmp_path: Path) -> None:
+    record = ck.read_record(written(tmp_path, FILES["plate.csv"]), time_zone="America/Chicago")
+    assert record.start == pytest.approx(1755561082.947365, abs=1e-6)  # 2025-08-18 23:51:22.947365 UTC
+    np.testing.assert_allclose(np.diff(record.times), 0.1, atol=1e-9)
+    pressure, temperature = record.channel("D1: Press."), record.channel("D1: Temp.")
+    assert (pressure.quantity, pressure.reference, pressure.written_unit) == ("pressure", "gauge", "PSIG")
+    assert pressure.values[-1] == pytest.approx(1.015e3 * PSI, rel=1e-9)  # 70 bar, written with four digits
+    assert temperature.values[0] == pytest.approx(777.3 + 273.15)
+    assert record.channel("Thermocouple1").quantity == "number"
+
+
+@pytest.mark.parametrize(
+    ("name", "span", "channel", "value"),
+    [
+        ("elapsed.csv", 78.0, "pressure", 7.0),
+        ("midnight.txt", 39.0, "P1", 139 * PSI),
+        ("iso.csv", 39.0, "Pressure", 39.0),
+        ("unix.csv", 7.8, "p", 53.7 * PSI),
+        ("german.csv", 39.0, "Druck", 3.95),
+        ("dropouts.csv", 1170.0, "P", 7.8),
+        ("units_below.csv", 39.0, "Pressure", 7.0),
+        ("us_dates.csv", 39.0, "P", 39 * PSI),
+        ("blanks.txt", 39.0, "p", 3.9),
+        ("western.txt", 39.0, "P1", 139 * PSI),
+        ("utf16.csv", 78.0, "pressure", 7.0),
+        ("mark.csv", 39.0, "Pressure", 39.0),
+    ],
+)
+def test_other_loggers(tmp_path: Path, name: str, span: float, channel: str, value: float) -> None:
+    record = ck.read_record(written(tmp_path, FILES[name], name))
+    assert np.ptp(record.times) == pytest.approx(span, abs=1e-6)
+    assert record.channel(channel).values[-1] == pytest.approx(value, rel=1e-9)
+
+
+def test_lost_readings_are_marked_and_counted(tmp_path: Path) -> None:
+    record = ck.read_record(written(tmp_path, FILES["dropouts.csv"]))
+    assert np.isnan(record.channel("P").values).nonzero()[0].tolist() == [5]
+    assert np.isnan(record.channel("TC1").values).nonzero()[0].tolist() == [7, 8]
+    assert record.notes == ("P: 1 of 40 readings are missing", "TC1: 2 of 40 readings are missing")
+
+
+@pytest.mark.parametrize(
+    ("stamps", "start"),
+    [
+        (["2025-08-18T18:51:00Z", "2025-08-18T18:52:00Z"], 1755543060.0),
+        (["2025-08-18 18:51:00+02:00", "2025-08-18 18:52:00+02:00"], 1755535860.0),
+        (["1755543060", "1755543120"], 1755543060.0),
+        (["1755543060000", "1755543120000"], 1755543060.0),
+    ],
+)
+def test_absolute_times(tmp_path: Path, stamps: list[str], start: float) -> None:
+    record = ck.read_record(written(tmp_path, table(stamps)))
+    assert record.start == start
+    assert record.times.tolist() == [0.0, 60.0]
+
+
+@pytest.mark.parametrize(("order", "day"), [("month first", "2025-03-04"), ("day first", "2025-04-03")])
+def test_a_date_that_may_be_two_is_asked_for(tmp_path: Path, order: str, day: str) -> None:
+    path = written(tmp_path, table(["3/4/2025 00:00:00", "3/4/2025 00:01:00"]))
+    with pytest.raises(HistoryError, match="x.csv:2: the date '3/4/2025' may have the month or the day first"):
+        ck.read_record(path)
+    record = ck.read_record(path, date_order=order, time_zone="+00:00")
+    assert record.start == np.datetime64(day).astype("datetime64[s]").astype(float)
+
+
+def test_other_rows_decide_on_the_order_of_a_date(tmp_path: Path) -> None:
+    by_number = ck.read_record(written(tmp_path, table(["12/8/2025 23:59:00", "13/8/2025 00:00:00"])))
+    by_order = ck.read_record(written(tmp_path, table(["3/4/2025 23:59:00", "3/5/2025 00:00:00"])))
+    assert by_number.times.tolist() == by_order.times.tolist() == [0.0, 60.0]
+    assert "its dates have the day first" in by_number.notes
+    assert any("month first" in note for note in by_order.notes)
+
+
+def test_clocks_that_are_put_back_for_winter(tmp_path: Path) -> None:
+    stamps = [f"2025-11-02 {hour}:{minute:02d}:00" for hour in ("00", "01", "01", "02") for minute in (0, 30)]
+    path = written(tmp_path, table(stamps))
+    with pytest.raises(HistoryError, match=r"x.csv:6: time falls by 1800 s; .*state time_zone"):
+        ck.read_record(path)
+    record = ck.read_record(path, time_zone="America/Chicago")
+    np.testing.assert_array_equal(np.diff(record.times), 1800.0)
+
+
+def test_a_time_that_no_clock_showed_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, table(["2025-03-09 01:59:00", "2025-03-09 02:30:00"]))
+    with pytest.raises(HistoryError, match=r"x.csv:3: there was no 02:30 on 2025-03-09 in America/Chicago"):
+        ck.read_record(path, time_zone="America/Chicago")
+
+
+def test_absolute_pressures_become_gauge_only_by_a_stated_ambient_pressure(tmp_path: Path) -> None:
+    path = written(tmp_path, "time_s,p_bara\n0,1.013\n1,11.013\n")
+    assert ck.read_record(path).channel("p").reference == "absolute"
+    channel = ck.read_record(path, ambient_pressure=0.1013).channel("p")
+    assert channel.reference == "gauge"
+    np.testing.assert_allclose(channel.values, [0.0, 1.0], atol=1e-12)
+
+
+def test_rows_are_averaged_and_channels_left_out_on_reading(tmp_path: Path) -> None:
+    path = written(tmp_path, FILES["plate.csv"])
+    whole = ck.read_record(path)
+    part = ck.read_record(path, channels=["D1: Press."], every=8)
+    assert [*part.channels] == ["D1: Press."]
+    np.testing.assert_allclose(
+        part.channel("D1: Press.").values, whole.channel("D1: Press.").values.reshape(-1, 8).mean(axis=1)
+    )
+    np.testing.assert_allclose(np.diff(part.times), 0.8, atol=1e-9)
+
+
+def test_files_of_several_parts_are_read_as_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from creepkit.instruments import record_tables
+
+    path = written(tmp_path, FILES["plate.csv"].replace(b"\n", b"\r\n"))
+    whole = ck.read_record(path)
+    for size in (700, 1023, 1500):
+        monkeypatch.setattr(record_tables, "PART_BYTES", size)
+        parts = ck.read_record(path)
+        np.testing.assert_array_equal(parts.times, whole.times)
+        np.testing.assert_array_equal(parts.channel("D1: Temp.").values, whole.channel("D1: Temp.").values)
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "message"),
+    [
+        ("", {}, "the file is empty"),
+        ("time_s,p_bar\n", {}, ":1: no row of readings"),
+        ("1,2\n3,4\n", {}, ":1: the rows begin here, with 2 columns, and no line above names as many"),
+        ("p_bar,T_C\n1,2\n", {}, ":1: no column of time among p_bar, T_C"),
+        ("time,p_bar\n0,1\n1,2\n", {}, ":1: the unit of 'time' is not stated"),
+        ("time_s,p_bar\n0,1\n1,x\n", {}, ":3, column 2: 'p_bar' is 'x'"),
+        ("time_s,p_bar\n0,1\n1,2,3\n2,3\n", {}, ":3: number of cells 3, of names 2"),
+        ("time_s,p_bar\n1,1\n0,2\n", {}, ":3: time falls from 1 to 0"),
+        ("time,p_bar\n10:00:00,1\n9:00:00,2\n", {}, ":3: time falls by 3600 s"),
+        ("time,p_bar\n10:00:00,1\n10:61:00,2\n", {}, ":3, column 1: time is '10:61:00'"),
+        ("time_s,p_bar,p_bar\n1,1,2\n", {}, ":1: the channel 'p' stands there twice"),
+        ("time_s,p_bar\n0,1\n", {"chanels": ["p"]}, "no option 'chanels'; did you mean 'channels'"),
+        ("time_s,p_bar\n0,1\n", {"channels": ["q"]}, ":1: there is no channel 'q'; known: p"),
+        (
+            "time_s,p_bar\n0,1\n",
+            {"format": "tabel"},
+            "no format of instruments is called 'tabel'; did you mean 'table'",
+        ),
+        ("time,p\n2025-02-30 10:00,1\n", {}, ":2: '2025-02-30' is no date"),
+        ("time,p\n2025-02-20 10:00,1\n", {"time_zone": "Mars"}, "time_zone is 'Mars'"),
+    ],
+)
+def test_what_cannot_be_read_is_said_in_one_sentence(
+    tmp_path: Path, content: str, options: dict[str, object], message: str
+) -> None:
+    with pytest.raises(HistoryError) as caught:
+        ck.read_record(written(tmp_path, content), **options)  # type: ignore[arg-type]
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_damaged_files_are_read_or_refused_in_one_sentence(tmp_path: Path, name: str) -> None:
+    draw = random.Random(name)
+    messages: list[str] = []
+    for _ in range(40):
+        content = bytearray(FILES[name])
+        for _ in range(draw.choice((1, 3, 10))):
+            place = draw.randrange(len(content))
+            kind = draw.randrange(4)
+            if kind == 0:
+                content[place] = draw.randrange(256)
+            elif kind == 1:
+                del content[place : place + draw.choice((1, 40, 400))]
+            elif kind == 2:
+                content[place:place] = draw.choice((b'"', b",", b"\n", b"nan", b"1e999", b"99:99", b"2/30/2025", b"\0"))
+            else:
+                start = draw.randrange(len(content))
+                content[place:place] = content[start : start + 60]
+            content = content or bytearray(b" ")
+        try:
+            record = ck.read_record(written(tmp_path, bytes(content), name))
+        except HistoryError as error:
+            messages.append(str(error))
+        else:
+            assert (np.diff(record.times) > 0).all()
+    assert not any("\n" in message for message in messages)
+
+
+def test_units_in_heads() -> None:
+    assert split_head("A1: Press.(PSIG)") == ("A1: Press.", "PSIG")
+    assert split_head("P1 [bar(g)]") == ("P1", "bar(g)")
+    assert split_head("p / kPa") == ("p", "kPa")
+    assert split_head("furnace_temperature_C") == ("furnace_temperature", "C")
+    assert split_head("set_point") == ("set_point", "")
+
+
+@needs_shared_data
+def test_the_record_of_dimple_d1() -> None:
+    record = ck.read_record(SHARED / "cameras/dabi_static/D1_record.csv")
+    assert record.times.size == 1421
+    assert record.interval == pytest.approx(0.1, abs=1e-6)
+    assert sum(c.reference == "gauge" for c in record.channels.values()) == 26
+    assert sum(c.quantity == "temperature" for c in record.channels.values()) == 25
+    first = ck.read_record(SHARED / "dabi/log/dimple_D1_log.csv")
+    assert first.times.size > 300
