@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -137,6 +138,8 @@ def _number_rows(text: str, lines: Sequence[str], start: int, decimal: str | Non
     allowed = f"0123456789+-eE\n{dialect.delimiter}{point}"
     if "\n\n" in body or body.startswith("\n") or not body.isascii() or body.encode().translate(None, allowed.encode()):
         return None
+    if re.search(rf"(?:^|[\n{dialect.delimiter}+-])0[0-9]+(?:[\n{dialect.delimiter}]|$)", body):
+        return None  # a whole number such as 0123 is refused
     try:
         numbers = np.loadtxt(
             io.StringIO(body if point == "." else body.replace(",", ".")),
