@@ -61,6 +61,10 @@ _THOUSANDS_LIKE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 """Three digits behind one comma: a number below 1000 with a decimal comma, or a larger one with a separator."""
 
 
+_PADDED = re.compile(r"^[+-]?0\d+$", re.ASCII | re.MULTILINE)
+"""A whole number that begins with 0, as 0123 does where the sign of 0.123 was lost."""
+
+
 _PLAIN_CHARACTERS = frozenset("0123456789+-.eE")
 
 
@@ -135,9 +139,10 @@ def split_line(line: str, dialect: Dialect, location: str = "") -> list[str]:
 def parse_number(text: str, dialect: Dialect, location: str, name: str) -> float:
     """A cell as a number; `name` and `location` say in the HistoryError what it was meant to be, and where it stands.
 
-    An exponent may be written E or D. NaN, infinities, and digits in groups are no numbers.
+    An exponent may be written E or D. NaN, infinities, digits in groups and whole numbers such as 0123 are no numbers.
     """
-    value = _number(text, dialect.decimal) if _NUMBERS[dialect.decimal].fullmatch(text) else math.nan
+    is_written_well = _NUMBERS[dialect.decimal].fullmatch(text) and not _PADDED.match(text)
+    value = _number(text, dialect.decimal) if is_written_well else math.nan
     if not math.isfinite(value):
         raise HistoryError(f"{location}: '{name}' is {_why_no_number(text, dialect)}")
     return value
@@ -150,7 +155,7 @@ def parse_numbers(
 
     locate : the place of cell k, for the HistoryError. missing : texts that stand for a lost value; they become NaN.
     """
-    if dialect.decimal == "." and set("".join(cells)) <= _PLAIN_CHARACTERS:
+    if dialect.decimal == "." and set("".join(cells)) <= _PLAIN_CHARACTERS and not _PADDED.search("\n".join(cells)):
         try:
             values = np.array([float(cell) for cell in cells])
         except ValueError:
@@ -163,7 +168,7 @@ def parse_numbers(
     for k, cell in enumerate(cells):
         if cell in lost:
             continue
-        if matches(cell):
+        if matches(cell) and not _PADDED.match(cell):
             values[k] = _number(cell, dialect.decimal)
         if not math.isfinite(values[k]):
             raise HistoryError(f"{locate(k)}: '{name}' is {_why_no_number(cell, dialect)}")
@@ -184,6 +189,8 @@ def _why_no_number(text: str, dialect: Dialect) -> str:
     shown = text if len(text) <= 40 else f"{text[:37]}..."
     if not text:
         return "empty; write a finite number such as 1.5e-3"
+    if _PADDED.match(text):
+        return f"'{shown}', which begins with 0, as where a decimal sign is lost; write it without"
     if _NUMBERS[dialect.decimal].fullmatch(text):
         return f"'{shown}', too large a number; write a finite number such as 1.5e-3"
     other = "," if dialect.decimal == "." else "."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +36,7 @@ class CellGrid:
 
     sheet : of a spreadsheet, "" of a text. header : the entries of `# key: value` lines. rows : those of them that are
     no comment and not empty. numbers : the rows below the last of `rows`, where they hold numbers alone.
-    late_keys : key and place of each `# key: value` below the first row.
+    comments : line, key and entry of each `# key: value` below the first row.
     """
 
     path: Path
@@ -44,7 +45,7 @@ class CellGrid:
     header: Mapping[str, SourceText]
     rows: Sequence[TableRow]
     numbers: NumberRows | None = None
-    late_keys: Sequence[tuple[str, str]] = ()
+    comments: Sequence[tuple[int, str, SourceText]] = ()
 
     def location(self, line: int) -> str:
         """Where a row stands."""
@@ -89,13 +90,13 @@ def _grid_of_lines(path: Path, lines: Sequence[str]) -> CellGrid:
     head = lines[:start]
     numbered = [(k, line) for k, line in enumerate(lines[start:], start + 1) if line.strip() and not is_comment(line)]
     dialect = detect_dialect((line for _, line in numbered), str(path), _stated_decimal(path, head))
-    late = [(_entry_of(line), k) for k, line in enumerate(lines[start:], start + 1) if is_comment(line)]
-    late_keys = tuple((key, f"{path}:{k}") for (key, colon, _), k in late if colon)
+    comments = [(k, *_entry_of(line)) for k, line in enumerate(lines[start:], start + 1) if is_comment(line)]
+    late = [(k, key, SourceText(text, f"{path}:{k}", dialect.decimal)) for k, key, colon, text in comments if colon]
     split = (TableRow(number, split_line(line, dialect, f"{path}:{number}")) for number, line in numbered)
     rows = [row for row in split if any(row.cells)]
     if not rows:
         raise HistoryError(f"{path}:{start + 1}: no cell holds anything; write a line of columns, then rows")
-    return CellGrid(path, "", dialect, _header(path, head, rows[0].cells, dialect), rows, None, late_keys)
+    return CellGrid(path, "", dialect, _header(path, head, rows[0].cells, dialect), rows, None, late)
 
 
 def grid_of_rows(path: Path, sheet: str, rows: Sequence[TableRow]) -> CellGrid:
@@ -104,17 +105,21 @@ def grid_of_rows(path: Path, sheet: str, rows: Sequence[TableRow]) -> CellGrid:
     if start == len(rows):
         raise HistoryError(f"{path}, sheet '{sheet}': holds comments but no table; write a row of columns, then rows")
     header: dict[str, SourceText] = {}
-    for row in rows[:start]:
-        location, beside = location_in(path, sheet, row.line), [cell for cell in row.cells[1:] if cell]
+    comments: list[tuple[int, str, SourceText]] = []
+    kept: list[TableRow] = []
+    for k, row in enumerate(rows):
+        if not is_comment(row.cells[0]):
+            kept.append(row)
+            continue
         key, colon, text = _entry_of(row.cells[0])
+        location, beside = location_in(path, sheet, row.line), [cell for cell in row.cells[1:] if cell]
         if key in header or len(beside) > (not text):
             raise HistoryError(f"{location}: '{row.cells[0]:.40}' is given twice or with several values; keep one")
-        if colon or beside:
+        if (colon or beside) and k < start:
             header[key] = SourceText(text or "".join(beside), location)
-    late = [(_entry_of(row.cells[0]), row.line) for row in rows[start:] if is_comment(row.cells[0])]
-    late_keys = tuple((key, location_in(path, sheet, line)) for (key, _, _), line in late)
-    kept = [row for row in rows[start:] if not is_comment(row.cells[0])]
-    return CellGrid(path, sheet, Dialect("\t"), header, kept, None, late_keys)
+        elif colon or beside:
+            comments.append((row.line, key, SourceText(text or "".join(beside), location)))
+    return CellGrid(path, sheet, Dialect("\t"), header, kept, None, comments)
 
 
 def is_comment(line: str) -> bool:
@@ -142,6 +147,8 @@ def _number_rows(text: str, lines: Sequence[str], start: int, decimal: str | Non
     allowed = f"0123456789+-eE\n{dialect.delimiter}{point}"
     if "\n\n" in body or body.startswith("\n") or not body.isascii() or body.encode().translate(None, allowed.encode()):
         return None
+    if re.search(rf"(?:^|[\n{dialect.delimiter}+-])0[0-9]+(?:[\n{dialect.delimiter}]|$)", body):
+        return None  # a whole number such as 0123 is refused
     try:
         numbers = np.loadtxt(
             io.StringIO(body if point == "." else body.replace(",", ".")),

@@ -34,8 +34,8 @@ def read_histories(paths: PathsLike, readers: Sequence[Reader], reader: str | No
 
     reader : the name of the reader to use; None asks each of `readers` which files it accepts. `csv` and `xlsx`
     accept every file of their format, and so get only those that no other reader wants. A folder is read as a whole
-    when a reader accepts it, else file by file. What is reached twice is kept once; tests of one name get the name of their
-    folder in front.
+    when a reader accepts it, else file by file. What is reached twice is kept once; tests of one name get the name of
+    their folder in front.
     """
     if reader is not None:
         readers = [_reader_named(reader, readers)]

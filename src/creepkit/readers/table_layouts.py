@@ -45,6 +45,7 @@ _NOT_TESTS = frozenset(
         *("plastic", "elastic", "total", "creep", "true", "engineering", "logarithmic", "inelastic", "thermal"),
         *("primary", "axial", "diametral", "lateral", "hoop", "radial", "transverse", "local", "global", "mean"),
         *("average", "max", "min", "maximum", "minimum", "rate", "sd", "corrected", "raw", "left", "right", "front"),
+        *("clock", "start", "end", "cycle", "date", "loading", "hold", "ramp", "step", "rupture", "test", "no", "of"),
         *("back", "lvdt", "extensometer", "channel", "sensor", "upper", "lower", "top", "bottom"),
     )
 )
@@ -55,12 +56,12 @@ def tests_in(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TabulatedTest
     """The tests of a grid; HistoryError, in one sentence, where it cannot be told how it is laid out."""
     stated = grid.header.get("specimen")
     known = KnownNames.of(vocabulary, stated.text if stated else "")
-    _refuse_late_entries(grid, known)
     names_at = _row_of_names(grid, known)
+    grid = _with_comments(grid, grid.rows[names_at].line, known)
     head, names = grid.rows[:names_at], grid.rows[names_at]
     cells, tests_below, body_at = _joined_names(grid, names_at)
     below = replace(grid, rows=[TableRow(names.line, cells), *grid.rows[body_at:]])
-    times = [k for k, cell in enumerate(cells) if known.quantity(cell) == "time"]
+    times = [k for k, cell in enumerate(cells) if _is_time(cell, known)]
     if len(times) > 1 and not _one_time_in_two_units(cells, times):
         return _tests_of_blocks(below, head, _pairs(below, times, known), set(range(times[0])), known)
     if len(times) == 1 and (tests_below or _is_wide(cells, times[0], known, bool(head))):
@@ -76,14 +77,28 @@ def names_time(grid: CellGrid, vocabulary: HeaderVocabulary) -> bool:
     """Whether some row of a grid names a time, as that above frames does."""
     known = KnownNames.of(vocabulary)
     row = grid.rows[_row_of_names(grid, known)]
-    return any(known.quantity(cell) == "time" for cell in row.cells)
+    return any(_is_time(cell, known) for cell in row.cells)
 
 
-def _refuse_late_entries(grid: CellGrid, known: KnownNames) -> None:
-    """Refuse a condition in a comment below the names: it must not go unread; remarks may stand anywhere."""
-    for key, location in grid.late_keys:
-        if known.is_condition(key):
-            raise HistoryError(f"{location}: '{key}' stands below the names of the columns; move it above them")
+def _is_time(cell: str, known: KnownNames) -> bool:
+    """Whether a name of a column is a time, perhaps that of a test, as in `Time A1 (h)`."""
+    return known.quantity(_test_and_column(cell, known)[1]) == "time"
+
+
+def _with_comments(grid: CellGrid, names_line: int, known: KnownNames) -> CellGrid:
+    """The grid with the entries of comments between its first row and its names.
+
+    A condition in a comment below the names is refused, for it must not go unread; remarks may stand anywhere.
+    """
+    header = dict(grid.header)
+    for line, key, entry in grid.comments:
+        if line > names_line and known.is_condition(key):
+            raise HistoryError(f"{entry.location}: '{key}' stands below the names of the columns; move it above them")
+        if line < names_line and key in header:
+            raise HistoryError(f"{entry.location}: '{key:.60}' was already given; keep one of them")
+        if line < names_line:
+            header[key] = entry
+    return replace(grid, header=header)
 
 
 def _refuse_twice(entries: Mapping[str, SourceText], header: Mapping[str, SourceText], known: KnownNames) -> None:
@@ -99,7 +114,7 @@ def _row_of_names(grid: CellGrid, known: KnownNames) -> int:
         cells = [cell for cell in row.cells if cell]
         if any(is_number(cell, grid.dialect) for cell in cells):
             continue
-        if any(known.quantity(cell) == "time" for cell in cells) and (len(cells) > 1 or k == 0):
+        if any(_is_time(cell, known) for cell in cells) and (len(cells) > 1 or k == 0):
             return k
     return 0
 
@@ -154,7 +169,7 @@ def _is_wide(cells: Sequence[str], time: int, known: KnownNames, has_head: bool)
 
 def _test_and_column(cell: str, known: KnownNames) -> tuple[str, str]:
     """Name of the test and of the column in `A1 strain (%)` or `Strain A1 (%)`; ("", cell) where there are not both."""
-    if known.quantity(cell):
+    if known.quantity(cell) or known.is_condition(cell):
         return "", cell
     written, unit = split_written_name(cell)
     words = written.replace(":", " ").replace("_", " ").split()

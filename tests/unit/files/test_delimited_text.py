@@ -97,6 +97,7 @@ def test_numbers(text: str, decimal: str, value: float):
         ("", ".", "x:2: 'strain' is empty"),
         ("nan", ".", "x:2: 'strain' is 'nan'; write a finite number"),
         ("1e999", ".", "x:2: 'strain' is '1e999', too large a number"),
+        ("01233", ",", "x:2: 'strain' is '01233', which begins with 0, as where a decimal sign is lost"),
         ("1_000", ".", "x:2: 'strain' is '1_000'"),
         ("٣", ".", "x:2: 'strain' is '٣'"),
         ("0x1p3", ".", "x:2: 'strain' is '0x1p3'"),

@@ -21,8 +21,8 @@ bounded = settings(
 )
 
 GOOD = (
-    "# alloy: x\n# temperature_C: 850\n# stress_steps: 0 s 60 MPa; 1 h 70 MPa\n# modulus_GPa: 150\n# strain_sd_1: 1e-5\n"
-    "# end_time_h: 2\n# geometry gauge_mm: 25\n# label heat: X7\n"
+    "# alloy: x\n# temperature_C: 850\n# stress_steps: 0 s 60 MPa; 1 h 70 MPa\n# modulus_GPa: 150\n"
+    "# strain_sd_1: 1e-5\n# end_time_h: 2\n# geometry gauge_mm: 25\n# label heat: X7\n"
     "time_s,strain_1,used\n0,0,1\n10,0.1,1\n10,0.2,0\n20,0.3,1\n"
 )
 BULGE = (

@@ -10,7 +10,9 @@ from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE, Index
 from creepkit.readers.vocabulary import HeaderVocabulary
 
 INDEX = "key,temperature_C,stress_MPa,youngs_MPa,state\na/1,900,25,149000,Ruptured\na/2,950,20,144000,\n"
-CURVES = "key,temperature_C,stress_MPa,time_s,strain_1\na/1,900,25,0,0\na/2,950,20,0,0\na/1,900,25,10,0.1\na/2,950,20,9,0.2\n"
+CURVES = (
+    "key,temperature_C,stress_MPa,time_s,strain\na/1,900,25,0,0\na/2,950,20,0,0\na/1,900,25,10,0.1\na/2,950,20,9,0.2\n"
+)
 
 
 def folder(tmp_path: Path, files: dict[str, str]) -> Path:
