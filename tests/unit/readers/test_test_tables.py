@@ -172,9 +172,7 @@ PIECES = (
 )
 
 
-@settings(
-    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(st.tuples(st.integers(0, 3), st.integers(0, 6), st.sampled_from(PIECES)), min_size=1, max_size=4),
     st.sampled_from((",", ";", "\t")),
