@@ -170,7 +170,7 @@ def command(
 
 
 def _truncate_at_strain(histories: list[History], limit: float) -> list[History]:
-    """Frames up to a strain; a curve that has fewer than two of them is left out, and said.
+    """Frames up to a strain; a curve that has fewer than two of them is left out, and said; one without any stays.
 
     How a test ended is forgotten, also of those that never came so far: all are compared over the same part of life.
     """
@@ -178,7 +178,7 @@ def _truncate_at_strain(histories: list[History], limit: float) -> list[History]
         h.up_to("strain", limit).replace(rupture_time=None, unruptured=False) if "strain" in h.outputs else h
         for h in histories
     ]
-    retained = [h for h in truncated if int((h.used & (h.times > 0)).sum()) >= 2]
+    retained = [h for h in truncated if not h.outputs or int((h.used & (h.times > 0)).sum()) >= 2]
     for history in truncated:
         if history not in retained:
             typer.echo(f"left out: {history.name} has no two frames below a strain of {limit:g}", err=True)

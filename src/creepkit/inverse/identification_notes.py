@@ -114,6 +114,11 @@ def identification_notes(
         note = likelihood_note if settings.weights == "likelihood" else assumption_note
         sentences.append(f"fewer than {MINIMUM_TESTS} tests: {note}")
     sentences += _large_strain_notes(histories)
+    with_both = [h.name for h in histories if h.minimum_rate is not None and h.outputs]
+    if with_both:
+        sentences.append(
+            f"the minimum rate stated of {_named(with_both)} was not used: the frames of its test hold it already"
+        )
     sentences += nuisance_correlation_notes(problem, estimation.residuals)
     if (problem.bound_penalties.constraint_violations(estimation.minimum.x[: problem.parameter_count]) > 1e-3).any():
         sentences.append("a constraint of the law does not hold over the tests at these values")

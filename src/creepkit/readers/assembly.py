@@ -116,13 +116,13 @@ def assemble_without_frames(
     time = conditions.take_number("rupture")
     end = conditions.take_number("end_time")
     ended = conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
+    _check_end_without_frames(time, end, ended, location)
     if minimum_rate is None and time is None and ended != "stopped":
         raise conditions.missing_error(
             "frames, no minimum creep rate and no end of the test",
             "write minimum_rate_1/h, rupture_h, or end_time_h with 'ended: stopped'; or columns of frames, such as "
             "time_h,strain_pct",
         )
-    _check_end_without_frames(time, end, ended, location)
     duration = (time or end or StatedNumber(UNKNOWN_DURATION, "", location)).value
     only = TableFrames(TextTable(Path(source), {}, (), 0, ()), {"time": np.array([duration])}, np.array([0]))
     loading = read_loading(conditions, only)

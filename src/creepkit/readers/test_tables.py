@@ -185,7 +185,7 @@ def _keys(table: TextTable) -> list[str]:
     for written in table.columns:
         quantity, unit = key_of_column(written)
         if quantity in QUANTITIES:
-            QUANTITIES[quantity][0].unit(unit, location, written)
+            _check_unit(quantity, unit, written, location)
             quantity = f"{quantity}_{unit}"
         elif not quantity:
             _refuse_misspelt(written, location)
@@ -199,6 +199,16 @@ def _keys(table: TextTable) -> list[str]:
             raise HistoryError(f"{place}: '{key_in_header}' is also a column, '{written}'; keep one of them")
         keys.append(quantity)
     return keys
+
+
+def _check_unit(quantity: str, unit: str, written: str, location: str) -> None:
+    units = QUANTITIES[quantity][0].units
+    if unit not in units:
+        found = f"the unit '{unit}', which is not understood" if unit else "no unit"
+        raise HistoryError(
+            f"{location}: column '{written.strip()}' has {found}; allowed: {', '.join(units)}, such as "
+            f"'{quantity} ({next(iter(units))})'"
+        )
 
 
 def _quantity(key: str) -> str:
@@ -256,6 +266,10 @@ def _with_end(cells: Mapping[str, SourceText], location: str) -> dict[str, Sourc
         duration = next((other for other in entries if _quantity(other) == "end_time"), None)
         if duration is not None:
             entries[f"rupture_{duration.rpartition('_')[2]}"] = entries.pop(duration)
+        elif any(_quantity(other) == "minimum_rate" for other in entries):
+            entries["label ended"] = SourceText("ruptured", location)
+        else:
+            entries["ended"] = SourceText("ruptured", location)
     elif ruptures:
         entries = {key: entry for key, entry in entries.items() if _quantity(key) != "end_time"}
     if ended == "stopped":

@@ -211,8 +211,10 @@ class History:
     def up_to(self, output: str, limit: float) -> History:
         """Mark unused every frame from the first used one whose `output` exceeds `limit` on.
 
-        A history that is cut says nothing any more of how the test ended.
+        A history that is cut says nothing any more of how the test ended. One without frames stays as it is.
         """
+        if not self.outputs:
+            return self
         exceeding = np.flatnonzero((self.outputs[output] > limit) & self.used)
         if not exceeding.size:
             return self

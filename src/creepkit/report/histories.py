@@ -61,12 +61,24 @@ def _output_text(history: History, name: str) -> str:
 
 
 def _frames_text(history: History) -> str:
+    if not history.outputs:
+        return _rate_text(history)
     count, unused = history.times.size, int((~np.asarray(history.used)).sum())
     span = f"{history.times[0] / SECONDS_PER_HOUR:.4g} to {history.times[-1] / SECONDS_PER_HOUR:.4g} h"
     return f"{count} frame{'s' if count > 1 else ''} from {span}{f', {unused} not used' if unused else ''}"
 
 
+def _rate_text(history: History) -> str:
+    """What is known of a test without frames, beside its end."""
+    if history.minimum_rate is None:
+        return "no frames"
+    sd = "" if history.minimum_rate_sd is None else f" +- {history.minimum_rate_sd:.2g}"
+    return f"minimum creep rate {history.minimum_rate:.4g}{sd} 1/s, no frames"
+
+
 def _end_text(history: History) -> str:
+    if history.unruptured and not history.outputs:
+        return f"stopped before rupture at {history.times[-1] / SECONDS_PER_HOUR:.4g} h"
     if history.rupture_time is not None:
         return f"ruptured at {history.rupture_time / SECONDS_PER_HOUR:.4g} h"
     return "stopped before rupture" if history.unruptured else ""
@@ -99,6 +111,7 @@ def histories_to_json(histories: Sequence[History], tables: Sequence[TableSummar
                 },
                 "strain_measure": history.strain_measure,
                 "includes_elastic": history.includes_elastic,
+                "minimum_rate": history.minimum_rate,
                 "rupture_time": history.rupture_time,
                 "unruptured": history.unruptured,
                 "geometry": dict(history.geometry),

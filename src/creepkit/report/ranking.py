@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -72,14 +73,27 @@ def _is_logarithmic(output: str) -> bool:
 
 
 def _misfit_columns(fit: Identification) -> tuple[str, ...]:
+    if not fit.errors:
+        return _single_value_misfit(fit)[0], "test to test"
     output = next(iter(fit.errors))
     return (f"rms ln {output}" if _is_logarithmic(output) else f"error of {output}", "test to test")
 
 
 def _misfit_cells(fit: Identification) -> tuple[str, ...]:
+    if not fit.errors:
+        return _single_value_misfit(fit)[1], f"{100 * fit.noise_model.rate:.0f} %"
     output = next(iter(fit.errors))
     misfit = f"{fit.rms:.3f}" if _is_logarithmic(output) else f"{fit.errors[output].relative_squared_error:.3g}"
     return misfit, f"{100 * fit.noise_model.rate:.0f} %"
+
+
+def _single_value_misfit(fit: Identification) -> tuple[str, str]:
+    """Name and size of the misfit of tests without frames: of their minimum rates, else of their rupture times."""
+    rates = [m.minimum_rate.ratio for m in fit.tests if m.minimum_rate is not None]
+    ratios = rates or [m.rupture.ratio for m in fit.tests if m.rupture is not None and not m.rupture.censored]
+    logarithms = [math.log(ratio) for ratio in ratios if 0.0 < ratio < math.inf]
+    rms = math.sqrt(sum(x * x for x in logarithms) / len(logarithms)) if logarithms else math.nan
+    return f"rms ln {'minimum rate' if rates else 'rupture time'}", f"{rms:.3f}"
 
 
 def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]:

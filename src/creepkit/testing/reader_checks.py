@@ -140,7 +140,10 @@ def _round_trip(histories: list[History]) -> ConformanceCheck:
     return ConformanceCheck(name, True, f"{len(histories)} histories equal")
 
 
-_PLAIN = ("name", "specimen", "strain_measure", "includes_elastic", "operator", "alloy", "rupture_time", "unruptured")
+_PLAIN = (
+    *("name", "specimen", "strain_measure", "includes_elastic", "operator", "alloy", "rupture_time", "unruptured"),
+    *("minimum_rate", "minimum_rate_sd"),
+)
 
 
 def history_difference(first: History, second: History) -> str:

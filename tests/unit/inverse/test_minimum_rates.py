@@ -1,0 +1,233 @@
+"""Tables of minimum creep rates and rupture times: closed forms, planted values, and tests beside curves."""
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import FitError
+from creepkit.inverse.cross_validation import cross_validate
+from creepkit.inverse.minimum_rates import with_minimum_rates
+from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, STRAIN_OF_UNKNOWN_DURATION, followed_duration
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.laws.norton import NORTON
+from creepkit.records import UNKNOWN_DURATION, History, Nuisance, PressureJump, StressSteps, constant_stress
+from creepkit.specimens.uniaxial import Uniaxial
+from helpers.literature_laws import EQUATIONS
+from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, rate_table, whole_life_table
+
+BAR = Uniaxial()
+KACHANOV = EQUATIONS["Kachanov-Rabotnov"]
+
+
+def minimum_rate(law, values, history, bar=BAR):
+    """The minimum rate that is predicted, and its derivatives to the internal parameters."""
+    theta = law.to_internal(values)
+    prediction = bar.predict(law, theta, [history], sensitivities=True)
+    found = with_minimum_rates(prediction, bar, law, theta, [history], sensitivities=True)
+    return found.values[0, 0, 0, -1], found.jacobian[0, 0, 0, -1]
+
+
+def stated(stress=80.0, duration=UNKNOWN_DURATION, control="stress", rate=1e-9, **further):
+    return History("test", np.array([duration]), {}, constant_stress(stress, control), 1000.0, minimum_rate=rate,
+                   **further)  # fmt: skip
+
+
+# ---- the rate of a test -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("control", ["load", "stress"])
+def test_rate_of_steady_creep_is_that_of_the_law(control):
+    """Under a constant load the bar thins: the rate is smallest at once, A s^n."""
+    rate, jacobian = minimum_rate(NORTON, {"A": 1e-16, "n": 4.0}, stated(control=control))
+    assert rate == pytest.approx(1e-16 * 80.0**4, rel=1e-6)
+    np.testing.assert_allclose(jacobian / rate, [1.0, np.log(80.0)], rtol=1e-5)
+
+
+def test_rate_of_creep_that_only_slows_down_is_that_at_the_end():
+    """Time hardening: A s^n t^m falls for ever, so that the duration decides."""
+    law, values = ck.law("time-hardening"), {"A": 1e-15, "n": 4.0, "m": -0.4}
+    for duration in (1e5, 1e7):
+        rate, _ = minimum_rate(law, values, stated(duration=duration))
+        assert rate == pytest.approx(1e-15 * 80.0**4 * duration**-0.4, rel=2e-3)
+
+
+def test_rate_between_primary_and_tertiary_stage_is_the_minimum_of_the_curve():
+    """Primary A t^m beside steady B exp(strain k): a quadrature of time over strain, independent of the integrator."""
+    law = EQUATIONS["MPC Omega"] + ck.law("strain-hardening")
+    values = dict(zip(law.names, (1e-16, 4.0, 20.0, 1e-18, 4.0, -0.9), strict=True))
+    strain = np.geomspace(1e-6, 0.3, 20001)
+    rates = 80.0**4 * (1e-16 * np.exp(20.0 * strain) + 1e-18 * strain**-0.9)
+    for duration in (1e8, 3e7):
+        rate, jacobian = minimum_rate(law, values, stated(duration=duration))
+        assert rate == pytest.approx(rates.min(), rel=2e-3)
+    assert jacobian[0] + jacobian[3] == pytest.approx(rate, rel=2e-2)  # a factor on all rates is one on the rate
+
+
+def test_derivatives_are_those_of_the_rate():
+    law = KACHANOV + ck.law("strain-hardening")
+    values = dict(zip(law.names, (1e-16, 4.0, 1e-15, 3.5, 4.0, 1e-18, 4.0, -0.9), strict=True))
+    test, theta, exact = stated(duration=2e7), law.to_internal(values)[0], Uniaxial(tolerance=1e-8)
+    _, jacobian = minimum_rate(law, values, test, exact)
+    step = 1e-4 * np.eye(theta.size)
+    ends = np.concatenate([theta + step, theta - step])
+    moved = with_minimum_rates(exact.predict(law, ends, [test]), exact, law, ends, [test]).values[:, 0, 0, -1]
+    np.testing.assert_allclose(jacobian, (moved[: theta.size] - moved[theta.size :]) / 2e-4, rtol=1e-3)
+    _, rough = minimum_rate(law, values, test)
+    np.testing.assert_allclose(rough, jacobian, rtol=0.02)
+
+
+def test_a_test_of_unknown_duration_is_followed_to_a_strain_at_its_rate():
+    assert followed_duration(stated(rate=1e-9)) == STRAIN_OF_UNKNOWN_DURATION / 1e-9
+    assert followed_duration(stated(duration=3e6)) == 3e6
+    assert followed_duration(stated(duration=3e6, rupture_time=3e6)) == 3e6
+
+
+# ---- identification -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("weights", ["noise", "likelihood"])
+def test_rates_alone_are_a_linear_regression(weights):
+    """ln rate = ln A + n ln s - Q/R (1/T - 1/T0): values, and intervals with Student's t of tests less parameters."""
+    from scipy.stats import t as student
+
+    tests = rate_table(np.random.default_rng(1))
+    fit = ck.identify(NORTON.times(ck.arrhenius(T_ref=1100.0)), tests, weights=weights, starts=1)
+    stress = np.array([h.loading.program().values[0] for h in tests])
+    inverse = np.array([1.0 / h.temperature - 1.0 / 1100.0 for h in tests]) / GAS_CONSTANT
+    design = np.stack([np.ones_like(stress), np.log(stress), -inverse], axis=1)
+    y = np.log([h.minimum_rate for h in tests])
+    solution, squares, *_ = np.linalg.lstsq(design, y, rcond=None)
+    assert np.log(fit.values["A"]) == pytest.approx(solution[0], abs=1e-6)
+    assert fit.values["n"] == pytest.approx(solution[1], rel=1e-6)
+    assert fit.values["Q"] == pytest.approx(solution[2], rel=1e-6)
+    freedom = len(y) - 3
+    sd = np.sqrt(float(squares[0]) / freedom * np.linalg.inv(design.T @ design)[1, 1])
+    exponent = {e.name: e for e in fit.estimates}["n"]
+    assert 0.5 * (exponent.high - exponent.low) == pytest.approx(student.ppf(0.975, freedom) * sd, rel=0.01)
+
+
+def test_stated_standard_deviations_weigh_the_rates():
+    """One rate known to 1 % beside others known to 50 %: the weighted regression, without scatter between tests."""
+    stresses, sds = np.array([60.0, 80.0, 100.0, 140.0]), np.array([0.01, 0.5, 0.5, 0.01])
+    factors = np.array([1.0, 1.6, 0.7, 1.0])
+    tests = [
+        History(f"{s}", np.array([1e7]), {}, constant_stress(s, "stress"), 1000.0, minimum_rate=1e-16 * s**4 * f,
+                minimum_rate_sd=sd * 1e-16 * s**4 * f)
+        for s, sd, f in zip(stresses, sds, factors, strict=True)
+    ]  # fmt: skip
+    fit = ck.identify(NORTON, tests, nuisances=[], weights="likelihood", starts=2)
+    assert fit.values["n"] == pytest.approx(4.0, abs=0.02)
+    assert fit.noise_model[MINIMUM_RATE_OUTPUT].stated > 0
+
+
+@pytest.fixture(scope="module")
+def whole_life():
+    tests = whole_life_table(np.random.default_rng(2))
+    return tests, ck.identify(KACHANOV.fix(r=KACHANOV_VALUES["r"]), tests, starts=1)
+
+
+def test_planted_rates_and_rupture_times_give_creep_and_damage(whole_life):
+    """Closed forms under constant stress: rate A s^n, life (1 - 0.01^(r+1)) / ((r + 1) B s^k)."""
+    _, fit = whole_life
+    for e in fit.estimates:
+        assert e.low <= KACHANOV_VALUES[e.name] <= e.high, e
+        assert e.verdict == "determined"
+
+
+def test_the_answer_says_rates_and_ends(whole_life, tmp_path):
+    tests, fit = whole_life
+    compared = [m.minimum_rate for m in fit.tests]
+    assert [r.measured for r in compared] == [h.minimum_rate for h in tests]
+    assert all(r.low < r.predicted < r.high for r in compared)
+    assert sum(r.low <= r.measured <= r.high for r in compared) >= len(tests) - 2
+    assert "minimum rates of 10 tests without frames: predicted over measured" in str(fit)
+    assert "rupture: 8 of 10 tests broke" in str(fit)
+    assert not any("nothing is predicted" in note for note in fit.notes)
+    assert len(fit.plot(tmp_path / "fit.png").axes) == 2
+    back = ck.load(fit.save(tmp_path / "fit.json"))
+    assert [m.minimum_rate for m in back.tests] == compared
+    assert back.with_histories(tests).least_squares_problem.observations.count == 20
+
+
+def test_a_run_out_moves_nothing_that_it_does_not_contradict(whole_life):
+    tests, fit = whole_life
+    problem = fit.least_squares_problem
+    residuals = problem.residuals(fit.x)
+    censored = [k for k, h in enumerate(tests) if h.unruptured]
+    assert len(censored) == 2
+    assert not (residuals.present & problem.observations.rupture_mask)[censored].any()
+
+
+def test_a_condition_is_held_out_of_a_table():
+    tests = whole_life_table(np.random.default_rng(3), lives=False)[2:6]
+    fit = ck.identify(NORTON, tests, starts=1)
+    validation = cross_validate(fit, by="condition")
+    held = [values["minimum rate"] for values in validation.single_values.values()]
+    assert len(held) == len(tests)
+    assert sum(one.low <= one.measured <= one.high for one in held) >= 3
+    assert "minimum rate predicted over measured" in str(validation)
+    with pytest.raises(FitError, match="these tests have none; take by='test'"):
+        cross_validate(fit, by="time")
+
+
+def curve(stress, factor=1.0):
+    times = np.geomspace(1e3, 3e5, 12)
+    return History(f"curve {stress:g}", times, {"strain": factor * 1e-16 * stress**4 * times},
+                   constant_stress(stress, "stress"), 1000.0)  # fmt: skip
+
+
+def test_rates_beside_curves_narrow_the_interval():
+    """Curves over a factor of 1.2 in stress, rates over one of 3."""
+    curves = [curve(s, f) for s, f in ((90.0, 1.1), (100.0, 0.9), (108.0, 1.05))]
+    rates = [
+        stated(s, rate=f * 1e-16 * s**4).replace(name=f"rate {s:g}")
+        for s, f in ((50.0, 1.1), (70.0, 0.92), (120.0, 1.05), (150.0, 0.95))
+    ]
+    widths = []
+    for tests in (curves, curves + rates):
+        exponent = {e.name: e for e in ck.identify(NORTON, tests, starts=2).estimates}["n"]
+        assert exponent.low < 4.0 < exponent.high
+        widths.append(exponent.high - exponent.low)
+    assert widths[1] < 0.5 * widths[0]
+
+
+def test_a_rate_beside_the_frames_of_its_test_is_not_counted_twice():
+    tests = [curve(s) for s in (80.0, 100.0, 120.0)]
+    with_rates = [h.replace(minimum_rate=3e-9) for h in tests]
+    plain, both = (ck.identify(NORTON, each, starts=1) for each in (tests, with_rates))
+    assert both.values == plain.values
+    assert any("minimum rate" in note and "frames" in note for note in both.notes)
+    assert not any("minimum rate" in note for note in plain.notes)
+
+
+def test_explicit_nuisances_move_the_rate():
+    """A test 10 K too warm creeps faster by Q/R (1/T - 1/(T + 10))."""
+    law = NORTON.times(ck.arrhenius(T_ref=1000.0)).fix(Q=4e5)
+    tests = [stated(s, rate=1e-16 * s**4).replace(name=f"{s:g}") for s in (60.0, 80.0, 100.0, 120.0)]
+    settings = IdentificationSettings(nuisances=(Nuisance("temperature", sd=5.0),))
+    problem = LeastSquaresProblem.from_histories(law, tests, BAR, settings)
+    u = problem.coordinates.u(law.to_internal({"A": 1e-16, "n": 4.0})[0])
+    warm = np.concatenate([u, [10.0, 0.0, 0.0, 0.0]])
+    change = problem.residuals(warm).values - problem.residuals(np.concatenate([u, np.zeros(4)])).values
+    expected = 4e5 / GAS_CONSTANT * (1.0 / 1000.0 - 1.0 / 1010.0)
+    np.testing.assert_allclose(change[:, 0], [expected, 0.0, 0.0, 0.0], atol=1e-4)
+    slope = problem.residuals(warm).jacobian[0, 0, u.size]
+    assert slope == pytest.approx(4e5 / GAS_CONSTANT / 1010.0**2, rel=1e-2)
+
+
+# ---- bad input ----------------------------------------------------------------------------------------------------
+
+
+def test_what_cannot_be_compared_is_refused():
+    nothing = History("plan", np.array([1e5]), {}, constant_stress(80.0), 1000.0)
+    with pytest.raises(FitError, match="'plan' has no frames, no minimum rate and no known end"):
+        ck.identify(NORTON, [nothing])
+    steps = stated().replace(loading=StressSteps(((0.0, 80.0), (1e5, 100.0))))
+    with pytest.raises(FitError, match=r"a load that changes from 80 to 100 MPa; give each load a test of its own"):
+        ck.identify(NORTON, [steps, *(stated(s).replace(name=f"{s}") for s in (60.0, 90.0, 100.0))])
+    with pytest.raises(FitError, match="has 2 parameters and the histories only 1 frames, minimum rates and rupture"):
+        ck.identify(NORTON, [stated()])
+    dimple = History("dimple", np.array([1.0]), {}, PressureJump(1.0, 1.2, 1e4), 1000.0, "bulge", minimum_rate=1e-9)
+    with pytest.raises(FitError, match=r"predicted where the leading output is a strain; of specimen 'bulge' its lead"):
+        ck.identify(NORTON, [dimple.replace(name=str(k)) for k in range(3)])

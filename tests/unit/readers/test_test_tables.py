@@ -1,0 +1,196 @@
+"""Tables of tests, one row a test, and heads without frames: what they say, what they refuse, what reads back."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import creepkit as ck
+from creepkit.errors import HistoryError
+from creepkit.readers.history_csv import write_history
+from creepkit.readers.test_tables import TEST_TABLE, key_of_column
+from creepkit.records import UNKNOWN_DURATION, History, constant_stress
+
+TABLE = """# alloy: Alloy X
+# control: stress
+test,stress_MPa,Temperature (C),min creep rate [%/h],t_r (h),heat,grain size
+A1,120,750,2.1e-4,8200,X7,40
+A2,100,750,,>10000,X7,41
+A3,150,750,1e-3,,X8,
+"""
+
+
+def read(tmp_path, text, name="table.csv", encoding="utf-8"):
+    path = tmp_path / name
+    path.write_bytes(text.encode(encoding))
+    return ck.read_histories(path)
+
+
+def test_a_table_of_rates_and_rupture_times(tmp_path):
+    first, second, third = read(tmp_path, TABLE)
+    assert [h.name for h in (first, second, third)] == ["A1", "A2", "A3"]
+    assert first.outputs == {}
+    assert first.minimum_rate == pytest.approx(2.1e-6 / 3600)
+    assert first.rupture_time == first.times[-1] == 8200 * 3600
+    assert (second.minimum_rate, second.rupture_time, second.unruptured) == (None, None, True)
+    assert second.times[-1] == 1e4 * 3600
+    assert (third.times[-1], third.end_known) == (UNKNOWN_DURATION, False)
+    assert (first.temperature, first.loading, first.alloy) == (1023.15, constant_stress(120.0, "stress"), "Alloy X")
+    assert first.labels["heat"] == "X7"
+    assert first.labels["grain size"] == "40"
+    assert third.source.endswith("table.csv (A3)")
+
+
+def test_the_same_in_another_dialect_and_without_names(tmp_path):
+    text = "Stress / MPa;T (°C);Minimum creep rate (1/s);Time to rupture in h;End\n120,5;750;2,1e-9;8200;ruptured\n" \
+           "100;750;1e-9;9000;running\n"  # fmt: skip
+    first, second = read(tmp_path, text, encoding="latin-1")
+    assert first.name == "table 2"
+    assert first.loading.program().values[0] == 120.5
+    assert (first.rupture_time, second.unruptured, second.times[-1]) == (8200 * 3600.0, True, 9000 * 3600.0)
+    assert "control load" in first.labels["assumed"]
+
+
+def test_a_sheet_of_a_spreadsheet(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.title = "rates"
+    for row in (("test", "stress_MPa", "T_C", "minimum_rate_1/h", "t_r (h)"), ("A", 100, 700, 1e-6, 1000),
+                ("B", 80, 700, None, ">5000")):  # fmt: skip
+        book.active.append(row)
+    book.save(tmp_path / "x.xlsx")
+    first, second = ck.read_histories(tmp_path / "x.xlsx")
+    assert (first.minimum_rate, first.rupture_time) == (pytest.approx(1e-6 / 3600), 3.6e6)
+    assert (second.unruptured, second.times[-1]) == (True, 1.8e7)
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("sigma (ksi)", ("stress", "ksi")),
+        ("T_C", ("temperature", "C")),
+        ("t (h)", ("end_time", "h")),
+        ("MCR, h^-1", ("minimum_rate", "1/h")),
+        ("steady-state creep rate (s-1)", ("minimum_rate", "1/s")),
+        ("min rate per h", ("minimum_rate", "1/h")),
+        ("minimum_rate_%/h", ("minimum_rate", "pct/h")),
+        ("tr_h", ("rupture", "h")),
+        ("rupture life, hr", ("rupture", "h")),
+        ("elongation (%)", ("label elongation_pct", "")),
+        ("Heat No", ("label heat", "")),
+        ("strain rate (1/s)", ("", "")),
+    ],
+)
+def test_names_of_columns(written, meant):
+    assert key_of_column(written) == meant
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("[%/h]", ""), r"table.csv:3: column 'min creep rate' has no unit; allowed: 1/s, 1/min, 1/h"),
+        (("[%/h]", "[%]"), r"table.csv:3: column 'min creep rate \[%\]' has the unit 'pct', which is not understood"),
+        (("2.1e-4", "0"), r"table.csv:4: 'min_?.*' is 0; a creep rate must lie above 0"),
+        (("2.1e-4", "slow"), r"table.csv:4: .* is 'slow'"),
+        (("A2,", "A1,"), r"table.csv:5: test 'A1' already stands in .*table.csv:4; give each row its own name"),
+        (("1e-3", ""), r"table.csv:6: no frames, no minimum creep rate and no end of the test"),
+        ((">10000", "10000*"), r"table.csv:5: .* is '10000\*'"),
+        (("heat", "stres_MPa"), r"table.csv:3: column 'stres_MPa' is not understood; did you mean 'stress'\?"),
+        (("heat", "sigma_MPa"), r"table.csv:3: 'stress_MPa' and 'sigma_MPa' mean the same; keep one of them"),
+        (("# control: stress", "# stress_MPa: 80"), r"table.csv:2: 'stress_MPa' is also a column"),
+        (("grain size", "ended"), r"table.csv:4: the test ended '40'; allowed: ruptured, stopped"),
+        (("Temperature (C)", "note"), r"table.csv:4: no temperature"),
+    ],
+)
+def test_bad_tables_are_refused_in_one_sentence(tmp_path, change, said):
+    assert change[0] in TABLE
+    with pytest.raises(HistoryError, match=said) as caught:
+        read(tmp_path, TABLE.replace(*change))
+    assert "\n" not in str(caught.value)
+
+
+def test_ends_that_contradict_one_another(tmp_path):
+    head = "stress_MPa,temperature_C,t_r_h,ended\n"
+    with pytest.raises(HistoryError, match=r"'>900' is a time without rupture, and the test ruptured; keep one"):
+        read(tmp_path, head + "100,700,>900,ruptured\n")
+    with pytest.raises(HistoryError, match=r"the test ruptured, and nothing says when; write rupture_h"):
+        read(tmp_path, head + "100,700,,ruptured\n")
+    (known,) = read(tmp_path, "stress_MPa,temperature_C,min rate (1/h),t_r_h,ended\n100,700,1e-6,,ruptured\n")
+    assert (known.end_known, known.labels["ended"]) == (False, "ruptured")
+    with pytest.raises(HistoryError, match=r"the test was stopped, and nothing says when; write end_time_h"):
+        read(tmp_path, head + "100,700,,stopped\n")
+
+
+# ---- heads without frames -----------------------------------------------------------------------------------------
+
+
+def test_a_head_without_frames(tmp_path):
+    text = "# temperature_C: 700\n# stress_MPa: 100\n# minimum_rate_%/h: 1e-4\n# minimum_rate_sd_1/h: 1e-7\n"
+    (found,) = read(tmp_path, text)
+    assert (found.minimum_rate, found.minimum_rate_sd) == (pytest.approx(1e-6 / 3600), pytest.approx(1e-7 / 3600))
+    (stopped,) = read(tmp_path, text + "# ended: stopped\n# end_time_h: 500\n")
+    assert (stopped.unruptured, stopped.times[-1]) == (True, 1.8e6)
+    with pytest.raises(HistoryError, match="holds a header but no table"):
+        read(tmp_path, "# temperature_C: 700\n# stress_MPa: 100\n")
+    with pytest.raises(HistoryError, match=r"'minimum_rate_sd_1/h' stands there without a minimum_rate; give both"):
+        read(tmp_path, text.replace("# minimum_rate_%/h: 1e-4\n", "# rupture_h: 5\n"))
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        {"times": [1.0], "minimum_rate": 1.25e-9},
+        {"times": [3e6], "minimum_rate": 1.25e-9, "minimum_rate_sd": 3e-11},
+        {"times": [3e6], "rupture_time": 3e6},
+        {"times": [3e6], "unruptured": True, "minimum_rate": 2e-9},
+    ],
+)
+def test_a_test_without_frames_reads_back(tmp_path, known):
+    times = np.array(known.pop("times"))
+    test = History("A1", times, {}, constant_stress(80.0), 1000.0, labels={"heat": "X7"}, **known)
+    (back,) = ck.read_histories(write_history(test, tmp_path / "A1.csv"))
+    for name in ("name", "minimum_rate", "minimum_rate_sd", "rupture_time", "unruptured", "loading", "temperature"):
+        assert getattr(back, name) == getattr(test, name)
+    np.testing.assert_array_equal(back.times, test.times)
+    assert back.labels["heat"] == "X7"
+
+
+def test_a_rate_beside_frames_reads_back(tmp_path):
+    test = History("A1", np.array([1.0, 2.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0, minimum_rate=2e-9)
+    assert ck.read_histories(write_history(test, tmp_path / "A1.csv"))[0].minimum_rate == 2e-9
+
+
+def test_a_plan_is_not_written_as_a_measurement(tmp_path):
+    plan = History("A1", np.array([1.0, 2.0]), {}, constant_stress(80.0), 1000.0)
+    with pytest.raises(HistoryError, match="has no outputs and no minimum rate and no known end; it cannot be written"):
+        write_history(plan, tmp_path / "A1.csv")
+
+
+PIECES = (
+    *("", "A1", "120", "-1", "0", "nan", ">", ">1e4", ">>5", "1e400", "stopped", "ruptured", "%", "\x00", '"', "#"),
+    *("stress_MPa", "stress", "T_C", "t_r (h)", "min creep rate (1/h)", "rupture", "ended", "label x", "1,5"),
+)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.tuples(st.integers(0, 3), st.integers(0, 6), st.sampled_from(PIECES)), min_size=1, max_size=4),
+    st.sampled_from((",", ";", "\t")),
+)
+def test_mutated_tables_give_tests_or_one_sentence(tmp_path, changes, delimiter):
+    rows = [line.split(",") for line in TABLE.splitlines()[2:]]
+    for row, column, piece in changes:
+        rows[row][column] = piece
+    path = tmp_path / "t.csv"
+    path.write_text("# control: stress\n" + "\n".join(delimiter.join(row) for row in rows), encoding="utf-8")
+    try:
+        found = TEST_TABLE.read(path)
+    except HistoryError as error:
+        said, found = str(error), []
+    else:
+        said = ""
+    assert bool(found) != (str(path) in said)
+    assert "\n" not in said
+    for history in found:
+        assert history.minimum_rate is not None or history.end_known
+        assert history.minimum_rate is None or history.minimum_rate > 0
