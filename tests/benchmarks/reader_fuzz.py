@@ -13,6 +13,7 @@ only have to be read or refused. "read" counts files that gave a result, of all 
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 import resource
@@ -29,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from measured import Page, arguments, progress
 
-from helpers.file_mutations import mutation
+from helpers.file_mutations import ENCODINGS, mutation
 from helpers.reader_samples import ReaderSample, all_samples
 
 CPU_SECONDS, MEMORY_BYTES = 5.0, 1_000_000_000
@@ -59,8 +60,8 @@ def outcome(sample: ReaderSample, good: object, seed: int, folder: Path) -> tupl
         return changed.kind, "refused" if sound else "traceback", "" if sound else text[:300]
     except Hang:
         return changed.kind, "hang", ""
-    except MemoryError:
-        return changed.kind, "memory", ""
+    except MemoryError as error:
+        return changed.kind, "memory", str(error)
     except Exception as error:
         return changed.kind, "traceback", f"{type(error).__name__}: {error}"[:300]
     finally:
@@ -90,6 +91,8 @@ def work(name: str, first: int, last: int, folder: Path) -> None:
 
 def _give_up_privileges() -> None:
     """Limit the memory, and become nobody where the process is root's."""
+    for encoding in ENCODINGS:
+        codecs.lookup(encoding)
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_BYTES, used + MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -38,6 +38,9 @@ PIECES = [
 ]
 
 
+ENCODINGS = ("utf-16", "utf-16-be", "utf-32", "latin-1", "utf-8-sig")
+
+
 @dataclass(frozen=True)
 class Mutation:
     """A mutated file. kind : how. changed : whether it says something else, and must not be read as if it did not."""
@@ -86,7 +89,7 @@ def _changed(content: bytes, kind: str, draw: random.Random) -> bytes:
         return content[:start]
     if kind == "encode":
         text = content.decode("utf-8", errors="replace")
-        return text.encode(draw.choice(("utf-16", "utf-16-be", "utf-32", "latin-1", "utf-8-sig")), errors="replace")
+        return text.encode(draw.choice(ENCODINGS), errors="replace")
     if kind == "newlines":
         return content.replace(b"\n", draw.choice((b"\r\n", b"\r", b"\n\n", b"", b"\x0b")))
     lines = content.split(b"\n")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from creepkit.errors import HistoryError, nearest
 from creepkit.hookspecs import hookimpl
+from creepkit.readers.creep_schema_json import CREEP_SCHEMA
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
 from creepkit.records import History, Reader, accepts_path, histories_in
@@ -17,7 +18,7 @@ from creepkit.records import History, Reader, accepts_path, histories_in
 @hookimpl
 def creepkit_readers() -> list[Reader]:
     """Return the built-in readers."""
-    return [INDEXED_TABLE, INDEXED_FILES, HISTORY_CSV]
+    return [INDEXED_TABLE, INDEXED_FILES, CREEP_SCHEMA, HISTORY_CSV]
 
 
 PathsLike = str | Path | Iterable[str | Path]
