@@ -18,6 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from creepkit.errors import HistoryError, nearest
 from creepkit.files.json_documents import read_json
 from creepkit.files.reading import FileKind, read_bytes
@@ -268,7 +270,7 @@ def _without_frames(entries: _Entries, path: Path) -> History:
     control = entries.choice(CONTROL, {"constant force": "load", "constant stress": "stress"}) or "load"
     return History(
         name=entries.text(NAME) or path.stem,
-        times=[end],
+        times=np.array([end]),
         outputs={},
         loading=constant_stress(values["stress"], control="stress" if control == "stress" else "load"),
         temperature=values["temperature"],
