@@ -21,6 +21,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import traceback
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -60,8 +61,8 @@ def outcome(sample: ReaderSample, good: object, seed: int, folder: Path) -> tupl
         return changed.kind, "refused" if sound else "traceback", "" if sound else text[:300]
     except Hang:
         return changed.kind, "hang", ""
-    except MemoryError as error:
-        return changed.kind, "memory", str(error)
+    except MemoryError:
+        return changed.kind, "memory", traceback.format_exc(limit=-2)[-300:].replace("\n", " ")
     except Exception as error:
         return changed.kind, "traceback", f"{type(error).__name__}: {error}"[:300]
     finally:
@@ -91,7 +92,7 @@ def work(name: str, first: int, last: int, folder: Path) -> None:
 
 def _give_up_privileges() -> None:
     """Limit the memory, and become nobody where the process is root's."""
-    for encoding in ENCODINGS:
+    for encoding in (*ENCODINGS, "utf-16-le", "utf-32-le", "utf-32-be", "cp1252"):
         codecs.lookup(encoding)
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_BYTES, used + MEMORY_BYTES))

@@ -134,7 +134,7 @@ def samples() -> Iterator[ReaderSample]:
     folder = {"index.csv": INDEX, "curves.csv": CURVES}
     columns = "temperature_C stress_MPa youngs_MPa heat"
     yield table("index of a table", folder, "index.csv", columns, "temperature_C stress_MPa")
-    yield table("table with an index", folder, "curves.csv", "strain_pct time_s key", "strain_pct time_s")
+    yield table("table with an index", folder, "curves.csv", "strain_pct time_s key", "time_s")
     files = {"index.csv": LIST, "A_creep.csv": FRAMES}
     yield table("index of files", files, "index.csv", "temperature_C stress_MPa rupture_h", "stress_MPa rupture_h")
     yield table("files with an index", files, "A_creep.csv", "creep_extension_pct time_h T_mid_C", "time_h")

@@ -123,12 +123,12 @@ def test_unknown_law_suggests_the_nearest(tmp_path):
     ("text", "words"),
     [
         ("", "empty"),
-        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain_sd\n0,1\n1,1\n", "strain"),
-        ("# stress_furlong: 100\n# temperature_C: 800\ntime_s,strain\n0,0\n1,1e-4\n", "furlong"),
-        ("# stress_MPa: -100\n# temperature_C: 800\ntime_s,strain\n0,0\n1,1e-4\n", "stress"),
-        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain\n0,0\n5,1e-4\n3,2e-4\n", "bad.csv:6"),
-        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain\n0,0\n1,nan\n", "bad.csv:5"),
-        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain\n0,0\n", "one"),
+        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain_sd_1\n0,1\n1,1\n", "strain"),
+        ("# stress_furlong: 100\n# temperature_C: 800\ntime_s,strain_1\n0,0\n1,1e-4\n", "furlong"),
+        ("# stress_MPa: -100\n# temperature_C: 800\ntime_s,strain_1\n0,0\n1,1e-4\n", "stress"),
+        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain_1\n0,0\n5,1e-4\n3,2e-4\n", "bad.csv:6"),
+        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain_1\n0,0\n1,nan\n", "bad.csv:5"),
+        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain_1\n0,0\n", "one"),
     ],
 )
 def test_a_file_that_cannot_be_read_is_one_sentence_and_nothing_is_written(tmp_path, text, words):

@@ -152,6 +152,7 @@ STEPS = {
             "set.h5",
         ]
     ],
+    "read": [],  # has no law
     "data": [["data", "set.h5", "--json"]],
     "train": [["train", "set.h5", "--hidden", "4", "--layers", "1", "--epochs", "2", "--to", "net.safetensors"]],
     "sweep": [["sweep", "set.h5", "--hidden", "4", "--layers", "1", "--epochs", "1", "--to", "sweep"]],

@@ -14,6 +14,7 @@ from creepkit.errors import HistoryError
 from creepkit.readers.conditions import END_OF_TEST_TERMS, StatedConditions, errors_located_at
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.loading_strain import without_loading
+from creepkit.readers.standard_names import in_standard_names
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records import History, Loading, Program
@@ -39,7 +40,10 @@ def assemble_history(
     columns in `skipped_columns`; source : what the history says of its origin. columns_as_labels : whether entries that
     resemble no key are labels, as columns of an index are.
     """
+    entries, table = in_standard_names(entries, table, vocabulary)
     conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
+    for assumption in table.assumptions:
+        conditions.record_assumption(assumption)
     table, marked = _without_readings_before_steps(table, vocabulary, conditions.terms)
     frames = read_frames(table, vocabulary, conditions.terms, skipped_columns)
     columns = table.location(table.columns_line)

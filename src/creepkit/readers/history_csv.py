@@ -19,7 +19,7 @@ beside it is kept for the check of data quality. `_sd` names a standard deviatio
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,7 +29,9 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history
-from creepkit.readers.text_tables import peek_columns, read_table
+from creepkit.readers.cell_grids import CellGrid, peek_columns, read_text_grid
+from creepkit.readers.column_names import KnownNames
+from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (
     History,
@@ -46,7 +48,7 @@ from creepkit.records.quantities import LENGTH
 
 @dataclass(frozen=True)
 class HistoryCsvReader:
-    """Reader of files that hold one history each.
+    """Reader of text tables of one test or several: any delimiter, decimal sign and encoding.
 
     columns : columns by which a file of this laboratory is recognised; () accepts every CSV file.
     vocabulary : names that the laboratory uses in heads and columns.
@@ -58,18 +60,44 @@ class HistoryCsvReader:
     vocabulary: HeaderVocabulary = field(default_factory=HeaderVocabulary)
 
     def accepts(self, path: Path) -> bool:
-        """Say whether `path` is a CSV file with the columns."""
-        if path.suffix.lower() != ".csv" or not path.is_file():
+        """Say whether `path` is a text table with the columns."""
+        if path.suffix.lower() not in (*TABLE_SUFFIXES, *TEXT_SUFFIXES) or not path.is_file():
             return False
-        return set(self.columns) <= set(peek_columns(path))
+        if not self.columns and path.suffix.lower() in TABLE_SUFFIXES:
+            return True
+        present = peek_columns(path)
+        if self.columns:
+            return set(self.columns) <= set(present)
+        known = KnownNames.of(self.vocabulary)
+        return len(present) > 1 and any(known.quantity(name) == "time" for name in present)
 
     def read(self, path: Path) -> list[History]:
-        """Return the one history in the file."""
-        table = read_table(path)
-        return [assemble_history(path.stem, table.header, table, self.vocabulary, location=str(path), source=str(path))]
+        """Return the histories in the file."""
+        grid = read_text_grid(path)
+        return histories_of_tests([(grid, test) for test in tests_in(grid, self.vocabulary)], path, self.vocabulary)
 
 
-HISTORY_CSV = HistoryCsvReader("csv", "one history a file: `# key: value` lines, then columns such as time_s,strain")
+TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv"), (".txt", ".dat", ".asc")
+"""Endings of files that are taken for tables, and of those that are where a column of time is among the first names."""
+
+
+HISTORY_CSV = HistoryCsvReader("csv", "a table as text: `# key: value` lines, then columns such as time_s,strain_pct")
+
+
+def histories_of_tests(
+    found: Sequence[tuple[CellGrid, TabulatedTest]], path: Path, vocabulary: HeaderVocabulary
+) -> list[History]:
+    """The histories of the tests in one file; those without a name have that of their sheet or of the file."""
+    sheets = {grid.sheet for grid, _ in found}
+    names = [test.name or (grid.sheet if len(sheets) > 1 else path.stem) for grid, test in found]
+    histories = []
+    for (grid, test), name in zip(found, names, strict=True):
+        unique = f"{grid.sheet}/{name}" if names.count(name) > 1 and grid.sheet else name
+        parts = [f"sheet {grid.sheet}"] * bool(grid.sheet) + [test.name] * bool(test.name)
+        source = f"{path} ({', '.join(parts)})" if parts and len(found) > 1 else str(path)
+        history = assemble_history(unique, test.entries, test.table, vocabulary, location=grid.place, source=source)
+        histories.append(history)
+    return histories
 
 
 def write_history(history: History, path: str | Path) -> Path:
@@ -182,7 +210,8 @@ def _frame_columns(history: History, terms: Terms) -> Iterator[tuple[str, Floats
                 f"history '{history.name}': no unit is known for '{name}', for no registered specimen has such an "
                 f"output; known: {', '.join(kinds)}"
             )
-        unit = next(iter(kind.units))
+        # A strain is written with its unit, 1, for without one it may be a fraction or in per cent.
+        unit = "1" if kind.is_ambiguous_without_unit else next(iter(kind.units))
         yield f"{name}_{unit}" if unit else name, values
     used = np.asarray(history.used)
     if not used.all():

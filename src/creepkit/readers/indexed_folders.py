@@ -12,7 +12,8 @@ from pathlib import Path
 
 from creepkit.errors import HistoryError
 from creepkit.readers.assembly import assemble_history
-from creepkit.readers.text_tables import SourceText, TableRow, TextTable, peek_columns, read_table
+from creepkit.readers.cell_grids import peek_columns, read_table
+from creepkit.readers.text_tables import SourceText, TableRow, TextTable
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 
@@ -132,7 +133,7 @@ INDEXED_TABLE = IndexedFolderReader(
     key_column="key",
     frames_file="curves.csv",
     vocabulary=HeaderVocabulary(
-        synonyms={"youngs_MPa": "modulus_MPa", "state": "ended"},
+        synonyms={"youngs_MPa": "modulus_MPa", "state": "ended", "strain": "strain_1"},
         end_of_test_terms={"Ruptured": "ruptured", "Discontinued": "stopped"},
         labels=("environment", "product", "file", "t_end_s", "strain_end", "strain_max", "min_rate_est_per_s"),
     ),

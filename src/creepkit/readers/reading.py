@@ -12,13 +12,18 @@ from creepkit.hookspecs import hookimpl
 from creepkit.readers.creep_schema_json import CREEP_SCHEMA
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
+from creepkit.readers.spreadsheets import SPREADSHEET
 from creepkit.records import History, Reader, accepts_path, histories_in
 
 
 @hookimpl
 def creepkit_readers() -> list[Reader]:
     """Return the built-in readers."""
-    return [INDEXED_TABLE, INDEXED_FILES, CREEP_SCHEMA, HISTORY_CSV]
+    return [INDEXED_TABLE, INDEXED_FILES, CREEP_SCHEMA, HISTORY_CSV, SPREADSHEET]
+
+
+GENERAL_READERS: tuple[Reader, ...] = (HISTORY_CSV, SPREADSHEET)
+"""Readers that accept every file of their format, and so get only those that no other reader wants."""
 
 
 PathsLike = str | Path | Iterable[str | Path]
@@ -27,10 +32,10 @@ PathsLike = str | Path | Iterable[str | Path]
 def read_histories(paths: PathsLike, readers: Sequence[Reader], reader: str | None = None) -> list[History]:
     """Read the histories in files, folders and glob patterns, in the order given and sorted within each.
 
-    reader : the name of the reader to use; None asks each of `readers` which files it accepts. The general `csv`
-    accepts every CSV file, and so gets only those that no other reader wants. A folder is read as a whole when a
-    reader accepts it, else file by file. What is reached twice is kept once; tests of one name get the name of their
-    folder in front.
+    reader : the name of the reader to use; None asks each of `readers` which files it accepts. `csv` and `xlsx`
+    accept every file of their format, and so get only those that no other reader wants. A folder is read as a whole
+    when a reader accepts it, else file by file. What is reached twice is kept once; tests of one name get the name of
+    their folder in front.
     """
     if reader is not None:
         readers = [_reader_named(reader, readers)]
@@ -88,7 +93,7 @@ def _reader_of(path: Path, readers: Sequence[Reader]) -> Reader:
         return readers[0]
     accepting = [reader for reader in readers if accepts_path(reader, path)]
     if len(accepting) > 1:
-        accepting = [reader for reader in accepting if reader is not HISTORY_CSV]
+        accepting = [reader for reader in accepting if reader not in GENERAL_READERS]
     if not accepting:
         reader_list = "; ".join(f"{reader.name}: {reader.title}" for reader in readers)
         raise HistoryError(f"{path}: no reader understands it; known are {reader_list or 'none'}")

@@ -1,40 +1,47 @@
 """Text of a measured file as a table whose cells keep their location, and its frames as arrays.
 
-Columns are converted to MPa, mm, s and K; times increase strictly.
+Whatever the cells come from, text in any dialect or a sheet, they arrive here as a TextTable. Columns are converted to
+MPa, mm, s and K; times increase strictly.
 """
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import overload
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest
-from creepkit.files.reading import FileKind, read_bytes, read_text
+from creepkit.files.delimited_text import Dialect, is_number, parse_number, parse_numbers
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records.quantities import QuantityKind
-
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 @dataclass(frozen=True)
 class SourceText:
-    """One piece of text and its place, 'file:line'."""
+    """One piece of text and its place, 'file:line'.
+
+    decimal : the decimal sign of the table that it stands beside; a decimal point is understood in any case.
+    """
 
     text: str
     location: str
+    decimal: str = "."
 
     def number(self, name: str) -> float:
         """The text as a finite number; `name` says in the error what it was meant to be."""
-        if not _NUMBER.fullmatch(self.text):
-            description = f"'{self.text}'" if self.text else "empty"
-            raise HistoryError(f"{self.location}: '{name}' is {description}; write a finite number such as 1.5e-3")
-        return float(self.text)
+        dialect = Dialect(decimal=self.decimal)
+        if self.decimal == "," and not is_number(self.text, dialect) and not _POINT_OF_THOUSANDS.fullmatch(self.text):
+            dialect = Dialect()
+        return parse_number(self.text, dialect, self.location, name)
+
+
+_POINT_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)
+"""Beside decimal commas 1.234 may be 1234."""
 
 
 @dataclass(frozen=True)
@@ -46,18 +53,51 @@ class TableRow:
 
 
 @dataclass(frozen=True)
+class NumberRows(Sequence[TableRow]):
+    """The rows of a table of numbers alone, whose text is not kept.
+
+    numbers : (rows, columns). first_line : of the file; the others follow it without a gap.
+    """
+
+    numbers: Floats
+    first_line: int
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    @overload
+    def __getitem__(self, index: int) -> TableRow: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[TableRow]: ...
+    def __getitem__(self, index: int | slice) -> TableRow | Sequence[TableRow]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        row = range(len(self))[index]
+        return TableRow(self.first_line + row, [repr(float(x)) for x in self.numbers[row]])
+
+
+@dataclass(frozen=True)
 class TextTable:
-    """A file as it was written: the entries of its head, its columns, its rows; all still text."""
+    """A table as it was written: the entries of its head, its columns, its rows; all still text.
+
+    sheet : of a spreadsheet, "" elsewhere. positions : the column of the file, from 0, in which each column stands,
+    where errors must tell it. assumptions : what was assumed of the table, for the label "assumed".
+    """
 
     path: Path
     header: Mapping[str, SourceText]
     columns: Sequence[str]
     columns_line: int
     rows: Sequence[TableRow]
+    dialect: Dialect = field(default_factory=Dialect)
+    sheet: str = ""
+    positions: Sequence[int] = ()
+    assumptions: tuple[str, ...] = ()
 
-    def location(self, line_number: int) -> str:
-        """Where a line stands, 'file:line'."""
-        return f"{self.path}:{line_number}"
+    def location(self, line_number: int, column: int | None = None) -> str:
+        """Where a line stands, 'file:line', or 'file, sheet 'creep', row 3' in a spreadsheet; or a cell of it."""
+        place = location_in(self.path, self.sheet, line_number)
+        return place if column is None or not self.positions else f"{place}, column {self._column_label(column)}"
 
     def column(self, name: str) -> int:
         """The number of a column that must be there."""
@@ -66,89 +106,56 @@ class TextTable:
             raise HistoryError(f"{self.location(self.columns_line)}: missing column '{name}'; found: {result}")
         return self.columns.index(name)
 
-    def numbers(self, name: str) -> list[float]:
-        """One column as numbers."""
+    def numbers(self, name: str) -> Floats:
+        """(rows,) One column as numbers."""
         k = self.column(name)
-        return [SourceText(row.cells[k], self.location(row.line)).number(name) for row in self.rows]
+        if isinstance(self.rows, NumberRows):
+            return self.rows.numbers[:, k]
+        cells = [row.cells[k] for row in self.rows]
+        return parse_numbers(cells, self.dialect, lambda row: self.location(self.rows[row].line, k), name)
+
+    @property
+    def lines(self) -> Ints:
+        """(rows,) The line of the file in which each row stands."""
+        if isinstance(self.rows, NumberRows):
+            return self.rows.first_line + np.arange(len(self.rows))
+        return np.array([row.line for row in self.rows], dtype=int)
 
     def entries(self, row: TableRow) -> dict[str, SourceText]:
         """The cells of one row by column, those left empty excepted."""
-        place = self.location(row.line)
-        return {name: SourceText(cell, place) for name, cell in zip(self.columns, row.cells, strict=True) if cell}
+        place, decimal = self.location(row.line), self.dialect.decimal
+        return {n: SourceText(cell, place, decimal) for n, cell in zip(self.columns, row.cells, strict=True) if cell}
 
     def with_rows(self, rows: Sequence[TableRow]) -> TextTable:
         """The same table with other rows."""
         return replace(self, rows=tuple(rows))
 
-
-def read_table(path: Path) -> TextTable:
-    """Read a CSV file: UTF-8, commas, at most one head of `# key: value` lines, one line of columns, then rows."""
-    lines = _lines(path)
-    start = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), None)
-    if start is None:
-        problem = "holds a header but no table" if any(line.strip() for line in lines) else "is empty"
-        raise HistoryError(f"{path}: the file {problem}; write a line of columns such as time_s,strain, then rows")
-    columns = _cells(path, start + 1, lines[start])
-    _check_columns(f"{path}:{start + 1}", columns)
-    numbered_lines = ((number, line) for number, line in enumerate(lines[start + 1 :], start + 2) if line.strip())
-    rows = tuple(TableRow(number, _cells(path, number, line)) for number, line in numbered_lines)
-    for row in rows:
-        if len(row.cells) != len(columns):
-            description = f"number of cells {len(row.cells)}, of columns {len(columns)}"
-            raise HistoryError(f"{path}:{row.line}: {description}; write one cell a column, separated by commas")
-    if not rows:
-        raise HistoryError(f"{path}:{start + 1}: no rows below the line of columns; a table needs at least one")
-    return TextTable(path, _header(path, lines[:start]), columns, start + 1, rows)
+    def _column_label(self, column: int) -> str:
+        """The letters of a spreadsheet's column, elsewhere its number from 1."""
+        number = self.positions[column] + 1
+        if not self.sheet:
+            return str(number)
+        letters = ""
+        while number:
+            number, digit = divmod(number - 1, 26)
+            letters = chr(ord("A") + digit) + letters
+        return letters
 
 
-TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
+def location_in(path: Path, sheet: str, line: int) -> str:
+    """Where a line of a text or a row of a sheet stands."""
+    return f"{path}, sheet '{sheet}', row {line}" if sheet else f"{path}:{line}"
 
 
-def peek_columns(path: Path, byte_limit: int = 65536) -> tuple[str, ...]:
-    """The columns of a file as far as its beginning shows them, () when it has none; never raises for what it holds."""
-    try:
-        text = read_bytes(path, TABLE_FILE, first=byte_limit).decode("utf-8-sig", errors="replace")
-    except HistoryError:
-        return ()
-    lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
-    return tuple(cell.strip() for cell in next(lines, "").split(","))
-
-
-def _lines(path: Path) -> list[str]:
-    """The lines of a text file as an editor counts them (str.splitlines also breaks at form feeds and the like)."""
-    text = read_text(path, TABLE_FILE)
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-
-
-def _cells(path: Path, number: int, line: str) -> tuple[str, ...]:
-    """The cells of one line; read line by line so that a stray quote cannot swallow the rest of the file."""
-    try:
-        return tuple(cell.strip() for cell in next(csv.reader([line], strict=True)))
-    except csv.Error as error:
-        raise HistoryError(f"{path}:{number}: not a line of a CSV table ({error}); look for stray quotes") from error
-
-
-def _header(path: Path, lines: Sequence[str]) -> dict[str, SourceText]:
-    """The `# key: value` lines; a `#` line without a colon is a remark."""
-    header: dict[str, SourceText] = {}
-    for number, line in enumerate(lines, 1):
-        key, colon, text = line.strip().removeprefix("#").partition(":")
-        key = key.strip()
-        if not colon:
-            continue
-        if key in header:
-            first = header[key].location.rpartition(":")[2]
-            raise HistoryError(f"{path}:{number}: '{key}' was already given in line {first}; keep one of them")
-        header[key] = SourceText(text.strip(), f"{path}:{number}")
-    return header
-
-
-def _check_columns(location: str, columns: Sequence[str]) -> None:
+def check_columns(location: str, columns: Sequence[str]) -> None:
+    """Refuse a column without a name, and a name that stands there twice."""
+    if "" in columns:
+        raise HistoryError(f"{location}: a column has no name; name every column, such as time_s,strain_pct")
+    seen: set[str] = set()
     for name in columns:
-        if not name:
-            raise HistoryError(f"{location}: a column has no name; name every column, such as time_s,strain")
-        if columns.count(name) > 1:
+        if name in seen:
             raise HistoryError(f"{location}: the column '{name}' stands there twice; keep one of them")
+        seen.add(name)
 
 
 @dataclass(frozen=True)
@@ -160,7 +167,7 @@ class TableFrames:
     merged_count : number of frames that were merged into another one of the same time.
     """
 
-    path: Path
+    table: TextTable
     values: Mapping[str, Floats]
     lines: Ints
     merged_count: int = 0
@@ -172,7 +179,7 @@ class TableFrames:
 
     def location(self, frame: int) -> str:
         """Where a frame stands, 'file:line'."""
-        return f"{self.path}:{self.lines[frame]}"
+        return self.table.location(int(self.lines[frame]))
 
 
 def read_frames(
@@ -191,7 +198,7 @@ def read_frames(
     if "time" not in values:
         place, result = table.location(table.columns_line), ", ".join(table.columns)
         raise HistoryError(f"{place}: missing column: no time among {result}; name one time_s, time_min or time_h")
-    return _strictly_increasing(TableFrames(table.path, values, np.array([row.line for row in table.rows])))
+    return _strictly_increasing(TableFrames(table, values, table.lines))
 
 
 def column_means(table: TextTable, vocabulary: HeaderVocabulary) -> dict[str, str]:
@@ -215,10 +222,8 @@ def _parsed_column(table: TextTable, name: str, kinds: Mapping[str, QuantityKind
 
 def _converted_column(table: TextTable, name: str, kind: QuantityKind, suffix: str) -> Floats:
     """One column in creepkit's unit."""
-    locations = (table.location(row.line) for row in table.rows)
-    return np.array(
-        [kind.convert(x, suffix, place, name) for x, place in zip(table.numbers(name), locations, strict=True)]
-    )
+    k = table.column(name)
+    return kind.convert_all(table.numbers(name), suffix, lambda row: table.location(table.rows[row].line, k), name)
 
 
 def _strictly_increasing(frames: TableFrames) -> TableFrames:
@@ -237,4 +242,4 @@ def _strictly_increasing(frames: TableFrames) -> TableFrames:
     values = {name: np.add.reduceat(column, first) / counts for name, column in frames.values.items()}
     if first.size < 2:
         raise HistoryError(f"{frames.location(0)}: only one frame in time; at least two are needed to identify a law")
-    return TableFrames(frames.path, values, frames.lines[first], frames.times.size - first.size)
+    return TableFrames(frames.table, values, frames.lines[first], frames.times.size - first.size)

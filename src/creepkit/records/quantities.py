@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+import numpy as np
+
+from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
 
 ZERO_CELSIUS = 273.15
@@ -59,6 +62,24 @@ class QuantityKind:
         )
         return f"{template} {unit}".rstrip()
 
+    @property
+    def is_ambiguous_without_unit(self) -> bool:
+        """Whether a number without unit may mean several things, as a strain may be a fraction or in per cent."""
+        return "" in self.units and len(self.units) > 1
+
+    def convert_all(self, numbers: Floats, suffix: str, locate: Callable[[int], str], name: str) -> Floats:
+        """Return numbers in creepkit's unit; `locate` gives the place of number k for the error."""
+        unit = self.unit(suffix, "", name)
+        values: Floats = unit.factor * numbers + unit.offset
+        inside = (
+            (self.low < values) & (values < self.high)
+            if self.open_interval
+            else (self.low <= values) & (values <= self.high)
+        )
+        for k in np.flatnonzero(~inside)[:1]:
+            self.convert(float(numbers[k]), suffix, locate(int(k)), name)
+        return values
+
     def standard_deviation(self) -> QuantityKind:
         """The kind of a standard deviation of this quantity: same units, above zero."""
         units = {suffix: UnitConversion(unit.factor) for suffix, unit in self.units.items()}
@@ -81,10 +102,22 @@ TIME = QuantityKind(
 )
 
 
-LENGTH = QuantityKind("length", {"mm": UnitConversion(1.0), "um": UnitConversion(1e-3), "m": UnitConversion(1e3)})
+LENGTH = QuantityKind(
+    "length",
+    {"mm": UnitConversion(1.0), "um": UnitConversion(1e-3), "m": UnitConversion(1e3), "in": UnitConversion(25.4)},
+)
 
 
-STRAIN = QuantityKind("strain", {"": UnitConversion(1.0), "pct": UnitConversion(1e-2), "percent": UnitConversion(1e-2)})
+STRAIN = QuantityKind(
+    "strain",
+    {
+        "": UnitConversion(1.0),
+        "1": UnitConversion(1.0),
+        "pct": UnitConversion(1e-2),
+        "percent": UnitConversion(1e-2),
+        "microstrain": UnitConversion(1e-6),
+    },
+)
 
 
 NUMBER = QuantityKind("number", {"": UnitConversion(1.0)})
@@ -96,8 +129,10 @@ STRESS = QuantityKind(
         "MPa": UnitConversion(1.0),
         "kPa": UnitConversion(1e-3),
         "GPa": UnitConversion(1e3),
+        "Pa": UnitConversion(1e-6),
         "bar": UnitConversion(0.1),
         "ksi": UnitConversion(6.894757293168361),
+        "psi": UnitConversion(6.894757293168361e-3),
     },
     low=0.0,
     high=1e5,
@@ -109,7 +144,12 @@ SIGNED_STRESS = replace(STRESS, low=-1e5)
 
 MODULUS = QuantityKind(
     "modulus",
-    {"MPa": UnitConversion(1.0), "GPa": UnitConversion(1e3), "ksi": UnitConversion(6.894757293168361)},
+    {
+        "MPa": UnitConversion(1.0),
+        "GPa": UnitConversion(1e3),
+        "ksi": UnitConversion(6.894757293168361),
+        "Msi": UnitConversion(6.894757293168361e3),
+    },
     0.0,
     1e8,
     open_interval=True,
@@ -121,7 +161,11 @@ POISSON = QuantityKind("Poisson's ratio", NUMBER.units, low=-1.0, high=0.5, open
 
 TEMPERATURE = QuantityKind(
     "temperature",
-    {"K": UnitConversion(1.0), "C": UnitConversion(1.0, ZERO_CELSIUS)},
+    {
+        "K": UnitConversion(1.0),
+        "C": UnitConversion(1.0, ZERO_CELSIUS),
+        "F": UnitConversion(1.0 / 1.8, ZERO_CELSIUS - 32.0 / 1.8),
+    },
     low=0.0,
     high=1e4,
     open_interval=True,

@@ -20,9 +20,11 @@ from pathlib import Path
 import numpy as np
 
 from creepkit.errors import FitError, HistoryError, nearest
+from creepkit.files.delimited_text import parse_number
 from creepkit.inverse.composite_predictor import CompositePredictor, predictor_for
 from creepkit.inverse.reference_conditions import detect_creep, distinct_loads
-from creepkit.readers.text_tables import SourceText, TextTable, read_table
+from creepkit.readers.cell_grids import read_table
+from creepkit.readers.text_tables import TextTable
 from creepkit.records import History, Predictor, is_logarithmic
 
 
@@ -179,7 +181,7 @@ def read_compositions(path: str | Path) -> Compositions:
         place, name = table.location(row.line), row.cells[table.column("alloy")]
         if not name or name in compositions:
             raise HistoryError(f"{place}: alloy '{name}' stands there twice or has no name; give each its own")
-        contents = {e: SourceText(row.cells[table.column(e)] or "0", place).number(e) for e in elements}
+        contents = {e: parse_number(row.cells[table.column(e)] or "0", table.dialect, place, e) for e in elements}
         contents = {element: value for element, value in _scaled_to_100(contents, place, name).items() if value > 0}
         compositions[name] = atomic_percent(contents) if unit == "wt.%" else contents
     return Compositions(compositions, str(path))

@@ -8,19 +8,19 @@ from creepkit.errors import HistoryError
 from creepkit.readers.history_csv import HISTORY_CSV
 
 HEAD = "# temperature_C: 850\n# stress_MPa: 60\n"
-BODY = "time_s,strain\n0,0\n10,0.1\n"
+BODY = "time_s,strain_1\n0,0\n10,0.1\n"
 
 CASES = {
-    "empty": ("", "x.csv: the file is empty; write a line of columns such as time_s,strain, then rows"),
+    "empty": ("", "x.csv: the file is empty; write a line of columns such as time_s,strain_pct, then rows"),
     "blank": ("\n \n", "x.csv: the file is empty"),
     "header only": (HEAD, "x.csv: the file holds a header but no table"),
-    "no rows": (HEAD + "time_s,strain\n", "x.csv:3: no rows below the line of columns"),
-    "one point": (HEAD + "time_s,strain\n0,0\n", "x.csv:4: only one frame in time; at least two are needed"),
-    "one time": (HEAD + "time_s,strain\n1,0\n1,1\n", "x.csv:4: only one frame in time"),
+    "no rows": (HEAD + "time_s,strain_1\n", "x.csv:3: no rows below the line of columns"),
+    "one point": (HEAD + "time_s,strain_1\n0,0\n", "x.csv:4: only one frame in time; at least two are needed"),
+    "one time": (HEAD + "time_s,strain_1\n1,0\n1,1\n", "x.csv:4: only one frame in time"),
     "no time": (HEAD + "strain\n0\n1\n", "x.csv:3: missing column: no time among strain; name one time_s, time_min"),
     "no output": (HEAD + "time_s,temperature_C\n0,850\n1,850\n", "x.csv:3: missing column: the columns hold no output"),
     "two specimens": (
-        HEAD + "time_s,strain,shape\n0,0,2\n1,0,2\n",
+        HEAD + "time_s,strain_1,shape\n0,0,2\n1,0,2\n",
         "x.csv:3: a column of shape has no meaning beside strain, stress",
     ),
     "other specimen": (
@@ -32,40 +32,40 @@ CASES = {
         "x.csv:3: column 'strian' is not understood; did you mean 'strain'",
     ),
     "unknown unit of a column": (
-        HEAD + "time_yr,strain\n0,0\n1,0\n",
+        HEAD + "time_yr,strain_1\n0,0\n1,0\n",
         "x.csv:3: the unit 'yr' of 'time_yr' is not understood; allowed: time_s, time_min, time_h, time_d",
     ),
     "unknown unit of a strain": (
         HEAD + "time_s,strain_ppm\n0,0\n1,0\n",
-        "x.csv:3: the unit 'ppm' of 'strain_ppm' is not understood; allowed: strain, strain_pct, strain_percent",
+        "x.csv:3: the unit 'ppm' of 'strain_ppm' is not understood; allowed: strain, strain_1, strain_pct",
     ),
     "no unit": (HEAD + "time,strain\n0,0\n1,0\n", "x.csv:3: 'time' has no unit; allowed: time_s, time_min"),
     "unknown unit of a key": (
-        "# temperature_F: 1600\n# stress_MPa: 60\n" + BODY,
-        "x.csv:1: the unit 'F' of 'temperature_F' is not understood; allowed: temperature_K, temperature_C",
+        "# temperature_R: 1600\n# stress_MPa: 60\n" + BODY,
+        "x.csv:1: the unit 'R' of 'temperature_R' is not understood; allowed: temperature_K, temperature_C",
     ),
     "key without unit": (
         "# temperature: 850\n" + BODY,
         "x.csv:1: 'temperature' has no unit; allowed: temperature_K, temperature_C",
     ),
     "falling time": (
-        HEAD + "time_s,strain\n0,0\n10,0.1\n9,0.2\n",
+        HEAD + "time_s,strain_1\n0,0\n10,0.1\n9,0.2\n",
         "x.csv:6: time falls from 10 s to 9 s; it must never decrease",
     ),
-    "negative time": (HEAD + "time_s,strain\n-1,0\n1,0\n", "x.csv:4: 'time_s' is -1; a time must lie from 0 to 1e"),
-    "nan": (HEAD + "time_s,strain\n0,0\n1,nan\n", "x.csv:5: 'strain' is 'nan'; write a finite number"),
-    "infinite": (HEAD + "time_s,strain\n0,0\n1,1e999\n", "x.csv:5: 'strain' is inf; a strain must lie from"),
-    "not a number": (HEAD + "time_s,strain\n0,0\n1,a lot\n", "x.csv:5: 'strain' is 'a lot'; write a finite number"),
-    "grouped digits": (HEAD + "time_s,strain\n0,0\n1_000,0\n", "x.csv:5: 'time_s' is '1_000'; write a finite number"),
-    "empty cell": (HEAD + "time_s,strain\n0,0\n1,\n", "x.csv:5: 'strain' is empty; write a finite number"),
+    "negative time": (HEAD + "time_s,strain_1\n-1,0\n1,0\n", "x.csv:4: 'time_s' is -1; a time must lie from 0 to 1e"),
+    "nan": (HEAD + "time_s,strain_1\n0,0\n1,nan\n", "x.csv:5: 'strain_1' is 'nan'; write a finite number"),
+    "infinite": (HEAD + "time_s,strain_1\n0,0\n1,1e999\n", "x.csv:5: 'strain_1' is '1e999', too large"),
+    "not a number": (HEAD + "time_s,strain_1\n0,0\n1,a lot\n", "x.csv:5: 'strain_1' is 'a lot'; write a finite number"),
+    "grouped digits": (HEAD + "time_s,strain_1\n0,0\n1_000,0\n", "x.csv:5: 'time_s' is '1_000'; write a finite number"),
+    "empty cell": (HEAD + "time_s,strain_1\n0,0\n1,\n", "x.csv:5: 'strain_1' is empty; write a finite number"),
     "too few cells": (
-        HEAD + "time_s,strain\n0,0\n\n1\n",
+        HEAD + "time_s,strain_1\n0,0\n\n1\n",
         "x.csv:6: number of cells 1, of columns 2; write one cell a column",
     ),
-    "too many cells": (HEAD + "time_s,strain\n0,0,0\n", "x.csv:4: number of cells 3, of columns 2"),
-    "stray quote": (HEAD + 'time_s,strain\n0,"0\n1,0\n', "x.csv:4: not a line of a CSV table .*; look for stray"),
-    "column twice": (HEAD + "time_s,strain,strain\n0,0,0\n", "x.csv:3: the column 'strain' stands there twice"),
-    "quantity twice": (HEAD + "time_s,time_h,strain\n0,0,0\n", "x.csv:3: two columns hold the time; keep one"),
+    "too many cells": (HEAD + "time_s,strain_1\n0,0,0\n", "x.csv:4: number of cells 3, of columns 2"),
+    "stray quote": (HEAD + 'time_s,strain_1\n0,"0\n1,0\n', "x.csv:4: not a line of a CSV table .*; look for stray"),
+    "column twice": (HEAD + "time_s,strain_1,strain_1\n0,0,0\n", "x.csv:3: the column 'strain_1' stands there twice"),
+    "quantity twice": (HEAD + "time_s,time_h,strain_1\n0,0,0\n", "x.csv:3: two columns hold the time; keep one"),
     "nameless column": (HEAD + "time_s,,strain\n0,0,0\n", "x.csv:3: a column has no name"),
     "no loading": (
         "# temperature_C: 850\n# label furnace: 4\n" + BODY,
@@ -102,7 +102,7 @@ CASES = {
         "x.csv:3: 'pressure_MPa' has no meaning beside the other conditions",
     ),
     "pressure column beside stress": (
-        HEAD + "time_s,strain,pressure_MPa\n0,0,8\n1,0,8\n",
+        HEAD + "time_s,strain_1,pressure_MPa\n0,0,8\n1,0,8\n",
         "x.csv:3: a column of pressure has no meaning beside strain, stress, temperature",
     ),
     "half a jump": (
@@ -132,13 +132,13 @@ CASES = {
     ),
     "control": (HEAD + "# control: force\n" + BODY, "x.csv:3: control is 'force'; allowed: load, stress"),
     "strain measure": (HEAD + "# strain_measure: true\n" + BODY, "x.csv:3: strain_measure is 'true'; allowed: eng"),
-    "end before the start": (HEAD + "# end_time_s: 1\ntime_s,strain\n2,0\n3,0\n", "x.csv:3: every frame lies after"),
-    "no scatter at all": (HEAD + "# strain_sd: 0\n" + BODY, "x.csv:3: 'strain_sd' is 0; a standard deviation of a"),
+    "end before the start": (HEAD + "# end_time_s: 1\ntime_s,strain_1\n2,0\n3,0\n", "x.csv:3: every frame lies after"),
+    "no scatter at all": (HEAD + "# strain_sd_1: 0\n" + BODY, "x.csv:3: 'strain_sd_1' is 0; a standard deviation of a"),
     "scatter twice": (
-        HEAD + "# strain_sd: 1\ntime_s,strain,strain_sd\n0,0,1\n1,0,1\n",
-        "x.csv:3: 'strain_sd' is also a column of the frames",
+        HEAD + "# strain_sd_1: 1\ntime_s,strain_1,strain_sd_1\n0,0,1\n1,0,1\n",
+        "x.csv:3: 'strain_sd_1' is also a column of the frames",
     ),
-    "flag of two": (HEAD + "time_s,strain,used\n0,0,1\n1,0,2\n", "x.csv:5: 'used' is 2; a flag must lie from 0 to 1"),
+    "flag of two": (HEAD + "time_s,strain_1,used\n0,0,1\n1,0,2\n", "x.csv:5: 'used' is 2; a flag must lie from 0 to 1"),
 }
 
 
@@ -154,8 +154,10 @@ def test_message(case: str, tmp_path: Path):
 
 def test_bytes_that_are_no_text(tmp_path: Path):
     path = tmp_path / "x.csv"
-    path.write_bytes(b"# alloy: a\n# heat: \xb0\n")
-    with pytest.raises(HistoryError, match=r"x.csv:2: byte 0xb0 is not text in UTF-8; save the table as CSV in UTF-8"):
+    path.write_bytes(b"# alloy: a\n# heat: \x01\xb0\n")
+    with pytest.raises(
+        HistoryError, match=r"x.csv:2: byte 0x01 is not text in UTF-8 or Latin-1; save it as CSV in UTF-8"
+    ):
         HISTORY_CSV.read(path)
 
 

@@ -21,9 +21,9 @@ bounded = settings(
 )
 
 GOOD = (
-    "# alloy: x\n# temperature_C: 850\n# stress_steps: 0 s 60 MPa; 1 h 70 MPa\n# modulus_GPa: 150\n# strain_sd: 1e-5\n"
-    "# end_time_h: 2\n# geometry gauge_mm: 25\n# label heat: X7\n"
-    "time_s,strain,used\n0,0,1\n10,0.1,1\n10,0.2,0\n20,0.3,1\n"
+    "# alloy: x\n# temperature_C: 850\n# stress_steps: 0 s 60 MPa; 1 h 70 MPa\n# modulus_GPa: 150\n"
+    "# strain_sd_1: 1e-5\n# end_time_h: 2\n# geometry gauge_mm: 25\n# label heat: X7\n"
+    "time_s,strain_1,used\n0,0,1\n10,0.1,1\n10,0.2,0\n20,0.3,1\n"
 )
 BULGE = (
     "# temperature_K: 1000\n# pressure_1_MPa: 8\n# pressure_2_MPa: 9\n# jump_time_h: 3\n# ramp_s: 5\n"
@@ -92,7 +92,7 @@ def test_good_files_with_pieces_cut_out_and_put_in(tmp_path, data, good):
 @bounded
 @given(cells=st.lists(st.lists(st.sampled_from(PIECES) | st.floats().map(repr), min_size=3, max_size=3), max_size=6))
 def test_good_head_with_any_cells(tmp_path, cells):
-    head = "# temperature_C: 850\n# stress_MPa: 60\ntime_s,strain,strain_sd\n"
+    head = "# temperature_C: 850\n# stress_MPa: 60\ntime_s,strain_1,strain_sd_1\n"
     read_or_refuse(head + "\n".join(map(",".join, cells)), tmp_path / "x.csv")
 
 
@@ -100,7 +100,7 @@ def test_good_head_with_any_cells(tmp_path, cells):
 @given(data=st.data())
 @pytest.mark.parametrize("reader", [INDEXED_TABLE, INDEXED_FILES], ids=lambda reader: reader.name)
 def test_index_with_pieces_cut_out_and_put_in(tmp_path, reader, data):
-    frames = {"curves.csv": "key,time_s,strain\na,0,0\na,1,1\n"}
+    frames = {"curves.csv": "key,time_s,strain_1\na,0,0\na,1,1\n"}
     frames["a_creep.csv"] = "time_h,creep_extension_pct,T_top_C,T_mid_C,T_bot_C\n0,0,1,1,1\n1,1,1,1,1\n"
     for name, text in frames.items():
         (tmp_path / name).write_text(text)

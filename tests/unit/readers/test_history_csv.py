@@ -42,7 +42,7 @@ def test_uniaxial_test_in_laboratory_units(read):
 
 
 def test_what_was_not_said_is_assumed_and_recorded(read):
-    history = read(CREEP + "time_s,strain\n0,0\n1,0.1\n")
+    history = read(CREEP + "time_s,strain_1\n0,0\n1,0.1\n")
     assert history.labels == {"assumed": "control load, strain_measure engineering, includes_elastic no"}
     assert (history.strain_measure, history.includes_elastic) == ("engineering", False)
     assert history.loading.control == "load"
@@ -60,7 +60,7 @@ def test_what_was_not_said_is_assumed_and_recorded(read):
     ],
 )
 def test_stress_may_be_told_in_several_ways(read, head, loading):
-    history = read(f"# temperature_K: 1000\n# {head}\n# control: load\ntime_s,strain\n0,0\n1,0.1\n")
+    history = read(f"# temperature_K: 1000\n# {head}\n# control: load\ntime_s,strain_1\n0,0\n1,0.1\n")
     assert history.loading == loading
 
 
@@ -84,7 +84,7 @@ def test_pressure_may_be_told_in_several_ways(read, head, loading):
 
 def test_recorded_columns_become_programs(read):
     history = read(
-        "# alloy: x\ntime_s,strain,stress_MPa,temperature_C,strain_sd_pct\n10,0,50,700,0.01\n20,1e-3,60,701,0.02\n"
+        "# alloy: x\ntime_s,strain_1,stress_MPa,temperature_C,strain_sd_pct\n10,0,50,700,0.01\n20,1e-3,60,701,0.02\n"
     )
     assert history.loading.program() == Program([0, 10, 20], [50, 50, 60])
     np.testing.assert_allclose(history.temperature_program().values, [973.15, 973.15, 974.15])
@@ -92,13 +92,13 @@ def test_recorded_columns_become_programs(read):
 
 
 def test_column_that_never_changes_is_a_constant(read):
-    history = read("# temperature_C: 700\ntime_s,strain,stress_MPa,temperature_C\n0,0,50,700\n1,1e-3,50,700\n")
+    history = read("# temperature_C: 700\ntime_s,strain_1,stress_MPa,temperature_C\n0,0,50,700\n1,1e-3,50,700\n")
     assert history.temperature == 973.15
     assert history.loading.steps == ((0.0, 50.0),)
 
 
 def test_temperature_steps_and_programs(read):
-    body = "# stress_MPa: 50\ntime_s,strain\n0,0\n10,1e-3\n"
+    body = "# stress_MPa: 50\ntime_s,strain_1\n0,0\n10,1e-3\n"
     stepped = read("# temperature_steps: 0 s 900 K; 5 s 910 K\n" + body).temperature_program()
     np.testing.assert_allclose(stepped.at([0, 4.9, 5, 9]), [900, 900, 910, 910])
     ramped = read("# temperature_program: 0 s 900 K; 10 s 910 K\n" + body).temperature_program()
@@ -106,17 +106,17 @@ def test_temperature_steps_and_programs(read):
 
 
 def test_one_standard_deviation_serves_all_frames(read):
-    history = read(CREEP + "# strain_sd: 1e-5\ntime_s,strain\n0,0\n1,0.1\n")
+    history = read(CREEP + "# strain_sd_1: 1e-5\ntime_s,strain_1\n0,0\n1,0.1\n")
     np.testing.assert_array_equal(history.standard_deviation["strain"], [1e-5, 1e-5])
 
 
 def test_geometry_is_in_mm_unless_it_says_otherwise(read):
-    history = read(CREEP + "# geometry apex_thickness_um: 480\n# geometry angle: 3\ntime_s,strain\n0,0\n1,0.1\n")
+    history = read(CREEP + "# geometry apex_thickness_um: 480\n# geometry angle: 3\ntime_s,strain_1\n0,0\n1,0.1\n")
     assert history.geometry == pytest.approx({"apex_thickness": 0.48, "angle": 3.0})
 
 
 def test_frames_of_one_time_become_their_mean_and_are_counted(read):
-    history = read(CREEP + "time_s,strain,strain_sd\n0,0,1e-4\n5,0.1,1e-4\n5,0.2,3e-4\n5,0.6,2e-4\n9,1,1e-4\n")
+    history = read(CREEP + "time_s,strain_1,strain_sd_1\n0,0,1e-4\n5,0.1,1e-4\n5,0.2,3e-4\n5,0.6,2e-4\n9,1,1e-4\n")
     np.testing.assert_allclose(history.times, [0, 5, 9])
     np.testing.assert_allclose(history.outputs["strain"], [0, 0.3, 1])
     np.testing.assert_allclose(history.standard_deviation["strain"], [1e-4, 2e-4, 1e-4])
@@ -124,25 +124,25 @@ def test_frames_of_one_time_become_their_mean_and_are_counted(read):
 
 
 def test_frames_after_the_end_are_kept_but_not_used(read):
-    history = read(CREEP + "# end_time_h: 4\ntime_s,strain\n0,0\n14400,0.1\n14550,0.09\n")
+    history = read(CREEP + "# end_time_h: 4\ntime_s,strain_1\n0,0\n14400,0.1\n14550,0.09\n")
     assert history.used.tolist() == [True, True, False]
     assert history.labels["frames_after_end"] == "1"
 
 
 def test_marked_frames(read):
-    history = read(CREEP + "time_s,strain,used\n0,0,1\n1,0.1,0\n2,0.1,1\n")
+    history = read(CREEP + "time_s,strain_1,used\n0,0,1\n1,0.1,0\n2,0.1,1\n")
     assert history.used.tolist() == [True, False, True]
 
 
 def test_text_of_the_specimen_is_a_label_and_its_name_a_name(read):
-    assert read(CREEP + "# specimen: bar\ntime_s,strain\n0,0\n1,0.1\n").specimen == "bar"
-    history = read(CREEP + "# specimen: Round bar, 6 mm\ntime_s,strain\n0,0\n1,0.1\n")
+    assert read(CREEP + "# specimen: bar\ntime_s,strain_1\n0,0\n1,0.1\n").specimen == "bar"
+    history = read(CREEP + "# specimen: Round bar, 6 mm\ntime_s,strain_1\n0,0\n1,0.1\n")
     assert (history.specimen, history.labels["specimen"]) == ("uniaxial", "Round bar, 6 mm")
 
 
 @pytest.mark.parametrize("text", ["\ufeff{}", "{}\n\n", "{}   \n"])
 def test_marks_blank_lines_and_spaces_do_not_matter(read, text):
-    plain = CREEP + "time_s,strain\n0,0\n1,0.1"
+    plain = CREEP + "time_s,strain_1\n0,0\n1,0.1"
     assert read(text.format(plain)).outputs["strain"].tolist() == [0.0, 0.1]
     assert read(plain.replace("\n", "\r\n").replace(",", " , ")).times.tolist() == [0.0, 1.0]
 
@@ -163,5 +163,5 @@ def test_words_of_another_laboratory(read):
 def test_reader_with_columns_accepts_only_files_that_have_them(tmp_path):
     reader = HistoryCsvReader("lab", "our laboratory", columns=("Zeit_h",))
     (tmp_path / "a.csv").write_text("# x: 1\n\nZeit_h,Dehnung_pct\n0,0\n")
-    (tmp_path / "b.csv").write_text("time_h,strain\n0,0\n")
+    (tmp_path / "b.csv").write_text("time_h,strain_1\n0,0\n")
     assert [reader.accepts(tmp_path / name) for name in ("a.csv", "b.csv", "c.csv")] == [True, False, False]

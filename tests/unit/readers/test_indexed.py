@@ -96,7 +96,11 @@ BAD = {
     "test without a name": (INDEX + ",900,25,149000,\n", CURVES, "index.csv:4: the key is empty or not printable"),
     "test without frames": (INDEX + "a/3,900,25,149000,\n", CURVES, "index.csv:4: test 'a/3' has no frames in .*"),
     "frames without test": (INDEX, CURVES + "b,900,25,0,0\n", "curves.csv:6: test 'b' is not in .*index.csv; add it"),
-    "no stress": (INDEX.replace("stress_MPa", "sigma"), CURVES.replace("stress_MPa", "strain_sd"), "index.csv:2: no l"),
+    "no stress": (
+        INDEX.replace("stress_MPa", "weight"),
+        CURVES.replace("stress_MPa", "strain_sd_1"),
+        "index.csv:2: no l",
+    ),
     "falling time": (INDEX, CURVES + "a/1,900,25,9,0.2\n", "curves.csv:6: time falls from 10 s to 9 s"),
     "empty index": ("", CURVES, "index.csv: the file is empty"),
     "no key": (INDEX.replace("key", "test"), CURVES, "index.csv:1: missing column 'key'; found: test, temperature_C"),

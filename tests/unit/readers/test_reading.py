@@ -12,7 +12,7 @@ from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, Program, constant_stress
 
 READERS = creepkit_readers()
-TEST = "# temperature_C: 850\n# stress_MPa: 60\ntime_s,strain\n0,0\n1,0.1\n"
+TEST = "# temperature_C: 850\n# stress_MPa: 60\ntime_s,strain_1\n0,0\n1,0.1\n"
 
 
 @dataclass(frozen=True)

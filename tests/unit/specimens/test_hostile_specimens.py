@@ -101,7 +101,7 @@ def test_a_length_of_a_file_is_never_a_label(tmp_path, line, said):
 
 def test_a_misspelt_specimen_is_not_taken_for_another(tmp_path):
     path = tmp_path / "bar.csv"
-    path.write_text("# specimen: uniaxal\n# temperature_C: 800\n# stress_MPa: 80\ntime_s,strain\n0,0\n100,0.001\n")
+    path.write_text("# specimen: uniaxal\n# temperature_C: 800\n# stress_MPa: 80\ntime_s,strain_1\n0,0\n100,0.001\n")
     with pytest.raises(HistoryError, match="there is no specimen 'uniaxal'; did you mean 'uniaxial'"):
         ck.read_histories(path)
 

@@ -1,0 +1,245 @@
+"""A text file as rows of cells, with the `# key: value` lines above them; a sheet of a spreadsheet is one too."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from creepkit.errors import HistoryError
+from creepkit.files.delimited_text import Dialect, decode_text, detect_dialect, split_line, text_lines
+from creepkit.files.reading import FileKind, read_bytes
+from creepkit.readers.text_tables import NumberRows, SourceText, TableRow, TextTable, check_columns, location_in
+
+TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
+
+
+DECIMAL_SIGNS: Mapping[str, str] = {".": ".", ",": ",", "point": ".", "comma": ","}
+"""What `# decimal:` may say."""
+
+
+_LARGE_TEXT = 65_536
+"""Characters above which the rows of a text are read as numbers at once where they hold nothing else."""
+
+
+_HEAD_LINES = 1000
+"""Lines of a large text within which its names must stand for that."""
+
+
+@dataclass(frozen=True)
+class CellGrid:
+    """Rows of cells as they stand in a file.
+
+    sheet : of a spreadsheet, "" of a text. header : the entries of `# key: value` lines. rows : those of them that are
+    no comment and not empty. numbers : the rows below the last of `rows`, where they hold numbers alone.
+    comments : line, key and entry of each `# key: value` below the first row.
+    """
+
+    path: Path
+    sheet: str
+    dialect: Dialect
+    header: Mapping[str, SourceText]
+    rows: Sequence[TableRow]
+    numbers: NumberRows | None = None
+    comments: Sequence[tuple[int, str, SourceText]] = ()
+
+    def location(self, line: int) -> str:
+        """Where a row stands."""
+        return location_in(self.path, self.sheet, line)
+
+    @property
+    def place(self) -> str:
+        """The file, and the sheet in it."""
+        return f"{self.path}, sheet '{self.sheet}'" if self.sheet else str(self.path)
+
+
+def read_text_grid(path: Path) -> CellGrid:
+    """Read a text table of any delimiter, decimal sign and encoding; HistoryError where it holds no table."""
+    text = decode_text(read_bytes(path, TABLE_FILE), path)
+    if "\r" in text:
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    lines = text.split("\n", _HEAD_LINES) if len(text) > _LARGE_TEXT else text.split("\n")
+    start = next((k for k, line in enumerate(lines[:_HEAD_LINES]) if line.strip() and not is_comment(line)), None)
+    if start is not None and len(text) > _LARGE_TEXT:
+        numbers = _number_rows(text, lines, start, _stated_decimal(path, lines[:start]))
+        if numbers is not None:
+            dialect, rows = numbers
+            names = TableRow(start + 1, split_line(lines[start], dialect, f"{path}:{start + 1}"))
+            return CellGrid(path, "", dialect, _header(path, lines[:start], names.cells, dialect), [names], rows)
+    return _grid_of_lines(path, text_lines(text))
+
+
+def _grid_of_lines(path: Path, lines: Sequence[str]) -> CellGrid:
+    start = next((k for k, line in enumerate(lines) if line.strip() and not is_comment(line)), None)
+    if start is None:
+        problem = "holds a header but no table" if any(line.strip() for line in lines) else "is empty"
+        raise HistoryError(f"{path}: the file {problem}; write a line of columns such as time_s,strain_pct, then rows")
+    head = lines[:start]
+    numbered = [(k, line) for k, line in enumerate(lines[start:], start + 1) if line.strip() and not is_comment(line)]
+    dialect = detect_dialect((line for _, line in numbered), str(path), _stated_decimal(path, head))
+    comments = [(k, *_entry_of(line)) for k, line in enumerate(lines[start:], start + 1) if is_comment(line)]
+    late = [(k, key, SourceText(text, f"{path}:{k}", dialect.decimal)) for k, key, colon, text in comments if colon]
+    split = (TableRow(number, split_line(line, dialect, f"{path}:{number}")) for number, line in numbered)
+    rows = [row for row in split if any(row.cells)]
+    if not rows:
+        raise HistoryError(f"{path}:{start + 1}: no cell holds anything; write a line of columns, then rows")
+    return CellGrid(path, "", dialect, _header(path, head, rows[0].cells, dialect), rows, None, late)
+
+
+def grid_of_rows(path: Path, sheet: str, rows: Sequence[TableRow]) -> CellGrid:
+    """The grid of the rows of a sheet, where comments fill the first cell; `# key:` may have its value beside it."""
+    start = next((k for k, row in enumerate(rows) if not is_comment(row.cells[0] if row.cells else "")), len(rows))
+    if start == len(rows):
+        raise HistoryError(f"{path}, sheet '{sheet}': holds comments but no table; write a row of columns, then rows")
+    header: dict[str, SourceText] = {}
+    comments: list[tuple[int, str, SourceText]] = []
+    kept: list[TableRow] = []
+    for k, row in enumerate(rows):
+        if not is_comment(row.cells[0]):
+            kept.append(row)
+            continue
+        key, colon, text = _entry_of(row.cells[0])
+        location, beside = location_in(path, sheet, row.line), [cell for cell in row.cells[1:] if cell]
+        if key in header or len(beside) > (not text):
+            raise HistoryError(f"{location}: '{row.cells[0]:.40}' is given twice or with several values; keep one")
+        if (colon or beside) and k < start:
+            header[key] = SourceText(text or "".join(beside), location)
+        elif colon or beside:
+            comments.append((row.line, key, SourceText(text or "".join(beside), location)))
+    return CellGrid(path, sheet, Dialect("\t"), header, kept, None, comments)
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line, or the first cell of a row, is a comment."""
+    text = line.lstrip(' \t"\ufeff')
+    return text.startswith(("#", "//")) and not text.startswith(_ERROR_VALUES)
+
+
+_ERROR_VALUES = ("#REF!", "#DIV/0!", "#N/A", "#VALUE!", "#NAME?", "#NUM!", "#NULL!", "#SPILL!", "#CALC!", "#####")
+"""What spreadsheets write for a value that could not be computed or shown."""
+
+
+def _number_rows(text: str, lines: Sequence[str], start: int, decimal: str | None) -> tuple[Dialect, NumberRows] | None:
+    """The rows of a large text, where they hold numbers alone and no line is empty; None where they do not."""
+    sample = [line for line in lines[start:_HEAD_LINES] if line.strip() and not is_comment(line)]
+    offset = sum(len(line) + 1 for line in lines[: start + 1])
+    body = text[offset:].rstrip("\n")
+    try:
+        dialect = detect_dialect(sample, decimal=decimal)
+    except HistoryError:  # told by who reads line by line
+        return None
+    if dialect.delimiter == " " or '"' in lines[start]:
+        return None
+    point = dialect.decimal
+    allowed = f"0123456789+-eE\n{dialect.delimiter}{point}"
+    if "\n\n" in body or body.startswith("\n") or not body.isascii() or body.encode().translate(None, allowed.encode()):
+        return None
+    if re.search(rf"(?:^|[\n{dialect.delimiter}+-])0[0-9]+(?:[\n{dialect.delimiter}]|$)", body):
+        return None  # a whole number such as 0123 is refused
+    try:
+        numbers = np.loadtxt(
+            io.StringIO(body if point == "." else body.replace(",", ".")),
+            delimiter=dialect.delimiter,
+            comments=None,
+            ndmin=2,
+        )
+    except ValueError:
+        return None
+    columns = len(split_line(lines[start], dialect))
+    if numbers.shape != (body.count("\n") + 1, columns) or not np.isfinite(numbers).all():
+        return None
+    return dialect, NumberRows(numbers, start + 2)
+
+
+def _stated_decimal(path: Path, head: Sequence[str]) -> str | None:
+    for number, line in enumerate(head, 1):
+        key, colon, text = _entry_of(line)
+        if colon and key == "decimal":
+            sign = text if text in DECIMAL_SIGNS else text.rstrip(";,\t ")
+            if sign not in DECIMAL_SIGNS:
+                raise HistoryError(f"{path}:{number}: decimal is '{text:.40}'; allowed: point, comma")
+            return DECIMAL_SIGNS[sign]
+    return None
+
+
+def _entry_of(line: str) -> tuple[str, bool, str]:
+    """Key, whether there is a colon, and text of a comment, which a spreadsheet may have put in quotes."""
+    text = line.strip().strip("\ufeff")
+    if text.startswith('"') and text.endswith('"'):
+        text = text[1:-1].replace('""', '"')
+    key, colon, value = text.lstrip("#/").partition(":")
+    return key.strip(), bool(colon), value.strip()
+
+
+def _header(path: Path, lines: Sequence[str], names: Sequence[str], dialect: Dialect) -> dict[str, SourceText]:
+    """The `# key: value` lines; a comment without a colon is a remark.
+
+    A spreadsheet writes them with an empty cell for each further column; these cells are cut off.
+    """
+    padding = dialect.delimiter * (len(names) - 1)
+    comments = [line.rstrip(" ") for line in lines if line.strip()]
+    is_padded = len(names) > 1 and all(line.endswith(padding) for line in comments)
+    header: dict[str, SourceText] = {}
+    for number, line in enumerate(lines, 1):
+        key, colon, text = _entry_of(line.rstrip(" ").removesuffix(padding) if is_padded else line)
+        if not colon or key == "decimal":
+            continue
+        if key in header:
+            first = header[key].location.rpartition(":")[2]
+            raise HistoryError(f"{path}:{number}: '{key}' was already given in line {first}; keep one of them")
+        header[key] = SourceText(text, f"{path}:{number}", dialect.decimal)
+    return header
+
+
+def read_table(path: Path) -> TextTable:
+    """Read a file of one table: its first row names the columns, whatever they are."""
+    return table_of(read_text_grid(path))
+
+
+def table_of(grid: CellGrid) -> TextTable:
+    """The table of a grid whose first row names its columns."""
+    names, *rows = grid.rows
+    width = max((k for k, cell in enumerate(names.cells, 1) if cell), default=0)
+    columns = names.cells[:width]
+    check_columns(grid.location(names.line), columns)
+    body: Sequence[TableRow] = grid.numbers if grid.numbers is not None else tuple(_cut_rows(grid, rows, width))
+    if not body:
+        place = grid.location(names.line)
+        raise HistoryError(f"{place}: no rows below the line of columns; a table needs at least one")
+    return TextTable(grid.path, grid.header, columns, names.line, body, grid.dialect, grid.sheet)
+
+
+def _cut_rows(grid: CellGrid, rows: Sequence[TableRow], width: int) -> Iterator[TableRow]:
+    """The rows with as many cells as there are columns; empty ones behind them are none."""
+    for row in rows:
+        cells = row.cells
+        if len(cells) > width and not any(cells[width:]):
+            cells = cells[:width]
+        if len(cells) != width:
+            description = f"number of cells {len(cells)}, of columns {width}"
+            advice = "" if grid.dialect.delimiter != "," else "; decimal commas need another delimiter, such as ;"
+            raise HistoryError(
+                f"{grid.location(row.line)}: {description}; write one cell a column, separated by "
+                f"{str(grid.dialect).partition(',')[0]}{advice}"
+            )
+        yield TableRow(row.line, cells)
+
+
+def peek_columns(path: Path, byte_limit: int = 65536) -> tuple[str, ...]:
+    """The columns of a file as far as its beginning shows them, () when it has none; never raises for what it holds."""
+    try:
+        content = read_bytes(path, TABLE_FILE, first=byte_limit)
+        is_cut = len(content) == byte_limit
+        if is_cut:  # not within a character: a line feed of UTF-16 has two bytes
+            end = content.rfind(b"\n") + 1
+            content = content[: end + end % 2] if content[:2] in (b"\xff\xfe", b"\xfe\xff") else content[:end]
+        lines = [line for line in text_lines(decode_text(content, path)) if line.strip() and not is_comment(line)]
+        if not lines:
+            return ()
+        return tuple(split_line(lines[0], detect_dialect(lines, decimal=".")))
+    except HistoryError:
+        return ()

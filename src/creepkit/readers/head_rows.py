@@ -1,0 +1,96 @@
+"""Conditions in rows of cells above the names of the columns: key and value, or a key and one value a test."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from creepkit.errors import HistoryError
+from creepkit.files.delimited_text import is_number
+from creepkit.readers.cell_grids import CellGrid
+from creepkit.readers.column_names import KnownNames, split_written_name, unit_suffix
+from creepkit.readers.text_tables import SourceText, TableRow
+
+
+@dataclass
+class BlockConditions:
+    """What stands above the columns of one test, while it is collected: its entries, and what was assumed of them."""
+
+    entries: dict[str, SourceText] = field(default_factory=dict)
+    assumptions: tuple[str, ...] = ()
+
+
+def entries_of_blocks(
+    grid: CellGrid, head: Sequence[TableRow], blocks: Sequence[Sequence[int]], key_columns: set[int], known: KnownNames
+) -> list[BlockConditions]:
+    """What the rows above the names say of each test.
+
+    blocks : positions of the columns of each test. key_columns : positions before those of the first test, in which
+    keys stand. A row holds a key and one value a test, pairs of key and value, or the names of the tests.
+    """
+    results = [BlockConditions() for _ in blocks]
+    own = [sorted(set(block) - key_columns) for block in blocks]
+    for row in head:
+        place = grid.location(row.line)
+        filled = {k: cell for k, cell in enumerate(row.cells) if cell}
+        first = min(filled)
+        key = filled[first] if known.is_condition(filled[first].rstrip(": ")) else ""
+        if len(set(filled.values())) == 1 and not key:
+            for result in results:
+                put_entry(result.entries, f"label line {row.line}", filled[first], place, grid, known)
+            continue
+        one_for_all = len(filled) == 2 and bool(key) and len(blocks) > 1
+        for result, columns in zip(results, own, strict=True):
+            values = [(k, filled[k]) for k in range(columns[0], columns[-1] + 1) if k in filled]
+            if one_for_all:
+                text = next(cell for k, cell in filled.items() if k != first)
+                put_entry(result.entries, key, text, place, grid, known)
+                result.assumptions += (f"{key} in line {row.line} holds for all tests",)
+                continue
+            if len(values) > 1 and known.is_condition(values[0][1].rstrip(": ")):
+                put_entry(result.entries, values[0][1], values[1][1], place, grid, known)
+                continue
+            values = [(k, cell) for k, cell in values if k != first or not key][:1]
+            if values and not key and (first in key_columns or is_number(values[0][1], grid.dialect)):
+                raise HistoryError(
+                    f"{place}: '{values[0][1]:.40}' stands above the names of the columns, and '{filled[first]:.40}' "
+                    "is no condition that is known; write one such as 'Stress (MPa)' before it"
+                )
+            if values:
+                put_entry(result.entries, key or "name", values[0][1], place, grid, known)
+    return results
+
+
+def entries_above(grid: CellGrid, head: Sequence[TableRow], known: KnownNames) -> dict[str, SourceText]:
+    """What rows above the names say of one test: keys, each with its value and perhaps a unit behind it."""
+    entries: dict[str, SourceText] = {}
+    for row in head:
+        place, cells = grid.location(row.line), [cell for cell in row.cells if cell]
+        if grid.dialect.delimiter == " ":
+            cells = [" ".join(cells)]
+        if len(cells) == 1 and ":" in cells[0]:
+            cells = [part.strip() for part in cells[0].split(":", 1)]
+        while cells:
+            key, *rest = cells
+            if is_number(key, grid.dialect):
+                raise HistoryError(f"{place}: the number {key:.40} stands above the names of the columns; remove it")
+            if not rest:
+                if known.is_condition(key):
+                    raise HistoryError(f"{place}: '{key:.40}' stands above the names of the columns without a value")
+                put_entry(entries, f"label line {row.line}", key, place, grid, known)
+                break
+            value, cells = rest[0], rest[1:]
+            if cells and is_number(value, grid.dialect) and unit_suffix(cells[0]) and not split_written_name(key)[1]:
+                key, cells = f"{key} ({cells[0]})", cells[1:]
+            put_entry(entries, key, value, place, grid, known)
+    return entries
+
+
+def put_entry(
+    entries: dict[str, SourceText], key: str, text: str, place: str, grid: CellGrid, known: KnownNames
+) -> None:
+    """Add an entry under creepkit's name of its key; HistoryError where it is there already."""
+    key = known.condition(key.rstrip(": "))
+    if key in entries:
+        raise HistoryError(f"{place}: '{key:.60}' was already given; keep one of them")
+    entries[key] = SourceText(text, place, grid.dialect.decimal)

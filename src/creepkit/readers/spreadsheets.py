@@ -1,0 +1,279 @@
+"""Spreadsheets (.xlsx): their sheets as grids of cells, with the values that were last computed; nothing is evaluated.
+
+Needs openpyxl (`pip install 'creepkit[excel]'`). A sheet of frames has a column of time; a sheet with a column of tests
+and none of time states conditions, one row a test; other sheets are left aside, which the label "assumed" says.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+from creepkit.errors import HistoryError
+from creepkit.files.delimited_text import Dialect, detect_dialect, is_number
+from creepkit.files.reading import FileKind, check_readable, read_bytes
+from creepkit.readers.cell_grids import CellGrid, grid_of_rows, table_of
+from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
+from creepkit.readers.history_csv import histories_of_tests
+from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
+from creepkit.readers.text_tables import SourceText, TableRow
+from creepkit.readers.vocabulary import HeaderVocabulary
+from creepkit.records import History
+
+SPREADSHEET_FILE = FileKind("a spreadsheet of tests", HistoryError, "save the sheet as .xlsx or CSV", 100_000_000)
+
+
+MAXIMUM_UNPACKED_BYTES, MAXIMUM_CELLS = 500_000_000, 5_000_000
+"""Of all parts of a file together, and of a sheet with the empty cells in its rows."""
+
+
+_FILLED_ROWS = 60
+"""Rows from the top in which a merged cell counts for all the columns that it covers."""
+
+
+_MERGED = re.compile(rb'<(?:\w+:)?mergeCell\s[^>]*?ref="([A-Z]{1,3})(\d{1,7}):([A-Z]{1,3})\d{1,7}"')
+
+
+_SHEETS = re.compile(r"xl/worksheets/[^/]+\.xml")
+
+
+def read_sheets(path: Path) -> list[CellGrid]:
+    """The sheets that hold something; HistoryError for a file that is no spreadsheet, or too large unpacked."""
+    content = read_bytes(path, SPREADSHEET_FILE)
+    try:
+        from openpyxl import load_workbook
+    except ImportError:
+        raise HistoryError(f"{path}: to read spreadsheets, install openpyxl: pip install 'creepkit[excel]'") from None
+    parts = _checked_parts(path, content)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of what a workbook holds beside its cells
+            book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
+            formulas = _formulas(content, load_workbook) if any(b"<f" in part for part in parts.values()) else {}
+            grids = [
+                _grid(path, sheet, formulas.get(sheet.title, set()), parts.get(_part_of(sheet), b""))
+                for sheet in book.worksheets
+            ]
+    except HistoryError:
+        raise
+    except Exception as error:  # openpyxl lets all kinds of errors through where a file is damaged
+        cause = " ".join(str(error).split())[:80]
+        raise HistoryError(f"{path}: is no spreadsheet that can be read ({cause}); save it anew as .xlsx") from None
+    return [grid for grid in grids if grid is not None]
+
+
+def _checked_parts(path: Path, content: bytes) -> dict[str, bytes]:
+    """{name: XML} of the sheets, once it is known that the file unpacks to a sensible size and defines no entities."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            size = sum(part.file_size for part in archive.infolist())
+            if size > MAXIMUM_UNPACKED_BYTES:
+                raise HistoryError(
+                    f"{path}: unpacks to {size / 1e6:.0f} MB, which no spreadsheet of tests does; save it as CSV"
+                )
+            for name in archive.namelist():
+                with archive.open(name) as part:
+                    start = part.read(2000).replace(b"\0", b"")
+                if name.endswith((".xml", ".rels")) and b"<!DOCTYPE" in start:
+                    raise HistoryError(f"{path}: a part of it defines XML entities; save it anew as .xlsx")
+            return {name: archive.read(name) for name in archive.namelist() if _SHEETS.fullmatch(name)}
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, OSError, EOFError, RuntimeError, ValueError, NotImplementedError):
+        raise HistoryError(f"{path}: is no spreadsheet in the format .xlsx; save it anew as .xlsx or CSV") from None
+    except Exception as error:  # zlib.error and lzma.LZMAError have no common base
+        raise HistoryError(f"{path}: its parts cannot be unpacked ({error}); save it anew as .xlsx") from None
+
+
+def _part_of(sheet: Any) -> str:
+    return str(getattr(sheet, "_worksheet_path", "")).lstrip("/")
+
+
+def _formulas(content: bytes, load_workbook: Any) -> dict[str, set[tuple[int, int]]]:
+    """{sheet: row and column of each formula}; their texts are not kept."""
+    book = load_workbook(io.BytesIO(content), read_only=True, data_only=False, keep_links=False)
+    return {
+        sheet.title: {(cell.row, cell.column) for row in _rows(sheet) for cell in row if cell.data_type == "f"}
+        for sheet in book.worksheets
+    }
+
+
+def _rows(sheet: Any) -> Iterator[tuple[Any, ...]]:
+    """The rows of a sheet as they stand, whatever size the file claims that it has."""
+    sheet.reset_dimensions()
+    count = 0
+    for row in sheet.iter_rows():
+        count += len(row) + 1
+        if count > MAXIMUM_CELLS:
+            raise HistoryError(f"sheet '{sheet.title}' has more than {MAXIMUM_CELLS} cells; save its columns as CSV")
+        yield row
+
+
+def _grid(path: Path, sheet: Any, formulas: set[tuple[int, int]], part: bytes) -> CellGrid | None:
+    """A sheet as a grid, None where it is empty."""
+    place = f"{path}, sheet '{sheet.title}'"
+    rows: list[TableRow] = []
+    texts: list[str] = []
+    try:
+        for number, row in enumerate(_rows(sheet), 1):
+            cells = [_cell_text(cell) for cell in row]
+            if not any(cells) and not any((number, k) in formulas for k in range(1, len(row) + 1)):
+                continue
+            for k, cell in enumerate(cells, 1):
+                if not cell and (number, k) in formulas:
+                    raise HistoryError(
+                        f"{place}, row {number}, column {k}: a formula without a computed value; open the file in a "
+                        "spreadsheet program and save it, or paste the values"
+                    )
+            texts += [cell for cell, source in zip(cells, row, strict=True) if "," in cell and _is_text(source)]
+            rows.append(TableRow(number, cells))
+    except HistoryError as error:
+        raise error if str(error).startswith(str(path)) else HistoryError(f"{path}, {error}") from None
+    if not rows:
+        return None
+    rows = _with_points(rows, texts, place)
+    return grid_of_rows(path, str(sheet.title), _with_merged(rows, part))
+
+
+def _is_text(cell: Any) -> bool:
+    return isinstance(cell.value, str)
+
+
+def _cell_text(cell: Any) -> str:
+    """A cell as text; a number shown in per cent as the number that is shown, with the sign."""
+    value = cell.value
+    if value is None:
+        return ""
+    if isinstance(value, str):
+        return " ".join(value.split())
+    if isinstance(value, bool):
+        return str(value).upper()
+    if isinstance(value, (int, float)):
+        text = repr(value)
+        return f"{Decimal(text).scaleb(2).normalize():f}%" if "%" in str(cell.number_format) else text
+    return value.isoformat(" ") if isinstance(value, datetime) else str(value)
+
+
+def _with_points(rows: list[TableRow], texts: list[str], place: str) -> list[TableRow]:
+    """The rows with decimal points in numbers that were entered as text with a decimal comma."""
+    comma = Dialect("\t", ",")
+    numbers = [text for text in texts if is_number(text, comma)]
+    if not numbers or detect_dialect([f"{text}\t0" for text in numbers], place).decimal == ".":
+        return rows
+    return [
+        TableRow(row.line, [c.replace(",", ".") if "," in c and is_number(c, comma) else c for c in row.cells])
+        for row in rows
+    ]
+
+
+def _with_merged(rows: list[TableRow], part: bytes) -> list[TableRow]:
+    """The rows with the text of each merged cell in all columns that it covers, in its first row."""
+    by_line = {row.line: row for row in rows}
+    for match in _MERGED.finditer(part):
+        first, last = _column_number(match[1]), _column_number(match[3])
+        row = by_line.get(int(match[2]))
+        if row is None or row.line > _FILLED_ROWS or last - first > 1000 or first > len(row.cells):
+            continue
+        cells = [*row.cells, *[""] * (last - len(row.cells))]
+        cells[first - 1 : last] = [cells[first - 1]] * (last - first + 1)
+        by_line[row.line] = TableRow(row.line, cells)
+    return list(by_line.values())
+
+
+def _column_number(letters: bytes) -> int:
+    number = 0
+    for letter in letters:
+        number = 26 * number + letter - ord("A") + 1
+    return number
+
+
+@dataclass(frozen=True)
+class SpreadsheetReader:
+    """Reader of spreadsheets of one laboratory; vocabulary : names that it uses in heads and columns."""
+
+    name: str
+    title: str
+    vocabulary: HeaderVocabulary = field(default_factory=HeaderVocabulary)
+
+    def accepts(self, path: Path) -> bool:
+        """Say whether `path` is a file .xlsx."""
+        return path.suffix.lower() in (".xlsx", ".xlsm") and path.is_file()
+
+    def read(self, path: Path) -> list[History]:
+        """Return the histories in all sheets."""
+        check_readable(path, SPREADSHEET_FILE)
+        grids = read_sheets(path)
+        framed = [grid for grid in grids if names_time(grid, self.vocabulary)]
+        if not framed:
+            sheets = ", ".join(f"'{grid.sheet}'" for grid in grids) or "none that holds anything"
+            raise HistoryError(f"{path}: no sheet has a column of time (sheets: {sheets}); name one time_h or Time (h)")
+        stated: dict[str, dict[str, SourceText]] = {}
+        aside: list[str] = []
+        for grid in grids:
+            if grid not in framed:
+                conditions = _conditions_by_test(grid, self.vocabulary)
+                aside += [] if conditions else [f"sheet '{grid.sheet}' not read as it has no column of time"]
+                _add_conditions(stated, conditions, grid)
+        found = [(grid, test) for grid in framed for test in tests_in(grid, self.vocabulary)]
+        return histories_of_tests(_with_conditions(path, found, stated, aside), path, self.vocabulary)
+
+
+def _conditions_by_test(grid: CellGrid, vocabulary: HeaderVocabulary) -> dict[str, dict[str, SourceText]]:
+    """{test: its conditions} of a sheet with a column of tests; {} of any other sheet."""
+    names = grid.rows[0].cells
+    columns = [k for k, name in enumerate(names) if words_of(name) in (*TEST_NAME_COLUMNS, "name", "sheet")]
+    if not columns or len(grid.rows) < 2:
+        return {}
+    table, known = table_of(grid), KnownNames.of(vocabulary)
+    tests: dict[str, dict[str, SourceText]] = {}
+    for row in table.rows:
+        test, place = row.cells[columns[0]], table.location(row.line)
+        if not test or test in tests:
+            raise HistoryError(f"{place}: the test is '{test:.40}', which is empty or named before; name each once")
+        tests[test] = {
+            known.condition(name) if known.is_condition(name) else f"label {name}": entry
+            for name, entry in table.entries(row).items()
+            if name != table.columns[columns[0]]
+        }
+    return tests
+
+
+def _add_conditions(
+    stated: dict[str, dict[str, SourceText]], conditions: Mapping[str, dict[str, SourceText]], grid: CellGrid
+) -> None:
+    for test, entries in conditions.items():
+        if test in stated:
+            raise HistoryError(f"{grid.place}: test '{test:.40}' has conditions in another sheet too; keep one of them")
+        stated[test] = entries
+
+
+def _with_conditions(
+    path: Path,
+    found: list[tuple[CellGrid, TabulatedTest]],
+    stated: Mapping[str, Mapping[str, SourceText]],
+    aside: list[str],
+) -> list[tuple[CellGrid, TabulatedTest]]:
+    """The tests with what the sheets of conditions say of them, by their name or that of their sheet."""
+    results, used = [], set[str]()
+    for grid, test in found:
+        key = test.name if test.name in stated else grid.sheet
+        extra = stated.get(key, {})
+        used.add(key)
+        clash = sorted(extra.keys() & test.entries.keys())
+        if clash:
+            raise HistoryError(f"{extra[clash[0]].location}: '{clash[0]}' was already given; keep one of them")
+        table = replace(test.table, assumptions=(*test.table.assumptions, *aside))
+        results.append((grid, replace(test, entries={**test.entries, **extra}, table=table)))
+    unused = sorted(stated.keys() - used)
+    if unused:
+        raise HistoryError(f"{path}: test '{unused[0]:.40}' has conditions, but no sheet or column of that name")
+    return results
+
+
+SPREADSHEET = SpreadsheetReader("xlsx", "a spreadsheet .xlsx: a test a sheet, or several side by side")

@@ -1,0 +1,168 @@
+"""What a file states in creepkit's names and with units: `Stress: 120 MPa` as stress_MPa, a strain as what it is.
+
+A strain without a unit may be a fraction or in per cent. It is decided by, in this order: the key `strain_unit` (1, %),
+the head of a file that earlier versions of creepkit wrote (fractions), and its values: above 1 they are per cent, for
+few creep tests are stretched to twice their length; below 0.001 they are fractions, for no extensometer resolves 0.001 %.
+Else it is asked for. What was decided by head or values is recorded in the label "assumed".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from creepkit.errors import HistoryError
+from creepkit.readers.column_names import STATED_BY_NAME, KnownNames, split_written_name, unit_suffix, words_of
+from creepkit.readers.text_tables import NumberRows, SourceText, TableRow, TextTable
+from creepkit.readers.vocabulary import HeaderVocabulary, split_unit
+
+SURELY_PER_CENT, SURELY_FRACTION = 1.0, 1e-3
+"""Largest strain above which, and below which, a strain without unit is decided by its values."""
+
+
+STRAIN_UNITS: Mapping[str, str] = {"1": "1", "pct": "pct", "microstrain": "microstrain"}
+"""Units that the key `strain_unit` may name, as a suffix or in any other spelling of it."""
+
+
+_VALUE_WITH_UNIT = re.compile(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([^\d\s.,;:+-][^;:]{0,10})", re.ASCII)
+
+
+_WRITTEN_HEAD = ("name", "specimen", "control", "temperature_K", "strain_measure", "includes_elastic")
+"""Keys that stand in the head of every creep curve that write_history wrote when it left out the unit of strain."""
+
+
+def in_standard_names(
+    entries: Mapping[str, SourceText], table: TextTable, vocabulary: HeaderVocabulary
+) -> tuple[dict[str, SourceText], TextTable]:
+    """Entries and columns of one test under creepkit's names, with units, and a strain whose unit is decided."""
+    written = next(
+        (e.text for key, e in entries.items() if vocabulary.synonyms.get(key, key).lower() == "specimen"), ""
+    )
+    known = KnownNames.of(vocabulary, written)
+    stated = _standard_entries(entries, known)
+    for key, entry in _stated_by_columns(table):
+        if stated.setdefault(key, entry).text != entry.text:
+            raise HistoryError(
+                f"{stated[key].location}: {key} is '{stated[key].text}', but {entry.location} says {entry.text}"
+            )
+    columns = [known.column(name) for name in table.columns]
+    table = replace(table, columns=columns) if columns != list(table.columns) else table
+    return _with_decided_strains(stated, _without_per_cent_signs(table, known), known, entries)
+
+
+def _standard_entries(entries: Mapping[str, SourceText], known: KnownNames) -> dict[str, SourceText]:
+    stated: dict[str, SourceText] = {}
+    for key, entry in entries.items():
+        name = known.condition(key)
+        found = split_unit(name, known.condition_kinds)
+        if found and (match := _VALUE_WITH_UNIT.fullmatch(entry.text)):
+            suffix = unit_suffix(match[2])
+            if suffix in known.condition_kinds[found[0]].units and found[1] in ("", suffix):
+                name, entry = f"{found[0]}_{suffix}", replace(entry, text=match[1])
+        if name in stated:
+            raise HistoryError(f"{entry.location}: '{name}' is given twice (perhaps in two units); keep one of them")
+        stated[name] = entry
+    return stated
+
+
+def _stated_by_columns(table: TextTable) -> list[tuple[str, SourceText]]:
+    """Conditions that names of columns state, as `True strain (%)` does."""
+    place = table.location(table.columns_line)
+    names = [(column, words_of(split_written_name(column)[0])) for column in table.columns]
+    return [
+        (STATED_BY_NAME[words][0], SourceText(STATED_BY_NAME[words][1], f"{place}, column '{column}'"))
+        for column, words in names
+        if words in STATED_BY_NAME
+    ]
+
+
+def _without_per_cent_signs(table: TextTable, known: KnownNames) -> TextTable:
+    """The table without the signs in cells such as `1.2 %`, whose columns are in per cent, as their names must say."""
+    if isinstance(table.rows, NumberRows):
+        return table
+    signed = [k for k, cell in enumerate(table.rows[0].cells) if cell.endswith("%") and _kind(table.columns[k], known)]
+    if not signed:
+        return table
+    columns = list(table.columns)
+    for k in signed:
+        name, suffix = split_unit(columns[k], known.column_kinds) or (columns[k], "")
+        if suffix not in ("", "pct", "percent"):
+            place = table.location(table.columns_line, k)
+            raise HistoryError(f"{place}: '{columns[k]}' is not in per cent, but its cells are; correct one of them")
+        columns[k] = f"{name}_pct"
+    rows = []
+    for row in table.rows:
+        cells = list(row.cells)
+        for k in signed:
+            if not cells[k].endswith("%"):
+                place = table.location(row.line, k)
+                raise HistoryError(f"{place}: '{columns[k]}' is '{cells[k]:.40}' without the sign % of other cells")
+            cells[k] = cells[k].removesuffix("%").rstrip()
+        rows.append(TableRow(row.line, cells))
+    return replace(table, columns=columns, rows=rows)
+
+
+def _kind(name: str, known: KnownNames) -> bool:
+    """Whether a column holds a quantity that may be in per cent."""
+    found = split_unit(name, known.column_kinds)
+    return found is not None and "pct" in known.column_kinds[found[0]].units
+
+
+def _with_decided_strains(
+    stated: dict[str, SourceText], table: TextTable, known: KnownNames, written: Mapping[str, SourceText]
+) -> tuple[dict[str, SourceText], TextTable]:
+    """The columns and entries that have no unit, though it matters, under names with one."""
+    unit = stated.pop("strain_unit", None)
+    suffix = None if unit is None else unit_suffix(unit.text)
+    if unit is not None and suffix not in STRAIN_UNITS:
+        raise HistoryError(f"{unit.location}: strain_unit is '{unit.text}'; allowed: 1, %, microstrain")
+    undecided = {name for name in table.columns if _is_undecided(name, known)}
+    deviations = {name for name in (*table.columns, *stated) if name.endswith("_sd") and _is_undecided(name, known)}
+    names, assumptions = dict[str, str](), list(table.assumptions)
+    if not any(known.quantity(column) == "time" for column in table.columns):
+        return stated, table  # no frames at all, which is told first
+    for name in sorted(undecided - deviations):
+        if suffix is None:
+            decided, assumption = _decided_by_table(name, table, written)
+            assumptions.append(assumption)
+        names[name] = f"{name}_{suffix or decided}"
+    for name in sorted(deviations):
+        base = names.get(name.removesuffix("_sd"), "")
+        if not (suffix or base):
+            place = stated[name].location if name in stated else table.location(table.columns_line)
+            raise HistoryError(f"{place}: '{name}' has no unit; allowed: {name}_1, {name}_pct, {name}_microstrain")
+        names[name] = f"{name}_{suffix or base.rpartition('_')[2]}"
+    if not names:
+        return stated, table
+    columns = [names.get(name, name) for name in table.columns]
+    return (
+        {names.get(key, key): entry for key, entry in stated.items()},
+        replace(table, columns=columns, assumptions=tuple(assumptions)),
+    )
+
+
+def _is_undecided(name: str, known: KnownNames) -> bool:
+    if name in known.declared:
+        return False
+    kinds = known.column_kinds
+    found = split_unit(name, kinds)
+    return bool(found) and found == (name, "") and kinds[name].is_ambiguous_without_unit
+
+
+def _decided_by_table(name: str, table: TextTable, written: Mapping[str, SourceText]) -> tuple[str, str]:
+    """The unit of a column that states none, and how it was decided; HistoryError where it cannot be."""
+    if set(_WRITTEN_HEAD) <= written.keys() and "time_s" in table.columns:
+        return "1", f"{name} a fraction as in files of write_history"
+    largest = float(np.abs(table.numbers(name)).max())
+    if largest > SURELY_PER_CENT:
+        return "pct", f"{name} in per cent (up to {largest:g})"
+    if largest < SURELY_FRACTION:
+        return "1", f"{name} a fraction (up to {largest:g})"
+    place = table.location(table.columns_line, table.column(name))
+    raise HistoryError(
+        f"{place}: '{name}' has no unit, and values up to {largest:g} may be fractions or per cent; name it "
+        f"{name}_1 or {name}_pct, or write '# strain_unit: 1' or '# strain_unit: %' above"
+    )

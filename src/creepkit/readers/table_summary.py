@@ -1,0 +1,55 @@
+"""What a file of tables was understood to hold: how it is written, and which column means what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from creepkit.readers.cell_grids import CellGrid, read_text_grid
+from creepkit.readers.column_names import KnownNames
+from creepkit.readers.history_csv import HISTORY_CSV
+from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
+from creepkit.readers.table_layouts import names_time, tests_in
+from creepkit.readers.vocabulary import HeaderVocabulary
+
+
+@dataclass(frozen=True)
+class TableSummary:
+    """The table of one test as it stands in a file.
+
+    place : the file and the sheet. dialect : its delimiter and decimal sign, "" in a spreadsheet. test : its name, ""
+    where the file does not tell. columns : {name as written: creepkit's name}. rows : frames in the file.
+    """
+
+    place: str
+    dialect: str
+    test: str
+    columns: Mapping[str, str]
+    rows: int
+
+
+def summarise_tables(path: Path) -> list[TableSummary]:
+    """The tables of a text file or a spreadsheet in one of the general layouts; [] of any other file."""
+    vocabulary = HeaderVocabulary()
+    if SPREADSHEET.accepts(path):
+        grids = [grid for grid in read_sheets(path) if names_time(grid, vocabulary)]
+    elif HISTORY_CSV.accepts(path):
+        grids = [read_text_grid(path)]
+    else:
+        return []
+    return [summary for grid in grids for summary in _summaries(grid, vocabulary)]
+
+
+def _summaries(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TableSummary]:
+    known = KnownNames.of(vocabulary, grid.header["specimen"].text if "specimen" in grid.header else "")
+    return [
+        TableSummary(
+            grid.place,
+            "" if grid.sheet else str(grid.dialect),
+            test.name,
+            {name: known.column(name) for name in test.table.columns},
+            len(test.table.rows),
+        )
+        for test in tests_in(grid, vocabulary)
+    ]
