@@ -62,7 +62,7 @@ def outcome(sample: ReaderSample, good: object, seed: int, folder: Path) -> tupl
     except Hang:
         return changed.kind, "hang", ""
     except MemoryError:
-        return changed.kind, "memory", traceback.format_exc(limit=-2)[-300:].replace("\n", " ")
+        return changed.kind, "memory", traceback.format_exc(limit=-1).strip().replace("\n", " ")[-200:]
     except Exception as error:
         return changed.kind, "traceback", f"{type(error).__name__}: {error}"[:300]
     finally:

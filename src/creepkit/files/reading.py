@@ -6,11 +6,16 @@ import os
 import stat
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from creepkit.errors import CreepkitError
 
 DEFAULT_MAXIMUM_BYTES = 50_000_000
 """Bytes; no document of creepkit is near it, and a reader must not load what memory cannot hold."""
+
+
+PIECE_BYTES = 1_000_000
+"""Bytes that are read at once."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +52,21 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
     descriptor = _open_regular(path, kind, any_size=first is not None)
     try:
         with os.fdopen(descriptor, "rb") as stream:
-            content = stream.read(kind.maximum_bytes + 1 if first is None else first)
+            content = _read_pieces(stream, kind.maximum_bytes + 1 if first is None else first)
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
     if first is None and len(content) > kind.maximum_bytes:  # it has grown meanwhile
         raise kind.error(_too_large(path, kind))
     return content
+
+
+def _read_pieces(stream: BinaryIO, limit: int) -> bytes:
+    """At most `limit` bytes; piece by piece, for to ask for all at once would reserve memory for the limit."""
+    pieces: list[bytes] = []
+    while limit > 0 and (piece := stream.read(min(limit, PIECE_BYTES))):
+        pieces.append(piece)
+        limit -= len(piece)
+    return b"".join(pieces)
 
 
 def read_text(path: Path, kind: FileKind) -> str:
