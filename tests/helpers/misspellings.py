@@ -47,7 +47,7 @@ def other_unit(word: str, draw: random.Random) -> str:
     base, _, unit = word.rpartition("_")
     if unit not in UNITS:
         return draw.choice(EDITS)(word, draw)
-    return f"{base}_{draw.choice((*UNITS, 'mV', 'weeks', 'ppm', 'hours', 'degC', 'kgf'))}"
+    return f"{base}_{draw.choice((*UNITS, 'mV', 'weeks', 'ppm', 'furlong', 'torr', 'kgf'))}"
 
 
 EDITS = (dropped, doubled, swapped, changed, added)

@@ -16,7 +16,8 @@ DEFAULT_MAXIMUM_BYTES = 50_000_000
 """Bytes; no document of creepkit is near it, and a reader must not load what memory cannot hold."""
 
 
-_MORE_BYTES = 1_000_000
+PIECE_BYTES = 1_000_000
+"""Bytes that are read at once."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,7 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
     descriptor = _open_regular(path, kind, any_size=first is not None)
     try:
         with os.fdopen(descriptor, "rb") as stream:
-            content = stream.read(os.fstat(descriptor).st_size if first is None else first)
-            while first is None and len(content) <= kind.maximum_bytes and (more := stream.read(_MORE_BYTES)):
-                content += more  # it has grown meanwhile, or is one of the system's that have no size
+            content = _read_pieces(stream, kind.maximum_bytes + 1 if first is None else first)
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
     if first is None and len(content) > kind.maximum_bytes:
@@ -83,6 +82,17 @@ def open_binary(path: Path, kind: FileKind) -> Iterator[BinaryIO]:
             yield stream
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
+    except OSError as error:
+        raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
+
+
+def _read_pieces(stream: BinaryIO, limit: int) -> bytes:
+    """At most `limit` bytes; piece by piece, for to ask for all at once would reserve memory for the limit."""
+    pieces: list[bytes] = []
+    while limit > 0 and (piece := stream.read(min(limit, PIECE_BYTES))):
+        pieces.append(piece)
+        limit -= len(piece)
+    return b"".join(pieces)
 
 
 def read_text(path: Path, kind: FileKind) -> str:

@@ -173,7 +173,7 @@ class StatedConditions:
         elif dimension := _dimension_with_unit(name, self.terms.dimensions):
             value = LENGTH.convert(entry.number(key), dimension[1], entry.location, key)
             _put_once(self.geometry, dimension[0], value, entry.location)
-        elif result is None or self._is_misspelt_text(name):
+        elif result is None or (result[1] not in self._kinds[result[0]].units and self._is_misspelt_text(name)):
             _refuse_misread_length(name, entry, self.terms)
             return False
         else:

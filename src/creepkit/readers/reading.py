@@ -9,6 +9,7 @@ from pathlib import Path
 
 from creepkit.errors import HistoryError, nearest
 from creepkit.hookspecs import hookimpl
+from creepkit.readers.creep_schema_json import CREEP_SCHEMA
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
 from creepkit.readers.spreadsheets import SPREADSHEET
@@ -19,7 +20,7 @@ from creepkit.records import History, Reader, accepts_path, histories_in
 @hookimpl
 def creepkit_readers() -> list[Reader]:
     """Return the built-in readers."""
-    return [INDEXED_TABLE, INDEXED_FILES, TEST_TABLE, HISTORY_CSV, SPREADSHEET]
+    return [INDEXED_TABLE, INDEXED_FILES, CREEP_SCHEMA, TEST_TABLE, HISTORY_CSV, SPREADSHEET]
 
 
 GENERAL_READERS: tuple[Reader, ...] = (HISTORY_CSV, SPREADSHEET)

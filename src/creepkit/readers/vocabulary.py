@@ -89,7 +89,7 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 
 TEXT_KEYS = (
     *("name", "alloy", "specimen", "operator", "control", "strain_measure", "stress_measure"),
-    *("includes_elastic", "includes_loading", "ended", "noise_correlation"),
+    *("includes_elastic", "includes_loading", "ended", "noise_correlation", "strain_unit"),
 )
 """Words that stand once for a whole test, beside steps and programs."""
 
@@ -99,6 +99,10 @@ LABEL_KEYS: Mapping[str, str] = {
     **dict.fromkeys(("laboratory", "lab"), "laboratory"),
 }
 """{key: label} of what tests share with others: a forecast tells the scatter between heats and laboratories apart."""
+
+
+OTHER_UNITS = re.compile(r"(?<![A-Za-z])(mPa|mN|Mn|nm|M)\W*$")
+"""Units that in other capitals are known ones, millipascal or nanometre: a key in them is not understood."""
 
 
 HIGHEST_STEP = 9
@@ -214,7 +218,7 @@ class Terms:
 
     def spelled(self, name: str) -> str:
         """The key that a name is but for capitals, blanks, hyphens and brackets; the name itself where it is none."""
-        return self.spellings.get(plain_name(name), name)
+        return name if OTHER_UNITS.search(name) else self.spellings.get(plain_name(name), name)
 
     def misspelt(self, name: str) -> str:
         """The key of which an unknown name is a misspelling, first of those of the file's own specimen; "" for none."""
@@ -225,8 +229,8 @@ class Terms:
             if misspelt:
                 return spellings[get_close_matches(plain, misspelt, 1, cutoff=0.0)[0]]
         words = {plain, plain.rpartition("_")[0]}
-        names = (*self.condition_kinds, *self.dimensions)
-        return next((name for name in names for word in words if is_misspelling(word, name.casefold())), "")
+        names = (name for name in self.condition_kinds for word in words if is_misspelling(word, name.casefold()))
+        return next(names, "")
 
     def suggestion(self, name: str) -> str:
         """The key that an unknown name may have meant, "" where it resembles none."""

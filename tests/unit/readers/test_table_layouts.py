@@ -45,7 +45,7 @@ DIALECTS = [
 
 @pytest.mark.parametrize(("delimiter", "decimal", "encoding"), DIALECTS)
 def test_one_test_reads_the_same_in_every_dialect(read, delimiter: str, decimal: str, encoding: str):
-    head = "# Temperatur: gemessen in °C\n# temperature_C: 850\n# stress_MPa: 60\n"
+    head = "# label Messung: Temperatur in °C\n# temperature_C: 850\n# stress_MPa: 60\n"
     names = ["Time_(h)", "Strain_[%]"] if delimiter == " " else ["Time (h)", "Strain [%]"]
     body = joined([names, *zip(TIMES, STRAINS, strict=True)], delimiter, decimal)
     (history,) = read(head + body, encoding)

@@ -1,0 +1,194 @@
+"""Mutations of files: of any bytes, and of tables of text in ways that change what they say."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from helpers.reader_samples import ReaderSample
+
+PIECES = [
+    *(b"nan", b"inf", b"-", b"1e308", b"1e-320", b"-0.0", b"", b" ", b"#", b"# ", b":", b";", b'"', b"'", b"\n", b"\r"),
+    *(
+        b"\x00",
+        b"\x0c",
+        b"\xff",
+        b"\xfe\xff",
+        b"\xef\xbb\xbf",
+        "\u2028".encode(),
+        "\u0663".encode(),
+        b"\t",
+        b",,",
+        b"%",
+    ),
+    *(
+        b"label ",
+        b"geometry ",
+        b"specimen: bulge",
+        b"0 s 1 MPa",
+        b"used",
+        b"yes",
+        b"=1+1",
+        b"../x",
+        b"9" * 400,
+        b"[" * 300,
+    ),
+    *(b"{", b"}", b'{"a":', b"null", b"true", b"1_000", b"1,5", b"0x10", b"1e", b"stress_MPa", b"time_s", b"\\u0000"),
+]
+
+
+ENCODINGS = ("utf-16", "utf-16-be", "utf-32", "latin-1", "utf-8-sig")
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """A mutated file. kind : how. changed : whether it says something else, and must not be read as if it did not."""
+
+    kind: str
+    content: bytes
+    changed: bool = False
+
+
+def mutation(sample: ReaderSample, seed: int) -> Mutation:
+    """One mutation of a sample, by seed; of a kind with a meaning in three of eight cases, where there are such."""
+    draw = random.Random(f"{sample.name} {seed}")
+    kinds = [kind for kind in MEANINGFUL if kind(sample, draw) is not None]
+    if kinds and draw.random() < 0.375:
+        for _ in range(10):
+            result = draw.choice(kinds)(sample, draw)
+            if result is not None and result.content != sample.files[sample.mutated]:
+                return result
+    return _bytes_changed(sample.files[sample.mutated], draw)
+
+
+def _bytes_changed(content: bytes, draw: random.Random) -> Mutation:
+    """Cuts, insertions, repetitions, swaps, other encodings: no meaning is known of the result."""
+    done = []
+    for _ in range(draw.choice((1, 1, 1, 2, 3, 6))):
+        kind = draw.choice(("cut", "insert", "repeat", "swap", "flip", "truncate", "encode", "newlines", "lines"))
+        content = _changed(content, kind, draw)
+        done.append(kind)
+    return Mutation("bytes: " + (done[0] if len(done) == 1 else "several"), content)
+
+
+def _changed(content: bytes, kind: str, draw: random.Random) -> bytes:
+    start = draw.randrange(len(content) + 1)
+    end = min(start + draw.choice((1, 1, 2, 5, 20, 200)), len(content))
+    if kind == "cut":
+        return content[:start] + content[end:]
+    if kind == "insert":
+        return content[:start] + draw.choice((*PIECES, draw.randbytes(draw.randrange(1, 9)))) + content[start:]
+    if kind == "repeat":
+        return content[:start] + content[start:end] * draw.choice((2, 2, 3, 50)) + content[end:]
+    if kind == "swap":
+        return content[:start] + content[start:end][::-1] + content[end:]
+    if kind == "flip":
+        return content[:start] + bytes(byte ^ (1 << draw.randrange(8)) for byte in content[start:end]) + content[end:]
+    if kind == "truncate":
+        return content[:start]
+    if kind == "encode":
+        text = content.decode("utf-8", errors="replace")
+        return text.encode(draw.choice(ENCODINGS), errors="replace")
+    if kind == "newlines":
+        return content.replace(b"\n", draw.choice((b"\r\n", b"\r", b"\n\n", b"", b"\x0b")))
+    lines = content.split(b"\n")
+    draw.shuffle(lines)
+    return b"\n".join(lines)
+
+
+def _rows(sample: ReaderSample) -> tuple[list[str], int, list[list[str]]]:
+    """The lines of the head, how many of them there are, and the cells of names and rows."""
+    lines = sample.files[sample.mutated].decode().rstrip("\n").split("\n")
+    head = [line for line in lines if line.startswith("#")]
+    return head, len(head), [line.split(sample.delimiter) for line in lines[len(head) :]]
+
+
+def _joined(sample: ReaderSample, head: list[str], rows: list[list[str]]) -> bytes:
+    return "\n".join([*head, *(sample.delimiter.join(row) for row in rows)]).encode() + b"\n"
+
+
+def _column_twice(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """A column stands there twice, the second time with other numbers."""
+    if not sample.delimiter:
+        return None
+    head, _, rows = _rows(sample)
+    k = draw.randrange(len(rows[0]))
+    twice = [[*row, row[k] if n == 0 else row[k] + "1"] for n, row in enumerate(rows)]
+    return Mutation("column twice", _joined(sample, head, twice), changed=True)
+
+
+def _decimal_sign(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """Decimal commas, or the points left out, in one column, one row or all."""
+    if not sample.delimiter:
+        return None
+    head, _, rows = _rows(sample)
+    new = draw.choice((",", "", " ", "'"))
+    column, row = draw.choice((None, draw.randrange(len(rows[0])))), draw.choice((None, draw.randrange(1, len(rows))))
+    changed = [
+        [c.replace(".", new) if n and row in (None, n) and column in (None, k) else c for k, c in enumerate(cells)]
+        for n, cells in enumerate(rows)
+    ]
+    return Mutation("decimal sign", _joined(sample, head, changed), changed=new != "")
+
+
+def _without_unit(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """The name of a column or key without its unit."""
+    if not sample.without_unit:
+        return None
+    before, after = draw.choice(sample.without_unit)
+    content = sample.files[sample.mutated].decode().replace(before, after, 1)
+    return Mutation("unit removed", content.encode(), changed=True)
+
+
+def _misspelt(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """A key or the name of a column with a letter missing."""
+    if not sample.misspelt:
+        return None
+    before, after = draw.choice(sample.misspelt)
+    content = sample.files[sample.mutated].decode().replace(before, after, 1)
+    return Mutation("name misspelt", content.encode(), changed=True)
+
+
+def _no_number(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """A cell that is no number."""
+    if not sample.delimiter:
+        return None
+    head, _, rows = _rows(sample)
+    n, k = draw.randrange(1, len(rows)), draw.randrange(len(rows[0]))
+    rows[n][k] = draw.choice(("nan", "NaN", "inf", "-inf", "", "#N/A", "---", "1.2.3", "1e", "0x1F", "1_0", "n.a."))
+    return Mutation("no number in a cell", _joined(sample, head, rows), changed=True)
+
+
+def _time_not_increasing(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """Two rows in the other order."""
+    if not sample.delimiter:
+        return None
+    head, _, rows = _rows(sample)
+    times = [k for k, name in enumerate(rows[0]) if name.startswith("time")]
+    if not times or len(rows) < 4:
+        return None
+    n = draw.randrange(1, len(rows) - 1)
+    rows[n], rows[n + 1] = rows[n + 1], rows[n]
+    return Mutation("rows in another order", _joined(sample, head, rows), changed=True)
+
+
+def _line_cut(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """A row that ends amid its columns, or has one more."""
+    if not sample.delimiter:
+        return None
+    head, _, rows = _rows(sample)
+    n = draw.randrange(1, len(rows))
+    rows[n] = rows[n][: draw.randrange(1, len(rows[n]))] if draw.random() < 0.7 else [*rows[n], "1.5"]
+    return Mutation("row cut amid its columns", _joined(sample, head, rows), changed=True)
+
+
+MEANINGFUL: tuple[Callable[[ReaderSample, random.Random], Mutation | None], ...] = (
+    _column_twice,
+    _decimal_sign,
+    _without_unit,
+    _misspelt,
+    _no_number,
+    _time_not_increasing,
+    _line_cut,
+)

@@ -1,0 +1,103 @@
+"""Documents and series after the NFDI-MatWerk data schema for creep tests; the files are made up after it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import HistoryError
+from creepkit.testing.reader_checks import history_difference
+from helpers.samples_creep_schema import LIS, SERIES_NAME, document, value
+
+
+def write(folder: Path, content: Any, series: str | None = LIS, encoding: str = "utf-8") -> Path:
+    path = folder / "Q7.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    if series is not None:
+        (folder / SERIES_NAME).write_text(series, encoding=encoding)
+    return path
+
+
+def test_document_with_its_series(tmp_path: Path):
+    (test,) = ck.read_histories(write(tmp_path, document()))
+    assert (test.name, test.alloy, test.condition) == ("Q7", "ALLOY-X", "950 C, 152.5 MPa")
+    np.testing.assert_allclose(test.times, [0.0, 900.0, 37800.0, 218700.0])
+    np.testing.assert_allclose(test.outputs["strain"], [0.0, 1.25e-4, 2.125e-3, 0.025125])
+    assert test.rupture_time == 61.5 * 3600
+    assert (test.strain_measure, test.includes_elastic, test.loading.control) == ("engineering", False, "load")
+    assert test.labels == {"loading_strain": "0.00251", "measured_temperature_C": "950.69"}  # 7605.5 / 8
+
+
+def test_a_folder_gives_each_test_once_and_the_series_alone_says_the_same(tmp_path: Path):
+    path = write(tmp_path, document())
+    (test,) = ck.read_histories(tmp_path)
+    path.unlink()
+    (alone,) = ck.read_histories(tmp_path)
+    assert history_difference(test.replace(labels={}), alone.replace(labels={})) == ""
+    assert alone.labels["assumed"] == "control load"
+
+
+def test_the_first_files_are_in_the_code_page_of_windows(tmp_path: Path):
+    (test,) = ck.read_histories(write(tmp_path, document(), encoding="cp1252"))
+    assert test.times.size == 4
+
+
+def test_versions_differ_in_capitals(tmp_path: Path):
+    text = json.dumps(document()).replace("AdditionalMetadata", "additionalMetadata").replace("TestInfo", "testInfo")
+    path = write(tmp_path, {})
+    path.write_text(text)
+    assert ck.read_histories(path)[0].condition == "950 C, 152.5 MPa"
+
+
+def test_a_stopped_test(tmp_path: Path):
+    changes = {"endOfTestCriterium": {"endOfTestCriteriumOptions": "Time limit"}}
+    (test,) = ck.read_histories(write(tmp_path, document(rupture=value("Not applicable", "h"), **changes)))
+    assert (test.rupture_time, test.unruptured) == (None, True)
+
+
+def test_a_rupture_time_without_a_series(tmp_path: Path):
+    (test,) = ck.read_histories(write(tmp_path, document(link="Not applicable"), series=None))
+    assert (test.times.tolist(), dict(test.outputs)) == ([61.5 * 3600], {})
+    assert (test.rupture_time, test.condition) == (61.5 * 3600, "950 C, 152.5 MPa")
+
+
+BAD = {
+    "no stress": (document(initialStress=value("")), LIS, "Q7.json: no loading"),
+    "unit": (document(initialStress=value("152.5", "N")), LIS, "testParameters/initialStress: the unit 'N' is not und"),
+    "no number": (document(specifiedTemperature=value("hot", "°C")), LIS, "specifiedTemperature: 'hot' is no number"),
+    "thousands": (document(initialStress=value("1,520", "MPa")), LIS, "'1,520' may be a thousand or a decimal; write"),
+    "compression": (document(typeOfLoading="Compression"), LIS, "typeOfLoading: 'Compression' is not understood; all"),
+    "list": (document(initialStress=[152]), LIS, "initialStress: it is list; write a text or a number"),
+    "no document": ({"Measurement": {"MeasurementData": 1}}, LIS, "no object 'MeasurementData'"),
+    "other test": (document(), LIS.replace("\tQ7\t", "\tQ8\t"), f"{SERIES_NAME}: it is of the test 'Q8', and .* 'Q7'"),
+    "no series": (document(), None, f"its series stand in '{SERIES_NAME}', which is not beside it"),
+    "cut row": (document(), LIS.replace("10.5\t0.2125\t950.0\t951.25", "10.5\t0.2125"), ":20: number of cells 2, of c"),
+    "unit of time": (
+        document(),
+        LIS.replace("h\t%\t°C", "weeks\t%\t°C"),
+        "'Elapsed time from end of loading' in 'weeks' is not un",
+    ),
+    "column": (
+        document(),
+        LIS.replace("Percentage creep", "Diametral"),
+        "column 'Diametral extension' in '%' is not un",
+    ),
+    "no data": (document(), LIS.replace("[data]", ""), "no line '\\[data\\]' with rows of names"),
+    "nothing": (
+        document(link="", rupture=value(""), duration=value("")),
+        None,
+        "Q7.json: it names no series, no creepR",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_message(case: str, tmp_path: Path):
+    content, series, message = BAD[case]
+    path = write(tmp_path, content, series)
+    with pytest.raises(HistoryError, match=message) as caught:
+        ck.read_histories(path)
+    assert "\n" not in str(caught.value)
