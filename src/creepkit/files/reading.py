@@ -82,8 +82,6 @@ def open_binary(path: Path, kind: FileKind) -> Iterator[BinaryIO]:
             yield stream
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
-    except OSError as error:
-        raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
 
 
 def _read_pieces(stream: BinaryIO, limit: int) -> bytes:
