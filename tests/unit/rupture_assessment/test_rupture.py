@@ -52,7 +52,13 @@ def test_planted_constants_and_heats_are_recovered(with_heats):
 def test_planted_methods_are_found(mean, method, truth):
     tests = planted(mean, count=60, scatter=0.02)
     degrees = (1,) if method == "manson-haferd" else (2,)
-    found = ck.rupture(tests, tensile_strength=TENSILE, settings=ck.RuptureSettings(degrees=degrees))
+    found = ck.rupture(
+        tests,
+        hours=[1e4],
+        temperatures=[873.15],
+        tensile_strength=TENSILE,
+        settings=ck.RuptureSettings(degrees=degrees),
+    )
     assert found.best.method == method
     assert found.methods[method] > 0.95
     for name, value in truth.items():
@@ -114,7 +120,7 @@ def test_monkman_grant_predicts_by_rates_and_by_a_rate_law():
         rate = np.exp(2.0 + 5.0 * np.log(stress) - 300e3 / (8.314462618 * T) + 0.1 * rng.standard_normal())  # 1/h
         hours = 10 ** (-1.2 - 0.9 * np.log10(rate) + 0.03 * rng.standard_normal())
         tests.append(rupture_test(f"t{k}", stress, T, hours, minimum_rate=rate / HOUR))
-    assessment = ck.rupture(tests)
+    assessment = ck.rupture(tests, hours=[1e3], settings=ck.RuptureSettings(degrees=(1,)))
     times, rates = assessment.relation.times, assessment.relation.rates
     assert (times["c"].value, times["m"].value) == pytest.approx((-1.2, 0.9), abs=0.05)
     assert rates["n"].low < 5.0 < rates["n"].high
@@ -134,7 +140,9 @@ def test_laboratories_scatter_beside_heats():
         log_time = larson_miller(np.log10(stress), T) + effect[laboratory] + 0.05 * rng.standard_normal()
         labels = {"heat": f"H{k // 9}", "laboratory": laboratory}
         tests.append(rupture_test(f"t{k}", stress, T, 10**log_time, labels=labels))
-    fit = ck.rupture(tests, "larson-miller", settings=ck.RuptureSettings(degrees=(1,))).best
+    fit = ck.rupture(
+        tests, "larson-miller", hours=[1e3], temperatures=[850.0], settings=ck.RuptureSettings(degrees=(1,))
+    ).best
     assert fit.scatter["laboratory"] == pytest.approx(np.sqrt(2 / 3) * 0.2, rel=0.15)
     assert fit.scatter["heat"] < 0.05
 

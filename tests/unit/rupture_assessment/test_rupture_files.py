@@ -9,17 +9,17 @@ from creepkit.errors import FitError
 from helpers.command_line import creepkit, one_line
 from helpers.planted_rupture import TENSILE, larson_miller, planted
 
-SETTINGS = ck.RuptureSettings(degrees=(1, 2))
+SETTINGS = ck.RuptureSettings(degrees=(1,))
 
 
 @pytest.fixture(scope="module")
 def tests():
-    return planted(larson_miller, count=36, heats=4, end=3000.0)
+    return planted(larson_miller, count=27, heats=4, end=3000.0)
 
 
 @pytest.fixture(scope="module")
 def assessment(tests):
-    return ck.rupture(tests, tensile_strength=TENSILE, settings=SETTINGS)
+    return ck.rupture(tests, temperatures=[873.15], tensile_strength=TENSILE, settings=SETTINGS)
 
 
 def test_text_says_what_each_bound_is(assessment):
@@ -69,7 +69,7 @@ def test_command_answers_as_python(tests, tmp_path):
         temperatures=[873.15, 923.15],
         settings=ck.RuptureSettings(degrees=(2,)),
     )
-    assert (answer["tests"], answer["run_outs"]) == (36, int(expected.tests.censored.sum()))
+    assert (answer["tests"], answer["run_outs"]) == (27, int(expected.tests.censored.sum()))
     for one, other in zip(answer["strengths"], expected.strengths, strict=True):
         assert one["strength"] == pytest.approx(other.value)
         assert one["hours"] == other.hours
