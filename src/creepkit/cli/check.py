@@ -15,11 +15,12 @@ def command(
     targets: Annotated[
         list[str],
         typer.Argument(
-            metavar="FILE.py|NAME...", help="Plugin files, or names of laws, specimens, readers or exporters."
+            metavar="FILE.py|NAME...",
+            help="Plugin files, or names of laws, specimens, readers, camera formats or exporters.",
         ),
     ],
 ) -> None:
-    """Check that laws, specimens, readers, exporters are fit."""
+    """Check that laws, specimens, readers, exporters, camera formats are fit."""
     reports = [report for target in targets for report in _reports_of(target)]
     for report in reports:
         typer.echo(str(report))
