@@ -20,7 +20,7 @@ def command(
         ),
     ],
 ) -> None:
-    """Check that laws, specimens, readers, exporters, camera formats are fit."""
+    """Check that laws, specimens, readers, exporters are fit."""
     reports = [report for target in targets for report in _reports_of(target)]
     for report in reports:
         typer.echo(str(report))
