@@ -167,7 +167,7 @@ def main() -> None:
         for shape_function in ("AFFINE", "QUAD"):
             (folder / shape_function).mkdir()
             command = [options.python, "-c", CORRELATE, str(folder), str(options.points_step), shape_function]
-            subprocess.run(command, check=True, stdout=sys.stderr)
+            subprocess.run(command, check=True, stdout=sys.stderr, cwd=folder)  # pyvale leaves a log there
             page.heading(f"Subsets that deform as {MAPS[shape_function]} maps")
             page.table(
                 "true apex, mm",

@@ -15,7 +15,8 @@ def command(
     targets: Annotated[
         list[str],
         typer.Argument(
-            metavar="FILE.py|NAME...", help="Plugin files, or names of laws, specimens, readers or exporters."
+            metavar="FILE.py|NAME...",
+            help="Plugin files, or names of laws, specimens, readers, camera formats or exporters.",
         ),
     ],
 ) -> None:
