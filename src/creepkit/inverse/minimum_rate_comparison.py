@@ -9,10 +9,11 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.duration import compares_minimum_rate
 from creepkit.inverse.goodness_of_fit import RateComparison
 from creepkit.inverse.minimum_rates import with_minimum_rates
 from creepkit.inverse.noise_model import NoiseModel
-from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, compares_minimum_rate
+from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.inverse.uncertainty.log_values import LogValues, misfit_variance
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.records import History, Predictor

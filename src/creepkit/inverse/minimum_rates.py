@@ -15,7 +15,8 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for
-from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, compares_minimum_rate, followed_duration
+from creepkit.inverse.duration import compares_minimum_rate, followed_duration
+from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.language import CreepLaw
 from creepkit.records import History, NuisanceValues, Output, Prediction, Predictor, load_unit, outputs_of
 

@@ -15,6 +15,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
 from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
+from creepkit.inverse.duration import compares_minimum_rate, followed_duration
 from creepkit.inverse.observation_series import SharedNoise
 from creepkit.inverse.output_transforms import (
     LinearTransform,
@@ -23,7 +24,7 @@ from creepkit.inverse.output_transforms import (
     OutputTransform,
     RateTransform,
 )
-from creepkit.records import UNKNOWN_DURATION, History, Prediction, Predictor, is_logarithmic
+from creepkit.records import History, Prediction, Predictor, is_logarithmic
 
 RUPTURE_OUTPUT = "rupture"
 """The output of tests that were followed to rupture: the rupture time, s. It has no frames of its own."""
@@ -35,24 +36,6 @@ MINIMUM_RATE_OUTPUT = "minimum_rate"
 
 SINGLE_VALUES = (MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT)
 """Outputs of which a test has one value: no frames, no offset, no drift, and all of its scatter in one misfit."""
-
-
-STRAIN_OF_UNKNOWN_DURATION = 0.05
-"""Creep strain to which a test of unknown duration is followed, at its minimum rate: products of minimum rate and time
-to rupture (Monkman and Grant 1956) lie mostly between 0.02 and 0.2."""
-
-
-def compares_minimum_rate(history: History) -> bool:
-    """Whether a test is compared by its minimum rate: it states one and has no frames, which would hold it already."""
-    return history.minimum_rate is not None and not history.outputs
-
-
-def followed_duration(history: History) -> float:
-    """For how long a test lasted, s: to its rupture or last time; without frames and duration, see above."""
-    last = history.rupture_time or float(history.times[-1])
-    if history.minimum_rate is None or history.outputs or history.end_known or last > UNKNOWN_DURATION:
-        return last
-    return STRAIN_OF_UNKNOWN_DURATION / history.minimum_rate
 
 
 def transform_for(histories: Sequence[History], output: str) -> OutputTransform:

@@ -11,7 +11,8 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predictor_for
-from creepkit.inverse.observation_vector import followed_duration, noise_standard_deviation, usable_frames
+from creepkit.inverse.duration import followed_duration
+from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, arrhenius, temperature
 from creepkit.records import ZERO_CELSIUS, History, Predictor, growing_output, is_logarithmic, specimen_of
 
