@@ -110,7 +110,7 @@ def test_simulate_prints_to_the_terminal():
         "simulate", "norton", "--set", "A=1e-16", "--set", "n=5", "--stress", 100, "--end-h", 1, "--points", 3
     )
     rows = [line for line in result.stdout.splitlines() if not line.startswith("#")]
-    assert next(iter(csv.reader(rows))) == ["time_s", "strain"]
+    assert next(iter(csv.reader(rows))) == ["time_s", "strain_1"]
 
 
 def test_unknown_law_suggests_the_nearest(tmp_path):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from creepkit.arrays import Ints
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import Dialect, decode_text, detect_dialect, split_line, text_lines
 from creepkit.files.reading import FileKind, read_bytes
@@ -67,9 +68,17 @@ def read_text_grid(path: Path) -> CellGrid:
     if start is not None and len(text) > _LARGE_TEXT:
         numbers = _number_rows(text, lines, start, _stated_decimal(path, lines[:start]))
         if numbers is not None:
-            dialect, rows = numbers
+            dialect, rows, comments = numbers
             names = TableRow(start + 1, split_line(lines[start], dialect, f"{path}:{start + 1}"))
-            return CellGrid(path, "", dialect, _header(path, lines[:start], names.cells, dialect), [names], rows)
+            return CellGrid(
+                path,
+                "",
+                dialect,
+                _header(path, lines[:start], names.cells, dialect),
+                [names],
+                rows,
+                _late_entries(path, comments, dialect),
+            )
     return _grid_of_lines(path, text_lines(text))
 
 
@@ -81,13 +90,21 @@ def _grid_of_lines(path: Path, lines: Sequence[str]) -> CellGrid:
     head = lines[:start]
     numbered = [(k, line) for k, line in enumerate(lines[start:], start + 1) if line.strip() and not is_comment(line)]
     dialect = detect_dialect((line for _, line in numbered), str(path), _stated_decimal(path, head))
-    comments = [(k, *_entry_of(line)) for k, line in enumerate(lines[start:], start + 1) if is_comment(line)]
-    late = [(k, key, SourceText(text, f"{path}:{k}", dialect.decimal)) for k, key, colon, text in comments if colon]
+    comments = [(k, line) for k, line in enumerate(lines[start:], start + 1) if is_comment(line)]
+    late = _late_entries(path, comments, dialect)
     split = (TableRow(number, split_line(line, dialect, f"{path}:{number}")) for number, line in numbered)
     rows = [row for row in split if any(row.cells)]
     if not rows:
         raise HistoryError(f"{path}:{start + 1}: no cell holds anything; write a line of columns, then rows")
     return CellGrid(path, "", dialect, _header(path, head, rows[0].cells, dialect), rows, None, late)
+
+
+def _late_entries(
+    path: Path, comments: Sequence[tuple[int, str]], dialect: Dialect
+) -> list[tuple[int, str, SourceText]]:
+    """Line, key and entry of the `# key: value` lines among comments."""
+    found = ((line, *_entry_of(comment)) for line, comment in comments)
+    return [(k, key, SourceText(text, f"{path}:{k}", dialect.decimal)) for k, key, colon, text in found if colon]
 
 
 def grid_of_rows(path: Path, sheet: str, rows: Sequence[TableRow]) -> CellGrid:
@@ -123,36 +140,45 @@ _ERROR_VALUES = ("#REF!", "#DIV/0!", "#N/A", "#VALUE!", "#NAME?", "#NUM!", "#NUL
 """What spreadsheets write for a value that could not be computed or shown."""
 
 
-def _number_rows(text: str, lines: Sequence[str], start: int, decimal: str | None) -> tuple[Dialect, NumberRows] | None:
-    """The rows of a large text, where they hold numbers alone and no line is empty; None where they do not."""
+def _number_rows(
+    text: str, lines: Sequence[str], start: int, decimal: str | None
+) -> tuple[Dialect, NumberRows, list[tuple[int, str]]] | None:
+    """The rows of a large text and its comments by line, where it holds numbers alone; None where it does not."""
     sample = [line for line in lines[start:_HEAD_LINES] if line.strip() and not is_comment(line)]
-    offset = sum(len(line) + 1 for line in lines[: start + 1])
-    body = text[offset:].rstrip("\n")
     try:
         dialect = detect_dialect(sample, decimal=decimal)
     except HistoryError:  # told by who reads line by line
         return None
     if dialect.delimiter == " " or '"' in lines[start]:
         return None
-    point = dialect.decimal
-    allowed = f"0123456789+-eE\n{dialect.delimiter}{point}"
-    if "\n\n" in body or body.startswith("\n") or not body.isascii() or body.encode().translate(None, allowed.encode()):
+    body = text[sum(len(line) + 1 for line in lines[: start + 1]) :].rstrip("\n")
+    body, line_numbers, comments = _without_comments(body, start + 2)
+    allowed = f"0123456789+-eE\n{dialect.delimiter}{dialect.decimal}"
+    if not body.isascii() or body.encode().translate(None, allowed.encode()):
         return None
     if re.search(rf"(?:^|[\n{dialect.delimiter}+-])0[0-9]+(?:[\n{dialect.delimiter}]|$)", body):
         return None  # a whole number such as 0123 is refused
+    plain = io.StringIO(body if dialect.decimal == "." else body.replace(",", "."))
     try:
-        numbers = np.loadtxt(
-            io.StringIO(body if point == "." else body.replace(",", ".")),
-            delimiter=dialect.delimiter,
-            comments=None,
-            ndmin=2,
-        )
+        numbers = np.loadtxt(plain, delimiter=dialect.delimiter, comments=None, ndmin=2)
     except ValueError:
         return None
-    columns = len(split_line(lines[start], dialect))
-    if numbers.shape != (body.count("\n") + 1, columns) or not np.isfinite(numbers).all():
+    if numbers.shape != (line_numbers.size, len(split_line(lines[start], dialect))) or not np.isfinite(numbers).all():
         return None
-    return dialect, NumberRows(numbers, start + 2)
+    return dialect, NumberRows(numbers, line_numbers), comments
+
+
+def _without_comments(body: str, first_line: int) -> tuple[str, Ints, list[tuple[int, str]]]:
+    """A text without comments and empty lines, the number of each line that stays, and the comments by line."""
+    if "\n\n" not in body and not body.startswith("\n") and "#" not in body and "/" not in body:
+        return body, first_line + np.arange(body.count("\n") + 1), []
+    lines = body.split("\n")
+    kept = [k for k, line in enumerate(lines) if line and line[0] not in ' \t"#/']
+    others = sorted(set(range(len(lines))).difference(kept))
+    comments = [(first_line + k, lines[k]) for k in others if is_comment(lines[k])]
+    kept += [k for k in others if lines[k].strip() and not is_comment(lines[k])]
+    kept.sort()
+    return "\n".join([lines[k] for k in kept]), first_line + np.array(kept, dtype=int), comments
 
 
 def _stated_decimal(path: Path, head: Sequence[str]) -> str | None:

@@ -29,7 +29,7 @@ class TabulatedTest:
 
 
 @dataclass(frozen=True)
-class Block:
+class TestColumns:
     """The columns of one test: its name, "" where the columns do not tell it, and {position: name of the column}."""
 
     test: str
@@ -183,11 +183,11 @@ def _test_and_column(cell: str, known: KnownNames) -> tuple[str, str]:
 
 def _columns_beside(
     grid: CellGrid, head: Sequence[TableRow], time: int, tests_below: Mapping[int, str], known: KnownNames
-) -> list[Block]:
+) -> list[TestColumns]:
     """One column a test, beside one time."""
     names, stated = grid.rows[0], grid.header.get("columns")
     place = grid.location(names.line)
-    blocks: list[Block] = []
+    blocks: list[TestColumns] = []
     for k, cell in enumerate(names.cells):
         if k == time or not cell:
             continue
@@ -199,7 +199,7 @@ def _columns_beside(
                     "above, or names such as 'A1 strain (%)'"
                 )
             test, column = cell, stated.text
-        blocks.append(Block(test, {time: names.cells[time], k: column}))
+        blocks.append(TestColumns(test, {time: names.cells[time], k: column}))
     if not head and all(block.test.isdigit() for block in blocks):
         raise HistoryError(
             f"{place}: several columns of one quantity, and no conditions above them, may be tests or sensors of one "
@@ -208,7 +208,7 @@ def _columns_beside(
     return blocks
 
 
-def _pairs(grid: CellGrid, times: Sequence[int], known: KnownNames) -> list[Block]:
+def _pairs(grid: CellGrid, times: Sequence[int], known: KnownNames) -> list[TestColumns]:
     """Columns of each test side by side, each beginning with its time."""
     names = grid.rows[0]
     place = grid.location(names.line)
@@ -226,17 +226,17 @@ def _pairs(grid: CellGrid, times: Sequence[int], known: KnownNames) -> list[Bloc
                 f"{place}: the columns beside one time name the tests '{tests[0]:.40}' and '{tests[1]:.40}'; begin the "
                 "columns of each test with time"
             )
-        blocks.append(Block("".join(tests), {k: column for k, (_, column) in named.items()}))
+        blocks.append(TestColumns("".join(tests), {k: column for k, (_, column) in named.items()}))
     return blocks
 
 
 def _tests_of_blocks(
-    grid: CellGrid, head: Sequence[TableRow], blocks: Sequence[Block], key_columns: set[int], known: KnownNames
+    grid: CellGrid, head: Sequence[TableRow], blocks: Sequence[TestColumns], key_columns: set[int], known: KnownNames
 ) -> list[TabulatedTest]:
     """The tests of blocks of columns, with what the rows above say of each."""
     header = {key: entry for key, entry in grid.header.items() if key != "columns"}
     rows: Sequence[TableRow] = list(grid.numbers) if grid.numbers is not None else grid.rows[1:]
-    _refuse_cells_outside(grid, rows, {k for block in blocks for k in block.columns})
+    _check_cells(grid, rows, {k for block in blocks for k in block.columns})
     place = grid.location(grid.rows[0].line)
     tests: dict[str, TabulatedTest] = {}
     above = entries_of_blocks(grid, head, [list(block.columns) for block in blocks], key_columns, known)
@@ -253,8 +253,14 @@ def _tests_of_blocks(
     return list(tests.values())
 
 
-def _refuse_cells_outside(grid: CellGrid, rows: Sequence[TableRow], used: set[int]) -> None:
+def _check_cells(grid: CellGrid, rows: Sequence[TableRow], used: set[int]) -> None:
+    width = max(used) + 1
     for row in rows:
+        if len(row.cells) < width and not grid.sheet:  # a cell lost within a line of text moves those behind it
+            raise HistoryError(
+                f"{grid.location(row.line)}: number of cells {len(row.cells)}, of columns {width}; write one cell a "
+                "column, empty ones too"
+            )
         foreign = next((cell for k, cell in enumerate(row.cells) if cell and k not in used), "")
         if foreign:
             raise HistoryError(

@@ -56,11 +56,11 @@ class TableRow:
 class NumberRows(Sequence[TableRow]):
     """The rows of a table of numbers alone, whose text is not kept.
 
-    numbers : (rows, columns). first_line : of the file; the others follow it without a gap.
+    numbers : (rows, columns). lines : (rows,) of the file.
     """
 
     numbers: Floats
-    first_line: int
+    lines: Ints
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -73,7 +73,7 @@ class NumberRows(Sequence[TableRow]):
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
         row = range(len(self))[index]
-        return TableRow(self.first_line + row, [repr(float(x)) for x in self.numbers[row]])
+        return TableRow(int(self.lines[row]), [repr(float(x)) for x in self.numbers[row]])
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class TextTable:
     def lines(self) -> Ints:
         """(rows,) The line of the file in which each row stands."""
         if isinstance(self.rows, NumberRows):
-            return self.rows.first_line + np.arange(len(self.rows))
+            return self.rows.lines
         return np.array([row.line for row in self.rows], dtype=int)
 
     def entries(self, row: TableRow) -> dict[str, SourceText]:

@@ -68,7 +68,10 @@ class QuantityKind:
         return "" in self.units and len(self.units) > 1
 
     def convert_all(self, numbers: Floats, suffix: str, locate: Callable[[int], str], name: str) -> Floats:
-        """Return numbers in creepkit's unit; `locate` gives the place of number k for the error."""
+        """Return numbers in creepkit's unit; `locate` gives the place of number k for the error.
+
+        numbers : (numbers,) in the unit of the suffix.
+        """
         unit = self.unit(suffix, "", name)
         values: Floats = unit.factor * numbers + unit.offset
         inside = (

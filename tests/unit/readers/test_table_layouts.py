@@ -215,6 +215,10 @@ REFUSED = {
         "Time (h);A1 strain (%);A2 strain (%);\n0;0;0;\n1;1;1;5\n",
         "x.csv:5: '5' stands in a column without a name; name it or remove it",
     ),
+    "a line of text with a cell lost": (
+        "Time (h);A1 strain (%);A2 strain (%)\n0;0;0\n1;1\n",
+        "x.csv:5: number of cells 2, of columns 3; write one cell a column, empty ones too",
+    ),
     "a test without rows": (
         "Time (h);A1 strain (%);A2 strain (%)\n0;0;\n1;1;\n",
         "x.csv:3: test 'A2' has no rows below the names of its columns",
@@ -254,6 +258,13 @@ def test_large_tables_read_as_small_ones_do(read):
     np.testing.assert_array_equal(large.outputs["strain"], [0.01 * float(row.split(",")[1]) for row in rows])
     (german,) = read(HEAD + "Time (h);Strain (%)\n" + "".join(rows).replace(",", ";").replace(".", ","))
     np.testing.assert_array_equal(german.outputs["strain"], large.outputs["strain"])
+    rows[7000] = "# a remark\n\n7000,7\n"
+    (remarked,) = read(HEAD + "time_h,strain_pct\n" + "".join(rows))
+    np.testing.assert_array_equal(remarked.outputs["strain"], large.outputs["strain"])
+    with pytest.raises(HistoryError, match="x.csv:7006: time falls from"):
+        read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("7000,7\n", "6998,7\n"))
+    with pytest.raises(HistoryError, match="x.csv:7004: 'stress_MPa' stands below"):
+        read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("# a remark", "# stress_MPa: 3"))
     rows[7000] = "7000,a lot\n"
     with pytest.raises(HistoryError, match="x.csv:7004: 'strain_pct' is 'a lot'"):
         read(HEAD + "time_h,strain_pct\n" + "".join(rows))

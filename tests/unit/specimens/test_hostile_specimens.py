@@ -85,7 +85,7 @@ def test_what_one_returns_is_judged_where_it_is_written(returned, said):
     ("line", "said"),
     [
         ("# apex_thickness: 0.5", "'apex_thickness' needs a unit of length: write apex_thickness_mm"),
-        ("# apex_thickness_inch: 0.02", "'apex_thickness_inch' needs a unit of length"),
+        ("# apex_thickness_ft: 0.02", "'apex_thickness_ft' needs a unit of length"),
         ("# apex_thicknes_mm: 0.5", "no length of the test piece is called 'apex_thicknes'; did you mean"),
     ],
 )
