@@ -93,10 +93,10 @@ def read(path: Path) -> list[History]:
 
 
 def difference(first: Sequence[History], second: Sequence[History]) -> str:
-    """What distinguishes what was read of a mutated file; labels and names may differ."""
+    """What distinguishes what was read of a mutated file; labels and names, one of them the folder's, may differ."""
     if len(first) != len(second):
         return f"{len(first)} and {len(second)} tests"
-    plain = ([one.replace(name="", labels={}, source="") for one in each] for each in (first, second))
+    plain = ([one.replace(name="", alloy="", labels={}, source="") for one in each] for each in (first, second))
     return next((gap for one, other in zip(*plain, strict=True) if (gap := history_difference(one, other))), "")
 
 

@@ -81,9 +81,9 @@ class StatedConditions:
         self._assumptions: list[str] = []
         self._locations: dict[str, str] = {}
         unknown = {key: entry for key, entry in entries.items() if not self._classify(key, entry)}
-        refused = [key for key in unknown if not columns_as_labels or not key.strip() or self.terms.misspelt(key)]
+        refused = [key for key in unknown if not columns_as_labels or not key.strip() or self._misspelt(key)]
         if refused:
-            raise _unknown_key(refused, unknown, self.terms.suggestion(refused[0]))
+            raise _unknown_key(refused, unknown, self._misspelt(refused[0]) or self.terms.suggestion(refused[0]))
         for key, entry in unknown.items():
             _put_once(self.labels, key, entry.text, entry.location)
 
@@ -191,6 +191,11 @@ class StatedConditions:
         if near:
             raise HistoryError(f"{entry.location}: there is no specimen '{entry.text}'; did you mean '{near[0]}'?")
         _put_once(self.labels, "specimen", entry.text, entry.location)
+
+    def _misspelt(self, key: str) -> str:
+        """The key, the laboratory's own included, of which an unknown one is a misspelling; "" for none."""
+        own = (name for name in self._vocabulary.synonyms if is_misspelling(plain_name(key), plain_name(name)))
+        return next(own, "") or self.terms.misspelt(key)
 
     def _is_misspelt_text(self, name: str) -> bool:
         """Whether what begins like a number, such as `strain_mesure`, is a misspelt text."""

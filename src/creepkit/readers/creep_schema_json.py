@@ -245,7 +245,6 @@ def _history(entries: _Entries, path: Path, table: TextTable) -> History:
     origin = NUMBERS["loading_strain"]
     for key, text in (("strain_measure", "engineering"), ("includes_elastic", "no"), ("includes_loading", "no")):
         state(key, text, origin)
-    state("specimen", "uniaxial", NAME)
     temperatures = tuple(name for name in table.columns if name.startswith("Corrected"))
     vocabulary = HeaderVocabulary(averaged_columns={"measured_temperature_C": temperatures} if temperatures else {})
     name = entries.text(NAME) or path.stem

@@ -112,3 +112,11 @@ def test_heat_and_laboratory_are_labels_of_their_own(tmp_path: Path):
 def test_what_was_assumed_stays_known(tmp_path: Path):
     text = HEAD + "# label assumed: modulus of the data sheet\n" + BODY
     assert read(text, tmp_path / "x.csv").labels["assumed"].startswith("modulus of the data sheet, control load")
+
+
+def test_the_names_of_a_laboratory_are_misspelt_as_well(tmp_path: Path):
+    """A column `yongs_MPa` was a label, and the test was read without its modulus."""
+    (tmp_path / "curves.csv").write_text("key,time_s,strain_pct\na,0,0\na,10,0.1\n")
+    (tmp_path / "index.csv").write_text("key,temperature_C,stress_MPa,yongs_MPa\na,850,60,150000\n")
+    with pytest.raises(HistoryError, match="unknown key 'yongs_MPa'; did you mean 'youngs_MPa'"):
+        INDEXED_TABLE.read(tmp_path)
