@@ -1,6 +1,7 @@
 """The public names of creepkit, each once."""
 
 from . import errors as errors
+from .api.extraction import extract as extract
 from .api.identification import confirm as confirm
 from .api.identification import export as export
 from .api.identification import identify as identify

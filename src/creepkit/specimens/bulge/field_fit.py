@@ -210,6 +210,35 @@ def _fit_some(places: Floats, heights: Floats, weights: Floats, start: Floats, s
     return FrameFits(values, converged, cost)
 
 
+def without_smoothing(places: Floats, heights: Floats, weights: Floats, values: Floats, subset: float) -> Floats:
+    """Values (frames, 3) as least squares to a surface that no subsets had smoothed would give them.
+
+    Fitting a smoothed model leaves out that what the model misses was smoothed as well. With r what is left of the
+    smoothed field, J the derivatives of the model and B the mean over a subset, J^T (what is missed) is to second
+    order in the subset (2 J - B J)^T r, for the mean is self-adjoint; its zero is sought instead of that of (B J)^T r.
+    """
+    values = np.array(values)
+    for _ in range(4):
+        left, columns, surface = smoothing_columns(places, values, subset)
+        heavy = left * weights[:, None, :]
+        normal = np.matmul(heavy, columns.transpose(0, 2, 1))
+        gradient = np.einsum("fin,fn->fi", heavy, np.where(weights > 0.0, heights - surface, 0.0))
+        step = np.einsum("fij,fj->fi", np.linalg.pinv(normal), gradient)
+        values += np.clip(step, -0.2 * np.maximum(np.abs(values), 1e-3), 0.2 * np.maximum(np.abs(values), 1e-3))
+    return values
+
+
+def smoothing_columns(places: Floats, values: Floats, subset: float) -> tuple[Floats, Floats, Floats]:
+    """2 J - B J and B J (frames, 3, points) to D, ln S, ln p, and the smoothed surface (frames, points).
+
+    places : (points, 2) mm about the centre. values : (frames, 3). subset : mm.
+    """
+    surface, smoothed = model(places, values, subset)
+    if subset == 0.0:
+        return smoothed[:, :3], smoothed[:, :3], surface
+    return 2.0 * model(places, values)[1][:, :3] - smoothed[:, :3], smoothed[:, :3], surface
+
+
 def _normal_equations(
     places: Floats, heights: Floats, weights: Floats, values: Floats, subset: float
 ) -> tuple[Floats, Floats, Floats, Floats]:
