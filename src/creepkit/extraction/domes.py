@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from creepkit.errors import CreepkitError, HistoryError
 from creepkit.extraction.plate import plate_axes
 from creepkit.extraction.series import ReferencePlate, aligned_frame
 from creepkit.records import Frames, SurfaceRegion
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 LEAST_HEIGHT = 6.0
 """Robust standard deviations of the smoothed field of the plate above which a dome stands out."""
@@ -32,7 +36,8 @@ def find_domes(frames: Frames, plate: ReferencePlate, region: SurfaceRegion) -> 
     best: list[tuple[float, Floats]] = []
     fell = False
     count = len(frames)
-    for index in dict.fromkeys(int(k) for k in (count - 1, count - 2, 0.9 * count, 0.75 * count, 0.5 * count)):
+    discs = _discs(plate, region)
+    for index in dict.fromkeys(int(k) for k in (count - 1, 0.95 * count, 0.75 * count, 0.5 * count)):
         if index <= plate.index or index < 0:
             continue
         try:
@@ -41,7 +46,7 @@ def find_domes(frames: Frames, plate: ReferencePlate, region: SurfaceRegion) -> 
             continue
         if valid.sum() < 0.5 * plate.known.sum():
             continue
-        domes, negative = _domes_of(plate, moved, valid, region)
+        domes, negative = _domes_of(plate, moved, valid, region, discs)
         fell |= negative
         if sum(height for height, _ in domes) > sum(height for height, _ in best):
             best = domes
@@ -68,36 +73,57 @@ def given_centers(centers: Centers, plate: ReferencePlate) -> dict[str, Floats]:
     return result
 
 
-def _domes_of(
-    plate: ReferencePlate, moved: Floats, valid: Bools, region: SurfaceRegion
-) -> tuple[list[tuple[float, Floats]], bool]:
-    """Heights in mm and centres of domes; and whether something fell instead."""
+class _Discs(NamedTuple):
+    """Places at which domes are looked for, and the points about each.
+
+    places : (discs, 2) mm. near : sparse (discs, points) of areas, mm2.
+    """
+
+    places: Floats
+    near: csr_array
+
+
+def _discs(plate: ReferencePlate, region: SurfaceRegion) -> _Discs:
+    from scipy.sparse import csr_array
     from scipy.spatial import cKDTree
 
+    known = np.flatnonzero(plate.known)
+    tree = cKDTree(plate.places[known, :2])
+    places = plate.places[known[_thinned(plate.places[known, :2], 0.15 * region.moving)], :2]
+    near = tree.query_ball_point(places, 0.5 * region.moving, return_sorted=False)
+    ends = np.cumsum([0, *map(len, near)])
+    columns = known[np.concatenate([np.asarray(some, int) for some in near])]
+    return _Discs(places, csr_array((plate.areas[columns], columns, ends), shape=(len(places), len(plate.known))))
+
+
+def _domes_of(
+    plate: ReferencePlate, moved: Floats, valid: Bools, region: SurfaceRegion, discs: _Discs
+) -> tuple[list[tuple[float, Floats]], bool]:
+    """Heights in mm and centres of domes; and whether something fell instead."""
     places = plate.places[valid]
-    axes = plate_axes(places + moved[valid])
-    heights = axes.places(places + moved[valid])[:, 2]
-    flat = plate_axes(places)  # the same points at rest: what is not flat at rest is no dome
-    heights = heights - flat.places(places)[:, 2]
-    tree = cKDTree(places[:, :2])
+    risen = places + moved[valid] @ plate.axes.axes.T
+    heights = plate_axes(risen).places(risen)[:, 2]
+    heights = heights - plate_axes(places).places(places)[:, 2]  # what is not flat at rest is no dome
+    field = np.zeros(len(valid))
+    field[valid] = heights
     radius = 0.5 * region.moving
-    candidates = _thinned(places[:, :2], 0.15 * region.moving)
-    near = tree.query_ball_point(places[candidates, :2], radius)
-    sums = np.array([heights[list(some)].mean() for some in near])
-    covered = np.array([plate.areas[valid][list(some)].sum() for some in near]) / (np.pi * radius**2)
+    area = discs.near @ valid.astype(float)
+    candidates = discs.places[area > 0.0]
+    sums = ((discs.near @ field)[area > 0.0]) / area[area > 0.0]
+    covered = area[area > 0.0] / (np.pi * radius**2)
     # Domes only raise: what lies below the plate measures its noise even where domes fill half of the field.
     low, single = -sums[sums < 0.0], -heights[heights < 0.0]
     independent = 1.4826 * float(np.median(single)) / np.sqrt(max(np.pi * radius**2 / plate.spacing**2, 1.0))
     scale = max(1.4826 * float(np.median(low)) if low.size else 0.0, independent if single.size else 0.0, 1e-7)
     domes: list[tuple[float, Floats]] = []
     for k in np.argsort(-sums):
-        place = places[candidates[k], :2]
+        place = candidates[k]
         if sums[k] < LEAST_HEIGHT * scale or (domes and sums[k] < 0.05 * domes[0][0]):
             break
         if covered[k] < LEAST_COVERAGE:
             continue
         if all(np.hypot(*(place - other)) > region.held[0] for _, other in domes) and _is_summit(
-            place, sums[k], places[candidates, :2], sums, region.moving
+            place, sums[k], candidates, sums, region.moving
         ):
             domes.append((float(sums[k]), _center_of_mass(place, places, heights, region.moving)))
     complete = [dome for dome in domes if _coverage(dome[1], plate, region.moving) >= LEAST_COVERAGE]

@@ -4,11 +4,13 @@ An output's error is to first order the sum over points of its gain times the er
 points that lie nearer than a subset are correlated, so a variance is never that of independent points:
 
 - Frames at rest show whole fields of errors. The gains of a loaded frame applied to each of them give as many errors
-  of that frame's outputs, with whatever correlation in space they have; their covariance is used where there are
-  enough, multiplied by how much more the residuals of the loaded frame scatter in time than those at rest.
+  of that frame's outputs, with whatever correlation in space they have. Their covariance is multiplied by how much
+  more the residuals of the loaded frame scatter in time than those at rest.
 - The block bootstrap draws patches of the residual field with replacement and adds up what they contribute; in the
   linear limit its covariance is the sum over patches of the square of each patch's contribution, which is taken
   directly, enlarged for what the fit took from the residuals and for correlation across the edges of patches. Residuals have what is smooth in time taken off first, for what a model misses of the surface is no noise.
+
+The covariance of a frame is the mean of both, the frames at rest weighing by their number.
 """
 
 from __future__ import annotations
@@ -21,8 +23,15 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints, frozen
 
-FEWEST_REST_FRAMES = 20
-"""Frames at rest from which the covariance is taken; of 20 a standard deviation is known to 16 %."""
+PATCHES_WEIGHT = 40
+"""Frames at rest that the covariance from patches counts for in the mean of both.
+
+Of 40 fields a standard deviation is known to 11 %, about as well as the patches know it.
+"""
+
+
+FEWEST_REST_FRAMES = 8
+"""Frames at rest below which they say nothing of the noise."""
 
 
 NOISE_FRAMES = 60
@@ -42,7 +51,8 @@ class NoiseEstimate:
     """Noise of the outputs of one test.
 
     covariance : (frames, outputs, outputs) of each frame's outputs, the share of the zero level in it.
-    correlation : {(output, output): median of the frames}. method : "rest" or "blocks", which of the two below is used.
+    correlation : {(output, output): median of the frames}. rest_share : weight of the frames at rest in it; the rest
+        of it is from patches.
     rest_sd, block_sd : {output: median over the frames}, both of a single frame, without the zero level; NaN where
         there is none.
     point_sd : mm, of the height of one point in one frame, its part that changes with time.
@@ -53,7 +63,7 @@ class NoiseEstimate:
 
     covariance: Floats
     correlation: Mapping[tuple[str, str], float]
-    method: str
+    rest_share: float
     rest_sd: Mapping[str, float]
     block_sd: Mapping[str, float]
     point_sd: float
@@ -96,18 +106,20 @@ def estimate_noise(
     where there are no frames at rest. shown : (frames, outputs) which outputs a frame shows. spacing : mm of points.
     """
     enough = len(fields.rest) >= FEWEST_REST_FRAMES
-    rho = autocorrelation(fields.rest if enough else fields.loaded, fields.places, spacing)
+    # The clamped plate lost the least to a fit: three numbers over its whole area.
+    rho = autocorrelation(fields.clamped, fields.clamped_places, spacing)
     length = correlation_length(rho, spacing)
     patch = max(2.0 * length, 3.0 * spacing)
     reference = int(np.nanargmax(np.where(np.isfinite(signal), np.abs(signal), -1.0)))
     by_blocks = _block_covariance(gains, fields, patch, Correlation(rho, spacing), reference)
-    at_rest = _rest_covariance(gains, fields.rest) if len(fields.rest) > 1 else np.full_like(by_blocks, np.nan)
+    at_rest = _rest_covariance(gains, fields.rest) if enough else np.full_like(by_blocks, np.nan)
     growth = _growth(fields, len(gains), enough)
-    if len(fields.rest) >= 10:
+    if enough:
         lag_one, integral = time_correlation(fields.rest @ gains[reference, 0])
     else:
         lag_one, integral = time_correlation(smooth_free(signal[np.isfinite(signal)][:, None])[:, 0])
-    covariance = at_rest * growth[:, None, None] ** 2 if enough else by_blocks
+    share = len(fields.rest) / (len(fields.rest) + PATCHES_WEIGHT) if enough else 0.0
+    covariance = by_blocks + (share * (at_rest * growth[:, None, None] ** 2 - by_blocks) if enough else 0.0)
     # The zero level is a mean of frames at rest, and the reference image's own noise where there are none.
     covariance = covariance * (1.0 + min(integral / max(len(fields.rest), 1), 1.0))
     loaded = shown.all(axis=1)
@@ -116,7 +128,7 @@ def estimate_noise(
     return NoiseEstimate(
         covariance=np.where(shown[:, :, None] & shown[:, None, :], covariance, np.nan),
         correlation=_correlations(names, covariance[some]),
-        method="rest" if enough else "blocks",
+        rest_share=share,
         rest_sd=_medians(names, at_rest[some]),
         block_sd=_medians(names, by_blocks[some]),
         point_sd=_point_sd(source),
@@ -219,7 +231,7 @@ def _block_covariance(gains: Floats, fields: ErrorFields, patch: float, rho: Cor
     used = np.abs(gains).max(axis=(0, 1)) > 0.0
     numbers = patch_numbers(fields.places[used], patch)
     total = patch_covariance(gains[:, :, used], fields.loaded[:, used], numbers)
-    edges = rho.edge_factors(gains[reference][:, used], fields.places[used], numbers)
+    edges = rho.lost_factors(gains[reference][:, used], fields.places[used], numbers)
     plane = np.stack([np.ones(len(fields.places)), fields.places[:, 1], -fields.places[:, 0]])
     tilts = np.matmul(gains, plane.T)
     covariance = clamped_covariance(fields.clamped, fields.clamped_places, patch, rho)
@@ -234,7 +246,7 @@ def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: Correl
     errors : (fields, points) mm of the clamped plate, at places (points, 2) mm.
     """
     gains, numbers = rigid_gains(places), patch_numbers(places, patch)
-    edges = rho.edge_factors(gains, places, numbers)
+    edges = rho.lost_factors(gains, places, numbers)
     return np.asarray(patch_covariance(gains[None], errors, numbers)[0] * edges[:, None] * edges)
 
 
@@ -254,45 +266,32 @@ class Correlation:
         distance = np.hypot(*(places[:, None] - places[None, :]).T)
         return np.interp(distance / self.spacing, np.arange(values.size), values, right=0.0)
 
-    def edge_factors(self, gains: Floats, places: Floats, numbers: Ints) -> Floats:
-        """(outputs,) by how much a standard deviation from patches is too small: neighbours across edges are related.
+    def lost_factors(self, gains: Floats, places: Floats, numbers: Ints) -> Floats:
+        """(outputs,) by how much standard deviations from patches are too small if errors have this correlation.
 
-        gains : (outputs, points). numbers : (points,) of patches.
+        The fit has taken a part of the errors from the residuals, and neighbours across the edges of patches err
+        together; both are worked out exactly for the linear fit. gains : (outputs, points). numbers : (points,) of
+        patches.
         """
         C = self.matrix(places)
         whole = np.einsum("oi,oi->o", gains @ C, gains)
-        within = np.einsum("oi,oi->o", gains @ np.where(numbers[:, None] == numbers, C, 0.0), gains)
-        return np.sqrt(np.clip(whole / np.maximum(within, 1e-300), 1.0, 4.0))
+        columns, taken = np.linalg.pinv(gains), gains @ C
+        residual = C - columns @ taken - (columns @ taken).T + columns @ (taken @ gains.T) @ columns.T
+        within = np.einsum("oi,oi->o", gains @ np.where(numbers[:, None] == numbers, residual, 0.0), gains)
+        return np.sqrt(np.clip(whole / np.maximum(within, 1e-300), 1.0, 9.0))
 
 
 def patch_covariance(gains: Floats, errors: Floats, numbers: Ints) -> Floats:
     """Mean over fields of the sum over patches of squared contributions, (frames, outputs, outputs).
 
     gains : (frames, outputs, points). errors : (fields, points) mm. numbers : (points,) of patches.
-
-    A residual is less than the error by what the fit took, most where few patches determine it. With gains G = C Q^T,
-    Q orthonormal, a patch b of independent errors leaves A - A^2 of A = Q_b^T Q_b; (I - A)^-1/2 gives it back, which
-    is the correction CR2 of cluster-robust covariances (Bell and McCaffrey 2002).
     """
-    frames, outputs, _ = gains.shape
-    shape = np.matmul(gains, gains.transpose(0, 2, 1))
-    sizes = np.sqrt(np.maximum(np.einsum("fii->fi", shape), 1e-300))
-    scaled = gains / sizes[:, :, None]
-    # Outputs that a frame does not show have no gains: a unit on the diagonal keeps their row out of the others.
-    product = np.matmul(scaled, scaled.transpose(0, 2, 1))
-    product += np.where(np.einsum("fii->fi", product) > 0.5, 1e-9, 1.0)[:, :, None] * np.eye(outputs)
-    factor = np.linalg.cholesky(product)
-    whitened = np.linalg.solve(factor, scaled)
-    total = np.zeros((frames, outputs, outputs))
+    total = np.zeros((len(gains), gains.shape[1], gains.shape[1]))
     for patch in range(int(numbers.max()) + 1):
         some = numbers == patch
-        Q = whitened[:, :, some]
-        values, vectors = np.linalg.eigh(np.matmul(Q, Q.transpose(0, 2, 1)))
-        given_back = (vectors / np.sqrt(np.maximum(1.0 - values, 0.1))[:, None, :]) @ vectors.transpose(0, 2, 1)
-        part = np.matmul(given_back, Q @ errors[:, some].T)
+        part = np.matmul(gains[:, :, some], errors[:, some].T)
         total += np.matmul(part, part.transpose(0, 2, 1))
-    out = factor * sizes[:, :, None]
-    return np.asarray(np.matmul(np.matmul(out, total), out.transpose(0, 2, 1)) / max(len(errors), 1))
+    return total / max(len(errors), 1)
 
 
 def _rest_covariance(gains: Floats, rest: Floats) -> Floats:

@@ -14,6 +14,10 @@ _TUKEY = 6.0
 """Robust standard deviations at which a point's weight has fallen to zero."""
 
 
+_ROUNDS = 12
+"""Most rounds of reweighting."""
+
+
 _RESIDUAL_FLOOR = 1e-9
 """mm; residuals below it are equal."""
 
@@ -107,19 +111,23 @@ def rigid_motions(places: Floats, displacements: Floats, valid: Bools) -> RigidM
     """
     moved = np.where(valid[..., None], places + displacements, 0.0)
     weights = valid.astype(float)
-    rotations, shifts, residuals, sd = _kabsch(places, moved, weights)
-    for k in range(10):
-        distance = np.sqrt(((residuals / sd[:, None, :]) ** 2).sum(axis=2) / 3.0)
-        new = valid * _robust_weights(distance, first=k < 4)
-        if k >= 5 and np.abs(new - weights).max() < 1e-3:
-            break
+    rotations, shifts, residuals = _kabsch(places, moved, weights)
+    sd = _robust_sd(residuals, valid)
+    for k in range(_ROUNDS):
+        square = sum((residuals[:, :, axis] / sd[:, axis, None]) ** 2 for axis in range(3))
+        new = valid * _robust_weights(np.sqrt(square / 3.0), first=k < 3)
+        change = np.abs(new - weights).max()
         weights = new
-        rotations, shifts, residuals, sd = _kabsch(places, moved, weights)
+        rotations, shifts, residuals = _kabsch(places, moved, weights)
+        if k < 5:
+            sd = _robust_sd(residuals, valid)
+        elif change < 1e-2:
+            break
     return RigidMotions(rotations, shifts, weights, np.where(valid[..., None], residuals, 0.0), sd)
 
 
-def _kabsch(places: Floats, moved: Floats, weights: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """R, t of X = R x + t by weighted least squares, residuals (frames, points, 3) and their robust sd (frames, 3)."""
+def _kabsch(places: Floats, moved: Floats, weights: Floats) -> tuple[Floats, Floats, Floats]:
+    """R, t of X = R x + t by weighted least squares, and residuals (frames, points, 3)."""
     total = np.maximum(weights.sum(axis=1), 1e-300)[:, None]
     target_middle, source_middle = weights @ places / total, np.einsum("fn,fnk->fk", weights, moved) / total
     centred = moved - source_middle[:, None, :]
@@ -129,16 +137,18 @@ def _kabsch(places: Floats, moved: Floats, weights: Floats) -> tuple[Floats, Flo
     rotations = np.matmul(u, vt).transpose(0, 2, 1)
     shifts = target_middle - np.einsum("fij,fj->fi", rotations, source_middle)
     residuals = np.matmul(moved, rotations.transpose(0, 2, 1)) + shifts[:, None, :] - places
-    hidden = np.where(weights[..., None] > 0.0, np.abs(residuals), np.nan)
-    return rotations, shifts, residuals, np.maximum(1.4826 * _nanmedian(hidden), _RESIDUAL_FLOOR)
+    return rotations, shifts, residuals
 
 
-def _nanmedian(values: Floats) -> Floats:
-    """(frames, 3) medians over points of values (frames, points, 3); 0 of frames without any."""
-    ordered = np.sort(values, axis=1)
-    count = np.isfinite(values).sum(axis=1)
-    middle = np.take_along_axis(ordered, np.maximum(count - 1, 0)[:, None, :] // 2, axis=1)[:, 0]
-    return np.where(count > 0, middle, 0.0)
+def _robust_sd(residuals: Floats, valid: Bools) -> Floats:
+    """(frames, 3) from medians over the valid points of residuals (frames, points, 3), some 300 of them."""
+    some = slice(None, None, max(1, valid.shape[1] // 300))
+    residuals, valid = residuals[:, some], valid[:, some]
+    size = np.where(valid[..., None], np.abs(residuals), np.inf)
+    rows = [np.median(row[:, seen], axis=1) for row, seen in zip(size.transpose(0, 2, 1), valid, strict=True) if seen.any()]
+    result = np.full((len(size), 3), _RESIDUAL_FLOOR)
+    result[valid.any(axis=1)] = 1.4826 * np.array(rows).reshape(-1, 3)
+    return np.maximum(result, _RESIDUAL_FLOOR)
 
 
 def _robust_weights(distance: Floats, first: bool) -> Floats:
@@ -165,15 +175,17 @@ def point_areas(places: Floats, spacing: float) -> Floats:
     places : (points, 2) mm of all points of the undeformed surface, lost ones too, so that a lost subset is not
     given to its neighbours. spacing : mm.
     """
-    from scipy.spatial import ConvexHull, QhullError, Voronoi
+    from scipy.spatial import QhullError, Voronoi
 
     areas = np.full(len(places), spacing**2)
     try:
         cells = Voronoi(places)
     except QhullError:
         return areas
-    for k, region in enumerate(cells.point_region):
-        corners = cells.regions[region]
-        if corners and -1 not in corners and len(corners) > 2:
-            areas[k] = ConvexHull(cells.vertices[corners]).volume
+    lengths = np.array([len(region) if region and -1 not in region else 0 for region in cells.regions])
+    own = lengths[cells.point_region]
+    for corners in np.unique(own[own > 2]):  # cells of as many corners, which go round, at once
+        some = np.flatnonzero(own == corners)
+        x, y = cells.vertices[[cells.regions[k] for k in cells.point_region[some]]].transpose(2, 0, 1)
+        areas[some] = 0.5 * np.abs((x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1))
     return np.clip(areas, 0.1 * spacing**2, 4.0 * spacing**2)

@@ -82,7 +82,7 @@ def reference_plate(frames: Frames) -> ReferencePlate:
 
 
 def aligned_frame(frame: CameraFrame, plate: ReferencePlate) -> tuple[Floats, Bools]:
-    """Displacements (points, 3) mm in the plate's axes, and validity (points,), in the order of the reference plate.
+    """Displacements (points, 3) mm in the frames' axes, and validity (points,), in the order of the reference plate.
 
     Points are found by their undeformed place where the frame has others or another order.
     """
@@ -91,15 +91,14 @@ def aligned_frame(frame: CameraFrame, plate: ReferencePlate) -> tuple[Floats, Bo
         both = seen & plate.known
         apart = np.abs(frame.points[both] - plate.camera_points[both])
         if not apart.size or float(apart.max()) < MATCHING_DISTANCE * plate.spacing:
-            moved = np.where(both[:, None], frame.displacements, 0.0) @ plate.axes.axes.T
-            return moved, both
+            return frame.displacements, both
     from scipy.spatial import cKDTree
 
     own = np.flatnonzero(plate.known)
     distance, nearest = cKDTree(plate.camera_points[own]).query(frame.points[seen])
     order = np.flatnonzero(distance < MATCHING_DISTANCE * plate.spacing)
     moved, valid = np.zeros_like(plate.camera_points), np.zeros(len(plate.known), bool)
-    moved[own[nearest[order]]] = frame.displacements[seen][order] @ plate.axes.axes.T
+    moved[own[nearest[order]]] = frame.displacements[seen][order]
     valid[own[nearest[order]]] = True
     return moved, valid
 
@@ -125,6 +124,7 @@ def read_series(frames: Frames, plate: ReferencePlate, groups: Sequence[Ints]) -
         if index == plate.index:
             zero_reference = bool(seen.any()) and float(np.abs(displacements[seen]).max()) < 1e-9
         for k, group in enumerate(groups):
-            moved[k][index], valid[k][index] = displacements[group], seen[group]
+            turned = np.where(seen[group, None], displacements[group], 0.0) @ plate.axes.axes.T
+            moved[k][index], valid[k][index] = turned, seen[group]
     series = [PointSeries(g, m, v) for g, m, v in zip(groups, moved, valid, strict=True)]
     return SeriesOfFrames(series, unreadable, share, zero_reference)

@@ -15,6 +15,7 @@ from creepkit.arrays import Bools, Floats
 from creepkit.errors import FitError, SolveError
 from creepkit.records import SurfaceObservation, SurfacePoints
 from creepkit.specimens.bulge.field_fit import (
+    LOOSE,
     SHAPES,
     fit_frames,
     joint_center,
@@ -69,13 +70,13 @@ def surface_center(points: SurfacePoints, window: float) -> tuple[Floats, Floats
             raise FitError(f"only {np.count_nonzero(inside)} points lie within {window:g} mm of ({center[0]:g}, {center[1]:g}) mm")
         start = _shared_start(points.places[inside] - center, seen, weights, points.subset, window)
         moved, fits, matrix = joint_center(
-            points.places[inside], seen, weights, center, start, points.subset
+            points.places[inside], seen, weights, center, start, points.subset, LOOSE
         )
         variance = 2.0 * fits.cost.sum() / max(np.count_nonzero(weights) - 3 * len(frames) - 2, 1)
         step, center = float(np.hypot(*(moved - center))), moved
         if not np.hypot(*center) < 2.0 * window:
             raise FitError("the points show no centre of a bulge; give it")
-        if step < 1e-4:
+        if step < 1e-3:  # mm: the window has moved by nothing
             break
     covariance = variance * np.linalg.pinv(matrix, hermitian=True)
     return center, covariance
@@ -116,7 +117,7 @@ def _observe_field(points: SurfacePoints, window: float, operator: str) -> Surfa
     weights, heights = _weights(distance[inside], points.areas[inside], points.heights[:, inside], window)
     enough = np.count_nonzero(weights, axis=1) >= max(FEWEST_WINDOW_POINTS, 0.5 * np.count_nonzero(weights.any(axis=0)))
     start = _shared_start(places, heights, weights, points.subset, window)
-    fits = fit_frames(places, heights, weights, start, points.subset)
+    fits = fit_frames(places, heights, weights, start, points.subset, LOOSE)
     values = np.array(fits.values)
     if points.subset > 0.0:
         values = without_smoothing(places, heights, weights, values, points.subset)
@@ -220,7 +221,7 @@ def _shared_start(places: Floats, heights: Floats, weights: Floats, subset: floa
     signal = np.abs((weights * heights).sum(axis=1)) / np.maximum(weights.sum(axis=1), 1e-300)
     best = int(np.argmax(signal))
     start = np.array([[0.0, np.log(window) + _START[0], _START[1]]])
-    first = fit_frames(places, heights[best : best + 1], weights[best : best + 1], start, subset)
+    first = fit_frames(places, heights[best : best + 1], weights[best : best + 1], start, subset, LOOSE)
     return np.broadcast_to(first.values, (len(heights), 3))
 
 

@@ -31,7 +31,10 @@ _START_QUANTILES = (1.0, 0.98)
 
 
 _MOST_STEPS, _MOST_CENTERS = 60, 40
-_TOLERANCE = 1e-11
+TIGHT, LOOSE = 1e-11, 1e-6
+"""Tolerances of fits; noise changes ln S and ln p by 1e-3 and more, and the last step is quadratically better."""
+
+
 _FRAMES_AT_ONCE = 48
 """Of a fit: so many keep its arrays in the processor's cache."""
 
@@ -170,20 +173,25 @@ def _bells(x: Floats, values: Floats, subset: float) -> Bells:
     return Bells(*sums)
 
 
-def fit_frames(places: Floats, heights: Floats, weights: Floats, start: Floats, subset: float = 0.0) -> FrameFits:
+def fit_frames(
+    places: Floats, heights: Floats, weights: Floats, start: Floats, subset: float = 0.0, tolerance: float = TIGHT
+) -> FrameFits:
     """D, S, p of every frame by least squares about the centre: Levenberg-Marquardt, many frames at once.
 
     places : (points, 2) mm about the centre. heights : (frames, points) mm; anything where the weight is zero.
     weights : (frames, points). start : (frames, 3) of D, ln S, ln p; D is not used, for it follows from the others.
+    subset : mm, as in `model`. tolerance : change of ln S and ln p at which a fit has converged.
     """
     parts = [
-        _fit_some(places, heights[some], weights[some], start[some], subset)
+        _fit_some(places, heights[some], weights[some], start[some], subset, tolerance)
         for some in (slice(k, k + _FRAMES_AT_ONCE) for k in range(0, len(heights), _FRAMES_AT_ONCE))
     ]
     return FrameFits(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def _fit_some(places: Floats, heights: Floats, weights: Floats, start: Floats, subset: float) -> FrameFits:
+def _fit_some(
+    places: Floats, heights: Floats, weights: Floats, start: Floats, subset: float, tolerance: float
+) -> FrameFits:
     values = np.array(start)
     damping = np.full(len(values), 1e-3)
     converged = np.zeros(len(values), bool)
@@ -200,7 +208,7 @@ def _fit_some(places: Floats, heights: Floats, weights: Floats, start: Floats, s
         tried[:, 2] = np.clip(tried[:, 2], np.log(0.5 * SHAPES[0]), np.log(2.0 * SHAPES[1]))
         trial = _normal_equations(places, heights[active], weights[active], tried, subset)
         better = trial[1] <= cost[active] * (1.0 + 1e-14)
-        small = np.abs(step[:, 1:]).max(axis=1) < _TOLERANCE
+        small = np.abs(step[:, 1:]).max(axis=1) < tolerance
         stuck = ~better & (damping[active] > 1e10)
         for array, new in zip((values, cost, normal, gradient), trial, strict=True):
             array[active[better]] = new[better]
@@ -258,16 +266,17 @@ def _normal_equations(
 
 
 def joint_center(
-    places: Floats, heights: Floats, weights: Floats, center: Floats, start: Floats, subset: float = 0.0
+    places: Floats, heights: Floats, weights: Floats, center: Floats, start: Floats, subset: float = 0.0,
+    tolerance: float = TIGHT,
 ) -> tuple[Floats, FrameFits, Floats]:
     """The centre (2,) mm for which all frames together are fitted best, their fits, and the centre's normal matrix.
 
     places : (points, 2) mm. heights, weights : (frames, points) as in fit_frames. center : (2,) mm, where to begin.
-    start : (frames, 3). The frames' own D, S, p are eliminated (Schur complement); a frame weighs as its signal does,
+    start : (frames, 3). tolerance : as in fit_frames. The frames' own D, S, p are eliminated (Schur complement); a frame weighs as its signal does,
     for the derivative of its heights to the centre is proportional to them.
     """
     center = np.asarray(center, float)
-    fits = fit_frames(places - center, heights, weights, start, subset)
+    fits = fit_frames(places - center, heights, weights, start, subset, tolerance)
     matrix = np.zeros((2, 2))
     for _ in range(_MOST_CENTERS):
         surface, derivatives = model(places - center, fits.values, subset)
@@ -281,14 +290,14 @@ def joint_center(
         reach = 0.5 * float(np.median(np.exp(fits.values[:, 1])))
         step *= min(1.0, reach / max(float(np.hypot(*step)), 1e-300))
         for _ in range(8):
-            trial = fit_frames(places - center - step, heights, weights, fits.values, subset)
+            trial = fit_frames(places - center - step, heights, weights, fits.values, subset, tolerance)
             if trial.cost.sum() <= fits.cost.sum() * (1.0 + 1e-12):
                 break
             step = 0.25 * step
         else:
             break
         center, fits = center + step, trial
-        if np.hypot(*step) < 1e-10 * reach:
+        if np.hypot(*step) < 10.0 * tolerance * reach:
             break
     return center, fits, matrix
 
