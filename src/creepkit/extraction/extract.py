@@ -21,6 +21,7 @@ from creepkit.extraction.noise import (
     clamped_covariance,
     estimate_noise,
     smooth_free,
+    whole,
 )
 from creepkit.extraction.plate import RigidMotions, rigid_motions
 from creepkit.extraction.series import PointSeries, ReferencePlate, SeriesOfFrames, read_series, reference_plate
@@ -307,8 +308,9 @@ def _error_fields(
     residuals = smooth_free(seen.residuals[loaded], position)[chosen]
     clamped = smooth_free(taken.clamped_heights[loaded], position)[chosen]
     fields = ErrorFields(
-        np.nan_to_num(at_rest), residuals, loaded[chosen], clamped, points.places, clamped_places[:, :2]
-    )
+        whole(np.nan_to_num(at_rest)), whole(residuals), loaded[chosen], whole(clamped), points.places,
+        clamped_places[:, :2],
+    )  # fmt: skip
     shown = np.stack([np.isfinite(values) for values in seen.outputs.values()], axis=1) & good[:, None]
     return fields, shown
 

@@ -141,6 +141,13 @@ def estimate_noise(
     )
 
 
+def whole(fields: Floats) -> Floats:
+    """Fields (fields, points), zeros where lost, enlarged so that each has the squares of one without lost points."""
+    seen = np.count_nonzero(fields, axis=1)[:, None]
+    used = np.count_nonzero(fields.any(axis=0))  # others lie outside of what is observed, or are lost for good
+    return np.asarray(fields * np.sqrt(used / np.maximum(seen, 1)))
+
+
 def smooth_free(values: Floats, positions: Floats | None = None) -> Floats:
     """What is left of columns (frames, columns) without what is smooth along the frames, scaled for what that took.
 
