@@ -97,11 +97,13 @@ def test_the_files_of_the_guide_are_read(tmp_path):
     for k, block in enumerate(blocks):
         (tmp_path / f"{k}.csv").write_text(block, encoding="utf-8")
         found += ck.read_histories(tmp_path / f"{k}.csv")
-    bar, dimple, beam = found
+    bar, dimple, rings, beam = found
     assert set(bar.labels) == {"heat", "laboratory", "assumed"}
     assert bar.standard_deviation["strain"] == pytest.approx(2e-5)
     assert (dimple.labels, dimple.geometry) == ({}, {"apex_thickness": 0.502})
     assert dimple.standard_deviation["amplitude"] == pytest.approx(2e-3)
+    assert (rings.labels, rings.operator) == ({}, "rings 0, 2, 4 mm")
+    assert list(rings.outputs) == ["displacement_1", "displacement_2", "displacement_3"]
     assert (beam.labels, beam.geometry) == ({}, {"height": 2.02})
     assert beam.outputs["deflection"] == pytest.approx([0.031, 0.052])
     alone = "\n".join(line.rsplit(",", 3)[0] if line[0] != "#" else line for line in blocks[1].splitlines())

@@ -22,7 +22,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.residuals import candidate_residuals, candidate_residuals_and_jacobian, residuals_of_prediction
-from creepkit.records import History, Predictor, Status
+from creepkit.records import History, Predictor, Status, outputs_of_test
 
 CHUNK = 8
 """Planned tests that are predicted at once: between two chunks progress is reported, and a stop takes effect."""
@@ -151,7 +151,7 @@ class PlannedOutcomes:
         base, predictor = self.laws[0].measured.observations, self.laws[0].measured.predictor
         planned = []
         for history in chunk:
-            names = getattr(predictor_for(predictor, history), "outputs", base.outputs)
+            names = outputs_of_test(predictor_for(predictor, history), history) or base.outputs
             noise = {n: float(base.noise[base.outputs.index(n)]) for n in names if n in base.outputs}
             sd = {n: np.full(history.times.size, max(v, 1e-300)) for n, v in noise.items()}
             zero = {n: np.zeros(history.times.size) for n in noise}
@@ -270,5 +270,5 @@ def _predicted(law: KnownLaw, planned: Sequence[History], observations: Observat
 
 def _leading(predictor: Predictor, history: History, predicted: Sequence[str]) -> str:
     """The output of a test that grows with creep, the first of its predictor."""
-    own: Sequence[str] = getattr(predictor_for(predictor, history), "outputs", predicted)
+    own = outputs_of_test(predictor_for(predictor, history), history) or predicted
     return own[0]

@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predictor_for
-from creepkit.records import History, Predictor, dimension_named, dimensions_of, load_unit
+from creepkit.records import History, Predictor, dimension_named, dimensions_of, load_unit, outputs_of_test
 
 LOWER_LEVEL, HIGHER_LEVEL, EXTENSION = 0.7, 1.4, 2.0
 """Where nothing is said of a rig: its least and greatest level over those of the tests that were made, and its longest
@@ -163,7 +163,7 @@ def _rig_of(tests: Sequence[History], predictor: Predictor) -> Rig:
 
 def _largest_output(history: History, predictor: Predictor) -> float:
     """The largest value of the leading output, in its unit."""
-    outputs = getattr(predictor_for(predictor, history), "outputs", tuple(history.outputs))
+    outputs = outputs_of_test(predictor_for(predictor, history), history) or tuple(history.outputs)
     values = next((history.outputs[name] for name in outputs if name in history.outputs), np.zeros(1))
     finite = values[np.isfinite(values)]
     return float(finite.max()) if finite.size else 0.0

@@ -21,7 +21,7 @@ from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
 from creepkit.language import temperature
 from creepkit.presentation import Presentable, present
-from creepkit.records import History, Predictor
+from creepkit.records import History, Predictor, outputs_of
 from creepkit.registry.arguments import check_histories, resolve_predictors
 
 if TYPE_CHECKING:
@@ -197,7 +197,7 @@ def _check_targets(targets: Mapping[str, Sequence[float]], asked: bool, predicto
     """FitError for a target of what no test has, or that is not above zero."""
     if sum(len(values) for values in targets.values()) > MOST_TARGETS:
         raise FitError(f"there are more than {MOST_TARGETS} targets; ask for those that matter")
-    known = list(dict.fromkeys(name for p in predictors for name in getattr(p, "outputs", ())))
+    known = list(dict.fromkeys(name for p in predictors for name in outputs_of(p)))
     for output, values in targets.items():
         if asked and known and output not in known:
             raise FitError(f"no test has an output '{output}' to reach; {nearest(output, known)}")

@@ -5,7 +5,7 @@ Finite differences replace the derivatives that a predictor does not give.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -30,6 +30,7 @@ from creepkit.records import (
     checked_prediction,
     is_length_nuisance,
     kind_and_start,
+    outputs_of_test,
 )
 
 
@@ -145,7 +146,7 @@ def predictor_for(predictor: Predictor, history: History) -> Predictor:
 
 def compared_outputs(predictor: Predictor, history: History) -> tuple[str, ...]:
     """What is both measured and predicted of a history, in the predictor's order; the first grows with creep."""
-    known: Iterable[str] = getattr(predictor_for(predictor, history), "outputs", tuple(history.outputs))
+    known = outputs_of_test(predictor_for(predictor, history), history) or tuple(history.outputs)
     return tuple(name for name in known if name in history.outputs)
 
 

@@ -14,7 +14,7 @@ from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.quality import check_rig, exclude_suspect_frames
-from creepkit.records import History, Predictor, is_logarithmic, output_named
+from creepkit.records import History, Predictor, is_logarithmic, output_named, outputs_of_test
 
 SUSPECT_LABEL = "suspect"
 """Label of a history that says which of its frames were left out, and why."""
@@ -118,7 +118,7 @@ def _check_outputs(history: History, predictor: Predictor) -> None:
     """Frames without a number are left out, output by output; an infinite one is a mistake."""
     outputs = compared_outputs(predictor, history)
     if not outputs:
-        known = ", ".join(getattr(predictor_for(predictor, history), "outputs", ())) or "nothing"
+        known = ", ".join(outputs_of_test(predictor_for(predictor, history), history)) or "nothing"
         raise FitError(
             f"history '{history.name}' has none of the outputs that are predicted ({known}); "
             f"it has {', '.join(history.outputs) or 'none'}"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, SolveError
 from creepkit.readers.conditions import (
     END_OF_TEST_TERMS,
     StatedConditions,
@@ -19,7 +20,7 @@ from creepkit.readers.conditions import (
 )
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
-from creepkit.records import History
+from creepkit.records import History, outputs_of_test, specimen_of
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -53,7 +54,7 @@ def assemble_history(
     used = _used_frames(conditions, frames)
     rupture_time, unruptured = _end_of_test(conditions, frames, used)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
-    return History(
+    history = History(
         name=conditions.take_text("name", name),
         times=frames.times,
         outputs=outputs,
@@ -75,6 +76,16 @@ def assemble_history(
         # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
     )
+    _check_operator(history, columns)
+    return history
+
+
+def _check_operator(history: History, location: str) -> None:
+    """HistoryError where the operator of a test does not give the outputs that its columns hold."""
+    try:
+        outputs_of_test(specimen_of(history), replace(history, source=location))
+    except SolveError as error:
+        raise HistoryError(str(error)) from error
 
 
 def _merge_label(frames: TableFrames) -> dict[str, str]:

@@ -30,6 +30,8 @@ from creepkit.records.known_specimens import (
     output_named,
     output_unit,
     outputs_of,
+    outputs_of_test,
+    outputs_of_tests,
     remember_specimen,
     specimen_of,
 )
@@ -160,6 +162,8 @@ __all__ = [
     "output_named",
     "output_unit",
     "outputs_of",
+    "outputs_of_test",
+    "outputs_of_tests",
     "predict_with",
     "remember_specimen",
     "specimen_of",

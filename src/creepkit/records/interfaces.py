@@ -71,9 +71,10 @@ class Predictor(Protocol):
     """Anything that predicts histories from a law and its internal values: specimen, surrogate or closed form.
 
     Optional attributes, looked for by name: `outputs`, the names of what is predicted, first the one that grows with
-    creep; `nuisances`, the kinds of explicit nuisances that predict() understands (none without it);
-    `program_nuisances`, those of PROGRAM_NUISANCES that predict() takes and differentiates itself (without it they
-    become other programs of the histories);
+    creep; `optional_outputs` and `outputs_of_test(history)`, where a test decides what is observed of it, as by its
+    operator: all that may be, and what is; `nuisances`, the kinds of explicit nuisances that predict() understands
+    (none without it); `program_nuisances`, those of PROGRAM_NUISANCES that predict() takes and differentiates itself
+    (without it they become other programs of the histories);
     `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
     of its loading); `reduced_order_model()`, `refined()` and `for_search()`, see SupportsReducedOrderModel,
     SupportsRefinement and SupportsSearchTolerance; `specimen`, that a surrogate stands for; `outside_class(law)`, why

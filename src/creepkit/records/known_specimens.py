@@ -58,11 +58,26 @@ def specimen_of(history: StatedTest) -> Registered | None:
 
 
 def outputs_of(predictor: object) -> tuple[Output, ...]:
-    """The outputs of a predictor; those of which it gives the names alone are numbers."""
-    stated = getattr(predictor, "outputs", ())
+    """The outputs of a predictor, then its optional ones; those of which it gives the names alone are numbers."""
+    stated = dict.fromkeys((*getattr(predictor, "outputs", ()), *getattr(predictor, "optional_outputs", ())))
     own = getattr(getattr(predictor, "specimen", None), "outputs", ())
     known = {name: output for name in own if isinstance(output := name, Output)}
     return tuple(o if isinstance(o, Output) else known.get(o, Output(o)) for o in stated)
+
+
+def outputs_of_test(predictor: object, history: StatedTest) -> tuple[str, ...]:
+    """The outputs that a predictor gives of a test: `outputs`, unless the test itself decides; () where none are known.
+
+    SolveError where the test has optional outputs that its operator does not give.
+    """
+    own = getattr(predictor, "outputs_of_test", None)
+    return tuple(getattr(predictor, "outputs", ()) if own is None else own(history))
+
+
+def outputs_of_tests(predictor: object, histories: Iterable[StatedTest]) -> tuple[str, ...]:
+    """The outputs that a predictor gives of any of the tests, or of none: its `outputs`."""
+    every = dict.fromkeys(name for history in histories for name in outputs_of_test(predictor, history))
+    return tuple(every) or tuple(getattr(predictor, "outputs", ()))
 
 
 def loads_of(predictor: object) -> tuple[Load, ...]:

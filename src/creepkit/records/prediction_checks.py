@@ -9,6 +9,7 @@ import numpy as np
 
 from creepkit.errors import SolveError
 from creepkit.records.history import History
+from creepkit.records.known_specimens import outputs_of_tests
 from creepkit.records.prediction import Prediction, Status
 
 _REAL, _WHOLE, _NUMERIC = "f", "iu", "fiu"
@@ -28,7 +29,7 @@ def checked_prediction(
     who = predictor_in_words(predictor)
     if not isinstance(prediction, Prediction):
         raise SolveError(f"{who} returned a {type(prediction).__name__} from predict(); it must return a Prediction")
-    names = tuple(getattr(predictor, "outputs", ()) or prediction.outputs)
+    names = outputs_of_tests(predictor, histories) or tuple(prediction.outputs)
     if tuple(prediction.outputs) != names:
         found = ", ".join(map(str, prediction.outputs)) or "none"
         raise SolveError(

@@ -302,6 +302,7 @@ def record_problem(specimen: Any) -> str:
     """What is wrong with the record of a specimen, as the end of a sentence; "" where files and options can use it."""
     try:
         outputs, loads, lengths = (tuple(getattr(specimen, name, ())) for name in ("outputs", "loads", "dimensions"))
+        outputs += tuple(getattr(specimen, "optional_outputs", ())) if outputs else ()
         known = (*(str(name) for name in outputs), *(one.name for one in loads), *(one.name for one in lengths))
     except Exception as error:
         return (

@@ -10,7 +10,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, SIDES, outline, shape_functions
-from creepkit.records import Status, output_named
+from creepkit.records import Output, Status, output_named
 from creepkit.report.figures import empty_figure, save_figure, set_range
 
 if TYPE_CHECKING:
@@ -69,31 +69,38 @@ def section_figure(run: BulgeRun, time: float | None, name: str, path: str | Pat
 
 
 def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
-    """Amplitude, width, shape and pressure over time, one below the other."""
-    figure = empty_figure(6.4, 6.6)
-    panels = figure.subplots(4, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0, 0.8))
+    """Outputs and pressure over time, one below the other; outputs of one quantity that grow with creep as one."""
+    groups: dict[tuple[str, bool], list[Output]] = {}
+    for name in run.outputs:
+        output = output_named(name, run.specimen)
+        groups.setdefault((output.quantity, output.grows), []).append(output)
+    figure = empty_figure(6.4, 3.0 + 1.2 * len(groups))
+    panels = figure.subplots(len(groups) + 1, 1, sharex=True, height_ratios=(2.0, *[1.0] * (len(groups) - 1), 0.8))
     hours = run.times / 3600.0
-    for axes, (name, values) in zip(panels, run.outputs.items(), strict=False):
-        axes.plot(hours, values, lw=1.5, color="tab:blue")
-        axes.set_ylabel(output_named(name, run.specimen).label)
+    for axes, group in zip(panels, groups.values(), strict=False):
+        for k, output in enumerate(group):
+            axes.plot(hours, run.outputs[output], lw=1.5, color=f"C{k}", label=output.long_name)
+        axes.set_ylabel(group[0].label if len(group) == 1 else f"{group[0].quantity}, {group[0].unit}")
+        if len(group) > 1:
+            axes.legend(fontsize=8, frameon=False)
     program = run.setup.load_history.pressure
     inside = program.times[program.times < run.end_time]
     knots = np.unique(np.concatenate([inside, [0.0, run.end_time]]))
-    panels[3].plot(knots / 3600.0, program.at(knots), lw=1.5, color="tab:red")
-    panels[3].set(ylabel="pressure, MPa", xlabel="time, h")
+    panels[-1].plot(knots / 3600.0, program.at(knots), lw=1.5, color="tab:red")
+    panels[-1].set(ylabel="pressure, MPa", xlabel="time, h")
     for axes in panels:
         values = np.concatenate([line.get_ydata() for line in axes.lines])
         values = values[np.isfinite(values)]
-        low = 0.0 if axes in (panels[0], panels[3]) else float(values.min(initial=np.inf))
+        low = 0.0 if axes in (panels[0], panels[-1]) else float(values.min(initial=np.inf))
         set_range(
             axes,
             "y",
             min(low, float(values.max(initial=0.0))),
-            (1.1 if axes is panels[3] else 1.0) * float(values.max(initial=1e-9)),
+            (1.1 if axes is panels[-1] else 1.0) * float(values.max(initial=1e-9)),
             most=5,
         )
         axes.grid(alpha=0.25)
-    set_range(panels[3], "x", 0.0, float(knots[-1]) / 3600.0)
+    set_range(panels[-1], "x", 0.0, float(knots[-1]) / 3600.0)
     ended = f", ended at {_duration(run.end_time)}: {run.reason}" if run.reason else ""
     figure.suptitle(f"{run.name}{ended}", fontsize=10)
     figure.align_ylabels(panels)

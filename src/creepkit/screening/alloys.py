@@ -23,7 +23,7 @@ from creepkit.errors import FitError, HistoryError, nearest
 from creepkit.inverse.composite_predictor import CompositePredictor, predictor_for
 from creepkit.inverse.reference_conditions import detect_creep, distinct_loads
 from creepkit.readers.text_tables import SourceText, TextTable, read_table
-from creepkit.records import History, Predictor, is_logarithmic
+from creepkit.records import History, Predictor, is_logarithmic, outputs_of_test
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def limitations(alloy: Alloy, predictor: Predictor) -> tuple[str, ...]:
     specimens = sorted({t.specimen for t in tests})
     if len(specimens) > 1:
         notes.append(f"tests of several specimens ({', '.join(specimens)}) are identified together")
-    for name in getattr(predictor_for(predictor, tests[0]), "outputs", ())[1:]:
+    for name in outputs_of_test(predictor_for(predictor, tests[0]), tests[0])[1:]:
         lacking = [t.name for t in tests if name not in t.outputs]
         if lacking:
             notes.append(f"no {name} in {len(lacking)} of {len(tests)} tests: the stress exponent is known the less")
@@ -103,7 +103,7 @@ def _check_creep(alloy: Alloy, creep_outputs: Sequence[tuple[History, str]]) -> 
 
 def _creep_output(test: History, predictor: Predictor) -> str:
     """The output that grows with creep."""
-    outputs = getattr(predictor_for(predictor, test), "outputs", ())
+    outputs = outputs_of_test(predictor_for(predictor, test), test)
     return str(outputs[0]) if outputs else next(iter(test.outputs), "output")
 
 

@@ -12,7 +12,17 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
 from creepkit.language.law import CreepLaw
-from creepkit.records import History, Output, Prediction, Status, dimension_named, predict_with, typical_history
+from creepkit.records import (
+    History,
+    Output,
+    Prediction,
+    Status,
+    dimension_named,
+    outputs_of,
+    outputs_of_tests,
+    predict_with,
+    typical_history,
+)
 from creepkit.testing.reports import ConformanceCheck
 
 SAME = 1e-6
@@ -323,6 +333,10 @@ def check_outputs(case: PredictorCase) -> Iterator[ConformanceCheck]:
     units = [f"{o} in {o.unit or 'no unit'}" if isinstance(o, Output) else str(o) for o in outputs]
     detail = ", ".join(units[:4]) + ("" if len(units) <= 4 else f" and {len(units) - 4} more")
     yield ConformanceCheck("outputs", True, detail)
+    stated = outputs_of_tests(case.predictor, case.histories)
+    if unknown := [name for name in stated if name not in outputs_of(case.predictor)]:
+        detail = f"outputs_of_test() gives '{unknown[0]}'; name it among outputs or optional_outputs"
+        yield ConformanceCheck("outputs_of_test()", False, detail)
 
 
 def default_histories(predictor: object) -> list[History]:

@@ -7,8 +7,6 @@ averages the surface.
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
@@ -49,9 +47,6 @@ _START = (np.log(0.5), np.log(2.1))
 """ln of S over the window, and ln p, where fits of the first frame begin."""
 
 
-_RINGS = re.compile(r"\s*rings\s+(.+?)\s*mm\s*")
-
-
 def surface_center(points: SurfacePoints, window: float) -> tuple[Floats, Floats]:
     """The one centre of all frames, (2,) mm, and its covariance, (2, 2) mm2, if points err independently.
 
@@ -84,30 +79,15 @@ def surface_center(points: SurfacePoints, window: float) -> tuple[Floats, Floats
 
 def observe_surface(points: SurfacePoints, operator: str) -> SurfaceObservation:
     """Outputs of each frame by the operator's text: "field 0-7.5 mm" or "rings 0, 2, 4 mm"."""
-    radii = ring_radii(operator)
-    if radii is not None:
-        return _observe_rings(points, radii, operator)
     observation = Observation.from_text(operator)
+    if observation.form == "rings":
+        return _observe_rings(points, observation.radii, str(observation))
     if observation.form != "field":
         raise SolveError(
             f"observation: points of cameras are not observed as '{operator}', which is of profiles; "
             "write 'field 0-7.5 mm' or 'rings 0, 2, 4 mm'"
         )
     return _observe_field(points, observation.window, str(observation))
-
-
-def ring_radii(operator: str) -> tuple[float, ...] | None:
-    """Radii, mm, of an operator of rings; None for others."""
-    match = _RINGS.fullmatch(operator)
-    if match is None:
-        return None
-    try:
-        radii = tuple(float(text) for text in match[1].split(","))
-    except ValueError:
-        radii = ()
-    if not radii or not all(0.0 <= r <= 1e4 for r in radii) or list(radii) != sorted(set(radii)) or len(radii) > 8:
-        raise SolveError(f"observation: '{operator}' needs 1 to 8 rising radii, as in 'rings 0, 2, 4 mm'")
-    return radii
 
 
 def _observe_field(points: SurfacePoints, window: float, operator: str) -> SurfaceObservation:

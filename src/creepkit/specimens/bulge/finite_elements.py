@@ -23,6 +23,7 @@ from creepkit.records import (
     History,
     HistoryPrediction,
     NuisanceValues,
+    Output,
     Prediction,
     Program,
     Status,
@@ -30,15 +31,16 @@ from creepkit.records import (
     broadcast_candidates,
     check_nuisances,
     kind_and_start,
+    outputs_of_tests,
 )
 from creepkit.specimens.bulge.geometry import DimpleGeometry
-from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.bulge.setup import BulgeSetup, set_up_test
 from creepkit.specimens.finite_element_tests import PROGRAM_STEPS, in_threads, step_time_derivative
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import CreepLaw
+    from creepkit.specimens.bulge.observation import Observation
     from creepkit.specimens.bulge.settings import BulgeSettings
 
 
@@ -50,7 +52,8 @@ MODULUS_TEMPERATURE_STEP = 1.0
 class BulgeSensitivities:
     """Derivatives of the outputs.
 
-    law : (times, 3, parameters) to the internal parameters. nuisances : {name: (times, 3)} to everything else.
+    law : (times, outputs, parameters) to the internal parameters. nuisances : {name: (times, outputs)} to everything
+    else.
     """
 
     law: Floats
@@ -90,7 +93,7 @@ def output_sensitivities(
     names: Sequence[str],
     directions: SensitivityDirections,
 ) -> tuple[Floats, BulgeSensitivities]:
-    """Outputs (times, 3) and their derivatives, from a simulation that was differentiated to `directions`.
+    """Outputs (times, outputs) and their derivatives, from a simulation that was differentiated to `directions`.
 
     theta : (parameters,) internal values. profiles : (times, nodes) mm, displacements of the top. names : those that
         the directions were made of.
@@ -105,7 +108,7 @@ def output_sensitivities(
         output_columns[:, :, theta.size + len(loads) + k] += setup.observation.node_derivatives(
             setup.radii, profiles, radial_velocity
         )
-    _lend_to_rest(output_columns)
+    _lend_to_rest(output_columns, setup.observation)
     along = simulation.at(output_columns, history.times)
     nuisances = {}
     for k, name in enumerate(loads):
@@ -116,14 +119,15 @@ def output_sensitivities(
         nuisances[name] = along[..., theta.size + len(loads) + k]
     if "window" in names:
         window_columns = setup.observation.window_derivatives(setup.radii, profiles)
-        _lend_to_rest(window_columns)
+        _lend_to_rest(window_columns, setup.observation)
         nuisances["window"] = simulation.at(window_columns, history.times)
     return simulation.at(outputs, history.times), BulgeSensitivities(along[..., : theta.size], nuisances)
 
 
-def _lend_to_rest(columns: Floats) -> None:
-    """Width and shape at rest are those of the first step, and so are their derivatives, (steps, 3, ...)."""
-    columns[0, 1:] = columns[1, 1:] if len(columns) > 1 else 0.0
+def _lend_to_rest(columns: Floats, observation: Observation) -> None:
+    """Width and shape at rest are those of the first step, and so are their derivatives, (steps, outputs, ...)."""
+    if observation.form != "rings":
+        columns[0, 1:] = columns[1, 1:] if len(columns) > 1 else 0.0
 
 
 def _is_dimension(name: str) -> bool:
@@ -213,10 +217,11 @@ def _velocity(geometry: DimpleGeometry, name: str, setup: BulgeSetup) -> tuple[G
 class BulgeResponse:
     """One candidate in one test.
 
-    values : (times, 3) outputs: D and S in mm, p. status, end_time : how it ended, and when, s.
-    sensitivities : derivatives of the outputs, if asked for.
+    outputs : names of what is observed. values : (times, outputs) in their units. status, end_time : how it ended, and
+    when, s. sensitivities : derivatives of the outputs, if asked for.
     """
 
+    outputs: tuple[Output, ...]
     values: Floats
     status: Status
     end_time: float
@@ -260,8 +265,9 @@ def predict_bulge(
         return test.simulate_and_observe(kernel, theta[c], settings)
 
     rows = in_threads(run, tasks, specimen.threads)
-    parts = [_history_prediction(rows[k :: len(histories)]) for k in range(len(histories))]
-    return assemble_prediction(parts, histories, OBSERVED, len(theta))
+    observed = outputs_of_tests(specimen, histories)
+    parts = [_history_prediction(rows[k :: len(histories)], observed) for k in range(len(histories))]
+    return assemble_prediction(parts, histories, observed, len(theta))
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,7 +315,8 @@ class PreparedTest:
             )
         else:
             outputs = setup.observation.observe_at_times(setup.radii, profiles, simulation.timeline, times)
-        return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
+        names = setup.observation.outputs
+        return BulgeResponse(names, outputs, simulation.status, simulation.end_time, sensitivities)
 
 
 def solver_settings(specimen: BulgeSettings, *, exact: bool = False) -> SolverSettings:
@@ -323,16 +330,27 @@ def solver_settings(specimen: BulgeSettings, *, exact: bool = False) -> SolverSe
     )
 
 
-def _history_prediction(responses: Sequence[BulgeResponse]) -> HistoryPrediction:
-    """The responses of all candidates in one test."""
+def _history_prediction(responses: Sequence[BulgeResponse], outputs: Sequence[str]) -> HistoryPrediction:
+    """The responses of all candidates in one test; NaN for outputs of other tests."""
     sensitivities = [r.sensitivities for r in responses if r.sensitivities is not None]
+    columns = [outputs.index(name) for name in responses[0].outputs]
+
+    def in_columns(arrays: Sequence[Floats]) -> Floats:
+        """(candidates, times, outputs, ...) from one array (times, own outputs, ...) of each candidate."""
+        own = np.array(arrays)
+        if own.shape[2] == len(outputs):
+            return own
+        out = np.full((*own.shape[:2], len(outputs), *own.shape[3:]), np.nan)
+        out[:, :, columns] = own
+        return out
+
     return HistoryPrediction(
-        values=np.array([r.values for r in responses]),
+        values=in_columns([r.values for r in responses]),
         status=np.array([int(r.status) for r in responses], dtype=np.int64),
         end_times=np.array([r.end_time for r in responses]),
-        jacobian=np.array([s.law for s in sensitivities]) if sensitivities else None,
+        jacobian=in_columns([s.law for s in sensitivities]) if sensitivities else None,
         nuisance_jacobian={
-            kind: np.array([s.nuisances[kind] for s in sensitivities])
+            kind: in_columns([s.nuisances[kind] for s in sensitivities])
             for kind in (sensitivities[0].nuisances if sensitivities else ())
         },
     )

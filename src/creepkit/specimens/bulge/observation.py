@@ -1,13 +1,14 @@
-"""The observation operator: amplitude D_amp, width S_d and shape S_p of a generalised Gaussian.
+"""The observation operator: what is observed of the displacement of the top of a dimple.
 
-Fitted by least squares to the displacement of the top within a window of the undeformed radius: as "profile", D
-exp(-(r/S)^p), the paper's Eq. (3), or as "field", Eq. (7). `field_fit` does the same with measured points.
+Amplitude D_amp, width S_d and shape S_p of a generalised Gaussian, fitted by least squares within a window of the
+undeformed radius: as "profile", D exp(-(r/S)^p), the paper's Eq. (3), or as "field", Eq. (7). Or, as "rings", u_z
+itself at given undeformed radii, without any assumption of its form. `camera_points` does the
+same with measured points.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from numbers import Real
@@ -19,39 +20,17 @@ from creepkit.arrays import ArrayLike, Floats, frozen
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.mesh import SurfaceInterpolation, checked_surface_radii, surface_interpolation_with_slopes
 from creepkit.records import Output
+from creepkit.specimens.bulge.outputs import OBSERVED, RING_OUTPUTS
+from creepkit.specimens.bulge.ring_displacements import ProfileOutputs, RingDisplacements, checked_ring_radii
 
 if TYPE_CHECKING:  # heavy, and a list of specimens needs none of it
     from creepkit.fem.time_interpolation import TimeInterpolation
-    from creepkit.specimens.bulge.gaussian_fit import GaussianFit
 
-OBSERVED = (
-    Output("amplitude", "length", noise=0.0015, weight=0.99, visible=0.02),
-    Output("width", "length", grows=False, noise=0.02, weight=0.005),
-    Output("shape", "number", grows=False, noise=0.02, weight=0.005),
-)
-"""Columns of what is observed: D_amp in mm, S_d in mm, S_p. Noise as measured on real dimples; the paper's weights."""
+Form = Literal["profile", "field", "rings"]
 
 
-PLOT_RADII = (0.0, 2.0, 4.0)
-"""mm, those of the paper's Fig. 7a."""
-
-
-def profile_displacement(outputs: Mapping[str, Floats], radius: float) -> Floats:
-    """D exp(-(r / S)^p), (frames,) mm; NaN where width or shape is not above zero or was not observed.
-
-    outputs : {name: (frames,)}, "amplitude" and "width" in mm, "shape". radius : mm.
-    """
-    amplitude = np.asarray(outputs["amplitude"], float)
-    if radius == 0.0:
-        return amplitude
-    not_observed = np.full(amplitude.shape, np.nan)
-    width, shape = (np.asarray(outputs.get(name, not_observed), float) for name in ("width", "shape"))
-    valid = (width > 0) & (shape > 0)
-    ratio = np.where(valid, radius / np.where(valid, width, 1.0), np.nan)
-    return np.asarray(amplitude * np.exp(-(ratio ** np.where(valid, shape, 1.0))))
-
-
-Form = Literal["profile", "field"]
+DEFAULT_WINDOW = 7.5
+"""mm, the radius of the paper's cavity."""
 
 
 DEFAULT_RADII: dict[str, int] = {"profile": 76, "field": 40}
@@ -68,8 +47,11 @@ _FEWEST, _MOST = 8, 2000
 _TEXT = re.compile(r"\s*(\w+)\s+0\s*(?:-|to)\s*(\S+)\s*mm\s*(?:,\s*(\d+)\s+radii\s*)?")
 
 
+_RINGS_TEXT = re.compile(r"\s*rings\s+(\S+(?:\s*,\s*\S+)*)\s+mm\s*")
+
+
 class ProfileSampling(NamedTuple):
-    """What follows from a form, a window and a set of nodes.
+    """What follows from an operator and a set of nodes.
 
     shares : (radii,) the radii that are sampled, as shares of the window. nodes : interpolation from the nodes to them.
     fit : to the displacements there.
@@ -77,26 +59,33 @@ class ProfileSampling(NamedTuple):
 
     shares: Floats
     nodes: SurfaceInterpolation
-    fit: GaussianFit
+    fit: ProfileOutputs
 
 
 @dataclass(frozen=True)
 class Observation:
-    """How a top profile becomes D_amp, S_d, S_p: form, window and grid of the generalised Gaussian fit.
+    """How a top profile becomes outputs: D_amp, S_d, S_p of a generalised Gaussian fit, or u_z on rings.
 
-    form : "profile" or "field". window : mm, the largest radius observed, in the undeformed plate.
-    points : observed radii; None for 76 of a profile and 40 of a field (Gauss points, at 6 angles each).
+    form : "profile", "field" or "rings". window : mm, the largest radius of a fit, in the undeformed plate.
+    points : radii of a fit; None for 76 of a profile and 40 of a field (Gauss points, at 6 angles each).
+    radii : mm, one to eight increasing radii of the undeformed plate, of the form "rings" alone, which has no window.
 
-    The radii are fixed shares of the window, so that what is observed changes smoothly with it.
+    The radii of a fit are fixed shares of the window, so that what is observed changes smoothly with it.
     """
 
     form: Form = "profile"
-    window: float = 7.5
+    window: float = DEFAULT_WINDOW
     points: int | None = None
+    radii: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if self.form not in get_args(Form):
             raise SolveError(f"observation: no form is called '{self.form}'; {nearest(str(self.form), get_args(Form))}")
+        if self.form == "rings":
+            self._check_rings()
+            return
+        if len(self.radii):
+            raise SolveError(f"observation: a {self.form} has a window and no radii; write form='rings' for these")
         if not _lies_within(self.window, 1e-3, 1e4):
             raise SolveError(f"observation: window is {self.window!r}; allowed is a length of 0.001 to 10000 mm")
         points = DEFAULT_RADII[self.form] if self.points is None else self.points
@@ -105,40 +94,60 @@ class Observation:
         object.__setattr__(self, "window", float(self.window))
         object.__setattr__(self, "points", int(points))
 
+    def _check_rings(self) -> None:
+        if self.window != DEFAULT_WINDOW or self.points is not None:
+            raise SolveError("observation: rings are observed at their radii alone; leave window and points out")
+        object.__setattr__(self, "radii", checked_ring_radii(self.radii))
+
     @classmethod
     def from_text(cls, text: str) -> Observation:
-        """The operator that `str` wrote, as in 'profile 0-7.5 mm' or 'field 0-5 mm, 30 radii'."""
-        result = _TEXT.fullmatch(text)
+        """The operator that `str` wrote, as in 'profile 0-7.5 mm', 'field 0-5 mm, 30 radii' or 'rings 0, 2, 4 mm'."""
+        result, rings = _TEXT.fullmatch(text), _RINGS_TEXT.fullmatch(text)
         try:
-            if result is None:
+            if rings is not None:
+                return cls("rings", radii=tuple(float(word) for word in rings[1].split(",")))
+            if result is None or result[1] == "rings":
                 raise ValueError(text)
             window, points = float(result[2]), None if result[3] is None else int(result[3])
         except ValueError as error:
             raise SolveError(
                 f"observation: '{text}' is not understood; write a form and a window, as in 'profile 0-7.5 mm' or "
-                "'field 0-5 mm'"
+                "'field 0-5 mm', or radii, as in 'rings 0, 2, 4 mm'"
             ) from error
         return cls(result[1], window, points)  # type: ignore[arg-type]
 
     def __str__(self) -> str:
-        window = repr(self.window).removesuffix(".0")
+        if self.form == "rings":
+            return f"rings {', '.join(map(_length_text, self.radii))} mm"
         radii = "" if self.points == DEFAULT_RADII[self.form] else f", {self.points} radii"
-        return f"{self.form} 0-{window} mm{radii}"
+        return f"{self.form} 0-{_length_text(self.window)} mm{radii}"
 
     def replace(self, **changes: Any) -> Observation:
-        """The same operator with some fields changed; a new form has its own points unless they are given too."""
+        """The same operator with some fields changed; a new form has its own points and radii unless given too."""
         if "form" in changes:
-            changes = {"points": None, **changes}
+            changes = {"points": None, "radii": (), **changes}
+            if "rings" in (self.form, changes["form"]):
+                changes = {"window": DEFAULT_WINDOW, **changes}
         return replace(self, **changes)
 
+    def within(self, window: float) -> Observation:
+        """The same operator in another window, mm; rings have none and stay."""
+        return self if self.form == "rings" else self.replace(window=float(window))
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Names of what is observed."""
+        return RING_OUTPUTS[: len(self.radii)] if self.form == "rings" else OBSERVED
+
     def observe(self, radii: ArrayLike, profiles: ArrayLike) -> Floats:
-        """D_amp in mm, S_d in mm and S_p, (frames, 3).
+        """Outputs of frames, (frames, outputs): D_amp in mm, S_d in mm and S_p, or u_z in mm on each ring.
 
         radii : (nodes,) mm, of the undeformed top's corner and middle nodes in turn, from the axis outwards.
         profiles : (frames, nodes) u_z in mm.
 
-        A frame at rest (below 1e-9 mm everywhere) has D = 0 and the S and p of the next frame that was fitted, else of
-        the last one: at t = 0 they stand for the limit of what follows. A frame without a fit worth the name is NaN.
+        In a fit a frame at rest (below 1e-9 mm everywhere) has D = 0 and the S and p of the next frame that was fitted,
+        else of the last one: at t = 0 they stand for the limit of what follows. A frame without a fit worth the name is
+        NaN.
         """
         sampling = self._sampling(radii)
         return sampling.fit.observe(_frames(profiles, sampling), derivatives=False)[0]
@@ -146,7 +155,7 @@ class Observation:
     def observe_at_times(
         self, radii: ArrayLike, profiles: ArrayLike, steps: TimeInterpolation, times: ArrayLike
     ) -> Floats:
-        """As `observe` of the accepted steps of a simulation, interpolated to `times`: (times, 3).
+        """As `observe` of the accepted steps of a simulation, interpolated to `times`: (times, outputs).
 
         radii : (nodes,) mm at rest. profiles : (steps, nodes) mm. times : (times,) s.
         """
@@ -155,7 +164,9 @@ class Observation:
         return sampling.fit.observe_at_times(_frames(profiles, sampling), steps, asked)[0]
 
     def observe_with_derivatives(self, radii: ArrayLike, profiles: ArrayLike) -> tuple[Floats, Floats]:
-        """As `observe`, and the exact derivatives (frames, 3, nodes); radii (nodes,) mm, profiles (frames, nodes) mm.
+        """As `observe`, and the exact derivatives (frames, outputs, nodes).
+
+        radii : (nodes,) mm. profiles : (frames, nodes) mm.
 
         At rest D has the derivatives of the frame that lent its shape (those of D do not change with the size of a
         profile), S and p have none and are given zeros.
@@ -165,19 +176,21 @@ class Observation:
         return outputs, derivatives @ sampling.nodes.values
 
     def window_derivatives(self, radii: ArrayLike, profiles: ArrayLike) -> Floats:
-        """Derivatives (frames, 3) of what is observed to the window, 1/mm of each.
+        """Derivatives (frames, outputs) of what is observed to the window, 1/mm of each; zero of rings.
 
         radii : (nodes,) mm at rest. profiles : (frames, nodes) mm.
         """
+        if self.form == "rings":
+            return np.zeros((len(np.asarray(profiles)), len(self.radii)))
         sampling = self._sampling(radii)
         frames = _frames(profiles, sampling)
         outputs, derivatives = sampling.fit.observe(frames, derivatives=True)
-        slopes = self._chain(derivatives, frames @ sampling.nodes.slopes.T * sampling.shares)
+        slopes = _chain(derivatives, frames @ sampling.nodes.slopes.T * sampling.shares)
         slopes[:, 1] += outputs[:, 1] / self.window
         return slopes
 
     def node_derivatives(self, radii: ArrayLike, profiles: ArrayLike, shift: ArrayLike) -> Floats:
-        """Derivatives (frames, 3) of what is observed when the top nodes move along the radius, keeping their u_z.
+        """Derivatives (frames, outputs) of what is observed when top nodes move along the radius, keeping their u_z.
 
         radii : (nodes,) mm at rest. profiles : (frames, nodes) mm.
         shift : (nodes,) mm for each unit of what moves them, such as the apex thickness of a mesh that follows it.
@@ -186,15 +199,19 @@ class Observation:
         frames = _frames(profiles, sampling)
         _, derivatives = sampling.fit.observe(frames, derivatives=True)
         moved = sampling.nodes.values @ np.asarray(shift, dtype=float)
-        return self._chain(derivatives, -(frames @ sampling.nodes.slopes.T) * moved)
+        return _chain(derivatives, -(frames @ sampling.nodes.slopes.T) * moved)
 
     def _sampling(self, radii: ArrayLike) -> ProfileSampling:
         return _sampling_of(self, np.asarray(radii, dtype=float).tobytes())
 
-    @staticmethod
-    def _chain(derivatives: Floats, change: Floats) -> Floats:
-        """Change (frames, 3) of what is observed with a change (frames, radii) of the profile."""
-        return np.asarray(np.einsum("fvi,fi->fv", derivatives, change))
+
+def _chain(derivatives: Floats, change: Floats) -> Floats:
+    """Change (frames, outputs) of what is observed with a change (frames, radii) of the profile."""
+    return np.asarray(np.einsum("fvi,fi->fv", derivatives, change))
+
+
+def _length_text(length: float) -> str:
+    return repr(length).removesuffix(".0")
 
 
 def _lies_within(value: object, least: float, most: float) -> bool:
@@ -217,6 +234,10 @@ def _sampling_of(operator: Observation, nodes: bytes) -> ProfileSampling:
     from creepkit.specimens.bulge.gaussian_fit import LOG_OF_ZERO, GaussianFit, PolarGrid
 
     radii = checked_surface_radii(np.frombuffer(nodes))
+    if operator.form == "rings":
+        rings = np.array(operator.radii)
+        at_rings = surface_interpolation_with_slopes(radii, rings)
+        return ProfileSampling(frozen(rings / operator.window), at_rings, RingDisplacements(at_rings.values))
     if radii[0] > 1e-9 or radii[-1] < operator.window * (1 - 1e-9):
         raise SolveError(
             f"observation: the window reaches from 0 to {operator.window:g} mm, but the observed surface from "

@@ -23,6 +23,7 @@ from creepkit.records import (
     PROGRAM_NUISANCES,
     History,
     NuisanceValues,
+    Output,
     Prediction,
     Predictor,
     Program,
@@ -30,7 +31,8 @@ from creepkit.records import (
 )
 from creepkit.specimens.bulge.finite_elements import predict_bulge, solver_settings
 from creepkit.specimens.bulge.geometry import DimpleGeometry
-from creepkit.specimens.bulge.observation import OBSERVED
+from creepkit.specimens.bulge.observation import DEFAULT_WINDOW, Observation
+from creepkit.specimens.bulge.outputs import OBSERVED, RING_OUTPUTS
 from creepkit.specimens.bulge.settings import BulgeSettings
 from creepkit.specimens.bulge.setup import BulgeSetup, model_of_geometry, model_of_specimen
 from creepkit.specimens.reduced_order_training import MODES, RAMP, power_law_runs, trained_basis
@@ -78,10 +80,18 @@ class BulgeReducedOrderModel:
     searching: bool = False
     name: str = field(default="bulge, reduced-order model", init=False)
     title: str = field(default="Bulge test in a reduced-order model, for searches", init=False)
-    outputs: tuple[str, ...] = field(default=OBSERVED, init=False)
+    outputs: tuple[Output, ...] = field(default=OBSERVED, init=False)
 
+    optional_outputs: ClassVar[tuple[Output, ...]] = (*OBSERVED, *RING_OUTPUTS)
     nuisances: ClassVar[tuple[str, ...]] = BulgeSettings.nuisances
     program_nuisances: ClassVar[tuple[str, ...]] = PROGRAM_NUISANCES
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "outputs", self.specimen.observation.outputs)
+
+    def outputs_of_test(self, history: History) -> tuple[Output, ...]:
+        """As the specimen's."""
+        return self.specimen.outputs_of_test(history)
 
     def predict(
         self,
@@ -92,7 +102,7 @@ class BulgeReducedOrderModel:
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict amplitude, width and shape of each history at its times; see records.Predictor.
+        """Predict what is observed of each history at its times; see records.Predictor.
 
         theta : (candidates, parameters) internal values.
         """
@@ -158,9 +168,11 @@ class BulgeReducedOrderModel:
     def error(self) -> dict[str, float]:
         """{output: standard deviation of its error}, in the output's unit, from runs that training did not see.
 
-        1.25 times the mean absolute error, that of a Gaussian: rare large errors would widen every interval.
+        1.25 times the mean absolute error, that of a Gaussian: rare large errors would widen every interval. On rings
+        it is the largest of the whole top, which is that of the middle.
         """
-        return dict(zip(OBSERVED, _output_errors(self), strict=True))
+        *of_fit, largest = _output_errors(self)
+        return {**dict(zip(OBSERVED, of_fit, strict=True)), **dict.fromkeys(RING_OUTPUTS, largest)}
 
     def reference_stress(self, history: History) -> Floats:
         """As the specimen's, (levels,) MPa."""
@@ -175,23 +187,30 @@ class BulgeReducedOrderModel:
 
 @lru_cache(maxsize=16)
 def _output_errors(predictor: BulgeReducedOrderModel) -> tuple[float, ...]:
-    """(3,) standard deviations of the errors of D and S in mm and of p, on the specimen's own dimple."""
+    """(4,) standard deviations of the errors of D and S in mm, of p, and of u_z in mm where it is largest.
+
+    On the specimen's own dimple, in its own window.
+    """
     specimen = predictor.specimen
     setup = predictor.own_setup()
     model, reduced = setup.model, predictor.reduced_model_of(setup)
+    fit = specimen.observation
+    if fit.form == "rings":
+        fit = Observation(window=min(DEFAULT_WINDOW, float(setup.radii[-1])))
     runs = power_law_runs([model], TESTED_RUNS, seed=1)
     settings, errors = solver_settings(specimen), []
     for run in runs:
         made = [simulate(run.law, run.theta, each, run.load_history, settings=settings) for each in (model, reduced)]
         end = TESTED_SHARE * min(each.end_time for each in made)
         times = made[0].times[(made[0].times > RAMP) & (made[0].times <= end)]
-        profiles = ((each, each.displacements[:, model.top, 1]) for each in made)
+        profiles = [each.displacements[:, model.top, 1] for each in made]
         exact, found = (
-            specimen.observation.observe_at_times(setup.radii, profile, each.timeline, times)
-            for each, profile in profiles
+            np.hstack([fit.observe_at_times(setup.radii, profile, each.timeline, times), each.at(profile, times)])
+            for each, profile in zip(made, profiles, strict=True)
         )
         errors.append(np.abs(found - exact))
-    return tuple(float(e) for e in 1.2533 * np.nanmean(np.concatenate(errors), axis=0))
+    mean = 1.2533 * np.nanmean(np.concatenate(errors), axis=0)
+    return (*mean[: len(OBSERVED)].tolist(), float(mean[len(OBSERVED) :].max()))
 
 
 @lru_cache(maxsize=256)

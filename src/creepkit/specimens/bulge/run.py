@@ -18,7 +18,6 @@ from creepkit.fem.simulation import simulate
 from creepkit.presentation import present
 from creepkit.records import History, Status
 from creepkit.specimens.bulge.finite_elements import solver_settings
-from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.bulge.setup import BulgeSetup, set_up_test
 from creepkit.specimens.finite_element_run import STRESS_FIELD, FiniteElementRun, rate_failure_of
 from creepkit.specimens.run import run_from_outputs
@@ -98,7 +97,7 @@ class BulgeRun(FiniteElementRun):
         return present(self, "section", time, name, path)
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """A picture of amplitude, width, shape and pressure over time."""
+        """A picture of what is observed, and of the pressure, over time."""
         return present(self, "plot", path)
 
     @property
@@ -131,7 +130,7 @@ def run_bulge(specimen: BulgeSettings, law: CreepLaw, values: Mapping[str, float
     return run_from_outputs(
         BulgeRun,
         plan_with_setup,
-        OBSERVED,
+        test_setup.observation.outputs,
         rows,
         status,
         end_time,

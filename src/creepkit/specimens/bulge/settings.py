@@ -16,14 +16,16 @@ from creepkit.records import (
     History,
     Load,
     Loading,
+    Output,
     PressureJump,
     SurfaceObservation,
     SurfacePoints,
     SurfaceRegion,
 )
-from creepkit.specimens.bulge.camera_points import observe_surface, ring_radii, surface_center
+from creepkit.specimens.bulge.camera_points import observe_surface, surface_center
 from creepkit.specimens.bulge.geometry import LENGTH_RANGE, DimpleGeometry
-from creepkit.specimens.bulge.observation import PLOT_RADII, Observation, profile_displacement
+from creepkit.specimens.bulge.observation import Observation
+from creepkit.specimens.bulge.outputs import OBSERVED, PLOT_RADII, RING_OUTPUTS, profile_displacement
 from creepkit.specimens.load_scaling import LoadScaling
 from creepkit.specimens.settings_checks import check_number, check_whole_number, is_whole_number
 
@@ -99,7 +101,12 @@ class BulgeSettings:
             raise SolveError(f"bulge specimen: threads is {self.threads!r}; allowed are {allowed}")
 
     def replace(self, **changes: Any) -> Self:
-        """The same specimen with some fields, or lengths of its geometry, changed: replace(apex_thickness=0.48)."""
+        """The same specimen with some fields, or lengths of its geometry, changed: replace(apex_thickness=0.48).
+
+        An observation may be given as its text, as in replace(observation="rings 0, 2, 4 mm").
+        """
+        if isinstance(changes.get("observation"), str):
+            changes["observation"] = Observation.from_text(changes["observation"])
         own_fields = {f.name for f in fields(self) if f.init}
         known = own_fields | {f.name for f in fields(self.geometry)}
         for name in changes.keys() - known:
@@ -119,9 +126,7 @@ class BulgeSettings:
     def surface_operator(self, window: float | None = None, radii: Sequence[float] = ()) -> str:
         """The operator of camera points: Eq. (7) within a window, mm, or mean displacements on rings of radii, mm."""
         if len(radii):
-            text = f"rings {', '.join(f'{radius:g}' for radius in radii)} mm"
-            ring_radii(text)
-            return text
+            return str(Observation("rings", radii=tuple(radii)))
         return self.surface_region.operator if window is None else str(Observation("field", window))
 
     def surface_center(self, points: SurfacePoints) -> tuple[Floats, Floats]:
@@ -144,12 +149,43 @@ class BulgeSettings:
     def plotted_series(self, outputs: Mapping[str, Floats]) -> dict[str, Floats]:
         """Displacements of the top at the radii of the paper's Fig. 7a, {title: (frames,)} mm.
 
-        outputs : {name: (frames,)} amplitude, width (mm) and shape; without the last two, the middle alone.
+        outputs : {name: (frames,)} amplitude, width (mm) and shape; without the last two, the middle alone. Of a test
+        that was observed on rings, their displacements, mm.
         """
         if "amplitude" not in outputs:
-            return {}
+            return {o.long_name: np.asarray(outputs[o], float) for o in RING_OUTPUTS if o in outputs}
         radii = PLOT_RADII if {"width", "shape"} <= outputs.keys() else PLOT_RADII[:1]
         return {f"r = {radius:g} mm": profile_displacement(outputs, radius) for radius in radii}
+
+    def outputs_of_test(self, history: History) -> tuple[Output, ...]:
+        """What the operator of a history observes, or that of the specimen where it names none.
+
+        SolveError where the history has outputs of another form, or of more rings than its operator has radii.
+        """
+        operator = self.observation_of(history)
+        others = [o for o in (*OBSERVED, *RING_OUTPUTS) if o in history.outputs and o not in operator.outputs]
+        if others:
+            rings = others[0] in RING_OUTPUTS
+            advice = (
+                "name the radii of all rings in mm, as in '# operator: rings 0, 2, 4 mm'"
+                if rings
+                else "name a form and a window, as in '# operator: profile 0-7.5 mm'"
+            )
+            stated = f"the operator '{operator}'" + ("" if history.operator else ", that of a test that names none,")
+            raise SolveError(
+                f"{history.origin}: '{others[0]}' is not among {', '.join(operator.outputs)}, which {stated} "
+                f"observes; {advice}"
+            )
+        return operator.outputs
+
+    def observation_of(self, history: History) -> Observation:
+        """The operator that a history names, or that of the specimen where it names none."""
+        if not history.operator:
+            return self.observation
+        try:
+            return Observation.from_text(history.operator)
+        except SolveError as error:
+            raise SolveError(f"{history.origin}: {error}") from error
 
     def planned_loading(self, levels: tuple[float, float], jump_time: float) -> Loading:
         """The loading of a sample of a data set: both pressures, MPa, the second from `jump_time`, s, on."""

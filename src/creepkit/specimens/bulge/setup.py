@@ -59,10 +59,10 @@ def set_up_test(specimen: BulgeSettings, history: History, nuisances: Mapping[st
     if not pressure.values.max() > 0.0:
         raise SolveError(f"{where}: the pressure is zero throughout; a bulge test needs one above zero")
     geometry = _geometry(specimen, history, nuisances)
-    operator = Observation.from_text(history.operator) if history.operator else specimen.observation
+    operator = specimen.observation_of(history)
     window = nuisances.get("window", history.geometry.get("window"))
     if window is not None:
-        operator = operator.replace(window=float(window))
+        operator = operator.within(window)
     temperature = history.temperature_program()
     temperature = Program(temperature.times, temperature.values + nuisances.get("temperature", 0.0))
     modulus = modulus_program(history.elastic, temperature, 1.0 + nuisances.get("modulus", 0.0), where)

@@ -1,8 +1,8 @@
 """The bulge test: gas pressure on the cavity of a dimple, observed by cameras that watch its flat top.
 
 The dimple is simulated by finite elements (see `fem`). Outputs are amplitude, width and shape of the generalised
-Gaussian fitted to the displacement of the top (see `observation`). Time starts with the first pressure ramp; creep
-acts during ramps.
+Gaussian fitted to the displacement of the top, or this displacement on rings (see `observation`). Time starts with the
+first pressure ramp; creep acts during ramps.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 from creepkit.arrays import Floats
 from creepkit.hookspecs import hookimpl
 from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Output, Prediction, Predictor, Specimen
-from creepkit.specimens.bulge.observation import OBSERVED
+from creepkit.specimens.bulge.outputs import OBSERVED, RING_OUTPUTS
 from creepkit.specimens.bulge.settings import BulgeSettings
 
 if TYPE_CHECKING:
@@ -30,11 +30,18 @@ class Bulge(BulgeSettings):
     title: str = field(default="Bulge test of a dimple under gas pressure, by finite elements", init=False)
     outputs: tuple[Output, ...] = field(default=OBSERVED, init=False)
 
+    optional_outputs: ClassVar[tuple[Output, ...]] = (*OBSERVED, *RING_OUTPUTS)
+    """Those that a test has whose operator says so."""
+
     draws_section: ClassVar[bool] = True
     """Whether its runs can draw their section."""
 
     program_nuisances: ClassVar[tuple[str, ...]] = PROGRAM_NUISANCES
     """Kinds of nuisances of a history's programs that predict() differentiates itself."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "outputs", self.observation.outputs)
 
     def predict(
         self,
@@ -45,7 +52,7 @@ class Bulge(BulgeSettings):
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict amplitude (mm), width (mm) and shape of each history at its times; see records.Predictor.
+        """Predict what is observed of each history at its times; see records.Predictor.
 
         theta : (candidates, parameters) internal values.
         """
