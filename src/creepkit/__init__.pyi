@@ -73,6 +73,8 @@ from .language.temperature_forms import exponential as exponential
 from .language.temperature_forms import inverse_temperature as inverse_temperature
 from .language.temperature_forms import linear as linear
 from .readers.history_csv import write_history as write_history
+from .records.camera_format import CameraFormat as CameraFormat
+from .records.camera_frames import Frames as Frames
 from .records.history import History as History
 from .records.history_selection import select_tests as select_tests
 from .records.interfaces import Predictor as Predictor
@@ -95,6 +97,7 @@ from .records.prediction import Status as Status
 from .records.specimen_record import Dimension as Dimension
 from .records.specimen_record import Load as Load
 from .records.specimen_record import Output as Output
+from .registry.arguments import read_frames as read_frames
 from .registry.arguments import read_histories as read_histories
 from .sampling.conditions import TimeGrid as TimeGrid
 from .screening.planted import planted_plate as planted_plate

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import typer
 
     from creepkit.language.law import CreepLaw
-    from creepkit.records import Exporter, Reader, Specimen
+    from creepkit.records import CameraFormat, Exporter, Reader, Specimen
 
 
 PROJECT = "creepkit"
@@ -36,6 +36,11 @@ def creepkit_specimens() -> Sequence[Specimen]:  # type: ignore[empty-body]
 @hookspec
 def creepkit_readers() -> Sequence[Reader]:  # type: ignore[empty-body]
     """Return readers that turn measured files into histories."""
+
+
+@hookspec
+def creepkit_cameras() -> Sequence[CameraFormat]:  # type: ignore[empty-body]
+    """Return camera formats: how a system writes the frames that it measured."""
 
 
 @hookspec

@@ -31,8 +31,11 @@ def specimen(name: str) -> Specimen:
 
 
 def available(kind: str) -> dict[str, Any]:
-    """Return all that is registered of a kind, {name: value}: "laws", "specimens", "exporters" or "readers"."""
-    kinds = ("laws", "specimens", "exporters", "readers")
+    """Return all that is registered of a kind, {name: value}.
+
+    kind : "laws", "specimens", "exporters", "readers" or "cameras".
+    """
+    kinds = ("laws", "specimens", "exporters", "readers", "cameras")
     if kind not in kinds:
         raise PluginError(f"'{kind}' is no kind of plugin; choose one of {', '.join(kinds)}")
     return {name: entry.value for name, entry in getattr(registry.default_registry(), kind)().items()}

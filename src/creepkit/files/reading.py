@@ -55,6 +55,17 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
     return content
 
 
+def read_range(path: Path, kind: FileKind, start: int, count: int) -> bytes:
+    """Bytes of a regular file however large: `count` of them from byte `start`, fewer at its end."""
+    descriptor = _open_regular(path, kind, any_size=True)
+    try:
+        with os.fdopen(descriptor, "rb") as stream:
+            stream.seek(start)
+            return stream.read(count)
+    except OSError as error:
+        raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
+
+
 def read_text(path: Path, kind: FileKind) -> str:
     """The text of a regular file in UTF-8, with or without a byte order mark."""
     content = read_bytes(path, kind)

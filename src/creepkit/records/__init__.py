@@ -1,5 +1,6 @@
 """The records that the public functions take and return. Frozen; MPa, mm, s, K throughout."""
 
+from creepkit.records.camera_format import CameraFormat
 from creepkit.records.camera_frames import CameraFrame, Frames
 from creepkit.records.history import EVERY_FRAME, History
 from creepkit.records.interfaces import (
@@ -94,6 +95,7 @@ __all__ = [
     "STEP_NUISANCES",
     "TENSOR_COMPONENTS",
     "ZERO_CELSIUS",
+    "CameraFormat",
     "CameraFrame",
     "Dimension",
     "Exporter",

@@ -60,6 +60,7 @@ class Frames(Sequence[CameraFrame]):
     name : of the sequence, such as its folder. times : (frames,) s, as the files say; NaN where they do not.
     read_frame : returns the frame of an index, 0 to len(times) - 1.
     system : the camera system or format that wrote it. confidence_unit : of CameraFrame.confidence, such as "pixel".
+    missing : numbers that are absent from the names of the files, of frames that were lost or left out.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Frames(Sequence[CameraFrame]):
     read_frame: Callable[[int], CameraFrame]
     system: str = ""
     confidence_unit: str = ""
+    missing: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         times = frozen(self.times)

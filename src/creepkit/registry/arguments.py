@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from creepkit.arrays import ArrayLike
+from creepkit.cameras import reading as camera_reading
 from creepkit.errors import FitError, LawError, SolveError
 from creepkit.readers import reading
-from creepkit.records import History, Predictor, Specimen, known_specimens, remember_specimen
+from creepkit.records import Frames, History, Predictor, Specimen, known_specimens, remember_specimen
 from creepkit.registry.plugin_registry import default_registry
 
 if TYPE_CHECKING:
@@ -78,3 +80,19 @@ def read_histories(paths: reading.PathsLike, reader: str | None = None) -> list[
     """
     readers = [entry.value for entry in default_registry().readers().values()]
     return reading.read_histories(paths, readers, reader)
+
+
+def read_frames(
+    path: camera_reading.FramePath, format: camera_reading.FormatLike = None, times: ArrayLike | None = None
+) -> Frames:
+    """Read what cameras measured of a surface: a folder of one file a frame, a file of several images, a pattern.
+
+    Frames are read one at a time when they are asked for; one that cannot be read raises HistoryError then.
+
+    path : folder, file, pattern such as "run_3/*.csv", or a list of files in their order.
+    format : a ck.CameraFormat, the name of one of ck.available("cameras"), or {quantity: column} for x y z u v w; by
+        default the one whose columns the head of the first file names.
+    times : (frames,) s, increasing; by default as the files say, and NaN where they do not.
+    """
+    formats = [entry.value for entry in default_registry().cameras().values()]
+    return camera_reading.read_frames(path, formats, format, times)

@@ -1,4 +1,4 @@
-"""The registry: every law, specimen, reader, exporter and temperature form that plugins contribute, with provenance.
+"""The registry: all that plugins contribute (laws, specimens, readers, camera formats ...), with its provenance.
 
 Built-in and other plugins come through the same entry-point group; files come from CREEPKIT_PLUGINS and `load_file`.
 All are imported when first asked for. A plugin that cannot be used is kept with the reason and the others stand;
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import typer
 
     from creepkit.language.law import CreepLaw
-    from creepkit.records import Exporter, Reader, Specimen
+    from creepkit.records import CameraFormat, Exporter, Reader, Specimen
 
 
 LAWS_BY_PACKAGE = {
@@ -74,7 +74,8 @@ class Registered(Generic[_T]):
 class Plugin:
     """One plugin: where it came from, and what it offers or why it cannot be used.
 
-    contributions : {kind: {name: object}} with the kinds "law", "specimen", "reader", "exporter", "temperature form".
+    contributions : {kind: {name: object}} with the kinds "law", "specimen", "reader", "camera format", "exporter",
+        "temperature form".
     commands : whether it adds commands to the command line.
     problem : one sentence when the plugin is broken, else empty.
     """
@@ -124,6 +125,10 @@ class Registry:
         """Return {name: registered reader}."""
         return self._all(plugin_sources.READER)
 
+    def cameras(self) -> dict[str, Registered[CameraFormat]]:
+        """Return {name: registered camera format}."""
+        return self._all(plugin_sources.CAMERA_FORMAT)
+
     def exporters(self) -> dict[str, Registered[Exporter]]:
         """Return {name: registered exporter}."""
         return self._all(plugin_sources.EXPORTER)
@@ -154,6 +159,11 @@ class Registry:
         """Return the reader called `name`; HistoryError with the nearest name when there is none."""
         reader: Reader = self._one(plugin_sources.READER, name)
         return reader
+
+    def camera(self, name: str) -> CameraFormat:
+        """Return the camera format called `name`; HistoryError with the nearest name when there is none."""
+        camera: CameraFormat = self._one(plugin_sources.CAMERA_FORMAT, name)
+        return camera
 
     def exporter(self, name: str) -> Exporter:
         """Return the exporter called `name`; ExportError with the nearest name when there is none."""

@@ -218,13 +218,16 @@ SPECIMEN = ContributionKind("specimen", "creepkit_specimens", SolveError, "creep
 READER = ContributionKind("reader", "creepkit_readers", HistoryError, "creepkit.records", "Reader")
 
 
+CAMERA_FORMAT = ContributionKind("camera format", "creepkit_cameras", HistoryError, "creepkit.records", "CameraFormat")
+
+
 EXPORTER = ContributionKind("exporter", "creepkit_exporters", ExportError, "creepkit.records", "Exporter")
 
 
 TEMPERATURE_FORM = TemperatureFormKind("temperature form", "creepkit_temperature_forms", LawError, "", "function")
 
 
-CONTRIBUTION_KINDS = (LAW, SPECIMEN, READER, EXPORTER, TEMPERATURE_FORM)
+CONTRIBUTION_KINDS = (LAW, SPECIMEN, READER, CAMERA_FORMAT, EXPORTER, TEMPERATURE_FORM)
 
 
 def check_signatures(provenance: Provenance, plugin: object) -> None:

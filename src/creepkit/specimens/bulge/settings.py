@@ -120,8 +120,8 @@ class BulgeSettings:
     def surface_region(self) -> SurfaceRegion:
         """The roof moves, the top from the outer radius of the modelled disc on is held; see `camera_points`."""
         cavity, outer = self.geometry.cavity_radius, self.geometry.outer_radius
-        window = self.observation.window if self.observation.form == "field" else cavity
-        return SurfaceRegion(cavity, (outer, max(2.0 * cavity, 1.5 * outer)), str(Observation("field", window)))
+        seen = self.observation if self.observation.form != "profile" else Observation("field", cavity)
+        return SurfaceRegion(cavity, (outer, max(2.0 * cavity, 1.5 * outer)), str(seen))
 
     def surface_operator(self, window: float | None = None, radii: Sequence[float] = ()) -> str:
         """The operator of camera points: Eq. (7) within a window, mm, or mean displacements on rings of radii, mm."""

@@ -1,0 +1,1 @@
+"""Cameras: what correlation systems export, read frame by frame into one record."""

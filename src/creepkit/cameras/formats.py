@@ -1,0 +1,159 @@
+"""The camera systems that creepkit knows, one declaration each.
+
+Names of columns are those of the systems' own exports. Axes depend on how a system was set up: VIC-3D, Zeiss and DICe
+are read as they are, as of a plane whose z was laid towards the cameras; y of MatchID points down; pyvale writes the
+axes of camera 0 (x to the right, y down, z away from it). Where a surface that bulges towards the cameras comes out
+negative, z points away, as it does in the plane that DICe fits to its own examples: read it with
+`dataclasses.replace(format, axes=(1, -1, -1))`.
+"""
+
+from __future__ import annotations
+
+from creepkit.hookspecs import hookimpl
+from creepkit.records.camera_format import CameraFormat
+
+VIC_3D = CameraFormat(
+    "vic-3d",
+    "VIC-3D, CSV of one or several images",
+    {"x": "X", "y": "Y", "z": "Z", "u": "U", "v": "V", "w": "W", "confidence": "sigma"},
+    lost={"sigma": "< 0"},
+    confidence_unit="pixel",
+    patterns=("*.csv", "*.txt"),
+)
+
+
+VIC_3D_MAT = CameraFormat(
+    "vic-3d-mat",
+    "VIC-3D, arrays of MATLAB, lengths in mm",
+    {"x": "X", "y": "Y", "z": "Z", "u": "U", "v": "V", "w": "W", "confidence": "sigma"},
+    unit="mm",
+    lost={"sigma": "< 0"},
+    confidence_unit="pixel",
+    patterns=("*.mat",),
+)
+
+
+DICE = CameraFormat(
+    "dice",
+    "DICe, table of a stereo analysis, lengths in mm",
+    {
+        "x": "MODEL_COORDINATES_X",
+        "y": "MODEL_COORDINATES_Y",
+        "z": "MODEL_COORDINATES_Z",
+        "u": "MODEL_DISPLACEMENT_X",
+        "v": "MODEL_DISPLACEMENT_Y",
+        "w": "MODEL_DISPLACEMENT_Z",
+        "confidence": "SIGMA",
+    },
+    unit="mm",
+    lost={"SIGMA": "< 0"},
+    confidence_unit="pixel",
+    patterns=("*.txt", "*.csv"),
+    planar=("DISPLACEMENT_X", "DISPLACEMENT_Y"),
+)
+
+
+MATCHID = CameraFormat(
+    "matchid",
+    "MatchID, names of 2024.1 or of 2023 (lengths in mm)",
+    (
+        {
+            "x": "coor.X",
+            "y": "coor.Y",
+            "z": "coor.Z",
+            "u": ("disp.Horizontal Displacement U", "disp.Horizontal Displacement: U"),
+            "v": ("disp.Vertical Displacement V", "disp.Vertical Displacement: V"),
+            "w": ("disp.Out-Of-Plane: W", "disp.Out-Of-Plane Displacement W"),
+            "confidence": ("stats.Sigma", "corr.Sigma"),
+        },
+        {
+            "image_x": "x_pic",
+            "image_y": "y_pic",
+            "x": "x [mm]",
+            "y": "y [mm]",
+            "z": "z [mm]",
+            "u": "u [mm]",
+            "v": "v [mm]",
+            "w": "w [mm]",
+        },
+    ),
+    axes=(1, -1, 1),
+    patterns=("*.csv", "*.txt"),
+)
+
+
+ZEISS = CameraFormat(
+    "zeiss",
+    "Zeiss and GOM, nodemap.txt",
+    {"x": "x_undef", "y": "y_undef", "z": "z_undef", "u": "u", "v": "v", "w": "w"},
+    patterns=("*.txt", "*.csv"),
+)
+
+
+_PYVALE_COLUMNS = {
+    "x": "stereo_x",
+    "y": "stereo_y",
+    "z": "stereo_z",
+    "u": "stereo_disp_u",
+    "v": "stereo_disp_v",
+    "w": "stereo_disp_w",
+    "confidence": "stereo_cost_zncc",
+}
+
+
+PYVALE = CameraFormat(
+    "pyvale",
+    "pyvale, CSV of a stereo correlation",
+    _PYVALE_COLUMNS,
+    axes=(1, -1, -1),
+    lost={"converged": "== 0", "stereo_converged": "== 0"},
+    confidence_unit="ZNCC",
+    patterns=("*.csv", "*.txt"),
+)
+
+
+PYVALE_BINARY = CameraFormat(
+    "pyvale-binary",
+    "pyvale, binary *.dic3d of a stereo correlation",
+    _PYVALE_COLUMNS,
+    axes=(1, -1, -1),
+    lost={"converged": "== 0", "stereo_converged": "== 0"},
+    confidence_unit="ZNCC",
+    patterns=("*.dic3d",),
+    layout=(
+        ("subset_x", "<i4"),
+        ("subset_y", "<i4"),
+        ("disp_u", "<f8"),
+        ("disp_v", "<f8"),
+        ("disp_mag", "<f8"),
+        ("converged", "?"),
+        ("cost_zncc", "<f8"),
+        ("ftol", "<f8"),
+        ("xtol", "<f8"),
+        ("num_iter", "<i4"),
+        ("stereo_disp_u_px", "<f8"),
+        ("stereo_disp_v_px", "<f8"),
+        ("stereo_disp_mag_px", "<f8"),
+        ("stereo_disp_u_mm", "<f8"),
+        ("stereo_disp_v_mm", "<f8"),
+        ("stereo_disp_w_mm", "<f8"),
+        ("stereo_x_mm", "<f8"),
+        ("stereo_y_mm", "<f8"),
+        ("stereo_z_mm", "<f8"),
+        ("stereo_converged", "?"),
+        ("stereo_cost_zncc", "<f8"),
+        ("stereo_ftol", "<f8"),
+        ("stereo_xtol", "<f8"),
+        ("stereo_num_iter", "<i4"),
+        ("epi_dist_px", "<f8"),
+    ),
+)
+
+
+FORMATS = (VIC_3D, VIC_3D_MAT, DICE, MATCHID, ZEISS, PYVALE, PYVALE_BINARY)
+
+
+@hookimpl
+def creepkit_cameras() -> list[CameraFormat]:
+    """Return the formats of the camera systems that creepkit knows."""
+    return list(FORMATS)

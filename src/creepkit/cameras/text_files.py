@@ -1,0 +1,270 @@
+"""Frames in text: the line of columns is found by the names in it, whatever stands above; rows are read by the core."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from creepkit import core
+from creepkit.arrays import Floats
+from creepkit.errors import HistoryError
+from creepkit.files.delimited_text import Dialect, decode_text, split_line
+from creepkit.files.reading import FileKind, read_bytes, read_range
+
+FRAME_FILE = FileKind("a frame of cameras", HistoryError, "name a table of points", maximum_bytes=200_000_000)
+
+
+HEAD_BYTES = 65536
+"""In which the line of columns must stand."""
+
+
+HEAD_LINES = 500
+
+
+DELIMITERS = (";", "\t", ",", " ")
+
+
+SAMPLE_ROWS = 50
+"""Rows whose cells show the decimal sign."""
+
+
+@dataclass(frozen=True)
+class TextHead:
+    """The line of columns of a text file.
+
+    line : as it stands in the file, without its end. number : of that line, from 1. end : first byte behind it.
+    comments : the lines above it.
+    """
+
+    line: bytes
+    number: int
+    end: int
+    delimiter: str
+    names: tuple[str, ...]
+    comments: tuple[str, ...]
+
+    def location(self, path: Path) -> str:
+        """Where it stands, 'file:line'."""
+        return f"{path}:{self.number}"
+
+
+def plain_bytes(content: bytes, path: Path) -> bytes:
+    """Text as bytes without a byte order mark and of one byte a digit; HistoryError for what is no text."""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in content:
+        return decode_text(content, path).encode()
+    return content.removeprefix(b"\xef\xbb\xbf")
+
+
+def head_bytes(path: Path) -> bytes:
+    """The beginning of a text file, to the end of a line."""
+    content = read_bytes(path, FRAME_FILE, first=HEAD_BYTES)
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return plain_bytes(read_bytes(path, FRAME_FILE), path)[:HEAD_BYTES]
+    if len(content) == HEAD_BYTES:
+        content = content[: max(content.rfind(b"\n"), content.rfind(b"\r")) + 1] or content
+    return plain_bytes(content, path)
+
+
+def candidate_heads(content: bytes) -> Iterator[TextHead]:
+    """The lines of a file that may name columns, divided by each delimiter that they have."""
+    end = 0
+    comments: list[str] = []
+    for number, whole in enumerate(content.splitlines(keepends=True)[:HEAD_LINES], start=1):
+        start, end = end, end + len(whole)
+        line = content[start:end].rstrip(b"\r\n")
+        text = _decoded(line)
+        for delimiter in DELIMITERS:
+            names = _names(text, delimiter)
+            if len(names) >= 4:
+                yield TextHead(line, number, end, delimiter, names, tuple(comments))
+        comments.append(text)
+
+
+def _decoded(line: bytes) -> str:
+    try:
+        return line.decode("utf-8")
+    except UnicodeDecodeError:
+        return line.decode("cp1252", errors="replace")
+
+
+@lru_cache(maxsize=256)
+def _names(text: str, delimiter: str) -> tuple[str, ...]:
+    """The cells of a line of columns, which may begin with #; () where the delimiter is not in it."""
+    text = text.strip().removeprefix("#").strip(" ")
+    if delimiter not in text:
+        return ()
+    try:
+        return tuple(split_line(text, Dialect(delimiter)))
+    except HistoryError:
+        return ()
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """The table of one frame: the bytes of its rows, and where they stand.
+
+    rows : bytes of the rows. columns : cells in each. first_line : number of the line of the first row, or what counts
+    it, which only a message needs.
+    """
+
+    path: Path
+    rows: bytes
+    delimiter: str
+    names: tuple[str, ...]
+    first_line: Callable[[], int]
+
+    def numbers(self, positions: Sequence[int]) -> Floats:
+        """(rows, positions) the numbers of some columns; HistoryError with line and column for what is none."""
+        places = np.full(len(self.names), -1, dtype=np.int64)
+        places[list(positions)] = np.arange(len(positions))
+        capacity = self.rows.count(b"\n") + self.rows.count(b"\r") + 1
+        out = np.empty((capacity, len(positions)))
+        where = np.zeros(3, dtype=np.int64)
+        decimal = self._decimal(positions)
+        read = core.function("creepkit_read_number_table")(
+            self.rows,
+            ctypes.c_int64(len(self.rows)),
+            ctypes.c_int64(ord(self.delimiter)),
+            ctypes.c_int64(ord(decimal)),
+            ctypes.c_int64(len(self.names)),
+            core.address(places),
+            ctypes.c_int64(len(positions)),
+            ctypes.c_int64(capacity),
+            core.address(out),
+            core.address(where),
+        )
+        if read < 0:
+            raise HistoryError(self._problem(int(read), [int(one) for one in where], decimal))
+        return out[:read]
+
+    def location(self, row: int) -> str:
+        """Where a row of numbers stands, 'file:line'."""
+        number = self.first_line()
+        for line in self.rows.splitlines():
+            if line.strip() and not line.lstrip().startswith(b"#"):
+                if row == 0:
+                    break
+                row -= 1
+            number += 1
+        return f"{self.path}:{number}"
+
+    def _decimal(self, positions: Sequence[int]) -> str:
+        """The decimal sign: a comma where the cells of the first rows have one, which only another delimiter allows."""
+        if self.delimiter == "," or b"," not in self.rows:
+            return "," if self.delimiter == "," and self._has_quoted_commas(positions) else "."
+        for line in self.rows[:HEAD_BYTES].splitlines()[:SAMPLE_ROWS]:
+            cells = _names(_decoded(line), self.delimiter)
+            wanted = [cells[k] for k in positions if k < len(cells)]
+            if any("," in cell for cell in wanted):
+                return ","
+            if any("." in cell for cell in wanted):
+                return "."
+        return ","
+
+    def _has_quoted_commas(self, positions: Sequence[int]) -> bool:
+        """Whether numbers stand in quotes, with decimal commas: "1,5","2,5"."""
+        first = self.rows[:HEAD_BYTES].splitlines()[:SAMPLE_ROWS]
+        if b'"' not in self.rows[:HEAD_BYTES]:
+            return False
+        return any("," in c for line in first for c in _cells_at(_names(_decoded(line), ","), positions))
+
+    def _problem(self, kind: int, where: list[int], decimal: str) -> str:
+        first, last, column = where
+        before = self.rows[:first]
+        number = self.first_line() + len(before.splitlines()) - (not before.endswith((b"\n", b"\r")) and bool(before))
+        found = _decoded(self.rows[first:last]).strip()
+        if kind == -1:
+            cells = len(_names(found, self.delimiter)) or 1
+            return (
+                f"{self.path}:{number}: number of cells {cells}, of columns {len(self.names)}; a row has one cell a "
+                "column, so the file may be cut off or damaged"
+            )
+        shown = found if len(found) <= 40 else f"{found[:37]}..."
+        sign = "comma" if decimal == "," else "point"
+        return (
+            f"{self.path}:{number}: '{self.names[column].strip()}' is '{shown}'; write a finite number with a decimal "
+            f"{sign}, or nan for a lost point"
+        )
+
+
+def _cells_at(cells: Sequence[str], positions: Sequence[int]) -> list[str]:
+    return [cells[k] for k in positions if k < len(cells)]
+
+
+def table_in_file(path: Path, find: Callable[[bytes], TextHead]) -> TextTable:
+    """The table of a file with one frame.
+
+    find : the line of columns in the beginning of a file; HistoryError where it has none.
+    """
+    content = plain_bytes(read_bytes(path, FRAME_FILE), path)
+    head = find(content[:HEAD_BYTES])
+    again = content.find(head.line, head.end)
+    if again >= 0 and _is_line(content, again, head.line):
+        raise HistoryError(
+            f"{path}:{content[:again].count(10) + 1}: the line of columns comes again, as in a file of several images; "
+            "give such a file by its own name, or one image a file"
+        )
+    return TextTable(path, content[head.end :], head.delimiter, head.names, lambda: head.number + 1)
+
+
+def _is_line(content: bytes, start: int, line: bytes) -> bool:
+    end = start + len(line)
+    return content[start - 1 : start] in (b"\n", b"\r") and content[end : end + 1] in (b"\n", b"\r", b"")
+
+
+CHUNK_BYTES = 4_000_000
+
+
+def frame_ranges(path: Path, head: TextHead, mark: int) -> list[tuple[int, int]]:
+    """First byte and end of the rows of each image in a file that repeats its line of columns.
+
+    mark : bytes of a byte order mark before the text.
+    """
+    starts, position, overlap = [head.end + mark], head.end + mark, len(head.line) + 2
+    heads: list[int] = []
+    while True:
+        chunk = read_range(path, FRAME_FILE, position, CHUNK_BYTES + overlap)
+        found = chunk.find(head.line, 1)
+        while 0 <= found < CHUNK_BYTES:
+            if _is_line(chunk, found, head.line):
+                heads.append(position + found)
+                starts.append(position + found + len(head.line))
+            found = chunk.find(head.line, found + 1)
+        if len(chunk) < CHUNK_BYTES + overlap:
+            return list(zip(starts, [*heads, position + len(chunk)], strict=True))
+        position += CHUNK_BYTES - 1
+
+
+def table_in_range(path: Path, head: TextHead, start: int, end: int, is_last: bool) -> TextTable:
+    """The table of one image in a file of several: its bytes, less the title lines of the next image."""
+    if end - start > FRAME_FILE.maximum_bytes:
+        raise HistoryError(f"{path}: one image of {(end - start) / 1e6:.0f} MB, larger than any; is it a table?")
+    rows = plain_bytes(read_range(path, FRAME_FILE, start, end - start), path)
+    if not is_last:
+        rows = _without_titles(rows, head)
+
+    def first_line() -> int:
+        places = range(0, start, CHUNK_BYTES)
+        pieces = (read_range(path, FRAME_FILE, k, min(CHUNK_BYTES, start - k)) for k in places)
+        counts = [(piece.count(b"\n"), piece.count(b"\r")) for piece in pieces]
+        feeds, returns = (sum(pair[k] for pair in counts) for k in (0, 1))
+        return 1 + (feeds or returns)
+
+    return TextTable(path, rows, head.delimiter, head.names, first_line)
+
+
+def _without_titles(rows: bytes, head: TextHead) -> bytes:
+    """Rows without the lines of words at their end, of which an image has at most three above its line of columns."""
+    for _ in range(3):
+        trimmed = rows.rstrip()
+        start = max(trimmed.rfind(b"\n"), trimmed.rfind(b"\r")) + 1
+        last = _decoded(trimmed[start:]).strip().strip('"')
+        if not start or len(_names(last, head.delimiter)) == len(head.names) or last[:1] in "+-.0123456789":
+            break
+        rows = rows[:start]
+    return rows

@@ -1,0 +1,259 @@
+"""Text with delimiters, as any program writes it: its encoding, its delimiter, its decimal sign, its numbers.
+
+Nothing is guessed: what could be read in two ways is refused in one sentence. All takes a time linear in the text.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import CreepkitError, HistoryError
+
+_BYTE_ORDER_MARKS = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
+
+
+_CONTROL_BYTES = bytes(sorted({*range(32), 127} - {9, 10, 12, 13}))
+"""Bytes of no text: all control characters but tab, line feed, form feed and carriage return."""
+
+
+_SAMPLE_LINES, _SAMPLE_CHARACTERS = 200, 4000
+"""Lines, and characters of each, that decide on the delimiter; on the decimal sign all lines decide."""
+
+
+@dataclass(frozen=True)
+class Dialect:
+    r"""How a table is written as text.
+
+    delimiter : "," ";" "\t" "|", or " " for runs of blanks and tabs. decimal : "." or ",".
+    """
+
+    delimiter: str = ","
+    decimal: str = "."
+
+    def __str__(self) -> str:
+        return f"{_DELIMITER_NAMES[self.delimiter]}, decimal {'point' if self.decimal == '.' else 'comma'}"
+
+
+_DELIMITER_NAMES = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks"}
+"""Delimiters, in the order in which they are preferred where a sample speaks for two alike."""
+
+
+_NUMBERS = {
+    sign: re.compile(rf"[+-]?(?:\d+(?:{re.escape(sign)}\d*)?|{re.escape(sign)}\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
+    for sign in ".,"
+}
+"""A number by decimal sign. Every digit can be matched in one way only, so that a long row of digits costs no more."""
+
+
+_GROUPED = re.compile(r"[+-]?\d+(?:[.,'’  \s]\d+)+(?:[eEdD][+-]?\d+)?", re.ASCII)
+"""Digits in groups, with several separators or with one that is no decimal sign."""
+
+
+_THOUSANDS_LIKE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
+"""Three digits behind one comma: a number below 1000 with a decimal comma, or a larger one with a separator."""
+
+
+_PLAIN_CHARACTERS = frozenset("0123456789+-.eE")
+
+
+def decode_text(content: bytes, path: Path, error: type[CreepkitError] = HistoryError) -> str:
+    """The text of a file in UTF-8 (with or without byte order mark), UTF-16 with one, else in Windows Latin (cp1252).
+
+    error : what is raised for bytes that are no text, with their line.
+    """
+    mark, encoding = next(((m, e) for m, e in _BYTE_ORDER_MARKS if content.startswith(m)), (b"", "utf-8"))
+    try:
+        text = content[len(mark) :].decode(encoding)
+    except UnicodeDecodeError as problem:
+        if encoding == "utf-8" and not mark:
+            return _decode_western(content, path, error)
+        line = _line_of(problem.object, problem.start, encoding)
+        raise error(f"{path}:{line}: found bytes that are not text in {encoding.upper()}; save it in UTF-8") from None
+    if "\0" in text:
+        line = text[: text.index("\0")].count("\n") + 1
+        raise error(f"{path}:{line}: byte 0x00 is not text; save the table as text in UTF-8")
+    return text
+
+
+def _decode_western(content: bytes, path: Path, error: type[CreepkitError]) -> str:
+    """Text in cp1252, the Latin-1 of Windows; bytes that mean nothing there, and control characters, are no text."""
+    foreign = content.translate(None, bytes(set(range(256)) - set(_CONTROL_BYTES)))
+    try:
+        if not foreign:
+            return content.decode("cp1252")
+        start = content.index(foreign[:1])
+    except UnicodeDecodeError as problem:
+        start = problem.start
+    line = content[:start].count(b"\n") + 1
+    raise error(f"{path}:{line}: byte 0x{content[start]:02x} is not text in UTF-8 or Latin-1; save it as CSV in UTF-8")
+
+
+def _line_of(content: bytes, start: int, encoding: str) -> int:
+    return content[:start].decode(encoding, errors="replace").count("\n") + 1
+
+
+def text_lines(text: str) -> list[str]:
+    """The lines of a text as an editor counts them (str.splitlines also breaks at form feeds and the like)."""
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def detect_dialect(lines: Iterable[str], location: str = "", decimal: str | None = None) -> Dialect:
+    """The dialect of the lines of a table: its line of names and its rows, without comments.
+
+    decimal : the decimal sign, where it is known. HistoryError, beginning with `location`, where
+    `1,234` may be 1234 as well as 1.234, and no other number tells.
+    """
+    numbered = [line for line in lines if line.strip()]
+    delimiter = _delimiter([line[:_SAMPLE_CHARACTERS] for line in numbered[:_SAMPLE_LINES]])
+    return Dialect(delimiter, decimal or _decimal(numbered, delimiter, f"{location}: " if location else ""))
+
+
+def split_line(line: str, dialect: Dialect, location: str = "") -> list[str]:
+    """The cells of one line, without the blanks around them; HistoryError for a stray quote."""
+    if '"' not in line:
+        return line.split() if dialect.delimiter == " " else [cell.strip() for cell in line.split(dialect.delimiter)]
+    if dialect.delimiter == " ":
+        text = " ".join(line.split())
+    else:
+        text = re.sub(rf'" +{re.escape(dialect.delimiter)}', f'"{dialect.delimiter}', line.strip(" "))
+    try:
+        reader = csv.reader([text], delimiter=dialect.delimiter, skipinitialspace=True, strict=True)
+        return [cell.strip() for cell in next(reader)]
+    except csv.Error as error:
+        place = f"{location}: " if location else ""
+        raise HistoryError(f"{place}not a line of a CSV table ({error}); look for stray quotes") from None
+
+
+def parse_number(text: str, dialect: Dialect, location: str, name: str) -> float:
+    """A cell as a number; `name` and `location` say in the HistoryError what it was meant to be, and where it stands.
+
+    An exponent may be written E or D. NaN, infinities, and digits in groups are no numbers.
+    """
+    value = _number(text, dialect.decimal) if _NUMBERS[dialect.decimal].fullmatch(text) else math.nan
+    if not math.isfinite(value):
+        raise HistoryError(f"{location}: '{name}' is {_why_no_number(text, dialect)}")
+    return value
+
+
+def parse_numbers(
+    cells: Sequence[str], dialect: Dialect, locate: Callable[[int], str], name: str, missing: Collection[str] = ()
+) -> Floats:
+    """Cells of one column as numbers.
+
+    locate : the place of cell k, for the HistoryError. missing : texts that stand for a lost value; they become NaN.
+    """
+    if dialect.decimal == "." and set("".join(cells)) <= _PLAIN_CHARACTERS:
+        try:
+            values = np.array([float(cell) for cell in cells])
+        except ValueError:
+            pass  # which of them, and why, is found below
+        else:
+            if np.isfinite(values).all():
+                return values
+    lost, matches = frozenset(missing), _NUMBERS[dialect.decimal].fullmatch
+    values = np.full(len(cells), np.nan)
+    for k, cell in enumerate(cells):
+        if cell in lost:
+            continue
+        if matches(cell):
+            values[k] = _number(cell, dialect.decimal)
+        if not math.isfinite(values[k]):
+            raise HistoryError(f"{locate(k)}: '{name}' is {_why_no_number(cell, dialect)}")
+    return values
+
+
+def is_number(text: str, dialect: Dialect) -> bool:
+    """Whether a cell is a number."""
+    return _NUMBERS[dialect.decimal].fullmatch(text) is not None
+
+
+def _number(text: str, decimal: str) -> float:
+    plain = text if decimal == "." else text.replace(",", ".")
+    return float(plain.replace("D", "E").replace("d", "e"))
+
+
+def _why_no_number(text: str, dialect: Dialect) -> str:
+    shown = text if len(text) <= 40 else f"{text[:37]}..."
+    if not text:
+        return "empty; write a finite number such as 1.5e-3"
+    if _NUMBERS[dialect.decimal].fullmatch(text):
+        return f"'{shown}', too large a number; write a finite number such as 1.5e-3"
+    other = "," if dialect.decimal == "." else "."
+    if _NUMBERS[other].fullmatch(text):
+        sign, words = ("comma", "decimal points") if other == "," else ("point", "decimal commas")
+        return f"'{shown}' with a {sign}, while the table has {words}; write all numbers alike, without separators"
+    if _GROUPED.fullmatch(text):
+        return f"'{shown}', with digits in groups; write the number without separators between thousands"
+    return f"'{shown}'; write a finite number such as 1.5e-3"
+
+
+def _delimiter(sample: Sequence[str]) -> str:
+    """The delimiter by which most cells are numbers and fewest are mangled ones; else by which lines are alike."""
+    scores = {delimiter: _score(sample, delimiter) for delimiter in _DELIMITER_NAMES}
+    return max(scores, key=lambda delimiter: scores[delimiter])
+
+
+def _score(sample: Sequence[str], delimiter: str) -> tuple[bool, int, int]:
+    """Whether it is there, numbers less mangled ones, and lines of the commonest number of cells, for a delimiter."""
+    numbers = 0
+    counts: dict[int, int] = {}
+    for line in sample:
+        cells = _unquoted_cells(line, delimiter)
+        if len(cells) < 2:
+            continue
+        counts[len(cells)] = counts.get(len(cells), 0) + 1
+        for cell in cells:
+            if cell and (cell[0] in "+-.," or "0" <= cell[0] <= "9"):
+                is_numeric = _NUMBERS["."].fullmatch(cell) or (delimiter != "," and _NUMBERS[","].fullmatch(cell))
+                numbers += 1 if is_numeric else -2
+    return bool(counts), numbers, 0 if delimiter == " " else max(counts.values(), default=0)
+
+
+def _unquoted_cells(line: str, delimiter: str) -> list[str]:
+    """Cells of a line of a sample, where those in quotes count as words: their commas belong to them."""
+    text = re.sub(r'"[^"]*"', "quoted", line) if '"' in line else line
+    return text.split() if delimiter == " " else [cell.strip() for cell in text.split(delimiter)]
+
+
+def _decimal(lines: Sequence[str], delimiter: str, place: str) -> str:
+    """The decimal sign of most numbers in the lines; '.' where none has a fraction.
+
+    Numbers with the other sign are refused where they are read, so that a text such as '617.2' does no harm here.
+    """
+    commas, points, doubtful = 0, 0, ""
+    for number, line in enumerate(lines):
+        if number >= _SAMPLE_LINES and (commas or points):
+            break
+        if "," not in line and "." not in line:
+            continue
+        for cell in _possible_numbers(line, delimiter):
+            if "," in cell and _NUMBERS[","].fullmatch(cell):
+                if _THOUSANDS_LIKE.fullmatch(cell):
+                    doubtful = doubtful or cell
+                else:
+                    commas += 1
+            elif "." in cell and _NUMBERS["."].fullmatch(cell):
+                points += 1
+    if doubtful and not commas and not points:
+        raise HistoryError(
+            f"{place}'{doubtful}' may be {doubtful.replace(',', '.')} or {doubtful.replace(',', '')}; write decimal "
+            "points, or '# decimal: comma' in the head of the file"
+        )
+    return "," if commas > points else "."
+
+
+def _possible_numbers(line: str, delimiter: str) -> list[str]:
+    if '"' not in line:
+        return _unquoted_cells(line, delimiter)
+    try:
+        return split_line(line, Dialect(delimiter))
+    except HistoryError:  # told with its line by who reads the cells
+        return []

@@ -1,0 +1,162 @@
+"""How a camera system writes its frames: the declaration from which the readers of cameras work."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from creepkit.errors import HistoryError, nearest
+
+LENGTH_UNITS = {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "in": 25.4, "inch": 25.4}
+"""{unit: mm}."""
+
+
+TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
+"""{unit: s}."""
+
+
+PIXELS = ("px", "pixel", "pixels", "pix")
+
+
+COORDINATES, DISPLACEMENTS = ("x", "y", "z"), ("u", "v", "w")
+
+
+OUT_OF_PLANE = ("z", "w")
+
+
+QUANTITIES_OF_FRAMES = (*COORDINATES, *DISPLACEMENTS, "confidence", "time", "image_x", "image_y")
+
+
+_UNIT_IN_BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]$", re.DOTALL)
+
+
+_RULE = re.compile(r"\s*(<=|>=|<|>|==)\s*([+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*", re.ASCII)
+
+
+class ColumnName(NamedTuple):
+    """The name of a column without its unit, and the unit that stands with it; "" where none does."""
+
+    name: str
+    unit: str
+
+    @classmethod
+    def of(cls, text: str) -> ColumnName:
+        """From the head of a file: `X [mm]`, `coor.X.mm`, `stereo_x_mm`, `"W (in)"`, `SIGMA`."""
+        text = " ".join(text.strip().strip('"').split())
+        if found := _UNIT_IN_BRACKETS.match(text):
+            return cls(_plain(found[1]), found[2].strip())
+        stem, mark, last = _plain(text).rpartition(" ")
+        if mark and last in (*LENGTH_UNITS, *TIME_UNITS, *PIXELS):
+            return cls(stem, last)
+        return cls(_plain(text), "")
+
+
+def _plain(name: str) -> str:
+    """A name whose separators are blanks, so that `disp.Out-Of-Plane: W` and `disp_Out_Of_Plane_W` are one."""
+    return " ".join(re.split(r"[\s._:\-]+", name.strip())).strip()
+
+
+@dataclass(frozen=True)
+class LostRule:
+    """A column and what it holds for points that are lost: "< 0", "== -1"."""
+
+    column: str
+    comparison: str
+    value: float
+
+
+@dataclass(frozen=True)
+class CameraFormat:
+    """How one camera system writes its frames.
+
+    name, title : short name, and one sentence. columns : {quantity: column}, or a tuple of such mappings, one for each
+        version of the system; a column may be a tuple of spellings, and is given without its unit. Quantities are
+        x y z (coordinates), u v w (displacements), where there are such columns confidence and time, and image_x,
+        image_y (pixels) where only they tell the system from another one. Without z and w the format is that of a flat
+        surface that moves in its plane.
+    unit : of lengths where the head of the file states none; "" makes that an error.
+    axes : factors of x, y, z, each 1 or -1, that turn them into right-handed axes whose z points to the cameras.
+    lost : {column: rule} of points that the correlation lost, such as {"sigma": "< 0"}; NaN is one in all systems.
+    confidence_unit : of the column confidence, where the head states none.
+    patterns : names of files, such as "*.csv". planar : columns by which a two-dimensional table of the system is
+        recognised, which is refused.
+    time : where the time of a frame stands unless it is a column: ("head", key, unit) for a line `key: value` above the
+        columns, ("name", "", unit) for the last number in the file's name; () for nowhere.
+    layout : ((column, NumPy type), ...) of the packed rows of a binary file without a head.
+    """
+
+    name: str
+    title: str
+    columns: Mapping[str, str | tuple[str, ...]] | tuple[Mapping[str, str | tuple[str, ...]], ...]
+    unit: str = ""
+    axes: tuple[int, int, int] = (1, 1, 1)
+    lost: Mapping[str, str] | tuple[LostRule, ...] = ()
+    confidence_unit: str = ""
+    patterns: tuple[str, ...] = ("*.csv", "*.txt", "*.dat")
+    planar: tuple[str, ...] = ()
+    time: tuple[str, str, str] | tuple[()] = ()
+    layout: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and self.name.strip()):
+            raise HistoryError(f"a camera format is called {self.name!r}; give it a short name in words")
+        given = (self.columns,) if isinstance(self.columns, Mapping) else self.columns
+        if not isinstance(given, Sequence) or not given or not all(isinstance(one, Mapping) for one in given):
+            raise HistoryError(f"{self}: columns are {{quantity: column}}, or a tuple of them, found {given!r:.60}")
+        object.__setattr__(self, "columns", tuple(self._checked_columns(one) for one in given))
+        if self.unit and self.unit not in LENGTH_UNITS:
+            raise HistoryError(f"{self}: '{self.unit}' is no unit of length; {nearest(self.unit, LENGTH_UNITS)}")
+        if len(tuple(self.axes)) != 3 or not all(axis in (1, -1) for axis in self.axes):
+            raise HistoryError(f"{self}: axes are {self.axes!r}; give three factors that are 1 or -1")
+        rules = self.lost.items() if isinstance(self.lost, Mapping) else ()
+        if isinstance(self.lost, Mapping):
+            object.__setattr__(self, "lost", tuple(self._checked_rule(*rule) for rule in rules))
+        for field in ("axes", "patterns", "planar", "time", "layout"):
+            value = getattr(self, field)
+            object.__setattr__(self, field, (value,) if isinstance(value, str) else tuple(value))
+        self._check_time()
+
+    def __str__(self) -> str:
+        return f"camera format '{self.name}'"
+
+    @property
+    def versions(self) -> tuple[Mapping[str, tuple[str, ...]], ...]:
+        """{quantity: spellings of its column} of each version of the system."""
+        return self.columns  # type: ignore[return-value]  # brought into this form when made
+
+    @property
+    def lost_rules(self) -> tuple[LostRule, ...]:
+        """The rules of `lost`."""
+        return self.lost  # type: ignore[return-value]  # brought into this form when made
+
+    def _checked_columns(self, given: Mapping[str, str | tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        for quantity in given:
+            if quantity not in QUANTITIES_OF_FRAMES:
+                found = nearest(str(quantity), QUANTITIES_OF_FRAMES)
+                raise HistoryError(f"{self}: '{quantity}' is no quantity of a frame; {found}")
+        flat = not {*OUT_OF_PLANE} & {*given}
+        needed = [q for q in (*COORDINATES, *DISPLACEMENTS) if not (flat and q in OUT_OF_PLANE)]
+        if missing := [quantity for quantity in needed if quantity not in given]:
+            raise HistoryError(f"{self}: no column is given for {missing[0]}; name those of {' '.join(needed)}")
+        result = {q: (one,) if isinstance(one, str) else tuple(one) for q, one in given.items()}
+        for quantity, spellings in result.items():
+            if not spellings or not all(isinstance(word, str) and ColumnName.of(word).name for word in spellings):
+                raise HistoryError(f"{self}: the column of {quantity} is {spellings!r}; give its name")
+        return result
+
+    def _checked_rule(self, column: str, rule: str) -> LostRule:
+        found = _RULE.fullmatch(rule) if isinstance(rule, str) else None
+        if found is None:
+            raise HistoryError(f"{self}: the rule of '{column}' is {rule!r}; write one such as '< 0' or '== -1'")
+        return LostRule(column, found[1], float(found[2]))
+
+    def _check_time(self) -> None:
+        if not self.time:
+            return
+        if len(self.time) != 3 or self.time[0] not in ("head", "name") or self.time[2] not in TIME_UNITS:
+            raise HistoryError(
+                f"{self}: time is {self.time!r}; write ('head', key, unit) or ('name', '', unit) with one of the units "
+                f"{', '.join(TIME_UNITS)}"
+            )
