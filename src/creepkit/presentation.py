@@ -23,6 +23,11 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "plot": "creepkit.report.simulation:outputs_figure",
         "section": "creepkit.report.simulation:section_figure",
     },
+    # extraction
+    "Extraction": {
+        "text": "creepkit.report.extraction_text:extraction_text",
+        "plot": "creepkit.report.extraction_plot:extraction_figure",
+    },
     # sampling, data sets, surrogates
     "Acceptance": {
         "text": "creepkit.report.sampling:acceptance_text",

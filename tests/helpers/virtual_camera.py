@@ -35,8 +35,8 @@ def simulated_dimple(
     """A dimple that creeps after `rest` frames without load."""
     loaded = interval * np.arange(1, frames - rest + 1)
     run = ck.simulate(
-        law, ck.specimen("bulge").replace(refinement=1.0), dict(A=A, n=n), loading=ck.PressureJump(pressure, pressure, 1e9),
-        times=loaded, temperature=temperature, elastic=ck.Elastic(E=1e5, nu=0.3),
+        law, "bulge", dict(A=A, n=n), loading=ck.PressureJump(pressure, pressure, 1e9), times=loaded,
+        temperature=temperature, elastic=ck.Elastic(E=1e5, nu=0.3),
     )  # fmt: skip
     top = run.setup.model.top
     rise = run._at(np.asarray(run.simulation.displacements[:, top, 1]), loaded)
@@ -94,7 +94,11 @@ class VirtualCamera:
             phase = index / max(times.size - 1, 1)
             walk = 0.0 if index == 0 else phase + 0.03 * np.sin(17.0 * phase) + 0.01 * random.normal()
             turn = rotation(np.radians(self.turn) * walk * axis_of_turn)
-            moved = (flat + u) @ tilt.T @ turn.T + np.array([12.0, -7.0, 400.0]) @ np.eye(3) + self.motion * walk * direction
+            moved = (
+                (flat + u) @ tilt.T @ turn.T
+                + np.array([12.0, -7.0, 400.0]) @ np.eye(3)
+                + self.motion * walk * direction
+            )
             noise = (self._noise(random, side) - reference) * (index > 0)
             displacements = moved - points + noise @ tilt.T
             lost = gone | (self._blobs(random, side, 0.5 * self.lost) if self.lost else False)
@@ -109,7 +113,9 @@ class VirtualCamera:
 
     def _noise(self, random: np.random.Generator, side: int) -> Floats:
         white = random.normal(size=(3, side, side))
-        smooth = gaussian_filter(white, (0, self.correlation, self.correlation), mode="wrap") if self.correlation else white
+        smooth = (
+            gaussian_filter(white, (0, self.correlation, self.correlation), mode="wrap") if self.correlation else white
+        )
         smooth *= 1.0 / (2.0 * np.sqrt(np.pi) * self.correlation) ** -1 if self.correlation > 0.4 else 1.0
         return (smooth * np.array([1 / 3, 1 / 3, 1.0])[:, None, None] * self.noise).reshape(3, -1).T
 
@@ -131,7 +137,10 @@ class VirtualCamera:
                 inside = r < radii[-1]
                 rows = wx * wy * inside[:, None] * surface_interpolation(radii, np.where(inside, r, 0.0))
                 up = up + csr_matrix(rows)
-                out = [o + csr_matrix(rows * (d / np.maximum(r, 1e-12))[:, None]) for o, d in zip(out, (dx, dy), strict=True)]
+                out = [
+                    o + csr_matrix(rows * (d / np.maximum(r, 1e-12))[:, None])
+                    for o, d in zip(out, (dx, dy), strict=True)
+                ]
         return up, out
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from creepkit.errors import HistoryError
@@ -39,17 +40,27 @@ def extract(
     """
     from creepkit.extraction import extract_surfaces
 
-    watched = resolve_predictor(specimen)
-    if not isinstance(watched, SupportsSurfaceObservation):
-        name = getattr(watched, "name", type(watched).__name__)
-        raise HistoryError(f"specimen '{name}' does not say how cameras see its surface; use one that does, as 'bulge'")
+    watched = _watched(specimen)
     program = loading.program() if isinstance(loading, Loading) else None
     load = None if program is None else program.at(frames.times - frames.times[0])
-    found = extract_surfaces(
-        frames, watched, operator=operator, centers=centers, rest=rest, subset=subset, load=load
-    )
+    found = extract_surfaces(frames, watched, operator=operator, centers=centers, rest=rest, subset=subset, load=load)
     if loading is None or temperature is None:
         return found
     # A program counts from the first frame, a constant load from the last frame at rest.
     zero = None if program is None else 0.0
     return [one.replace(history=one.history_under(loading, temperature, time_zero=zero)) for one in found]
+
+
+def operator_of(specimen: Specimen | str, window: float | None = None, radii: Sequence[float] = ()) -> str:
+    """The text of the operator of a specimen within a window, mm, or at radii, mm; by default its own."""
+    if window is not None and len(radii):
+        raise HistoryError("a window and rings were given: means on rings have no window; leave one of them out")
+    return _watched(specimen).surface_operator(window, radii)
+
+
+def _watched(specimen: Specimen | str) -> SupportsSurfaceObservation:
+    watched = resolve_predictor(specimen)
+    if not isinstance(watched, SupportsSurfaceObservation):
+        name = getattr(watched, "name", type(watched).__name__)
+        raise HistoryError(f"specimen '{name}' does not say how cameras see its surface; use one that does, as 'bulge'")
+    return watched

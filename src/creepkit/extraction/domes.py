@@ -134,8 +134,10 @@ def _is_summit(place: Floats, height: float, candidates: Floats, heights: Floats
     """Whether the surface falls off around a place: at a distance of the radius that moves it stands below half."""
     distance = np.hypot(*(candidates - place).T)
     ring = (distance > 0.8 * reach) & (distance < 1.3 * reach)
-    return bool(ring.any()) and float(np.median(heights[ring])) < 0.5 * height and (
-        height >= heights[distance < 0.8 * reach].max()
+    return (
+        bool(ring.any())
+        and float(np.median(heights[ring])) < 0.5 * height
+        and (height >= heights[distance < 0.8 * reach].max())
     )
 
 

@@ -119,9 +119,7 @@ def _check(frames: Frames, subset: float) -> None:
         raise HistoryError(f"subset is {subset!r}; give the side of a subset in mm, or 0 to leave its smoothing in")
 
 
-def _group(
-    plate: ReferencePlate, center: Floats, region: SurfaceRegion, centers: list[Floats], name: str
-) -> Ints:
+def _group(plate: ReferencePlate, center: Floats, region: SurfaceRegion, centers: list[Floats], name: str) -> Ints:
     """Points about one centre up to the end of its clamped ring, without those that another piece moves."""
     own = np.hypot(*(plate.places[:, :2] - center).T)
     others = [np.hypot(*(plate.places[:, :2] - other).T) for other in centers if other is not center]
@@ -177,14 +175,20 @@ def _extract_one(
     good = _without(good, last)
     names = tuple(seen.outputs)
     signal = seen.outputs[names[0]]
-    fields, shown = _error_fields(seen, taken, centred, good, rest, loaded[good[loaded]], places[clamped] - np.r_[center, 0.0])
+    fields, shown = _error_fields(
+        seen, taken, centred, good, rest, loaded[good[loaded]], places[clamped] - np.r_[center, 0.0]
+    )
     noise = estimate_noise(names, seen.gains, fields, np.where(good, signal, np.nan), shown, plate.spacing)
     # Points of overlapping subsets err together: the centre of independent ones is known less well by as much.
     inflation = np.sqrt(max(1.0, np.pi * noise.correlation_length**2 / plate.spacing**2))
     motion = PlateMotion(
-        translations, rotations, _motion_errors(taken, fields, noise, plate.spacing), int(clamped.sum()), *_presence(series, clamped, good),
+        translations,
+        rotations,
+        _motion_errors(taken, fields, noise, plate.spacing),
+        int(clamped.sum()),
+        *_presence(series, clamped, good),
         _size(taken.clamped_heights),
-    )  # fmt: skip
+    )
     sd = np.sqrt(np.einsum("fii->fi", noise.covariance))
     return Extraction(
         name=piece.name,
@@ -192,8 +196,8 @@ def _extract_one(
         specimen=getattr(specimen, "name", "specimen"),
         operator=seen.operator,
         times=frames.times - frames.times[0],
-        outputs={n: np.where(good, values, np.nan) for n, values in seen.outputs.items()},
-        standard_deviation={n: np.where(good, sd[:, k], np.nan) for k, n in enumerate(names)},
+        outputs=seen.outputs,
+        standard_deviation={n: sd[:, k] for k, n in enumerate(names)},
         used=good & np.isfinite(signal),
         flags=tuple(sorted(flags, key=lambda flag: flag.frames)),
         rest=rest,
@@ -209,6 +213,7 @@ def _extract_one(
         clamped=clamped,
         maps=_maps(taken.heights, seen, surface, good, rest),
         spacing=plate.spacing,
+        first_time=float(frames.times[0]),
     )
 
 
@@ -222,7 +227,8 @@ def _first_flags(piece: _Piece, series: PointSeries, clamped: Bools) -> tuple[li
     good[list(piece.read.unreadable)] = False
     if good.sum() < 3:
         raise HistoryError(
-            f"{piece.name}: {good.sum()} of {good.size} frames can be used ({flags[0].reason if flags else 'too few'}); "
+            f"{piece.name}: {good.sum()} of {good.size} frames can be used "
+            f"({flags[0].reason if flags else 'there are no more'}); "
             "extraction needs at least 3"
         )
     return flags, good
@@ -311,7 +317,7 @@ def _error_fields(
         whole(np.nan_to_num(at_rest)), whole(residuals), loaded[chosen], whole(clamped), points.places,
         clamped_places[:, :2],
     )  # fmt: skip
-    shown = np.stack([np.isfinite(values) for values in seen.outputs.values()], axis=1) & good[:, None]
+    shown = np.stack([np.isfinite(values) for values in seen.outputs.values()], axis=1)
     return fields, shown
 
 

@@ -14,7 +14,7 @@ from creepkit.arrays import Bools, Floats, Ints, frozen
 from creepkit.errors import HistoryError
 from creepkit.extraction.noise import NoiseEstimate
 from creepkit.presentation import Presentable, present
-from creepkit.quality.flags import QualityFlag
+from creepkit.quality.flags import QualityFlag, frame_ranges_text
 from creepkit.records import History, Loading, Program, SurfaceRegion, constant_load, known_specimens, loads_of
 
 if TYPE_CHECKING:
@@ -51,15 +51,15 @@ class Extraction(Presentable):
     """The measured outputs of one test piece, and how they came about.
 
     name : D1, D2 ... or as given. source : the frames. specimen, operator : what was observed, and how.
-    times : (frames,) s since the first frame. outputs : {name: (frames,)}, NaN where a frame does not show one.
-    standard_deviation : {name: (frames,)} of the noise of a single frame and of the zero level. used : (frames,).
-    flags : why frames are not used. rest : (frames at rest,) their indices; the mean of them is the zero of heights.
-    center : (2,) mm, in the axes of the frames; center_sd : (2,) mm, zeros where it was given.
-    center_given : whether it was. region : which part moves and which is held. subset : mm, side of the mean that was
-    taken out. motion, noise : see there. residual : (frames,) mm, root mean square over the operator's points.
-    places : (points, 2) mm about the centre, in the plate; clamped : (points,) which of them gave the motion. maps :
-    some frames for a picture. spacing : mm of points. history : the test as creepkit identifies from it, where loading
-    and temperature were given; `history_under` makes one.
+    times : (frames,) s since the first frame. first_time : s, of that on the clock of the frames. outputs : {name:
+    (frames,)}, NaN where a frame does not show one. standard_deviation : {name: (frames,)} of the noise of a single
+    frame and of the zero level. used : (frames,). flags : why frames are not used. rest : (frames at rest,) their
+    indices; the mean of them is the zero of heights. center : (2,) mm, in the axes of the frames; center_sd : (2,) mm,
+    zeros where it was given. center_given : whether it was. region : which part moves and which is held. subset : mm,
+    side of the mean that was taken out. motion, noise : see there. residual : (frames,) mm, root mean square over the
+    operator's points. places : (points, 2) mm about the centre, in the plate; clamped : (points,) which of them gave
+    the motion. maps : some frames for a picture. spacing : mm of points. history : the test as creepkit identifies
+    from it, where loading and temperature were given; `history_under` makes one.
     """
 
     name: str
@@ -84,6 +84,7 @@ class Extraction(Presentable):
     clamped: Bools
     maps: tuple[FieldMap, ...]
     spacing: float
+    first_time: float = 0.0
     history: History | None = field(default=None)
 
     def __post_init__(self) -> None:
@@ -105,21 +106,24 @@ class Extraction(Presentable):
         """The test as a history, whose time starts with the load.
 
         loading : a record of the specimen's load, or its constant value, MPa. temperature : K, a number or a Program.
-        Programs count from `time_zero`, s since the first frame; by default that is the last frame at rest. Frames
-        before it are no part of the history, which a label says. Frames without outputs and bad ones are unused.
+        Programs count from `time_zero`, s since the first frame; by default that is `load_start`. Frames
+        before it, and those that do not show every output, are no part of the history, which labels say; flagged frames
+        are part of it and unused.
         """
-        last = float(self.times[self.rest[-1]]) if self.rest.size else float(self.times[0])
-        zero = last if time_zero is None else float(time_zero)
-        kept = np.flatnonzero(self.times >= zero)
+        zero = self.load_start if time_zero is None else float(time_zero)
+        after, complete = self.times >= zero, np.isfinite(list(self.outputs.values())).all(axis=0)
+        kept = np.flatnonzero(after & complete)
         if not kept.size:
             raise HistoryError(
-                f"frames '{self.source}': all {self.times.size} frames lie before time zero, {zero:g} s after the first; "
-                "check the alignment of the clocks"
+                f"frames '{self.source}': no frame after time zero, {zero:g} s after the first, has outputs; check the "
+                "alignment of the clocks"
             )
-        record = constant_load(self._load_name, loading) if isinstance(loading, int | float) else loading
+        record = constant_load(self.load_name, loading) if isinstance(loading, int | float) else loading
         labels = {"place": self.name, "extraction": _label(self)}
-        if kept[0] > 0:
-            labels["frames_before_the_load"] = f"{kept[0]}, to {self.times[kept[0] - 1]:g} s of the camera's clock"
+        if not after.all():
+            labels["frames_before_time_zero"] = str(np.count_nonzero(~after))
+        if (missing := np.flatnonzero(after & ~complete)).size:
+            labels["frames_without_all_outputs"] = frame_ranges_text(missing.tolist())
         if not self.used.all():
             labels["suspect"] = "; ".join(f"frame {f.frames[0]} {f.kind}: {f.reason}" for f in self.flags)[:2000]
         return History(
@@ -137,7 +141,20 @@ class Extraction(Presentable):
         )
 
     @property
-    def _load_name(self) -> str:
+    def load_start(self) -> float:
+        """When the load began, s since the first frame: the last frame before the leading output leaves its noise.
+
+        It is known to the interval between two frames.
+        """
+        name = next(iter(self.outputs))
+        signal = np.abs(self.outputs[name]) > 5.0 * self.standard_deviation[name]
+        first = int(self.rest[-1]) + 1 if self.rest.size else 1
+        loaded = np.flatnonzero(signal[first:] & self.used[first:])
+        return float(self.times[first + int(loaded[0]) - 1 if loaded.size else 0])
+
+    @property
+    def load_name(self) -> str:
+        """The first load of the specimen, which `history_under` takes a number to be."""
         loads = loads_of(known_specimens().get(self.specimen))
         return loads[0].name if loads else "stress"
 
@@ -151,5 +168,6 @@ def _label(extraction: Extraction) -> str:
     given = "given" if extraction.center_given else "of all frames"
     return (
         f"centre {x:.4g}, {y:.4g} mm ({given}); rigid motion from {extraction.motion.points} points of the plate; "
-        f"zero from {max(extraction.rest.size, 1)} frames; lag-1 correlation of the noise {extraction.noise.lag_one:.2f}"
+        f"zero from {max(extraction.rest.size, 1)} frames; "
+        f"lag-1 correlation of the noise {extraction.noise.lag_one:.2f}"
     )

@@ -109,7 +109,10 @@ def motion_flags(name: str, translations: Floats, rotations: Floats, good: Bools
             (rotations[:, k], LEAST_MOTION_JUMP / reach, "rotation about", "mrad", 1e3),
         ):
             for index in np.flatnonzero(off := isolated(values, good, MOTION_JUMP, floor)):
-                reason = f"{what} {axis} of {scale * values[index]:.3g} {unit} is {off[index]:.0f} times the scatter off its neighbours"
+                reason = (
+                    f"{what} {axis} of {scale * values[index]:.3g} {unit} is {off[index]:.0f} times the scatter "
+                    "off its neighbours"
+                )
                 flags.setdefault(int(index), _flag(name, "motion", int(index), reason))
     return list(flags.values())
 
@@ -119,10 +122,12 @@ def residual_flags(name: str, sizes: Mapping[str, Floats], good: Bools) -> list[
     flags: dict[int, QualityFlag] = {}
     for where, size in sizes.items():
         median = float(np.nanmedian(size[good])) if good.any() else 0.0
-        for index in np.flatnonzero(off := isolated(size, good, RESIDUAL_JUMP, 0.5 * median)):
+        for index in np.flatnonzero(isolated(size, good, RESIDUAL_JUMP, 0.5 * median)):
             neighbours = np.nanmedian(size[max(index - 2, 0) : index + 3])
             if size[index] > 1.5 * neighbours:
-                reason = f"residual {where} of {1e3 * size[index]:.3g} um beside {1e3 * neighbours:.3g} um of its neighbours"
+                reason = (
+                    f"residual {where} of {1e3 * size[index]:.3g} um beside {1e3 * neighbours:.3g} um of its neighbours"
+                )
                 flags.setdefault(int(index), _flag(name, "residual", int(index), reason))
     return list(flags.values())
 

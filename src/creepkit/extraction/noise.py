@@ -8,7 +8,8 @@ points that lie nearer than a subset are correlated, so a variance is never that
   more the residuals of the loaded frame scatter in time than those at rest.
 - The block bootstrap draws patches of the residual field with replacement and adds up what they contribute; in the
   linear limit its covariance is the sum over patches of the square of each patch's contribution, which is taken
-  directly, enlarged for what the fit took from the residuals and for correlation across the edges of patches. Residuals have what is smooth in time taken off first, for what a model misses of the surface is no noise.
+  directly, enlarged for what the fit took from the residuals and for correlation across the edges of patches.
+  Residuals have what is smooth in time taken off first, for what a model misses of the surface is no noise.
 
 The covariance of a frame is the mean of both, the frames at rest weighing by their number.
 """
@@ -337,6 +338,4 @@ def _correlations(names: Sequence[str], covariance: Floats) -> dict[tuple[str, s
     np.fill_diagonal(matrix, 1.0)
     while np.linalg.eigvalsh(matrix)[0] < 1e-3:
         matrix = 0.98 * matrix + 0.02 * np.eye(len(matrix))
-    return {
-        (names[i], names[j]): float(matrix[i, j]) for i in range(len(names)) for j in range(i + 1, len(names))
-    }
+    return {(names[i], names[j]): float(matrix[i, j]) for i in range(len(names)) for j in range(i + 1, len(names))}

@@ -145,7 +145,9 @@ def _robust_sd(residuals: Floats, valid: Bools) -> Floats:
     some = slice(None, None, max(1, valid.shape[1] // 300))
     residuals, valid = residuals[:, some], valid[:, some]
     size = np.where(valid[..., None], np.abs(residuals), np.inf)
-    rows = [np.median(row[:, seen], axis=1) for row, seen in zip(size.transpose(0, 2, 1), valid, strict=True) if seen.any()]
+    rows = [
+        np.median(row[:, seen], axis=1) for row, seen in zip(size.transpose(0, 2, 1), valid, strict=True) if seen.any()
+    ]
     result = np.full((len(size), 3), _RESIDUAL_FLOOR)
     result[valid.any(axis=1)] = 1.4826 * np.array(rows).reshape(-1, 3)
     return np.maximum(result, _RESIDUAL_FLOOR)

@@ -62,11 +62,11 @@ def surface_center(points: SurfacePoints, window: float) -> tuple[Floats, Floats
         inside = distance <= window + np.sqrt(points.areas)
         weights, seen = _weights(distance[inside], points.areas[inside], heights[:, inside], window)
         if np.count_nonzero(weights.sum(axis=0)) < FEWEST_WINDOW_POINTS:
-            raise FitError(f"only {np.count_nonzero(inside)} points lie within {window:g} mm of ({center[0]:g}, {center[1]:g}) mm")
+            raise FitError(
+                f"only {np.count_nonzero(inside)} points lie within {window:g} mm of ({center[0]:g}, {center[1]:g}) mm"
+            )
         start = _shared_start(points.places[inside] - center, seen, weights, points.subset, window)
-        moved, fits, matrix = joint_center(
-            points.places[inside], seen, weights, center, start, points.subset, LOOSE
-        )
+        moved, fits, matrix = joint_center(points.places[inside], seen, weights, center, start, points.subset, LOOSE)
         variance = 2.0 * fits.cost.sum() / max(np.count_nonzero(weights) - 3 * len(frames) - 2, 1)
         step, center = float(np.hypot(*(moved - center))), moved
         if not np.hypot(*center) < 2.0 * window:
@@ -126,9 +126,7 @@ def _observe_field(points: SurfacePoints, window: float, operator: str) -> Surfa
         "width": np.exp(values[:, 1]) + hidden,
         "shape": np.exp(values[:, 2]) + hidden,
     }
-    return SurfaceObservation(
-        operator, outputs, _spread(gains, inside), _spread(residuals, inside, np.nan), enough
-    )
+    return SurfaceObservation(operator, outputs, _spread(gains, inside), _spread(residuals, inside, np.nan), enough)
 
 
 def _observe_rings(points: SurfacePoints, radii: tuple[float, ...], operator: str) -> SurfaceObservation:

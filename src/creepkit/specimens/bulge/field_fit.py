@@ -131,9 +131,7 @@ def fit_field(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> FieldFit:
             "without pressure and give the points of one bulge"
         )
     residual_sd = scale * float(np.sqrt(left / H.size))
-    return FieldFit(
-        float(D), float(S), float(p), *map(float, center), tuple(errors.tolist()), residual_sd, int(H.size)
-    )
+    return FieldFit(float(D), float(S), float(p), *map(float, center), tuple(errors.tolist()), residual_sd, int(H.size))
 
 
 def model(places: Floats, values: Floats, subset: float = 0.0) -> tuple[Floats, Floats]:
@@ -266,14 +264,19 @@ def _normal_equations(
 
 
 def joint_center(
-    places: Floats, heights: Floats, weights: Floats, center: Floats, start: Floats, subset: float = 0.0,
+    places: Floats,
+    heights: Floats,
+    weights: Floats,
+    center: Floats,
+    start: Floats,
+    subset: float = 0.0,
     tolerance: float = TIGHT,
 ) -> tuple[Floats, FrameFits, Floats]:
     """The centre (2,) mm for which all frames together are fitted best, their fits, and the centre's normal matrix.
 
     places : (points, 2) mm. heights, weights : (frames, points) as in fit_frames. center : (2,) mm, where to begin.
-    start : (frames, 3). tolerance : as in fit_frames. The frames' own D, S, p are eliminated (Schur complement); a frame weighs as its signal does,
-    for the derivative of its heights to the centre is proportional to them.
+    start : (frames, 3). tolerance : as in fit_frames. The frames' own D, S, p are eliminated (Schur complement); a
+    frame weighs as its signal does, for the derivative of its heights to the centre is proportional to them.
     """
     center = np.asarray(center, float)
     fits = fit_frames(places - center, heights, weights, start, subset, tolerance)
