@@ -134,7 +134,7 @@ def _frames(path: str, format: str | None, interval: float | None) -> Frames:
         return frames
     if not 0.0 < interval < 1e9:
         raise HistoryError(f"--interval-s {interval:g}: give the time between frames, s, above zero")
-    return replace(frames, times=interval * np.arange(len(frames)))
+    return replace(frames, times=interval * np.arange(len(frames), dtype=float))
 
 
 def _reporting(frames: Frames, tick: Any) -> Frames:

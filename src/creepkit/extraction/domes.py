@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats
+from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import CreepkitError, HistoryError
 from creepkit.extraction.plate import plate_axes
 from creepkit.extraction.series import ReferencePlate, aligned_frame
@@ -157,10 +157,10 @@ def _coverage(place: Floats, plate: ReferencePlate, reach: float) -> float:
     return float(plate.areas[near].sum() / (np.pi * reach**2))
 
 
-def _thinned(places: Floats, step: float) -> Floats:
+def _thinned(places: Floats, step: float) -> Ints:
     """Numbers of points (some,), one in each square of a side in mm."""
     cells = np.floor((places - places.min(axis=0)) / step).astype(int)
-    return np.unique(cells[:, 0] * (cells[:, 1].max() + 1) + cells[:, 1], return_index=True)[1]
+    return np.asarray(np.unique(cells[:, 0] * (cells[:, 1].max() + 1) + cells[:, 1], return_index=True)[1])
 
 
 def _named(places: Sequence[Floats], reach: float) -> dict[str, Floats]:

@@ -14,9 +14,9 @@ from creepkit.extraction.extraction import Extraction, FieldMap, PlateMotion
 from creepkit.extraction.frame_checks import fit_flags, frames_at_rest, motion_flags, read_flags, residual_flags
 from creepkit.extraction.noise import (
     NOISE_FRAMES,
-    Correlation,
     ErrorFields,
     NoiseEstimate,
+    SpatialCorrelation,
     autocorrelation,
     clamped_covariance,
     estimate_noise,
@@ -252,7 +252,7 @@ def _always_there(series: PointSeries, clamped: Bools, good: Bools, name: str) -
             f"{name}: {chosen.sum()} points of the clamped plate are seen in half of the frames; "
             f"the rigid motion needs {FEWEST_CLAMPED_POINTS}"
         )
-    return chosen
+    return np.asarray(chosen)
 
 
 def _take_off(places: Floats, series: PointSeries, clamped: Bools, good: Bools) -> TakenOff:
@@ -333,7 +333,7 @@ def _positions(signal: Floats) -> Floats:
 def _motion_errors(taken: TakenOff, fields: ErrorFields, noise: NoiseEstimate, spacing: float) -> Floats:
     """(6,) standard errors of one frame's translations and rotations: along z and about x and y by patches."""
     places = fields.clamped_places
-    rho = Correlation(autocorrelation(fields.clamped, places, spacing), spacing)
+    rho = SpatialCorrelation(autocorrelation(fields.clamped, places, spacing), spacing)
     out = np.sqrt(np.diag(clamped_covariance(fields.clamped, places, noise.patch, rho)))
     single = np.median(taken.motion.residual_sd, axis=0)
     independent = np.sqrt(len(places) / max(1.0, np.pi * (0.5 * noise.patch) ** 2 / _cell(places)))

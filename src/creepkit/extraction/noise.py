@@ -112,7 +112,7 @@ def estimate_noise(
     length = correlation_length(rho, spacing)
     patch = max(2.0 * length, 3.0 * spacing)
     reference = int(np.nanargmax(np.where(np.isfinite(signal), np.abs(signal), -1.0)))
-    by_blocks = _block_covariance(gains, fields, patch, Correlation(rho, spacing), reference)
+    by_blocks = _block_covariance(gains, fields, patch, SpatialCorrelation(rho, spacing), reference)
     at_rest = _rest_covariance(gains, fields.rest) if enough else np.full_like(by_blocks, np.nan)
     growth = _growth(fields, len(gains), enough)
     if enough:
@@ -171,7 +171,7 @@ def smooth_free(values: Floats, positions: Floats | None = None) -> Floats:
         smooth = basis @ (basis.T @ left)
         left = np.where(seen, values - mean, smooth)
     taken = (basis**2).sum(axis=1)
-    return np.where(seen, left - smooth, 0.0) / np.sqrt(np.maximum(1.0 - taken, 0.2))[:, None]
+    return np.asarray(np.where(seen, left - smooth, 0.0) / np.sqrt(np.maximum(1.0 - taken, 0.2))[:, None])
 
 
 def autocorrelation(fields: Floats, places: Floats, spacing: float) -> Floats:
@@ -180,7 +180,7 @@ def autocorrelation(fields: Floats, places: Floats, spacing: float) -> Floats:
     fields : (fields, points) mm, zeros where lost. places : (points, 2) mm. spacing : mm.
     """
     if len(fields) < 2 or not np.abs(fields).max() > 0.0:
-        return np.eye(1, LAGS)[0]
+        return np.asarray(np.eye(1, LAGS)[0])
     chosen = np.arange(len(places))
     if chosen.size > 800:  # the middle ones, so that neighbours stay neighbours
         chosen = np.argsort(np.hypot(*(places - np.median(places, axis=0)).T))[:800]
@@ -201,11 +201,11 @@ def correlation_length(rho: Floats, spacing: float) -> float:
     if not below.size:
         return (LAGS - 1) * spacing
     k = int(below[0])
-    return spacing * (k - 1 + (rho[k - 1] - LEAST_CORRELATION) / max(rho[k - 1] - rho[k], 1e-12))
+    return spacing * float(k - 1 + (rho[k - 1] - LEAST_CORRELATION) / max(rho[k - 1] - rho[k], 1e-12))
 
 
 def time_correlation(errors: Floats) -> tuple[float, float]:
-    """Correlation of successive errors (frames,), and how many frames share one: 1 + 2 sum of rho to its first zero."""
+    """SpatialCorrelation of successive errors (frames,), and how many frames share one: 1 + 2 sum of rho to its first zero."""
     e = errors - errors.mean()
     power = float(e @ e)
     if e.size < 4 or not power > 0.0:
@@ -234,7 +234,9 @@ def rigid_gains(places: Floats) -> Floats:
     return np.asarray(np.linalg.pinv(terms.T))
 
 
-def _block_covariance(gains: Floats, fields: ErrorFields, patch: float, rho: Correlation, reference: int) -> Floats:
+def _block_covariance(
+    gains: Floats, fields: ErrorFields, patch: float, rho: SpatialCorrelation, reference: int
+) -> Floats:
     """(frames, outputs, outputs): squares of what each patch contributes, of points and of the clamped plate."""
     used = np.abs(gains).max(axis=(0, 1)) > 0.0
     numbers = patch_numbers(fields.places[used], patch)
@@ -248,7 +250,7 @@ def _block_covariance(gains: Floats, fields: ErrorFields, patch: float, rho: Cor
     )
 
 
-def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: Correlation) -> Floats:
+def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: SpatialCorrelation) -> Floats:
     """(3, 3) of the shift along z, mm, and the rotations about x and y, rad, of one frame, by patches.
 
     errors : (fields, points) mm of the clamped plate, at places (points, 2) mm.
@@ -259,7 +261,7 @@ def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: Correl
 
 
 @dataclass(frozen=True, eq=False)
-class Correlation:
+class SpatialCorrelation:
     """Autocorrelation of errors in space: values (lags,) at whole spacings, mm."""
 
     values: Floats
@@ -272,7 +274,7 @@ class Correlation:
         if below.size:
             values[below[0] :] = 0.0
         distance = np.hypot(*(places[:, None] - places[None, :]).T)
-        return np.interp(distance / self.spacing, np.arange(values.size), values, right=0.0)
+        return np.asarray(np.interp(distance / self.spacing, np.arange(values.size), values, right=0.0))
 
     def lost_factors(self, gains: Floats, places: Floats, numbers: Ints) -> Floats:
         """(outputs,) by how much standard deviations from patches are too small if errors have this correlation.
@@ -286,7 +288,7 @@ class Correlation:
         columns, taken = np.linalg.pinv(gains), gains @ C
         residual = C - columns @ taken - (columns @ taken).T + columns @ (taken @ gains.T) @ columns.T
         within = np.einsum("oi,oi->o", gains @ np.where(numbers[:, None] == numbers, residual, 0.0), gains)
-        return np.sqrt(np.clip(whole / np.maximum(within, 1e-300), 1.0, 9.0))
+        return np.asarray(np.sqrt(np.clip(whole / np.maximum(within, 1e-300), 1.0, 9.0)))
 
 
 def patch_covariance(gains: Floats, errors: Floats, numbers: Ints) -> Floats:

@@ -150,7 +150,7 @@ def _robust_sd(residuals: Floats, valid: Bools) -> Floats:
     ]
     result = np.full((len(size), 3), _RESIDUAL_FLOOR)
     result[valid.any(axis=1)] = 1.4826 * np.array(rows).reshape(-1, 3)
-    return np.maximum(result, _RESIDUAL_FLOOR)
+    return np.asarray(np.maximum(result, _RESIDUAL_FLOOR))
 
 
 def _robust_weights(distance: Floats, first: bool) -> Floats:
@@ -190,4 +190,4 @@ def point_areas(places: Floats, spacing: float) -> Floats:
         some = np.flatnonzero(own == corners)
         x, y = cells.vertices[[cells.regions[k] for k in cells.point_region[some]]].transpose(2, 0, 1)
         areas[some] = 0.5 * np.abs((x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1))
-    return np.clip(areas, 0.1 * spacing**2, 4.0 * spacing**2)
+    return np.asarray(np.clip(areas, 0.1 * spacing**2, 4.0 * spacing**2))

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import CreepkitError, HistoryError
 from creepkit.extraction.plate import PlateAxes, plate_axes, point_areas, point_spacing
 from creepkit.records import CameraFrame, Frames
+
+SingleFloats: TypeAlias = NDArray[np.float32]
+
 
 MATCHING_DISTANCE = 0.3
 """Of the spacing: a point of a frame belongs to the point of the reference frame that lies as near as that."""
@@ -42,7 +47,7 @@ class PointSeries:
     """
 
     points: Ints
-    displacements: Floats
+    displacements: SingleFloats
     valid: Bools
 
 

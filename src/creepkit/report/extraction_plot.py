@@ -33,7 +33,8 @@ def extraction_figure(extraction: Extraction, path: str | Path | None = None) ->
     figure = empty_figure(_WIDTH, _HEIGHT)
     outputs = list(e.outputs)
     shown = e.maps
-    top, bottom = figure.subfigures(2, 1, height_ratios=[1.0, 1.15])
+    parts: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.15])
+    top, bottom = parts
     maps = top.subplots(2, len(shown), squeeze=False)
     _draw_maps(top, maps, e, shown)
     panels = bottom.subplots(2, max(3, (len(outputs) + 4) // 2), squeeze=False).ravel()

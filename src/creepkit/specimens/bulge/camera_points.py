@@ -74,7 +74,7 @@ def surface_center(points: SurfacePoints, window: float) -> tuple[Floats, Floats
         if step < 1e-3:  # mm: the window has moved by nothing
             break
     covariance = variance * np.linalg.pinv(matrix, hermitian=True)
-    return center, covariance
+    return np.asarray(center), np.asarray(covariance)
 
 
 def observe_surface(points: SurfacePoints, operator: str) -> SurfaceObservation:

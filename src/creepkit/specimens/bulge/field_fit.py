@@ -131,7 +131,8 @@ def fit_field(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> FieldFit:
             "without pressure and give the points of one bulge"
         )
     residual_sd = scale * float(np.sqrt(left / H.size))
-    return FieldFit(float(D), float(S), float(p), *map(float, center), tuple(errors.tolist()), residual_sd, int(H.size))
+    x_center, y_center = center.tolist()
+    return FieldFit(float(D), float(S), float(p), x_center, y_center, tuple(errors.tolist()), residual_sd, int(H.size))
 
 
 def model(places: Floats, values: Floats, subset: float = 0.0) -> tuple[Floats, Floats]:
