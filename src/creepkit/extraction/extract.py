@@ -60,7 +60,11 @@ class ExtractionRequest:
 
 
 class TakenOff(NamedTuple):
-    """Heights (frames, points) mm without rigid motion, NaN where lost; the motion; residuals of the clamped plate."""
+    """Frames without their rigid motion.
+
+    heights : (frames, points) mm, NaN where lost. motion : what was taken off. clamped_heights : (frames, clamped
+    points) mm that are left of the clamped plate, NaN where lost or not counted.
+    """
 
     heights: Floats
     motion: RigidMotions

@@ -39,7 +39,10 @@ class PlateMotion(NamedTuple):
 
 
 class FieldMap(NamedTuple):
-    """One frame for a picture: index, heights and residuals (points,) mm, NaN where lost or outside."""
+    """One frame for a picture.
+
+    frame : its index. heights : (points,) mm. residuals : (points,) mm; both NaN where lost or outside.
+    """
 
     frame: int
     heights: Floats

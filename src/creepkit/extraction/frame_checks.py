@@ -32,9 +32,10 @@ LOAD_AT_REST = 0.005
 def frames_at_rest(signal: Floats, good: Bools, zero_reference: bool, load: Floats | None) -> Ints:
     """Leading frames without load: where `load` (frames,) says so, else those in which `signal` has not yet changed.
 
-    signal : (frames,) mm, mean height about the centre. A first frame that is zero by definition, being the reference
-    image, is left out where there are others: it shows no noise. The others' level must be that of the reference image
-    within its noise, for a deflection that is held is no rest.
+    signal : (frames,) mm, mean height about the centre. good : (frames,) which can be used. load : (frames,) imposed,
+    in any unit; None where it is not known. zero_reference : whether the first frame is zero by definition. A first
+    frame that is zero by definition, being the reference image, is left out where there are others: it shows no noise.
+    The others' level must be that of the reference image within its noise, for a deflection that is held is no rest.
     """
     order = np.flatnonzero(good & np.isfinite(signal))
     if load is not None:
@@ -73,7 +74,8 @@ def _constant_run(signal: Floats, order: Ints, zero_reference: bool) -> Ints:
 def isolated(values: Floats, good: Bools, threshold: float, floor: float) -> Floats:
     """(frames,) how many robust deviations a frame lies off the median of its five neighbours; 0 below the threshold.
 
-    values : (frames,). floor : deviations smaller than this count for nothing, in the unit of the values.
+    values : (frames,). good : (frames,) which count. floor : deviations smaller than this count for nothing, in the
+    unit of the values.
     """
     result = np.zeros(values.size)
     order = np.flatnonzero(good & np.isfinite(values))
@@ -101,7 +103,11 @@ def read_flags(name: str, unreadable: Mapping[int, str], few: Bools, seen: Float
 
 
 def motion_flags(name: str, translations: Floats, rotations: Floats, good: Bools, reach: float) -> list[QualityFlag]:
-    """Frames whose rigid motion differs from that of their neighbours: translations (frames, 3) mm, rotations rad."""
+    """Frames whose rigid motion differs from that of their neighbours.
+
+    translations : (frames, 3) mm. rotations : (frames, 3) rad. good : (frames,) which count. reach : mm, lever of a
+    rotation.
+    """
     flags: dict[int, QualityFlag] = {}
     for k, axis in enumerate("xyz"):
         for values, floor, what, unit, scale in (
@@ -118,7 +124,10 @@ def motion_flags(name: str, translations: Floats, rotations: Floats, good: Bools
 
 
 def residual_flags(name: str, sizes: Mapping[str, Floats], good: Bools) -> list[QualityFlag]:
-    """Frames whose residuals are larger than their neighbours': {where: (frames,) mm root mean square}."""
+    """Frames whose residuals are larger than their neighbours'.
+
+    sizes : {where: (frames,) mm root mean square}. good : (frames,) which count.
+    """
     flags: dict[int, QualityFlag] = {}
     for where, size in sizes.items():
         median = float(np.nanmedian(size[good])) if good.any() else 0.0
@@ -133,7 +142,7 @@ def residual_flags(name: str, sizes: Mapping[str, Floats], good: Bools) -> list[
 
 
 def fit_flags(name: str, failed: Bools) -> list[QualityFlag]:
-    """Frames (frames,) from which the observation operator made nothing."""
+    """Frames from which the observation operator made nothing; failed : (frames,)."""
     return [_flag(name, "fit", int(k), "the observation operator gave no outputs") for k in np.flatnonzero(failed)]
 
 

@@ -84,9 +84,10 @@ class NoiseEstimate:
 
 @dataclass(frozen=True, eq=False)
 class ErrorFields:
-    """Fields of errors of heights, (fields, points) mm each, zeros where lost: at rest, and of loaded frames.
+    """Fields of errors of heights, zeros where lost.
 
-    loaded_frames : (fields,) which frames the latter are of. clamped : (fields, points) of the clamped plate in them.
+    rest : (fields, points) mm, of frames at rest. loaded : (fields, points) mm, of loaded frames, and loaded_frames :
+    (fields,) which these are. clamped : (fields, clamped points) mm of the clamped plate in them.
     places, clamped_places : (points, 2) mm of both kinds of points.
     """
 
@@ -143,17 +144,20 @@ def estimate_noise(
 
 
 def whole(fields: Floats) -> Floats:
-    """Fields (fields, points), zeros where lost, enlarged so that each has the squares of one without lost points."""
+    """Fields enlarged so that each has the squares of one without lost points, (fields, points).
+
+    fields : (fields, points) mm, zeros where lost.
+    """
     seen = np.count_nonzero(fields, axis=1)[:, None]
     used = np.count_nonzero(fields.any(axis=0))  # others lie outside of what is observed, or are lost for good
     return np.asarray(fields * np.sqrt(used / np.maximum(seen, 1)))
 
 
 def smooth_free(values: Floats, positions: Floats | None = None) -> Floats:
-    """What is left of columns (frames, columns) without what is smooth along the frames, scaled for what that took.
+    """What is left, (frames, columns), without what is smooth along the frames, scaled for what that took.
 
-    positions : (frames,) from 0 to 1, along which quadratic splines, one for about eight frames and at most twelve,
-    are taken off; evenly spaced by default. NaN counts as nothing and stays nothing.
+    values : (frames, columns). positions : (frames,) from 0 to 1, along which quadratic splines, one for about eight
+    frames and at most twelve, are taken off; evenly spaced by default. NaN counts as nothing and stays nothing.
     """
     from scipy.interpolate import BSpline
 
@@ -196,7 +200,7 @@ def autocorrelation(fields: Floats, places: Floats, spacing: float) -> Floats:
 
 
 def correlation_length(rho: Floats, spacing: float) -> float:
-    """mm at which the autocorrelation (lags,) has fallen to LEAST_CORRELATION; twelve spacings at most."""
+    """mm at which the autocorrelation has fallen to LEAST_CORRELATION; rho : (lags,). Twelve spacings at most."""
     below = np.flatnonzero(rho < LEAST_CORRELATION)
     if not below.size:
         return (LAGS - 1) * spacing
@@ -205,7 +209,7 @@ def correlation_length(rho: Floats, spacing: float) -> float:
 
 
 def time_correlation(errors: Floats) -> tuple[float, float]:
-    """SpatialCorrelation of successive errors (frames,), and how many frames share one: 1 + 2 sum of rho to its first zero."""
+    """Correlation of successive errors (frames,), and how many frames share one: 1 + 2 sum of rho to its first zero."""
     e = errors - errors.mean()
     power = float(e @ e)
     if e.size < 4 or not power > 0.0:
@@ -222,7 +226,10 @@ def time_correlation(errors: Floats) -> tuple[float, float]:
 
 
 def patch_numbers(places: Floats, side: float) -> Ints:
-    """(points,) which square patch of a side, mm, each place (points, 2) lies in; the middle of one is the centre."""
+    """(points,) which square patch each point lies in; the middle of one is the centre.
+
+    places : (points, 2) mm. side : mm, of a patch.
+    """
     cells = np.floor(places / side + 0.5).astype(int)
     cells -= cells.min(axis=0)
     return np.unique(cells[:, 0] * (cells[:, 1].max() + 1) + cells[:, 1], return_inverse=True)[1]
@@ -280,8 +287,9 @@ class SpatialCorrelation:
         """(outputs,) by how much standard deviations from patches are too small if errors have this correlation.
 
         The fit has taken a part of the errors from the residuals, and neighbours across the edges of patches err
-        together; both are worked out exactly for the linear fit. gains : (outputs, points). numbers : (points,) of
-        patches.
+        together; both are worked out exactly for the linear fit.
+
+        gains : (outputs, points). places : (points, 2) mm. numbers : (points,) of patches.
         """
         C = self.matrix(places)
         whole = np.einsum("oi,oi->o", gains @ C, gains)

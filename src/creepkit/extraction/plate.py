@@ -61,7 +61,10 @@ class RigidMotions(NamedTuple):
     residual_sd: Floats
 
     def taken_off(self, places: Floats, displacements: Floats) -> Floats:
-        """Displacements (frames, points, 3) mm without the rigid motion; places (points, 3) mm."""
+        """Displacements without the rigid motion, (frames, points, 3) mm.
+
+        places : (points, 3) mm. displacements : (frames, points, 3) mm.
+        """
         moved = places + displacements
         return np.asarray(np.matmul(moved, self.rotations.transpose(0, 2, 1)) + self.shifts[:, None, :] - places)
 

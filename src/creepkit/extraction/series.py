@@ -25,7 +25,7 @@ MATCHING_DISTANCE = 0.3
 class ReferencePlate:
     """The undeformed plate, from the first frame that can be read.
 
-    index : of that frame. places : (points, 3) mm in the plate's axes, and areas : (points,) mm2 each stands for.
+    index : of that frame. places : (points, 3) mm in the plate's axes. areas : (points,) mm2 that each stands for.
     known : (points,) which points that frame has. camera_points : (points, 3) mm in the frames' axes. spacing : mm.
     """
 
@@ -109,7 +109,7 @@ def aligned_frame(frame: CameraFrame, plate: ReferencePlate) -> tuple[Floats, Bo
 
 
 def read_series(frames: Frames, plate: ReferencePlate, groups: Sequence[Ints]) -> SeriesOfFrames:
-    """Read every frame once and keep the displacements of each group of points (points,).
+    """Read every frame once and keep the displacements of each group of points; groups : of numbers (points,).
 
     Kept in single precision: 6e-8 of a displacement of a mm is far below any camera's noise, and memory holds half.
     """

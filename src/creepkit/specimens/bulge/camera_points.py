@@ -35,10 +35,10 @@ FEWEST_WINDOW_POINTS = 30
 """Points within the window below which a frame is not fitted."""
 
 
-RING_BAND, APEX_BAND = 0.9, 2.0
+RING_BAND, APEX_BAND = 1.3, 2.0
 """mm on both sides of a ring, and about the apex, within which points say what the mean displacement there is.
 
-At least 1.6 and 3.5 spacings of the points. Their polynomials miss less than 0.1 % of the apex displacement of a
+At least 2.2 and 3.5 spacings of the points. Their polynomials miss less than 0.1 % of the apex displacement of a
 dimple of 7.5 mm (docs/measured/camera_extraction.md).
 """
 
@@ -137,15 +137,13 @@ def _observe_rings(points: SurfacePoints, radii: tuple[float, ...], operator: st
     enough = np.ones(frames, bool)
     spacing = float(np.sqrt(np.median(points.areas)))
     for k, radius in enumerate(radii):
-        band, terms, curvature = _ring_terms(points.places, radius, spacing)
+        band, terms, mean, laplacian = _ring_terms(points.places, radius, spacing)
         seen = np.isfinite(points.heights[:, band])
         weights, heights = seen * points.areas[band], np.where(seen, points.heights[:, band], 0.0)
         enough &= seen.sum(axis=1) >= max(2 * len(terms), 0.5 * np.count_nonzero(seen.any(axis=0)))
         all_gains = _gains(np.broadcast_to(terms, (frames, *terms.shape)), weights)
         # A mean over a square of side h is u + h^2/24 of the Laplacian, which the terms know.
-        wanted = np.zeros(len(terms))
-        wanted[0] = 1.0
-        wanted -= points.subset**2 / 24.0 * curvature
+        wanted = mean - points.subset**2 / 24.0 * laplacian
         gains[:, k, band] = np.einsum("t,ftn->fn", wanted, all_gains)
         fitted = np.einsum("ftn,fn->ft", all_gains, heights) @ terms
         nearer = np.abs(np.hypot(*points.places[band].T) - radius) < misses[0, band]
@@ -160,28 +158,29 @@ def _observe_rings(points: SurfacePoints, radii: tuple[float, ...], operator: st
     return SurfaceObservation(operator, outputs, gains, residuals, enough)
 
 
-def _ring_terms(places: Floats, radius: float, spacing: float) -> tuple[Bools, Floats, Floats]:
-    """Points (points,) that speak of a ring, terms (terms, these points), and the Laplacian of each term there.
+def _ring_terms(places: Floats, radius: float, spacing: float) -> tuple[Bools, Floats, Floats, Floats]:
+    """Points (points,) that speak of a ring, terms (terms, these points), their means and Laplacians there (terms,).
 
-    About the apex: a quadratic in x and y, and r^4. About a ring: a quadratic in r - radius, and parts that go with
-    cos and sin of the angle and of twice the angle, so that an error of the centre or a tilt does not enter the mean
-    where points are missing.
+    About the apex, and on rings that are nearly there: a quadratic in x and y, and r^4. About others: a quartic in
+    r - radius, and parts that go with cos and sin of the angle and of twice the angle, so that an error of the centre
+    or a tilt does not enter the mean where points are missing.
     """
     x, y = places.T
     r = np.hypot(x, y)
-    width = max(RING_BAND, 1.6 * spacing)
+    width = max(RING_BAND, 2.2 * spacing)
     if radius < width:
-        if radius > 0.0:
-            raise SolveError(f"observation: a ring of {radius:g} mm; allowed are 0 and radii from {width:.2g} mm on")
-        band = r <= max(APEX_BAND, 3.5 * spacing)
+        band = r <= max(APEX_BAND, 3.5 * spacing, radius + 0.5 * width)
         x, y, r = x[band], y[band], r[band]
-        terms = np.stack([np.ones_like(r), x, y, r**2, x**2 - y**2, x * y, r**4])
-        return band, terms, np.array([0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0])
-    band = np.abs(r - radius) <= width
-    x, y, r = x[band], y[band], r[band]
-    c, s, off = x / r, y / r, r - radius
-    terms = np.stack([np.ones_like(r), off, off**2, c, s, c * c - s * s, 2.0 * c * s])
-    return band, terms, np.array([0.0, 1.0 / radius, 2.0, 0.0, 0.0, 0.0, 0.0])
+        terms = np.stack([np.ones_like(r), r**2, r**4, x, y, x**2 - y**2, x * y])
+        mean, laplacian = [1.0, radius**2, radius**4], [0.0, 4.0, 16.0 * radius**2]
+    else:
+        band = np.abs(r - radius) <= width
+        x, y, r = x[band], y[band], r[band]
+        c, s, off = x / r, y / r, r - radius
+        terms = np.stack([np.ones_like(r), off, off**2, off**3, off**4, c, s, c * c - s * s, 2.0 * c * s])
+        mean, laplacian = [1.0], [0.0, 1.0 / radius, 2.0]
+    padded = [np.array([*values, *np.zeros(len(terms) - len(values))]) for values in (mean, laplacian)]
+    return band, terms, padded[0], padded[1]
 
 
 def _weights(distance: Floats, areas: Floats, heights: Floats, window: float) -> tuple[Floats, Floats]:

@@ -40,7 +40,10 @@ _FRAMES_AT_ONCE = 48
 
 
 class Bells(NamedTuple):
-    """exp(-|x/S|^p) averaged over subsets, and its derivatives to ln S, ln p and the centre, (frames, points) each."""
+    """exp(-|x/S|^p) averaged over subsets, and its derivatives.
+
+    value : (frames, points). to_width, to_shape, to_center : (frames, points), to ln S, ln p and the centre's x, 1/mm.
+    """
 
     value: Floats
     to_width: Floats
@@ -218,7 +221,10 @@ def _fit_some(
 
 
 def without_smoothing(places: Floats, heights: Floats, weights: Floats, values: Floats, subset: float) -> Floats:
-    """Values (frames, 3) as least squares to a surface that no subsets had smoothed would give them.
+    """Values (frames, 3) of D, ln S, ln p as least squares to a surface that no subsets had smoothed would give them.
+
+    places : (points, 2) mm about the centre. heights, weights : (frames, points). values : (frames, 3) of the fit with
+    a smoothed model. subset : mm.
 
     Fitting a smoothed model leaves out that what the model misses was smoothed as well. With r what is left of the
     smoothed field, J the derivatives of the model and B the mean over a subset, J^T (what is missed) is to second
