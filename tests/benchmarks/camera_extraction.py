@@ -143,13 +143,15 @@ def released(page, cases) -> None:
     )
     page.table(
         "stress exponent", "seed", "A less D_amp, um", "A + offset less D_amp, um", "A + offset less apex, um",
-        "offset, um", "S less S_d, mm", "p less S_p", "centre moves, um",
+        "offset, um", "S less S_d, mm", "p less S_p", "centre moves, um", "fits that failed",
     )  # fmt: skip
     for k in range(cases):
         dimple, truth = case(k)
         camera = VirtualCamera(seed=100 * k, points=2500, centers=((0.3 * k - 0.2, 0.5 - 0.4 * k),))
         chosen = np.arange(REST + 9, REST + LOADED, 10)
         fits = released_fits(camera.frames(dimple), chosen, true_center(camera))
+        kept = np.isfinite(fits).all(axis=1)
+        fits, chosen = fits[kept], chosen[kept]
         A, x0, y0, sx, sy, theta, p, offset = fits.T
         mapped = np.array([ck.paper_parameters(*row) for row in np.c_[A, sx, sy, p, theta, offset]])
         way = 1e3 * np.hypot(np.nanmax(x0) - np.nanmin(x0), np.nanmax(y0) - np.nanmin(y0))
@@ -159,6 +161,7 @@ def released(page, cases) -> None:
             f"{np.nanmean(mapped[:, 1] - truth[chosen, 1]):+.3f}",
             f"{np.nanmean(p - truth[chosen, 2]):+.3f}",
             f"{way:.0f}",
+            np.count_nonzero(~kept),
         )  # fmt: skip
 
 

@@ -56,7 +56,7 @@ def released_fits(frames, chosen, center, seed=0):
         start = [heights.max(), 0.0, 0.0, 2.7, 2.7, 0.1, 2.2, 0.0]
         bounds = ([0, -5, -5, 0.5, 0.5, -np.pi / 4, 2, -1], [5, 5, 5, 10, 10, np.pi / 4, 3, 1])
         try:
-            results.append(curve_fit(eight_parameters, (x, y), heights, start, bounds=bounds, max_nfev=400)[0])
+            results.append(curve_fit(eight_parameters, (x, y), heights, start, bounds=bounds, max_nfev=2000)[0])
         except RuntimeError:
             results.append(np.full(8, np.nan))
     return np.array(results)
