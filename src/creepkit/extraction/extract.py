@@ -62,8 +62,8 @@ class ExtractionRequest:
 class TakenOff(NamedTuple):
     """Frames without their rigid motion.
 
-    heights : (frames, points) mm, NaN where lost. motion : what was taken off. clamped_heights : (frames, clamped
-    points) mm that are left of the clamped plate, NaN where lost or not counted.
+    heights : (frames, points) mm, NaN where lost. motion : what was taken off.
+    clamped_heights : (frames, clamped points) mm of the clamped plate, NaN where lost or not counted.
     """
 
     heights: Floats

@@ -86,9 +86,9 @@ class NoiseEstimate:
 class ErrorFields:
     """Fields of errors of heights, zeros where lost.
 
-    rest : (fields, points) mm, of frames at rest. loaded : (fields, points) mm, of loaded frames, and loaded_frames :
-    (fields,) which these are. clamped : (fields, clamped points) mm of the clamped plate in them.
-    places, clamped_places : (points, 2) mm of both kinds of points.
+    rest : (fields, points) mm, of frames at rest. loaded : (fields, points) mm, of loaded frames. loaded_frames :
+    (fields,) which frames these are. clamped : (fields, clamped points) mm of the clamped plate in them.
+    places : (points, 2) mm. clamped_places : (clamped, 2) mm.
     """
 
     rest: Floats
