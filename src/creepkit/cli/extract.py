@@ -25,6 +25,9 @@ def command(
     record: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Instrument record of loads, temperatures.")
     ] = None,
+    time_zone: Annotated[
+        str | None, typer.Option("--time-zone", metavar="ZONE", help="Of the record's times, as America/Chicago.")
+    ] = None,
     names: Annotated[
         str | None, typer.Option(metavar="D1,E1", help="Names of what is found, as the record has them.")
     ] = None,
@@ -91,14 +94,14 @@ def command(
             assert temperature is not None
             history = one.history_under(load, temperature + ZERO_CELSIUS)
         else:
-            history = _under_record(one, record)
+            history = _under_record(one, record, time_zone)
         path = to / f"{one.name}.csv"
         check_file("--to", path)
         ck.write_history(history, path)
         typer.echo(f"written: {path}")
 
 
-def _under_record(one: Extraction, record: Path) -> Any:
+def _under_record(one: Extraction, record: Path, time_zone: str | None) -> Any:
     """The history under what an instrument record says of a test piece, after the clocks were aligned."""
     import numpy as np
 
@@ -106,11 +109,12 @@ def _under_record(one: Extraction, record: Path) -> Any:
     from creepkit.records import RecordedLoading
 
     instruments: Any = ck  # the record's functions
-    recorded = instruments.read_record(record)
+    recorded = instruments.read_record(record, **({} if time_zone is None else {"time_zone": time_zone}))
     signal = np.where(one.used, next(iter(one.outputs.values())), np.nan)
     times = one.times + one.first_time
-    first = instruments.imposed(recorded, one.name, times)
-    alignment = instruments.align_clocks(recorded, first.channels[0], times, signal)
+    channel = recorded.channel_patterns.get(one.load_name, "{}").replace("{}", one.name)
+    alignment = instruments.align_clocks(recorded, channel, times, signal)
+    typer.echo(f"  {one.name}: {alignment}")
     imposed = instruments.imposed(recorded, one.name, times, alignment)
     for note in imposed.notes:
         typer.echo(f"  {note}")
