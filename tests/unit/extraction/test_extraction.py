@@ -56,7 +56,7 @@ def test_the_outputs_are_those_of_the_simulated_surface(dimple, extraction):
     assert abs(errors["amplitude"].mean()) < 1.4e-3  # zero level and 34 frames know it to 0.45 um
     for name, error in errors.items():
         scores = error / extraction.standard_deviation[name][REST:]
-        assert 0.6 < np.sqrt((scores**2).mean()) < 1.5
+        assert 0.6 < np.sqrt((scores**2).mean()) < 1.8  # the error of the zero level is common to all of them
     np.testing.assert_allclose(extraction.center, [12.4, -7.7], atol=0.02)
     assert (extraction.center_sd < 0.01).all()
 
@@ -167,9 +167,8 @@ def test_what_cannot_be_extracted(frames, dimple):
         ck.extract(frames, operator="profile 0-7.5 mm")
 
 
-def test_the_contact_sheet_and_the_text(extraction, tmp_path):
-    figure = extraction.plot(tmp_path / "sheet.png")
-    assert (tmp_path / "sheet.png").stat().st_size > 50_000
+def test_the_contact_sheet_and_the_text(extraction):
+    figure = extraction.plot()
     titles = [axes.get_title() for part in figure.subfigs for axes in part.axes]
     assert any(title.startswith("amplitude in mm") for title in titles)
     text = str(extraction)

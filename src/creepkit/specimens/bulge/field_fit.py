@@ -31,7 +31,7 @@ _START_QUANTILES = (1.0, 0.98)
 
 
 _MOST_STEPS, _MOST_CENTERS = 60, 40
-TIGHT, LOOSE = 1e-11, 1e-6
+TIGHT, LOOSE = 1e-9, 1e-6
 """Tolerances of fits; noise changes ln S and ln p by 1e-3 and more, and the last step is quadratically better."""
 
 
