@@ -1,6 +1,7 @@
 """The public names of creepkit, each once."""
 
 from . import errors as errors
+from .api.extraction import extract as extract
 from .api.identification import confirm as confirm
 from .api.identification import export as export
 from .api.identification import identify as identify
@@ -114,7 +115,8 @@ from .screening.screen import ScreeningOptions as ScreeningOptions
 from .screening.screen import screen as screen
 from .specimens.axisymmetric.displacements import Displacements as Displacements
 from .specimens.axisymmetric.specimen import Axisymmetric as Axisymmetric
-from .specimens.bulge.observation import fit_field as fit_field
+from .specimens.bulge.field_fit import fit_field as fit_field
+from .specimens.bulge.field_fit import paper_parameters as paper_parameters
 from .specimens.per_test import OneTest as OneTest
 from .specimens.per_test import PerTest as PerTest
 from .specimens.test_piece import TestPiece as TestPiece

@@ -30,6 +30,11 @@ PRESENTERS: dict[str, dict[str, str]] = {
     },
     "ClockAlignment": {"text": "creepkit.report.instrument_records:alignment_text"},
     "Imposed": {"text": "creepkit.report.instrument_records:imposed_text"},
+    # extraction
+    "Extraction": {
+        "text": "creepkit.report.extraction_text:extraction_text",
+        "plot": "creepkit.report.extraction_plot:extraction_figure",
+    },
     # sampling, data sets, surrogates
     "Acceptance": {
         "text": "creepkit.report.sampling:acceptance_text",

@@ -48,6 +48,7 @@ BENCHMARKS = {
     "dimple_accuracy": Benchmark(
         90, (("--cases", "145", "--cache", "build/dimple_references.jsonl"),), "reference cases in ../shared/data"
     ),
+    "camera_extraction": Benchmark(3, needs=DATA),
     "sensitivity_cost": Benchmark(3, (("--cold",),)),
     "reduced_order_model": Benchmark(2),
     "calculix": Benchmark(6, (("N3", "N7", "TH", "c1", "c2", "c3"),), "CalculiX (ccx)"),

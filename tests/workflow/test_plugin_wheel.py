@@ -130,6 +130,7 @@ STEPS = {
     "screen": [
         ["screen", ".", "--law", "soft-steel", "--dense", "none", "--workers", "1", "--to", "screened", "--json"]
     ],
+    "extract": [],  # needs the exports of a camera
     "discover": [],  # asks for laws without temperature
     "export": [["export", "identified/soft-steel.json", "--to", "python"]],
     "generate": [

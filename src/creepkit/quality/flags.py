@@ -20,6 +20,11 @@ FlagKind = Literal[
     "record",
     "jump",
     "rate change",
+    "unreadable",
+    "few points",
+    "motion",
+    "residual",
+    "fit",
 ]
 
 

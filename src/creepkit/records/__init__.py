@@ -15,6 +15,7 @@ from creepkit.records.interfaces import (
     SupportsRefinement,
     SupportsRupturePrediction,
     SupportsSearchTolerance,
+    SupportsSurfaceObservation,
     SupportsTraining,
 )
 from creepkit.records.known_specimens import (
@@ -82,6 +83,7 @@ from creepkit.records.prediction_assembly import (
 from creepkit.records.prediction_checks import checked_prediction
 from creepkit.records.quantities import QUANTITIES, ZERO_CELSIUS, QuantityKind, unit_of
 from creepkit.records.specimen_record import Dimension, Load, Output
+from creepkit.records.surface_observation import SurfaceObservation, SurfacePoints, SurfaceRegion
 from creepkit.records.typical_history import typical_history
 
 __all__ = [
@@ -130,7 +132,11 @@ __all__ = [
     "SupportsRefinement",
     "SupportsRupturePrediction",
     "SupportsSearchTolerance",
+    "SupportsSurfaceObservation",
     "SupportsTraining",
+    "SurfaceObservation",
+    "SurfacePoints",
+    "SurfaceRegion",
     "TimesToStrain",
     "TwoLevels",
     "Units",

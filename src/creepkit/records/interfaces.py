@@ -13,6 +13,7 @@ from creepkit.records.prediction import NuisanceValues, Prediction
 if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
     from creepkit.records.law_with_values import LawWithValues
+    from creepkit.records.surface_observation import SurfaceObservation, SurfacePoints, SurfaceRegion
 
 
 @runtime_checkable
@@ -159,6 +160,34 @@ class SupportsSearchTolerance(Predictor, Protocol):
 
     def for_search(self) -> Predictor:
         """Return the same predictor at such tolerances; its error is far below that of any measurement."""
+        ...
+
+
+@runtime_checkable
+class SupportsSurfaceObservation(Protocol):
+    """A specimen whose flat surface cameras watch: how its outputs follow from measured points."""
+
+    @property
+    def surface_region(self) -> SurfaceRegion:
+        """Return which part of the surface moves and which is clamped."""
+        ...
+
+    def surface_operator(self, window: float | None = None, radii: Sequence[float] = ()) -> str:
+        """Return the text of the operator within a window, mm, or at radii, mm; by default the region's own.
+
+        SolveError where it cannot be.
+        """
+        ...
+
+    def surface_center(self, points: SurfacePoints) -> tuple[Floats, Floats]:
+        """Return the one centre of all frames, (2,) mm, and its covariance, (2, 2) mm2, if points err independently.
+
+        FitError where the points show no centre.
+        """
+        ...
+
+    def observe_surface(self, points: SurfacePoints, operator: str) -> SurfaceObservation:
+        """Return the outputs of each frame, of points about the centre; SolveError for an operator not understood."""
         ...
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -11,7 +11,18 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
-from creepkit.records import Dimension, History, Load, Loading, Output, PressureJump
+from creepkit.records import (
+    Dimension,
+    History,
+    Load,
+    Loading,
+    Output,
+    PressureJump,
+    SurfaceObservation,
+    SurfacePoints,
+    SurfaceRegion,
+)
+from creepkit.specimens.bulge.camera_points import observe_surface, surface_center
 from creepkit.specimens.bulge.geometry import LENGTH_RANGE, DimpleGeometry
 from creepkit.specimens.bulge.observation import Observation
 from creepkit.specimens.bulge.outputs import OBSERVED, PLOT_RADII, RING_OUTPUTS, profile_displacement
@@ -104,6 +115,27 @@ class BulgeSettings:
         if geometry_changes:
             changes["geometry"] = changes.get("geometry", self.geometry).replace(**geometry_changes)
         return replace(self, **changes)
+
+    @property
+    def surface_region(self) -> SurfaceRegion:
+        """The roof moves, the top from the outer radius of the modelled disc on is held; see `camera_points`."""
+        cavity, outer = self.geometry.cavity_radius, self.geometry.outer_radius
+        seen = self.observation if self.observation.form != "profile" else Observation("field", cavity)
+        return SurfaceRegion(cavity, (outer, max(2.0 * cavity, 1.5 * outer)), str(seen))
+
+    def surface_operator(self, window: float | None = None, radii: Sequence[float] = ()) -> str:
+        """The operator of camera points: Eq. (7) within a window, mm, or mean displacements on rings of radii, mm."""
+        if len(radii):
+            return str(Observation("rings", radii=tuple(radii)))
+        return self.surface_region.operator if window is None else str(Observation("field", window))
+
+    def surface_center(self, points: SurfacePoints) -> tuple[Floats, Floats]:
+        """The one centre of all frames, (2,) mm, and its covariance (2, 2) mm2, by Eq. (7) within the cavity radius."""
+        return surface_center(points, self.geometry.cavity_radius)
+
+    def observe_surface(self, points: SurfacePoints, operator: str) -> SurfaceObservation:
+        """Outputs of each frame from points of the top about the centre; see `camera_points`."""
+        return observe_surface(points, operator)
 
     @property
     def dimensions(self) -> tuple[Dimension, ...]:

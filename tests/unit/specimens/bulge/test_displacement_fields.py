@@ -5,7 +5,8 @@ import pytest
 
 from creepkit.errors import FitError
 from creepkit.fem.mesh import surface_interpolation
-from creepkit.specimens.bulge.observation import Observation, fit_field
+from creepkit.specimens.bulge.field_fit import fit_field
+from creepkit.specimens.bulge.observation import Observation
 from helpers.bulge_profiles import cross, profile_with_apex
 from helpers.paths import needs_shared_data
 

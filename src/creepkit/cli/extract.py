@@ -1,0 +1,201 @@
+"""`creepkit extract`: from the frames of a camera to measured histories with their noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from creepkit.cli.options import PAPER_SPECIMEN, check_file, check_folder
+
+if TYPE_CHECKING:
+    from creepkit.extraction import Extraction
+    from creepkit.records import Frames
+
+
+def command(
+    frames: Annotated[str, typer.Argument(metavar="FOLDER", help="Folder, file or pattern of a camera's exports.")],
+    specimen: Annotated[str, typer.Option(metavar="NAME", help="What the camera watched.")] = PAPER_SPECIMEN,
+    format: Annotated[str | None, typer.Option(metavar="NAME", help="Camera format; by default by the head.")] = None,
+    interval: Annotated[
+        float | None, typer.Option("--interval-s", metavar="S", help="Time between frames whose files hold none.")
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Instrument record of loads, temperatures.")
+    ] = None,
+    time_zone: Annotated[
+        str | None, typer.Option("--time-zone", metavar="ZONE", help="Of the record's times, as America/Chicago.")
+    ] = None,
+    names: Annotated[
+        str | None, typer.Option(metavar="D1,E1", help="Names of what is found, as the record has them.")
+    ] = None,
+    load: Annotated[
+        float | None, typer.Option("--load-mpa", metavar="MPA", help="Constant load, for no record.")
+    ] = None,
+    temperature: Annotated[
+        float | None, typer.Option("--temperature-c", metavar="C", help="Constant temperature, for no record.")
+    ] = None,
+    center: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y", help="Centre in mm, in the frames' axes; for several, repeat it.")
+    ] = None,
+    window: Annotated[float | None, typer.Option(metavar="MM", help="Radius of the fitted window.")] = None,
+    rings: Annotated[
+        str | None, typer.Option(metavar="0,2,4", help="Radii, mm: means on rings in place of a fit.")
+    ] = None,
+    rest: Annotated[
+        str | None, typer.Option(metavar="A-B", help="Frames at rest, where they are not to be found.")
+    ] = None,
+    subset: Annotated[float, typer.Option("--subset", metavar="MM", help="Side of a subset, taken out.")] = 0.0,
+    to: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Write a history of each here.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a contact sheet, .png, .svg or .pdf.")
+    ] = None,
+) -> None:
+    """Extract measured histories from camera frames."""
+    import creepkit as ck
+    from creepkit.api.extraction import operator_of
+    from creepkit.errors import HistoryError
+    from creepkit.records import ZERO_CELSIUS
+    from creepkit.report.figures import check_figure_target
+    from creepkit.report.terminal import ProgressBar
+
+    if to is not None:
+        check_folder(to)
+    if plot is not None:
+        check_figure_target(plot, HistoryError)
+    if to is not None and record is None and (load is None or temperature is None):
+        raise HistoryError(
+            "a history needs what was imposed: give --record FILE, or --load-mpa and --temperature-c, beside --to"
+        )
+    operator = operator_of(specimen, window, _numbers(rings, "--rings", "0,2,4") if rings else ())
+    centers = _named_centers(center, names) if center else None
+    with ProgressBar() as progress:
+        found = ck.extract(
+            _reporting(_frames(frames, format, interval), progress.tick), specimen, operator=operator, centers=centers,
+            rest=_frame_range(rest), subset=subset,
+        )  # fmt: skip
+    if names and not center:
+        found = [one.replace(name=name) for one, name in zip(found, _names(names, len(found)), strict=True)]
+    for one in found:
+        typer.echo(str(one))
+    for one in found:
+        if plot is not None:
+            path = plot if len(found) == 1 else plot.with_stem(f"{plot.stem}_{one.name}")
+            one.plot(path)
+            typer.echo(f"written: {path}")
+    if to is None:
+        return
+    to.mkdir(parents=True, exist_ok=True)
+    for one in found:
+        if record is None:
+            assert load is not None
+            assert temperature is not None
+            history = one.history_under(load, temperature + ZERO_CELSIUS)
+        else:
+            history = _under_record(one, record, time_zone)
+        path = to / f"{one.name}.csv"
+        check_file("--to", path)
+        ck.write_history(history, path)
+        typer.echo(f"written: {path}")
+
+
+def _under_record(one: Extraction, record: Path, time_zone: str | None) -> Any:
+    """The history under what an instrument record says of a test piece, after the clocks were aligned."""
+    import numpy as np
+
+    import creepkit as ck
+    from creepkit.records import RecordedLoading
+
+    instruments: Any = ck  # the record's functions
+    recorded = instruments.read_record(record, **({} if time_zone is None else {"time_zone": time_zone}))
+    signal = np.where(one.used, next(iter(one.outputs.values())), np.nan)
+    times = one.times + one.first_time
+    channel = recorded.channel_patterns.get(one.load_name, "{}").replace("{}", one.name)
+    alignment = instruments.align_clocks(recorded, channel, times, signal)
+    typer.echo(f"  {one.name}: {alignment}")
+    imposed = instruments.imposed(recorded, one.name, times, alignment)
+    for note in imposed.notes:
+        typer.echo(f"  {note}")
+    return one.history_under(
+        RecordedLoading(imposed.load, one.load_name),
+        imposed.temperature,
+        time_zero=float(imposed.time_zero) - one.first_time,
+    )
+
+
+def _frames(path: str, format: str | None, interval: float | None) -> Frames:
+    from dataclasses import replace
+
+    import numpy as np
+
+    import creepkit as ck
+    from creepkit.errors import HistoryError
+
+    frames = ck.read_frames(path, format)
+    if interval is None:
+        return frames
+    if not 0.0 < interval < 1e9:
+        raise HistoryError(f"--interval-s {interval:g}: give the time between frames, s, above zero")
+    return replace(frames, times=interval * np.arange(len(frames), dtype=float))
+
+
+def _reporting(frames: Frames, tick: Any) -> Frames:
+    """The same frames; each that is read is told to a progress bar."""
+    from dataclasses import replace
+
+    done: set[int] = set()
+
+    def read(index: int) -> Any:
+        done.add(index)
+        tick("read", len(done), len(frames), "")
+        return frames.read_frame(index)
+
+    return replace(frames, read_frame=read)
+
+
+def _numbers(text: str, option: str, example: str) -> tuple[float, ...]:
+    from creepkit.errors import HistoryError
+
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise HistoryError(
+            f"{option} {text}: write numbers with commas between them, as in {option} {example}"
+        ) from None
+
+
+def _names(text: str, count: int) -> list[str]:
+    from creepkit.errors import HistoryError
+
+    names = [word.strip() for word in text.split(",") if word.strip()]
+    if len(names) != count or len(set(names)) != count or any("/" in name or name.startswith(".") for name in names):
+        raise HistoryError(
+            f"--names {text}: give {count} different names with commas between them, one for each that is found"
+        )
+    return names
+
+
+def _named_centers(texts: Sequence[str], names: str | None) -> dict[str, tuple[float, float]]:
+    from creepkit.errors import HistoryError
+
+    pairs = [_numbers(text, "--center", "12.5,-3") for text in texts]
+    for pair, text in zip(pairs, texts, strict=True):
+        if len(pair) != 2:
+            raise HistoryError(f"--center {text}: write X,Y in mm, as in --center 12.5,-3")
+    known = _names(names, len(pairs)) if names else [f"D{k + 1}" for k in range(len(pairs))]
+    return {name: (pair[0], pair[1]) for name, pair in zip(known, pairs, strict=True)}
+
+
+def _frame_range(text: str | None) -> slice | None:
+    from creepkit.errors import HistoryError
+
+    if text is None:
+        return None
+    first, _, last = text.partition("-")
+    if not (first.isdecimal() and last.isdecimal() and int(first) <= int(last) < 10**9):
+        raise HistoryError(
+            f"--rest {text}: write the first and the last frame at rest, counted from 0, as in --rest 0-39"
+        )
+    return slice(int(first), int(last) + 1)

@@ -1,0 +1,11 @@
+"""From camera frames to histories: domes, rigid motion, one centre, outputs with their noise, flags.
+
+`extract_surfaces` does it for any specimen that says how cameras see it (records.SupportsSurfaceObservation);
+docs/concepts/extraction.md describes the method.
+"""
+
+from creepkit.extraction.extract import extract_surfaces
+from creepkit.extraction.extraction import Extraction, FieldMap, PlateMotion
+from creepkit.extraction.noise import NoiseEstimate
+
+__all__ = ["Extraction", "FieldMap", "NoiseEstimate", "PlateMotion", "extract_surfaces"]

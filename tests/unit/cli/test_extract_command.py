@@ -1,0 +1,74 @@
+"""`creepkit extract`: from exports of a camera to histories, and what it refuses, in one sentence."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import creepkit as ck
+from creepkit.cli.app import app
+from helpers.virtual_camera import Dimple, VirtualCamera
+
+
+@pytest.fixture(scope="module")
+def exports(tmp_path_factory):
+    """Twenty frames in the format of VIC-3D, without times."""
+    folder = tmp_path_factory.mktemp("frames")
+    radii = np.linspace(0.0, 10.0, 21)
+    growth = np.r_[np.zeros(10), np.linspace(0.1, 0.3, 10)]
+    rise = growth[:, None] * np.where(radii < 7.5, (1 - (np.minimum(radii, 7.5) / 7.5) ** 2) ** 2, 0.0)
+    dimple = Dimple(np.arange(20.0), radii, rise, 0.0 * rise)
+    frames = VirtualCamera(seed=9, points=1700).frames(dimple)
+    for k in range(20):
+        frame = frames[k]
+        sigma = np.where(frame.valid, 0.02, -1.0)
+        rows = np.c_[frame.points, frame.displacements, sigma]
+        head = '"X [mm]","Y [mm]","Z [mm]","U [mm]","V [mm]","W [mm]","sigma [pixel]"'
+        np.savetxt(folder / f"frame_{k:03d}.csv", rows, "%.7f", ",", header=head, comments="")
+    return folder
+
+
+def run(*words):
+    return CliRunner().invoke(app, ["extract", *map(str, words)])
+
+
+def test_from_exports_to_a_history_and_a_picture(exports, tmp_path):
+    result = run(
+        exports, "--interval-s", 60, "--subset", 1.2, "--load-mpa", 8, "--temperature-c", 776.85, "--names", "E5",
+        "--rest", "0-9", "--to", tmp_path / "out", "--plot", tmp_path / "sheet.png",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert "20 of 20 frames used, field 0-7.5 mm" in result.stdout
+    assert (tmp_path / "sheet.png").stat().st_size > 50_000
+    (history,) = ck.read_histories(tmp_path / "out" / "E5.csv")
+    assert history.operator == "field 0-7.5 mm"
+    assert history.mean_temperature == pytest.approx(1050.0)
+    np.testing.assert_allclose(np.diff(history.times), 60.0)
+    assert history.outputs["amplitude"][-1] == pytest.approx(0.3, rel=0.02)
+
+
+def test_rings_about_a_given_centre(exports):
+    result = run(exports, "--interval-s", 60, "--center", "12.4,-7.7", "--rings", "0,2,4", "--rest", "0-9")
+    assert result.exit_code == 0, result.output
+    assert "rings 0, 2, 4 mm" in result.stdout
+    assert "as given" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--to", "x"), "a history needs what was imposed: give --record FILE, or --load-mpa and --temperature-c"),
+        (("--window", "5", "--rings", "0,2"), "a window and rings were given"),
+        (("--rings", "0;2"), "--rings 0;2: write numbers with commas between them"),
+        (("--rest", "5"), "--rest 5: write the first and the last frame at rest, counted from 0, as in --rest 0-39"),
+        (("--center", "5"), "--center 5: write X,Y in mm"),
+        (("--interval-s", "-1"), "--interval-s -1: give the time between frames, s, above zero"),
+        (("--specimen", "uniaxial"), "specimen 'uniaxial' does not say how cameras see its surface"),
+        (("--plot", "sheet.txt"), "the plot cannot be written ('.txt' is no format of pictures)"),
+        ((), "their times are not known, or do not rise"),
+    ],
+)
+def test_what_is_refused(exports, words, message):
+    result = run(exports, *words)
+    assert result.exit_code == 1
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
