@@ -82,6 +82,14 @@ SERIES_LINKS = (
 )
 
 
+CREEP_EXTENSION, PLASTIC_EXTENSION, TOTAL_EXTENSION = EXTENSIONS = (
+    "percentage creep extension",
+    "percentage plastic extension",
+    "percentage extension",
+)
+"""ISO 204: that since the end of loading; with the initial plastic extension; with the whole initial extension."""
+
+
 _NUMBER_AND_UNIT = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\D*)", re.ASCII)
 
 
@@ -113,8 +121,8 @@ class CreepSchemaReader:
     def read(self, path: Path) -> list[History]:
         """Return the one test."""
         if path.suffix.lower() == ".lis":
-            head, table = _read_series(path)
-            return [_history(_Entries(str(path), head), path, table)]
+            head, table, extension = _read_series(path)
+            return [_history(_Entries(str(path), head), path, table, extension)]
         document = read_json(path, DOCUMENT)
         data = _member(document, "measurementdata") if isinstance(document, dict) else None
         if not isinstance(data, dict):
@@ -123,11 +131,11 @@ class CreepSchemaReader:
         series = _series_of(entries, path)
         if series is None:
             return [_without_frames(entries, path)]
-        head, table = _read_series(series)
+        head, table, extension = _read_series(series)
         named, here = _Entries(str(series), head).text(NAME), entries.text(NAME)
         if named and here and _plain(named) != _plain(here):
             raise HistoryError(f"{series}: it is of the test '{named}', and {path} of '{here}'; correct one of them")
-        return [_history(entries, path, table)]
+        return [_history(entries, path, table, extension)]
 
 
 @dataclass(frozen=True)
@@ -222,7 +230,8 @@ def _series_of(entries: _Entries, path: Path) -> Path | None:
     return None
 
 
-def _history(entries: _Entries, path: Path, table: TextTable) -> History:
+def _history(entries: _Entries, path: Path, table: TextTable, extension: str) -> History:
+    """The history; `extension` : one of EXTENSIONS, that of the series."""
     stated: dict[str, SourceText] = {}
 
     def state(key: str, text: str, where: SchemaKey) -> None:
@@ -243,8 +252,12 @@ def _history(entries: _Entries, path: Path, table: TextTable) -> History:
         if text:
             state(key, text, where)
     origin = NUMBERS["loading_strain"]
-    for key, text in (("strain_measure", "engineering"), ("includes_elastic", "no"), ("includes_loading", "no")):
-        state(key, text, origin)
+    if extension == PLASTIC_EXTENSION:  # what loading left of it is its first value; the total extension is another
+        stated = {key: entry for key, entry in stated.items() if not key.startswith("loading_strain")}
+    state("strain_measure", "engineering", origin)
+    if extension == CREEP_EXTENSION:
+        state("includes_elastic", "no", origin)
+    state("includes_loading", "no" if extension == CREEP_EXTENSION else "yes", origin)
     temperatures = tuple(name for name in table.columns if name.startswith("Corrected"))
     vocabulary = HeaderVocabulary(averaged_columns={"measured_temperature_C": temperatures} if temperatures else {})
     name = entries.text(NAME) or path.stem
@@ -290,8 +303,8 @@ def _text(path: Path, first: int | None = None) -> str:
         return content.decode("cp1252", errors="replace")
 
 
-def _read_series(path: Path) -> tuple[dict[str, tuple[str, str]], TextTable]:
-    """Entries of the head of a LIS file, {name in small letters: (value, unit)}, and the table of its series."""
+def _read_series(path: Path) -> tuple[dict[str, tuple[str, str]], TextTable, str]:
+    """Entries of the head of a LIS file, {name in small letters: (value, unit)}, its table, its extension."""
     lines = _text(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     start = next((k for k, line in enumerate(lines) if line.strip().casefold() == "[data]"), None)
     if start is None or len(lines) < start + 4:
@@ -312,7 +325,9 @@ def _read_series(path: Path) -> tuple[dict[str, tuple[str, str]], TextTable]:
         rows.append(TableRow(number, cells))
     if not rows:
         raise HistoryError(f"{path}:{start + 4}: no rows below the units; a test needs at least two")
-    return head, TextTable(path, {}, columns, start + 2, tuple(rows))
+    names = [cell.strip().casefold() for cell in lines[start + 1].split("\t")]
+    extension = next((name for name in names if name in EXTENSIONS), CREEP_EXTENSION)
+    return head, TextTable(path, {}, columns, start + 2, tuple(rows)), extension
 
 
 def _columns(path: Path, start: int, lines: Sequence[str]) -> tuple[tuple[str, ...], int]:
@@ -326,9 +341,7 @@ def _columns(path: Path, start: int, lines: Sequence[str]) -> tuple[tuple[str, .
         plain, unit = name.casefold(), UNITS.get(written.casefold(), written)
         if plain.startswith("elapsed time from end of loading") and unit in TIME.units:
             columns.append(f"time_{unit}")
-        elif plain in ("percentage creep extension", "percentage plastic extension", "percentage extension") and (
-            unit == "pct"
-        ):
+        elif plain in EXTENSIONS and unit == "pct":
             columns.append("strain_pct")
         elif name.startswith("Corrected measured temperature") and unit == "C":
             columns.append(name)

@@ -20,6 +20,7 @@ from pathlib import Path
 from creepkit.errors import HistoryError
 from creepkit.readers.assembly import assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid, peek_columns, read_text_grid, table_of
+from creepkit.readers.column_names import unit_suffix
 from creepkit.readers.text_tables import SourceText, TableRow, TextTable
 from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary
 from creepkit.records import History
@@ -74,15 +75,8 @@ ENDED: Mapping[str, str] = {
 """{word in small letters: how a test ended}."""
 
 
-UNITS: Mapping[str, str] = {
-    **dict.fromkeys(("hr", "hrs", "hour", "hours"), "h"),
-    **dict.fromkeys(("sec", "second", "seconds"), "s"),
-    **dict.fromkeys(("day", "days"), "d"),
-    **dict.fromkeys(("c", "\N{DEGREE SIGN}c", "degc", "deg c", "celsius"), "C"),
-    **dict.fromkeys(("k", "kelvin"), "K"),
-    **{"mpa": "MPa", "ksi": "ksi", "kpa": "kPa", "gpa": "GPa", "bar": "bar", "n/mm2": "MPa"},
-}
-"""{spelling in small letters: unit}, beside those of rates."""
+_RATE_UNIT = re.compile(r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:(?:/|per )\s*([a-z]+)|([a-z]+)\^?-1)")
+"""`1/h`, `%/h`, `per hour`, `h-1`."""
 
 
 RUN_OUT = re.compile(r">=?|\N{GREATER-THAN OR EQUAL TO}")
@@ -301,13 +295,9 @@ def _is_unit(text: str) -> bool:
 
 def _unit(text: str) -> str:
     """A unit as creepkit spells it; the text where it is none."""
-    plain = text.strip().casefold()
-    if match := re.fullmatch(r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:/|per )?\s*([a-z]+)(?:\^?-1)?", plain):
+    if match := _RATE_UNIT.fullmatch(text.strip().casefold()):
         share = "pct" if match[1] in ("%", "pct", "percent") else "1"
-        time = UNITS.get(match[2], match[2])
-        is_rate = "/" in plain.removeprefix(match[1]) or "per" in plain or plain.endswith("-1")
-        if is_rate and time in TIME.units:
+        time = unit_suffix(match[2] or match[3])
+        if time in TIME.units:
             return f"{share}/{time}"
-    if plain in ("%", "pct", "percent"):
-        return "pct"
-    return UNITS.get(plain, text.strip())
+    return unit_suffix(text) or text.strip()

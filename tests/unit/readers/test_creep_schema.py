@@ -45,6 +45,20 @@ def test_the_first_files_are_in_the_code_page_of_windows(tmp_path: Path):
     assert test.times.size == 4
 
 
+@pytest.mark.parametrize(
+    ("name", "at_start"), [("Percentage plastic extension", 0.07), ("Percentage extension", 0.251)]
+)
+def test_extensions_that_hold_the_loading_strain(tmp_path: Path, name: str, at_start: float):
+    """ISO 204: plastic extension = initial plastic + creep extension; extension = initial total + creep extension."""
+    head, _, rows = LIS.partition("\nh\t%\t°C\t°C\t\t\n")
+    lines = [line.split("\t") for line in rows.splitlines()]
+    moved = ["\t".join([line[0], f"{float(line[1]) + at_start:.6f}", *line[2:]]) for line in lines]
+    series = "".join([head, "\nh\t%\t°C\t°C\t\t\n", "\n".join(moved), "\n"])
+    (test,) = ck.read_histories(write(tmp_path, document(), series.replace("Percentage creep extension", name)))
+    np.testing.assert_allclose(test.outputs["strain"], [0.0, 1.25e-4, 2.125e-3, 0.025125], atol=1e-12)
+    assert "subtracted" in test.labels["assumed"]
+
+
 def test_versions_differ_in_capitals(tmp_path: Path):
     text = json.dumps(document()).replace("AdditionalMetadata", "additionalMetadata").replace("TestInfo", "testInfo")
     path = write(tmp_path, {})
