@@ -125,6 +125,7 @@ from .surrogates.parameter_gru import ParameterGru as ParameterGru
 from .surrogates.recipe import Training as Training
 from .testing import check_camera_format as check_camera_format
 from .testing import check_exporter as check_exporter
+from .testing import check_instrument_format as check_instrument_format
 from .testing import check_law as check_law
 from .testing import check_predictor as check_predictor
 from .testing import check_reader as check_reader

@@ -45,7 +45,7 @@ def creepkit_cameras() -> Sequence[CameraFormat]:  # type: ignore[empty-body]
 
 @hookspec
 def creepkit_instruments() -> Sequence[InstrumentFormat]:  # type: ignore[empty-body]
-    """Return formats of instruments' records: how columns are called, and what their heads leave out."""
+    """Return instrument formats: how columns of records are called, and what their heads leave out."""
 
 
 @hookspec

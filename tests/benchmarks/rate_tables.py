@@ -2,12 +2,12 @@
 
     python tests/benchmarks/rate_tables.py [--campaigns 200] [--data FOLDER] [--write]
 
-Planted: rates of a power law with Arrhenius' factor, 12 tests with 3 parameters; and a law of Kachanov and Rabotnov, 10
-tests with rate and rupture time or run-out, 4 parameters (a quarter of the campaigns), both with a scatter of 10 % in
-rate and in life. Values come from closed forms under constant stress, not from the integrator. The last table
-gives the share of campaigns whose 95 % interval holds the planted value, and how often the interval of a single test
-holds a new one; the second the width of the interval of the stress exponent (its bounds are 7 apart) from three curves
-at 90 to 108 MPa, from seven minimum rates at 55 to 120 MPa, and from both.
+Planted: rates of a power law with Arrhenius' factor, 12 tests with 3 parameters; and a law of Kachanov and Rabotnov,
+10 tests with rate and rupture time or run-out, 4 parameters (a quarter of the campaigns), both with a scatter of 10 %
+in rate and in life. Values come from closed forms under constant stress, not from the integrator. The table of
+coverage gives the share of campaigns whose 95 % interval holds the planted value, and how often the interval of a
+single test holds a new one; the table of curves the width of the interval of the stress exponent (its bounds are 7
+apart) from three curves at 90 to 108 MPa, from seven minimum rates at 55 to 120 MPa, and from both.
 
 Measured: curves of Alloy 617 as ACME-MG keeps them, those with at least 40 frames and a minimum inside. Of each the
 minimum rate is the smallest slope of a straight line over a tenth of its frames. A power law is identified from the

@@ -1,4 +1,4 @@
-"""The built-in formats of instruments' records, one declaration each; plugins declare others."""
+"""The built-in instrument formats, one declaration each; plugins declare others."""
 
 from __future__ import annotations
 

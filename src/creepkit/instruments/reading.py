@@ -119,7 +119,7 @@ def _format_of(path: Path, head: TableHead, formats: Sequence[InstrumentFormat],
     if name is not None:
         known = {one.name: one for one in formats}
         if name not in known:
-            raise HistoryError(f"no format of instruments is called '{name}'; {nearest(name, known)}")
+            raise HistoryError(f"no instrument format is called '{name}'; {nearest(name, known)}")
         if not known[name].accepts(head.names):
             raise HistoryError(
                 f"{path}:{head.names_line}: the format '{name}' wants columns named {', '.join(known[name].required)}"
@@ -132,9 +132,7 @@ def _format_of(path: Path, head: TableHead, formats: Sequence[InstrumentFormat],
         )
     general = [one for one in formats if not one.required]
     if not accepting and not general:
-        raise HistoryError(
-            f"{path}: no format of instruments accepts it; known are {', '.join(o.name for o in formats)}"
-        )
+        raise HistoryError(f"{path}: no instrument format accepts it; known are {', '.join(o.name for o in formats)}")
     return (accepting or general)[0]
 
 

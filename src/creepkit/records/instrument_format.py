@@ -6,6 +6,10 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from creepkit.errors import HistoryError
+
+PRESSURE_REFERENCES = ("gauge", "absolute")
+
 
 @dataclass(frozen=True)
 class InstrumentFormat:
@@ -34,6 +38,31 @@ class InstrumentFormat:
     pressure_reference: str = ""
     missing: tuple[str, ...] = ()
     channel_patterns: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and re.fullmatch(r"[a-z0-9][a-z0-9_-]*", self.name)):
+            raise HistoryError(
+                f"instrument format {self.name!r:.40}: the name must be small letters, digits and hyphens, such as "
+                "'furnace-3'"
+            )
+        for pattern in (*self.required, *self.units):
+            try:
+                re.compile(pattern)
+            except (re.error, TypeError) as error:
+                raise HistoryError(
+                    f"instrument format '{self.name}': {pattern!r:.40} is no regular expression ({error}); correct it"
+                ) from None
+        if self.pressure_reference not in ("", *PRESSURE_REFERENCES):
+            raise HistoryError(
+                f"instrument format '{self.name}': pressure_reference is {self.pressure_reference!r:.40}; write "
+                "'gauge' or 'absolute', or leave it out"
+            )
+        for pattern in self.channel_patterns.values():
+            if not (isinstance(pattern, str) and pattern.count("{}") == 1):
+                raise HistoryError(
+                    f"instrument format '{self.name}': the channel pattern {pattern!r:.40} must hold {{}} once, where "
+                    "the name of the specimen stands"
+                )
 
     def accepts(self, names: Sequence[str]) -> bool:
         """Whether a line of names is one of this format."""

@@ -135,7 +135,7 @@ class Registry:
         return self._all(plugin_sources.EXPORTER)
 
     def instruments(self) -> dict[str, Registered[InstrumentFormat]]:
-        """Return {name: registered format of instruments' records}."""
+        """Return {name: registered instrument format}."""
         return self._all(plugin_sources.INSTRUMENT)
 
     def temperature_forms(self) -> dict[str, Registered[Callable[..., Any]]]:

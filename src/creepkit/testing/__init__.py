@@ -10,6 +10,7 @@ planned from its own record: its loads, ranges of conditions and lengths.
 from creepkit.testing.kits import (
     check_camera_format,
     check_exporter,
+    check_instrument_format,
     check_law,
     check_named,
     check_plugin,
@@ -29,6 +30,7 @@ __all__ = [
     "LawSamples",
     "check_camera_format",
     "check_exporter",
+    "check_instrument_format",
     "check_law",
     "check_named",
     "check_plugin",

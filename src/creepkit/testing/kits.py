@@ -210,13 +210,15 @@ def check_exporter(exporter: Exporter) -> ConformanceReport:
     return ConformanceReport(exporter, tuple(_all_findings(checks, case)), "exporter")
 
 
-def check_instrument_format(declared: InstrumentFormat) -> ConformanceReport:
-    """Run every check on a format of instruments' records."""
+def check_instrument_format(format: InstrumentFormat) -> ConformanceReport:
+    """Run every check on an instrument format: its name, the units of its channels, the order of its dates."""
+    if not isinstance(format, InstrumentFormat):
+        raise HistoryError(f"check_instrument_format() takes a ck.InstrumentFormat, found {format!r:.40}")
     checks = {
         "name and title": lambda one: specimen_checks.check_record_name(one, "instrument format"),
         "declaration": instrument_checks.check_declaration,
     }
-    return ConformanceReport(declared, tuple(_all_findings(checks, declared)), "instrument format")
+    return ConformanceReport(format, tuple(_all_findings(checks, format)), "instrument format")
 
 
 def check_temperature_form(name: str, form: Callable[..., Any]) -> ConformanceReport:

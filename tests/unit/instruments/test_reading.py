@@ -167,7 +167,7 @@ def test_files_of_several_parts_are_read_as_one(tmp_path: Path, monkeypatch: pyt
         (
             "time_s,p_bar\n0,1\n",
             {"format": "tabel"},
-            "no format of instruments is called 'tabel'; did you mean 'table'",
+            "no instrument format is called 'tabel'; did you mean 'table'",
         ),
         ("time,p\n2025-02-30 10:00,1\n", {}, ":2: '2025-02-30' is no date"),
         ("time,p\n2025-02-20 10:00,1\n", {"time_zone": "Mars"}, "time_zone is 'Mars'"),
