@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from numbers import Real
@@ -292,10 +291,11 @@ def check_temperatures(temperatures: Any) -> list[float]:
 def _numbers(values: Any, name: str, example: str) -> list[float]:
     if isinstance(values, str | Mapping) or not isinstance(values, Iterable):
         raise FitError(f"{name} is {values!r:.40}; give {example}")
-    found = list(values)
-    for one in found:
-        if isinstance(one, bool) or not isinstance(one, Real) or abs(one) > sys.float_info.max:
+    found = []
+    for one in values:
+        if isinstance(one, bool) or not isinstance(one, Real):
             raise FitError(f"{name} holds {one!r:.40}; give {example}")
+        found.append(float(one) if abs(one) < 1e30 else np.inf)
     if not found:
         raise FitError(f"{name} is empty; give {example}")
-    return [float(one) for one in found]
+    return found
