@@ -1,13 +1,15 @@
-"""Coverage of the bounds of rupture strength: planted Larson-Miller tests with heats and run-outs.
+"""Coverage of the bounds of rupture strength: planted tests of three methods with heats and run-outs.
 
     python tests/benchmarks/rupture_strength_coverage.py [--sets 200] [--write]
 
 Each simulated set has tests at 550, 600 and 650 °C of 20 to 10,000 h in the mean, planted by Larson-Miller's method
-with C = 20 and a quadratic of log stress; log10 of times scatters by 0.1 between heats and by 0.08 between tests of a
-heat; tests are stopped at a given time. Asked for are the strengths at 600 °C and 1e4 and 1e5 h. The table gives the
-share of sets whose 95 % bounds of the mean hold the planted strength, and the mean share of 400 drawn new heats, and of
-400 drawn tests of new heats, whose own strength lies within theirs; wherever a bound is missing it counts as infinite.
-"Larson-Miller" fits that method with a quadratic alone, "average" all three methods with polynomials of degree 1 to 3.
+with C = 20 and a quadratic of log stress, by Orr, Sherby and Dorn's with Q = 330 kJ/mol and a quadratic, or by Manson
+and Haferd's with a line that meets at 500 K and 1e14 h; log10 of times scatters by 0.1 between heats and by 0.08
+between tests of a heat; tests are stopped at a given time. Asked for are the strengths at 600 °C and 1e4 and 1e5 h. The
+table gives the share of sets whose 95 % bounds of the mean hold the planted strength, and the mean share of 400 drawn
+new heats, and of 400 drawn tests of new heats, whose own strength lies within theirs; wherever a bound is missing it
+counts as infinite. The method that was planted is fitted alone, with its own degree; "average" fits all three methods
+with polynomials of degree 1 to 3.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from measured import Page, arguments, progress
 import creepkit as ck
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from helpers.planted_rupture import larson_miller, planted
+from helpers.planted_rupture import larson_miller, manson_haferd, orr_sherby_dorn, planted
 
 TEMPERATURE = 873.15
 HOURS = (1e4, 1e5)
@@ -31,22 +33,35 @@ BETWEEN, WITHIN = 0.1, 0.08
 CASES = ((12, 60, 4000.0), (6, 36, 4000.0), (6, 36, np.inf), (0, 24, 4000.0))
 """Heats (0: one), tests, and hours at which tests are stopped."""
 
-AVERAGED_CASES = CASES[1:2]
+PLANTED = {
+    "larson-miller": (larson_miller, 2),
+    "orr-sherby-dorn": (orr_sherby_dorn, 2),
+    "manson-haferd": (manson_haferd, 1),
+}
+"""{method: mean log10 h at log10 MPa and K, degree of its stress function}."""
+
+RUNS = (
+    *(("larson-miller", case, False) for case in CASES),
+    ("larson-miller", CASES[1], True),
+    *((name, case, False) for name in ("orr-sherby-dorn", "manson-haferd") for case in CASES[:2]),
+)
+"""Method planted, case, and whether the average is asked in the place of that method."""
 
 
-def own_strength(target, shift):
+def own_strength(mean, target, shift):
     """MPa at which log10 of the time of a heat or test with a factor 10^shift is the target."""
     x = np.linspace(0.0, 3.0, 3001)
-    times = larson_miller(x, TEMPERATURE)
+    times = mean(x, TEMPERATURE)
     return 10.0 ** np.interp(-(target - np.asarray(shift)), -times, x)
 
 
-def coverage(case, seed, average):
+def coverage(seed, method, case, average):
     """Whether the bounds of the mean hold, and the shares of heats and tests held, at each time; run-outs."""
     heats, count, end = case
-    tests = planted(larson_miller, seed=seed, count=count, heats=heats, scatter=WITHIN, between=BETWEEN, end=end)
-    settings = ck.RuptureSettings() if average else ck.RuptureSettings(degrees=(2,))
-    methods = None if average else "larson-miller"
+    mean, degree = PLANTED[method]
+    tests = planted(mean, seed=seed, count=count, heats=heats, scatter=WITHIN, between=BETWEEN, end=end)
+    settings = ck.RuptureSettings() if average else ck.RuptureSettings(degrees=(degree,))
+    methods = None if average else method
     assessment = ck.rupture(tests, methods, hours=HOURS, temperatures=[TEMPERATURE], settings=settings)
     rng = np.random.default_rng([seed, 1])
     heat_shift = (BETWEEN if heats else 0.0) * rng.standard_normal(400)
@@ -55,7 +70,7 @@ def coverage(case, seed, average):
     for hours in HOURS:
         strength = assessment.strength(hours, TEMPERATURE)
         for of, shift in shifts.items():
-            own = own_strength(np.log10(hours), shift)
+            own = own_strength(mean, np.log10(hours), shift)
             low, high = getattr(strength, of)
             inside = (own >= (0.0 if low is None else low)) & (own <= (np.inf if high is None else high))
             held.append(float(inside.mean()))
@@ -69,15 +84,17 @@ def main():
     options = parser.parse_args()
     page = Page("rupture_strength_coverage", __doc__)
     heads = [f"{what}, {hours:g} h, %" for hours in HOURS for what in ("mean", "new heat", "one test")]
-    page.table("fitted", "heats", "tests", "stopped at, h", "run-outs, %", *heads, "sets")
+    page.table("planted", "fitted", "heats", "tests", "stopped at, h", "run-outs, %", *heads, "sets")
     with ProcessPoolExecutor(options.jobs) as pool:
-        for average, case in [*((False, case) for case in CASES), *((True, case) for case in AVERAGED_CASES)]:
-            made = pool.map(partial(coverage, case, average=average), range(1000, 1000 + options.sets))
+        for method, case, average in RUNS:
+            seeds = range(1000, 1000 + options.sets)
+            made = pool.map(partial(coverage, method=method, case=case, average=average), seeds)
             rows, stopped = zip(*made, strict=True)
-            progress(f"{case}, {'average' if average else 'Larson-Miller'}")
+            progress(f"{case}, {method}{', average' if average else ''}")
             heats, count, end = case
             page.row(
-                "average" if average else "Larson-Miller",
+                method,
+                "average" if average else method,
                 heats or "one",
                 count,
                 "never" if np.isinf(end) else f"{end:g}",

@@ -64,7 +64,9 @@ def catalogue(histories):
     for name, law in isothermal.items():
         law = law.times(ck.arrhenius(T_ref=T))
         damage = damage_parameters.get(name.split("-")[0], ())
-        laws[name] = law.with_temperature(**{p: ck.activated(T_ref=T) for p in damage}) if damage else law
+        # rate coefficients of damage have theirs from times() already
+        further = [p for p in damage if f"Q_{p}" not in law.names]
+        laws[name] = law.with_temperature(**{p: ck.activated(T_ref=T) for p in further}) if further else law
     return laws
 
 

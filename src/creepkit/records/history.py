@@ -107,6 +107,10 @@ class History:
             raise HistoryError(f"{origin}: a temperature of {temperatures.min():g} K is not above 0 and below 10000 K")
         if not isinstance(self.temperature, Program):
             freeze(self, "temperature", float(self.temperature))
+        if not callable(getattr(self.loading, "program", None)):
+            raise HistoryError(
+                f"{origin}: loading is {self.loading!r:.40}; give what was imposed, such as ck.constant_stress(100.0)"
+            )
         self._check_end(origin)
         sd = {n: self._checked_sd(origin, n, v, times.size) for n, v in self.standard_deviation.items()}
         freeze(self, "standard_deviation", MappingProxyType(sd))

@@ -67,9 +67,9 @@ def rupture(
     tensile_strength : {temperature in K: MPa}, interpolated between; by default as the tests state it.
     """
     chosen = settings or RuptureSettings()
-    check_hours(hours)
-    if not hours:
-        raise FitError("no time is given at which strengths are wanted; give hours, such as [1e5]")
+    hours = check_hours(hours)
+    if temperatures is not None:
+        temperatures = check_temperatures(temperatures)
     asked = _known_names(methods)
     observed, with_rate, notes = rupture_tests(check_histories(tests))
     if not chosen.random_effects:
@@ -80,8 +80,6 @@ def rupture(
         return interpolated(T, strengths, at)
 
     names, relation_asked = _methods(asked, observed, tensile, chosen)
-    if temperatures is not None:
-        check_temperatures(temperatures)
     with single_threaded_blas():
         ranked, rejected = _ranked(names, observed, tensile, chosen) if names else ((), {})
         relation = _relation(observed, with_rate, relation_asked, chosen)
@@ -104,9 +102,9 @@ def rupture(
                 "when": datetime.now(UTC).isoformat(timespec="seconds"),
             },
         )
-        wanted = list(observed.isotherms) if temperatures is None else [float(t) for t in temperatures]
+        wanted = list(observed.isotherms) if temperatures is None else temperatures
         by_name = [AVERAGE, *assessment.methods, *([] if relation is None else [MONKMAN_GRANT.name])]
-        stated = [one for name in by_name for t in wanted for one in assessment.strengths_at([*hours], t, name)]
+        stated = [one for name in by_name for t in wanted for one in assessment.strengths_at(hours, t, name)]
         checks = _checks(assessment, tensile, max(hours), wanted)
     return replace(assessment, strengths=tuple(stated), checks=tuple(checks))
 
@@ -116,6 +114,8 @@ def _known_names(methods: Sequence[str] | str | None) -> list[str] | None:
     if methods is None:
         return None
     known = [name for name in METHODS if name != MINIMUM_RATE.name]
+    if not isinstance(methods, str | Sequence):
+        raise FitError(f"methods is {methods!r:.40}; give a list of names, such as ['larson-miller']")
     asked = list(dict.fromkeys([methods] if isinstance(methods, str) else methods))
     for name in asked:
         if name not in known:
@@ -219,8 +219,16 @@ def _relation(
 
 
 def _nothing_left(rejected: Mapping[str, str], relation: MinimumRateRelation | None) -> str:
+    """Why nothing is ranked: of each method the reason of its lowest degree, methods with one reason together."""
     if rejected:
-        return f"no method can be fitted: {'; '.join(f'{name}: {why}' for name, why in rejected.items())}"
+        reasons = {}
+        for label, why in rejected.items():
+            reasons.setdefault(label.partition(",")[0], why)
+        alike: dict[str, list[str]] = {}
+        for name, why in reasons.items():
+            alike.setdefault(why, []).append(name)
+        parts = [f"{' and '.join(names)}: {why}" for why, names in alike.items()]
+        return f"no method can be fitted: {'; '.join(parts)}"
     asked = "" if relation is None else " beside monkman-grant, which predicts no time without rates"
     return f"no method of rupture times is asked for{asked}; name one, such as larson-miller"
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,6 +16,7 @@ from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIG
 from creepkit.presentation import Presentable, present
 from creepkit.rupture_assessment.checks import AssessmentCheck
 from creepkit.rupture_assessment.likelihood import DISTRIBUTIONS, Distribution
+from creepkit.rupture_assessment.log_time_distributions import power_of_ten
 from creepkit.rupture_assessment.methods import METHODS, Conditions
 from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
 from creepkit.rupture_assessment.observed_tests import SECONDS_PER_HOUR, RuptureTests, celsius
@@ -36,6 +38,9 @@ AVERAGE = "average"
 
 LEAST_WEIGHT = 1e-3
 """In the average."""
+
+LARGEST_CONSTANT = 1e7
+"""Of those that may be given: an activation energy in J/mol is some 1e5."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +78,8 @@ class RuptureSettings:
                 if name not in METHODS[method].fixable:
                     allowed = ", ".join(METHODS[method].fixable) or "none"
                     raise FitError(f"fixed= gives {method} a constant '{name}'; those that may be given: {allowed}")
-                if not (isinstance(value, int | float) and np.isfinite(value)):
-                    raise FitError(f"fixed= gives {method} {name}={value!r:.40}; give a finite number")
+                if isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= LARGEST_CONSTANT:
+                    raise FitError(f"fixed= gives {method} {name}={value!r:.40}; give a number, at most 1e7 in size")
 
 
 @dataclass(frozen=True)
@@ -185,8 +190,7 @@ class RuptureAssessment(Presentable):
 
     def strengths_at(self, hours: list[float], temperature: float, method: str = AVERAGE) -> list[StrengthEstimate]:
         """Strengths at several times, h, of one temperature, K."""
-        check_hours(hours)
-        check_temperatures([temperature])
+        hours, [temperature] = check_hours(hours), check_temperatures([temperature])
         models, unknown = self.models(method), (None, None)
         reason = ""
         if any(_needs(model, "tensile_strength") for model, _ in models) and not np.isfinite(
@@ -224,13 +228,13 @@ class RuptureAssessment(Presentable):
         if of not in BOUND_KINDS:
             raise FitError(f"of is {of!r:.40}; allowed are {', '.join(BOUND_KINDS)}")
         check_temperatures([temperature])
-        if not (np.isfinite(stress) and stress > 0):
+        if isinstance(stress, bool) or not isinstance(stress, Real) or not 0 < stress < 1e9:
             raise FitError(f"stress is {stress!r:.40}; give MPa above zero")
         T, s = np.array([float(temperature)]), np.array([float(stress)])
         at = Conditions(s, T, self.tensile(T), np.full(1, np.nan))
         times = mixed(self.models(method), at, of)
         tail = 0.5 * (1.0 - self.settings.level)
-        median, low, high = (SECONDS_PER_HOUR * 10.0 ** float(times.quantile(p)[0]) for p in (0.5, tail, 1.0 - tail))
+        median, low, high = (SECONDS_PER_HOUR * power_of_ten(times.quantile(p)[0]) for p in (0.5, tail, 1.0 - tail))
         return median, low, high
 
     def plot(self, path: str | Path | None = None) -> Figure:
@@ -266,15 +270,32 @@ def interpolated(temperatures: Floats, strengths: Floats, at: Floats) -> Floats:
     return np.where(known, np.interp(at, temperatures, strengths), np.nan)
 
 
-def check_hours(hours: Any) -> None:
-    """FitError unless these are times, h, above zero."""
-    for one in hours:
-        if isinstance(one, bool) or not isinstance(one, int | float) or not (np.isfinite(one) and 0 < one < 1e12):
-            raise FitError(f"a strength is asked for at {one!r:.40} h; give numbers of hours above zero")
+def check_hours(hours: Any) -> list[float]:
+    """The same as a list; FitError unless these are times, h, above zero."""
+    found = _numbers(hours, "hours", "a list of hours, such as [1e3, 1e5]")
+    for one in found:
+        if not 0 < one < 1e12:
+            raise FitError(f"a strength is asked for at {one!r:.40} h; give numbers of hours above zero, below 1e12")
+    return found
 
 
-def check_temperatures(temperatures: Any) -> None:
-    """FitError unless these are temperatures in K."""
-    for one in temperatures:
-        if isinstance(one, bool) or not isinstance(one, int | float) or not 0 < one < 1e4:
+def check_temperatures(temperatures: Any) -> list[float]:
+    """The same as a list; FitError unless these are temperatures in K."""
+    found = _numbers(temperatures, "temperatures", "a list of temperatures in K, such as [873.15]")
+    for one in found:
+        if not 0 < one < 1e4:
             raise FitError(f"a temperature is {one!r:.40}; give K, above 0 and below 10000")
+    return found
+
+
+def _numbers(values: Any, name: str, example: str) -> list[float]:
+    if isinstance(values, str | Mapping) or not isinstance(values, Iterable):
+        raise FitError(f"{name} is {values!r:.40}; give {example}")
+    found = []
+    for one in values:
+        if isinstance(one, bool) or not isinstance(one, Real):
+            raise FitError(f"{name} holds {one!r:.40}; give {example}")
+        found.append(float(one) if abs(one) < 1e30 else np.inf)
+    if not found:
+        raise FitError(f"{name} is empty; give {example}")
+    return found

@@ -30,6 +30,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
+from creepkit.rupture_assessment.log_time_distributions import power_of_ten
 from creepkit.rupture_assessment.methods import METHODS, Conditions
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength, celsius
 from creepkit.rupture_assessment.rupture_fit import RuptureFit
@@ -118,7 +119,7 @@ def physical_realism(
     if T.size > 1:
         gaps = np.where(inside[1:] & inside[:-1], times[:-1] - times[1:], np.inf)
         row, column = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
-        factor = 10.0 ** float(gaps[row, column])
+        factor = power_of_ten(float(gaps[row, column]))
         text = f"a step of {ISOTHERM_STEP:g} K shortens the time by a factor of at least {factor:.3g}"
         checks.append(
             AssessmentCheck(
@@ -149,7 +150,7 @@ def _predicted_against_measured(name: str, predicted: Floats, measured: Floats) 
     deviation = float(np.std(predicted - measured, ddof=1))
     outside = int((np.abs(predicted - measured) > OUTSIDE_DEVIATIONS * deviation).sum())
     ends = np.clip(np.log10(BAND_HOURS), measured.min(), measured.max())
-    departure = 10.0 ** float(np.abs(constant + (slope - 1.0) * ends).max())
+    departure = power_of_ten(float(np.abs(constant + (slope - 1.0) * ends).max()))
     passed = (
         SLOPE_RANGE[0] <= slope <= SLOPE_RANGE[1]
         and departure <= BAND_FACTOR
@@ -206,6 +207,8 @@ def _changed(
     if any(a is None or b is None for a, b in zip(original, repeated, strict=True)):
         lost = any(a is not None and b is None for a, b in zip(original, repeated, strict=True))
         return AssessmentCheck(name, False if lost else None, f"there is no strength at {hours:.3g} h to compare")
+    if not original:
+        return AssessmentCheck(name, None, "no strength can be stated at the temperatures asked for")
     changes = [b / a - 1.0 for a, b in zip(original, repeated, strict=True) if a is not None and b is not None]
     largest = max(changes, key=abs)
     text = f"the strength at {hours:.3g} h changes by up to {100 * largest:+.1f} % ({len(places)} tests less)"

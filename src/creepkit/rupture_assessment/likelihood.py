@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
-from creepkit.arrays import Bools, Floats
+from creepkit.arrays import Bools, Floats, Ints
 
 Distribution = Literal["lognormal", "weibull"]
 
@@ -104,10 +104,11 @@ class GroupedTimes:
         effects = np.zeros(scatter.shape)
         precision = scatter**-2.0
         limit = LARGEST_STEP * scale[:, None]
+        first_level, second_level, order, starts = _shared_tests(members)
         for _ in range(NEWTON_STEPS):
             _, first, second = self._terms(mean + effects @ members.T, scale[:, None])
-            hessian = np.einsum("ml,cm,mk->clk", members, -second, members, optimize=True)
-            hessian += precision[:, :, None] * np.eye(scatter.shape[1])
+            hessian = precision[:, :, None] * np.eye(scatter.shape[1])
+            hessian[:, first_level, second_level] -= np.add.reduceat(second[:, order], starts, axis=1)
             gradient = first @ members - precision * effects
             step = np.clip(np.linalg.solve(hessian, gradient[..., None])[..., 0], -limit, limit)
             effects = effects + step
@@ -153,3 +154,16 @@ class GroupedTimes:
         spread = np.repeat(np.maximum(np.abs(scatter), LEAST_SCATTER)[None], sizes, axis=1)
         modes, _ = self._modes(mean[None], np.array([scale]), spread, np.column_stack(self.members))
         return np.split(modes[0], np.cumsum(sizes)[:-1])
+
+
+def _shared_tests(members: Floats) -> tuple[Ints, Ints, Ints, Ints]:
+    """Pairs of levels (pairs,) (pairs,) that share tests; those tests, pair after pair, and where each pair's begin.
+
+    members : (tests, levels) of zeros and ones. A product of matrices would take all pairs, of which few share a test.
+    """
+    levels = [np.flatnonzero(row) for row in members]
+    triples = np.array([(i, j, test) for test, own in enumerate(levels) for i in own for j in own])
+    triples = triples[np.lexsort(triples.T[::-1])]
+    new = np.any(np.diff(triples[:, :2], axis=0) != 0, axis=1)
+    starts = np.concatenate([[0], np.flatnonzero(new) + 1])
+    return triples[starts, 0], triples[starts, 1], triples[:, 2], starts

@@ -90,6 +90,11 @@ class MixedLogTime:
         return _halved(self, probability, quantiles.min(axis=0), quantiles.max(axis=0))
 
 
+def power_of_ten(exponent: float) -> float:
+    """10 to a power, infinite where that is beyond a double."""
+    return 10.0 ** float(exponent) if exponent < 300.0 else float("inf")
+
+
 def _halved(distribution: LogTimeDistribution, probability: float, low: Floats, high: Floats) -> Floats:
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from creepkit.arrays import Floats
-from creepkit.rupture_assessment.log_time_distributions import LogTimeDistribution, MixedLogTime
+from creepkit.rupture_assessment.log_time_distributions import LogTimeDistribution, MixedLogTime, power_of_ten
 from creepkit.rupture_assessment.methods import Conditions
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength, celsius
 
@@ -184,4 +184,4 @@ def _falling_branch(stress: Floats, log_time: Floats, start: int) -> _Branch:
 
 
 def _hours(log_time: float) -> str:
-    return f"{10.0**log_time:.3g} h"
+    return f"{power_of_ten(log_time):.3g} h"
