@@ -43,6 +43,26 @@ dimple of 7.5 mm (docs/measured/camera_extraction.md).
 """
 
 
+UNSMOOTHED_FOURTH = 0.75 * (1.0 / 576.0 - 1.0 / 1920.0) + 1.0 / (8.0 * 576.0)
+"""Of h^4 and the second Laplacian in the mean on a circle of what was smoothed over squares of side h.
+
+The mean over such a square is 1 + (h^2 / 24) (a + b) + (h^4 / 1920) (a^2 + b^2) + (h^4 / 576) a b of a and b, the second
+derivatives along x and y. Its inverse is 1 - (h^2 / 24) (a + b) + h^4 ((1 / 576 - 1 / 1920) (a^2 + b^2) + a b / 576); on a
+circle the mean of a^2 + b^2 is 3/4 of the second Laplacian, that of a b one eighth.
+"""
+
+
+BALANCED_TERMS = {0: 10, 1: 2, 2: 2, 4: 6, 8: 3}
+"""Even powers of the radius by multiples of the angle, that weights integrate over the disc.
+
+Eq. (7) goes with 4 and 8 times the angle where p is not 2, the others are those of a centre a little off.
+"""
+
+
+WEIGHT_CHANGE = (0.2, 4.0)
+"""Least and greatest factor on a weight for that."""
+
+
 _START = (np.log(0.5), np.log(2.1))
 """ln of S over the window, and ln p, where fits of the first frame begin."""
 
@@ -96,6 +116,7 @@ def _observe_field(points: SurfacePoints, window: float, operator: str) -> Surfa
     places = points.places[inside]
     weights, heights = _weights(distance[inside], points.areas[inside], points.heights[:, inside], window)
     enough = np.count_nonzero(weights, axis=1) >= max(FEWEST_WINDOW_POINTS, 0.5 * np.count_nonzero(weights.any(axis=0)))
+    weights = _balanced(places, weights, points.areas[inside].mean(), window)
     start = _shared_start(places, heights, weights, points.subset, window)
     fits = fit_frames(places, heights, weights, start, points.subset, LOOSE)
     values = np.array(fits.values)
@@ -137,13 +158,11 @@ def _observe_rings(points: SurfacePoints, radii: tuple[float, ...], operator: st
     enough = np.ones(frames, bool)
     spacing = float(np.sqrt(np.median(points.areas)))
     for k, radius in enumerate(radii):
-        band, terms, mean, laplacian = _ring_terms(points.places, radius, spacing)
+        band, terms, wanted = _ring_terms(points.places, radius, spacing, points.subset)
         seen = np.isfinite(points.heights[:, band])
         weights, heights = seen * points.areas[band], np.where(seen, points.heights[:, band], 0.0)
         enough &= seen.sum(axis=1) >= max(2 * len(terms), 0.5 * np.count_nonzero(seen.any(axis=0)))
         all_gains = _gains(np.broadcast_to(terms, (frames, *terms.shape)), weights)
-        # A mean over a square of side h is u + h^2/24 of the Laplacian, which the terms know.
-        wanted = mean - points.subset**2 / 24.0 * laplacian
         gains[:, k, band] = np.einsum("t,ftn->fn", wanted, all_gains)
         fitted = np.einsum("ftn,fn->ft", all_gains, heights) @ terms
         nearer = np.abs(np.hypot(*points.places[band].T) - radius) < misses[0, band]
@@ -158,8 +177,8 @@ def _observe_rings(points: SurfacePoints, radii: tuple[float, ...], operator: st
     return SurfaceObservation(operator, outputs, gains, residuals, enough)
 
 
-def _ring_terms(places: Floats, radius: float, spacing: float) -> tuple[Bools, Floats, Floats, Floats]:
-    """Points (points,) that speak of a ring, terms (terms, these points), their means and Laplacians there (terms,).
+def _ring_terms(places: Floats, radius: float, spacing: float, subset: float) -> tuple[Bools, Floats, Floats]:
+    """Points (points,) that speak of a ring, terms (terms, these points), and their means there, unsmoothed (terms,).
 
     About the apex, and on rings that are nearly there: a quadratic in x and y, and r^4. About others: a quartic in
     r - radius, and parts that go with cos and sin of the angle and of twice the angle, so that an error of the centre
@@ -172,15 +191,16 @@ def _ring_terms(places: Floats, radius: float, spacing: float) -> tuple[Bools, F
         band = r <= max(APEX_BAND, 3.5 * spacing, radius + 0.5 * width)
         x, y, r = x[band], y[band], r[band]
         terms = np.stack([np.ones_like(r), r**2, r**4, x, y, x**2 - y**2, x * y])
-        mean, laplacian = [1.0, radius**2, radius**4], [0.0, 4.0, 16.0 * radius**2]
+        mean, laplacian, bilaplacian = [1.0, radius**2, radius**4], [0.0, 4.0, 16.0 * radius**2], [0.0, 0.0, 64.0]
     else:
         band = np.abs(r - radius) <= width
         x, y, r = x[band], y[band], r[band]
         c, s, off = x / r, y / r, r - radius
         terms = np.stack([np.ones_like(r), off, off**2, off**3, off**4, c, s, c * c - s * s, 2.0 * c * s])
         mean, laplacian = [1.0], [0.0, 1.0 / radius, 2.0]
-    padded = [np.array([*values, *np.zeros(len(terms) - len(values))]) for values in (mean, laplacian)]
-    return band, terms, padded[0], padded[1]
+        bilaplacian = [0.0, radius**-3, -2.0 * radius**-2, 12.0 / radius, 24.0]
+    orders = [np.array([*values, *np.zeros(len(terms) - len(values))]) for values in (mean, laplacian, bilaplacian)]
+    return band, terms, np.array([1.0, -(subset**2) / 24.0, UNSMOOTHED_FOURTH * subset**4]) @ np.array(orders)
 
 
 def _weights(distance: Floats, areas: Floats, heights: Floats, window: float) -> tuple[Floats, Floats]:
@@ -191,6 +211,29 @@ def _weights(distance: Floats, areas: Floats, heights: Floats, window: float) ->
     share = np.clip((window - distance) / np.sqrt(areas) + 0.5, 0.0, 1.0) * areas / areas.mean()
     seen = np.isfinite(heights)
     return seen * share, np.where(seen, heights, 0.0)
+
+
+def _balanced(places: Floats, weights: Floats, cell: float, window: float) -> Floats:
+    """Weights (frames, points), changed as little as can be, whose sums over the seen points are integrals over the disc.
+
+    places : (points, 2) mm. weights : (frames, points), in units of the area `cell`, mm2. window : mm, of the disc.
+
+    What Eq. (7) misses of a surface is balanced over the whole disc, on which a simulation is observed, and would not
+    be where subsets are lost. Sums of smooth functions, as its products with the derivatives of Eq. (7) are, are made
+    right with the seen points alone: calibration of the weights of a sample (Deville and Saerndal, 1992).
+    """
+    x, y = (places / window).T
+    turned = (x + 1j * y) ** np.arange(9)[:, None]
+    radial = np.polynomial.legendre.legvander(2.0 * (x**2 + y**2) - 1.0, max(BALANCED_TERMS.values()) - 1).T
+    parts = [part * radial[:count] for k, count in BALANCED_TERMS.items() for part in (turned[k].real, turned[k].imag)]
+    terms = np.concatenate(parts)
+    wanted = np.zeros(len(terms))
+    wanted[0] = np.pi * window**2 / cell  # the others have no mean over the disc
+    result = np.array(weights)
+    for k, row in enumerate(weights):
+        factor = np.linalg.lstsq((terms * row) @ terms.T, wanted - terms @ row, rcond=1e-6)[0] @ terms
+        result[k] = row * np.clip(1.0 + factor, *WEIGHT_CHANGE)
+    return result
 
 
 def _shared_start(places: Floats, heights: Floats, weights: Floats, subset: float, window: float) -> Floats:
