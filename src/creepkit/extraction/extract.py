@@ -182,7 +182,7 @@ def _extract_one(
     fields, shown = _error_fields(
         seen, taken, centred, good, rest, loaded[good[loaded]], places[clamped] - np.r_[center, 0.0]
     )
-    noise = estimate_noise(names, seen.gains, fields, np.where(good, signal, np.nan), shown, plate.spacing)
+    noise = estimate_noise(seen, fields, np.where(good, signal, np.nan), shown, plate.spacing)
     # Points of overlapping subsets err together: the centre of independent ones is known less well by as much.
     inflation = np.sqrt(max(1.0, np.pi * noise.correlation_length**2 / plate.spacing**2))
     motion = PlateMotion(

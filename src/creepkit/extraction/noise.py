@@ -23,6 +23,7 @@ from types import MappingProxyType
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints, frozen
+from creepkit.records import SurfaceObservation
 
 PATCHES_WEIGHT = 40
 """Frames at rest that the covariance from patches counts for in the mean of both.
@@ -100,20 +101,21 @@ class ErrorFields:
 
 
 def estimate_noise(
-    names: Sequence[str], gains: Floats, fields: ErrorFields, signal: Floats, shown: Bools, spacing: float
+    seen: SurfaceObservation, fields: ErrorFields, signal: Floats, shown: Bools, spacing: float
 ) -> NoiseEstimate:
-    """The noise of outputs.
+    """The noise of the outputs of an observation.
 
-    gains : (frames, outputs, points) to heights. signal : (frames,) the leading output, for the correlation in time
+    signal : (frames,) the leading output, for the correlation in time
     where there are no frames at rest. shown : (frames, outputs) which outputs a frame shows. spacing : mm of points.
     """
+    names, gains = tuple(seen.outputs), seen.gains
     enough = len(fields.rest) >= FEWEST_REST_FRAMES
     # The clamped plate lost the least to a fit: three numbers over its whole area.
     rho = autocorrelation(fields.clamped, fields.clamped_places, spacing)
     length = correlation_length(rho, spacing)
     patch = max(2.0 * length, 3.0 * spacing)
     reference = int(np.nanargmax(np.where(np.isfinite(signal), np.abs(signal), -1.0)))
-    by_blocks = _block_covariance(gains, fields, patch, SpatialCorrelation(rho, spacing), reference)
+    by_blocks = _block_covariance(seen, fields, patch, SpatialCorrelation(rho, spacing), reference)
     at_rest = _rest_covariance(gains, fields.rest) if enough else np.full_like(by_blocks, np.nan)
     growth = _growth(fields, len(gains), enough)
     if enough:
@@ -242,13 +244,16 @@ def rigid_gains(places: Floats) -> Floats:
 
 
 def _block_covariance(
-    gains: Floats, fields: ErrorFields, patch: float, rho: SpatialCorrelation, reference: int
+    seen: SurfaceObservation, fields: ErrorFields, patch: float, rho: SpatialCorrelation, reference: int
 ) -> Floats:
     """(frames, outputs, outputs): squares of what each patch contributes, of points and of the clamped plate."""
+    gains = seen.gains
     used = np.abs(gains).max(axis=(0, 1)) > 0.0
     numbers = patch_numbers(fields.places[used], patch)
     total = patch_covariance(gains[:, :, used], fields.loaded[:, used], numbers)
-    edges = rho.lost_factors(gains[reference][:, used], fields.places[used], numbers)
+    edges = rho.lost_factors(
+        gains[reference][:, used], fields.places[used], numbers, seen.terms[used], seen.fitted[:, used]
+    )
     plane = np.stack([np.ones(len(fields.places)), fields.places[:, 1], -fields.places[:, 0]])
     tilts = np.matmul(gains, plane.T)
     covariance = clamped_covariance(fields.clamped, fields.clamped_places, patch, rho)
@@ -263,7 +268,7 @@ def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: Spatia
     errors : (fields, points) mm of the clamped plate, at places (points, 2) mm.
     """
     gains, numbers = rigid_gains(places), patch_numbers(places, patch)
-    edges = rho.lost_factors(gains, places, numbers)
+    edges = rho.lost_factors(gains, places, numbers, np.linalg.pinv(gains), gains)
     return np.asarray(patch_covariance(gains[None], errors, numbers)[0] * edges[:, None] * edges)
 
 
@@ -283,20 +288,21 @@ class SpatialCorrelation:
         distance = np.hypot(*(places[:, None] - places[None, :]).T)
         return np.asarray(np.interp(distance / self.spacing, np.arange(values.size), values, right=0.0))
 
-    def lost_factors(self, gains: Floats, places: Floats, numbers: Ints) -> Floats:
-        """(outputs,) by how much standard deviations from patches are too small if errors have this correlation.
+    def lost_factors(self, gains: Floats, places: Floats, numbers: Ints, terms: Floats, fitted: Floats) -> Floats:
+        """(outputs,) by how much standard deviations from patches of residuals are too small for such errors.
 
         The fit has taken a part of the errors from the residuals, and neighbours across the edges of patches err
-        together; both are worked out exactly for the linear fit.
+        together; both are worked out exactly for a linear fit.
 
-        gains : (outputs, points). places : (points, 2) mm. numbers : (points,) of patches.
+        gains : (outputs, points). places : (points, 2) mm. numbers : (points,) of patches. terms, fitted : (points,
+        terms), (terms, points), residuals are errors less terms @ fitted @ errors.
         """
         C = self.matrix(places)
         whole = np.einsum("oi,oi->o", gains @ C, gains)
-        columns, taken = np.linalg.pinv(gains), gains @ C
-        residual = C - columns @ taken - (columns @ taken).T + columns @ (taken @ gains.T) @ columns.T
+        taken = fitted @ C
+        residual = C - terms @ taken - (terms @ taken).T + terms @ (taken @ fitted.T) @ terms.T
         within = np.einsum("oi,oi->o", gains @ np.where(numbers[:, None] == numbers, residual, 0.0), gains)
-        return np.asarray(np.sqrt(np.clip(whole / np.maximum(within, 1e-300), 1.0, 9.0)))
+        return np.asarray(np.sqrt(np.clip(whole / np.maximum(within, 1e-300), 1.0, 25.0)))
 
 
 def patch_covariance(gains: Floats, errors: Floats, numbers: Ints) -> Floats:

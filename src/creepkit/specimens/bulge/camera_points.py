@@ -125,6 +125,8 @@ def _observe_field(points: SurfacePoints, window: float, operator: str) -> Surfa
     left, columns, surface = smoothing_columns(places, values, points.subset)
     residuals = np.where(weights > 0.0, heights - surface, np.nan)
     gains = _gains(columns, weights, left)
+    greatest = _greatest(np.where(enough, values[:, 0], np.nan))
+    model_terms = columns[greatest].T, np.array(gains[greatest])
     errors = np.sqrt(np.maximum((gains**2).sum(axis=2), 0.0)) * _residual_size(residuals)[:, None]
     widths, shapes = np.exp(values[:, 1]), np.exp(values[:, 2])
     determined = (
@@ -147,34 +149,41 @@ def _observe_field(points: SurfacePoints, window: float, operator: str) -> Surfa
         "width": np.exp(values[:, 1]) + hidden,
         "shape": np.exp(values[:, 2]) + hidden,
     }
-    return SurfaceObservation(operator, outputs, _spread(gains, inside), _spread(residuals, inside, np.nan), enough)
+    terms = _spread(model_terms[0].T, inside).T, _spread(model_terms[1], inside)
+    return SurfaceObservation(
+        operator, outputs, _spread(gains, inside), _spread(residuals, inside, np.nan), enough, *terms
+    )
 
 
 def _observe_rings(points: SurfacePoints, radii: tuple[float, ...], operator: str) -> SurfaceObservation:
     """Mean displacement on circles, from local polynomials about each; see `_ring_terms`."""
     frames, count = points.heights.shape
     gains, residuals = np.zeros((frames, len(radii), count)), np.full((frames, count), np.nan)
-    misses = np.full((frames, count), np.inf)
     enough = np.ones(frames, bool)
     spacing = float(np.sqrt(np.median(points.areas)))
+    distance = np.hypot(*points.places.T)
+    nearest = np.argmin(np.abs(distance - np.array(radii)[:, None]), axis=0)
+    local = []
     for k, radius in enumerate(radii):
         band, terms, wanted = _ring_terms(points.places, radius, spacing, points.subset)
         seen = np.isfinite(points.heights[:, band])
         weights, heights = seen * points.areas[band], np.where(seen, points.heights[:, band], 0.0)
         enough &= seen.sum(axis=1) >= max(2 * len(terms), 0.5 * np.count_nonzero(seen.any(axis=0)))
-        all_gains = _gains(np.broadcast_to(terms, (frames, *terms.shape)), weights)
-        gains[:, k, band] = np.einsum("t,ftn->fn", wanted, all_gains)
-        fitted = np.einsum("ftn,fn->ft", all_gains, heights) @ terms
-        nearer = np.abs(np.hypot(*points.places[band].T) - radius) < misses[0, band]
-        there = np.flatnonzero(band)[nearer]
-        residuals[:, there] = np.where(seen, heights - fitted, np.nan)[:, nearer]
-        misses[:, there] = np.abs(np.hypot(*points.places[there].T) - radius)
+        fits = _gains(np.broadcast_to(terms, (frames, *terms.shape)), weights)
+        gains[:, k, band] = np.einsum("t,ftn->fn", wanted, fits)
+        own = nearest[band] == k  # a point between two rings has the residual of the nearer one
+        left = np.where(seen, heights - np.einsum("ftn,fn->ft", fits, heights) @ terms, np.nan)
+        residuals[:, np.flatnonzero(band)[own]] = left[:, own]
+        local.append((_spread(terms * own, band), band, fits))
     filled = np.nan_to_num(points.heights)
     outputs = {
         f"displacement_{k + 1}": np.where(enough, np.einsum("fn,fn->f", gains[:, k], filled), np.nan)
         for k in range(len(radii))
     }
-    return SurfaceObservation(operator, outputs, gains, residuals, enough)
+    greatest = _greatest(outputs["displacement_1"])
+    terms = np.concatenate([part for part, _, _ in local]).T
+    fitted = np.concatenate([_spread(fits[greatest], band) for _, band, fits in local])
+    return SurfaceObservation(operator, outputs, gains, residuals, enough, terms, fitted)
 
 
 def _ring_terms(places: Floats, radius: float, spacing: float, subset: float) -> tuple[Bools, Floats, Floats]:
@@ -258,6 +267,11 @@ def _residual_size(residuals: Floats) -> Floats:
     """(frames,) root mean square, mm."""
     count = np.maximum(np.isfinite(residuals).sum(axis=1), 1)
     return np.asarray(np.sqrt(np.nansum(residuals**2, axis=1) / count))
+
+
+def _greatest(signal: Floats) -> int:
+    """The frame of the greatest signal (frames,), NaN where there is none."""
+    return int(np.argmax(np.where(np.isfinite(signal), np.abs(signal), -1.0)))
 
 
 def _lend_shapes(values: Floats, determined: Bools) -> None:
