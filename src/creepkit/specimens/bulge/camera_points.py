@@ -7,6 +7,8 @@ averages the surface.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
@@ -15,6 +17,7 @@ from creepkit.records import SurfaceObservation, SurfacePoints
 from creepkit.specimens.bulge.field_fit import (
     LOOSE,
     SHAPES,
+    FrameFits,
     fit_frames,
     joint_center,
     model,
@@ -57,6 +60,10 @@ BALANCED_TERMS = {0: 10, 1: 2, 2: 2, 4: 6, 8: 3}
 
 Eq. (7) goes with 4 and 8 times the angle where p is not 2, the others are those of a centre a little off.
 """
+
+
+MISS_FRAMES = 25
+"""Neighbours in time that say together what Eq. (7) misses, as a share of D."""
 
 
 WEIGHT_CHANGE = (0.2, 4.0)
@@ -116,12 +123,12 @@ def _observe_field(points: SurfacePoints, window: float, operator: str) -> Surfa
     places = points.places[inside]
     weights, heights = _weights(distance[inside], points.areas[inside], points.heights[:, inside], window)
     enough = np.count_nonzero(weights, axis=1) >= max(FEWEST_WINDOW_POINTS, 0.5 * np.count_nonzero(weights.any(axis=0)))
-    weights = _balanced(places, weights, points.areas[inside].mean(), window)
+    balance = _Balance.of(places, window, points.areas[inside].mean())
+    weights = balance.weights(weights)
     start = _shared_start(places, heights, weights, points.subset, window)
-    fits = fit_frames(places, heights, weights, start, points.subset, LOOSE)
-    values = np.array(fits.values)
-    if points.subset > 0.0:
-        values = without_smoothing(places, heights, weights, values, points.subset)
+    fits, values = _fitted(places, heights, weights, start, points.subset)
+    weights = balance.weights(weights, *balance.missed(places, heights, weights, values, points.subset))
+    fits, values = _fitted(places, heights, weights, values, points.subset)
     left, columns, surface = smoothing_columns(places, values, points.subset)
     residuals = np.where(weights > 0.0, heights - surface, np.nan)
     gains = _gains(columns, weights, left)
@@ -222,27 +229,95 @@ def _weights(distance: Floats, areas: Floats, heights: Floats, window: float) ->
     return seen * share, np.where(seen, heights, 0.0)
 
 
-def _balanced(places: Floats, weights: Floats, cell: float, window: float) -> Floats:
-    """Weights (frames, points), changed as little as can be, whose sums over the seen points are integrals over the disc.
-
-    places : (points, 2) mm. weights : (frames, points), in units of the area `cell`, mm2. window : mm, of the disc.
+@dataclass(frozen=True)
+class _Balance:
+    """Smooth functions over the disc, whose sums over the points that a frame shows are made their integrals.
 
     What Eq. (7) misses of a surface is balanced over the whole disc, on which a simulation is observed, and would not
-    be where subsets are lost. Sums of smooth functions, as its products with the derivatives of Eq. (7) are, are made
-    right with the seen points alone: calibration of the weights of a sample (Deville and Saerndal, 1992).
+    be where subsets are lost. Weights of the seen points are changed, as little as can be, so that it is: calibration of
+    the weights of a sample (Deville and Saerndal, 1992). No height is put in the place of a lost one.
+
+    terms : (terms, points). wanted : (terms,) their integrals over the area of a point. nodes, shares : (nodes, 2) mm,
+    (nodes,) of a quadrature over an eighth of the disc, all of its area. node_terms : (terms, nodes).
     """
-    x, y = (places / window).T
+
+    terms: Floats
+    wanted: Floats
+    nodes: Floats
+    shares: Floats
+    node_terms: Floats
+
+    @classmethod
+    def of(cls, places: Floats, window: float, cell: float) -> _Balance:
+        """For points at places (points, 2) mm, cell mm2 each on average, in a disc of the radius window, mm."""
+        (u, along), (v, around) = np.polynomial.legendre.leggauss(20), np.polynomial.legendre.leggauss(10)
+        r, angle = (grid.ravel() for grid in np.meshgrid(window * np.sqrt(0.5 * (u + 1.0)), np.pi / 8.0 * (v + 1.0)))
+        nodes = np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1)
+        shares = np.pi * window**2 / cell * np.outer(around, along).ravel() / 4.0
+        terms = _smooth_terms(places / window)
+        wanted = np.zeros(len(terms))
+        wanted[0] = shares.sum()  # the others have no mean over the disc
+        return cls(terms, wanted, nodes, shares, _smooth_terms(nodes / window))
+
+    def weights(self, weights: Floats, more: Floats | None = None, wanted: Floats | None = None) -> Floats:
+        """Weights (frames, points) for these terms, and more (frames, terms, points) with integrals (frames, terms)."""
+        result = np.array(weights)
+        for k, row in enumerate(weights):
+            terms = self.terms if more is None else np.concatenate([self.terms, more[k]])
+            goal = self.wanted if wanted is None else np.concatenate([self.wanted, wanted[k]])
+            factor = np.linalg.lstsq((terms * row) @ terms.T, goal - terms @ row, rcond=1e-6)[0] @ terms
+            result[k] = row * np.clip(1.0 + factor, *WEIGHT_CHANGE)
+        return result
+
+    def missed(
+        self, places: Floats, heights: Floats, weights: Floats, values: Floats, subset: float
+    ) -> tuple[Floats, Floats]:
+        """What the fits miss, in these terms, times what it is weighed with, (frames, 3, points); integrals (frames, 3)."""
+        left, _, surface = smoothing_columns(places, values, subset)
+        normal = np.matmul(self.terms * weights[:, None, :], self.terms.T)
+        missed = np.matmul(np.where(weights > 0.0, heights - surface, 0.0) * weights, self.terms.T)
+        factors = np.einsum("fij,fj->fi", np.linalg.pinv(normal, rcond=1e-6, hermitian=True), missed)
+        factors = _shared_by_neighbours(factors, values[:, :1])
+        products = left * (factors @ self.terms)[:, None, :]
+        size = np.maximum(np.abs(products).max(axis=2), 1e-300)
+        over_disc = smoothing_columns(self.nodes, values, subset)[0] * (factors @ self._even_node_terms)[:, None, :]
+        return products / size[:, :, None], over_disc @ self.shares / size
+
+    @property
+    def _even_node_terms(self) -> Floats:
+        """The terms on the quadrature's nodes, but those that change sign over the disc: with even ones they have no sum."""
+        even = np.concatenate([[k % 4 == 0] * (2 * count) for k, count in BALANCED_TERMS.items()])
+        return self.node_terms * even[:, None]
+
+
+def _shared_by_neighbours(factors: Floats, amplitudes: Floats) -> Floats:
+    """Factors (frames, terms) proportional to amplitudes (frames, 1) among MISS_FRAMES neighbours, by least squares.
+
+    The noise of a frame must not change its own weights.
+    """
+    ends = np.clip(np.arange(len(factors))[:, None] + MISS_FRAMES * np.array([-0.5, 0.5]) + 0.5, 0, len(factors))
+    first, last = ends.astype(int).T
+    sums = [np.concatenate([np.zeros((1, part.shape[1])), np.cumsum(part, axis=0)]) for part in
+            (amplitudes * factors, amplitudes**2)]
+    top, bottom = (total[last] - total[first] for total in sums)
+    return np.asarray(amplitudes * top / np.maximum(bottom, 1e-300))
+
+
+def _smooth_terms(places: Floats) -> Floats:
+    """(terms, points) at places (points, 2) in radii of the disc; the first is 1."""
+    x, y = places.T
     turned = (x + 1j * y) ** np.arange(9)[:, None]
     radial = np.polynomial.legendre.legvander(2.0 * (x**2 + y**2) - 1.0, max(BALANCED_TERMS.values()) - 1).T
     parts = [part * radial[:count] for k, count in BALANCED_TERMS.items() for part in (turned[k].real, turned[k].imag)]
-    terms = np.concatenate(parts)
-    wanted = np.zeros(len(terms))
-    wanted[0] = np.pi * window**2 / cell  # the others have no mean over the disc
-    result = np.array(weights)
-    for k, row in enumerate(weights):
-        factor = np.linalg.lstsq((terms * row) @ terms.T, wanted - terms @ row, rcond=1e-6)[0] @ terms
-        result[k] = row * np.clip(1.0 + factor, *WEIGHT_CHANGE)
-    return result
+    return np.concatenate(parts)
+
+
+def _fitted(places: Floats, heights: Floats, weights: Floats, start: Floats, subset: float) -> tuple[FrameFits, Floats]:
+    """The fit of each frame, and D, ln S, ln p (frames, 3) without the smoothing of subsets."""
+    fits = fit_frames(places, heights, weights, start, subset, LOOSE)
+    if subset == 0.0:
+        return fits, np.array(fits.values)
+    return fits, without_smoothing(places, heights, weights, fits.values, subset)
 
 
 def _shared_start(places: Floats, heights: Floats, weights: Floats, subset: float, window: float) -> Floats:
