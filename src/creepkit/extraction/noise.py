@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -251,15 +252,19 @@ def _block_covariance(
     used = np.abs(gains).max(axis=(0, 1)) > 0.0
     numbers = patch_numbers(fields.places[used], patch)
     total = patch_covariance(gains[:, :, used], fields.loaded[:, used], numbers)
-    edges = rho.lost_factors(
-        gains[reference][:, used], fields.places[used], numbers, seen.terms[used], seen.fitted[:, used]
-    )
+    places, errors = fields.places[used], fields.loaded[:, used]
+    kept = rho.kept_by_residuals(gains[reference][:, used], places, numbers, seen.terms[used], seen.fitted[:, used])
+    by_patches = total / np.sqrt(np.maximum(kept.within[:, None] * kept.within, 1e-300))
+    squares = gains[reference][:, used] ** 2
+    variance = (squares @ (errors**2).mean(axis=0)) / np.maximum(squares @ kept.variance, 1e-300)
+    by_correlation = np.matmul(np.matmul(gains[:, :, used], rho.matrix(places)), gains[:, :, used].transpose(0, 2, 1))
+    shares = np.sqrt(kept.within), np.sqrt(1.0 - kept.within)
+    scale = np.sqrt(variance) * shares[1]
+    total = by_patches * shares[0][:, None] * shares[0] + by_correlation * scale[:, None] * scale
     plane = np.stack([np.ones(len(fields.places)), fields.places[:, 1], -fields.places[:, 0]])
     tilts = np.matmul(gains, plane.T)
     covariance = clamped_covariance(fields.clamped, fields.clamped_places, patch, rho)
-    return np.asarray(
-        total * edges[:, None] * edges + np.matmul(np.matmul(tilts, covariance), tilts.transpose(0, 2, 1))
-    )
+    return np.asarray(total + np.matmul(np.matmul(tilts, covariance), tilts.transpose(0, 2, 1)))
 
 
 def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: SpatialCorrelation) -> Floats:
@@ -268,8 +273,8 @@ def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: Spatia
     errors : (fields, points) mm of the clamped plate, at places (points, 2) mm.
     """
     gains, numbers = rigid_gains(places), patch_numbers(places, patch)
-    edges = rho.lost_factors(gains, places, numbers, np.linalg.pinv(gains), gains)
-    return np.asarray(patch_covariance(gains[None], errors, numbers)[0] * edges[:, None] * edges)
+    within = rho.kept_by_residuals(gains, places, numbers, np.linalg.pinv(gains), gains).within
+    return np.asarray(patch_covariance(gains[None], errors, numbers)[0] / np.sqrt(within[:, None] * within))
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,8 +293,10 @@ class SpatialCorrelation:
         distance = np.hypot(*(places[:, None] - places[None, :]).T)
         return np.asarray(np.interp(distance / self.spacing, np.arange(values.size), values, right=0.0))
 
-    def lost_factors(self, gains: Floats, places: Floats, numbers: Ints, terms: Floats, fitted: Floats) -> Floats:
-        """(outputs,) by how much standard deviations from patches of residuals are too small for such errors.
+    def kept_by_residuals(
+        self, gains: Floats, places: Floats, numbers: Ints, terms: Floats, fitted: Floats
+    ) -> KeptByResiduals:
+        """What patches of residuals show of errors with this correlation.
 
         The fit has taken a part of the errors from the residuals, and neighbours across the edges of patches err
         together; both are worked out exactly for a linear fit.
@@ -302,7 +309,14 @@ class SpatialCorrelation:
         taken = fitted @ C
         residual = C - terms @ taken - (terms @ taken).T + terms @ (taken @ fitted.T) @ terms.T
         within = np.einsum("oi,oi->o", gains @ np.where(numbers[:, None] == numbers, residual, 0.0), gains)
-        return np.asarray(np.sqrt(np.clip(whole / np.maximum(within, 1e-300), 1.0, 25.0)))
+        return KeptByResiduals(np.clip(within / np.maximum(whole, 1e-300), 0.02, 1.0), np.diag(residual))
+
+
+class KeptByResiduals(NamedTuple):
+    """What residuals show of errors: within (outputs,) of the variance of an output, variance (points,) of a point."""
+
+    within: Floats
+    variance: Floats
 
 
 def patch_covariance(gains: Floats, errors: Floats, numbers: Ints) -> Floats:

@@ -71,7 +71,7 @@ def test_patches_give_the_scatter_of_a_fit_to_correlated_errors():
     numbers = patch_numbers(places, 3.0)
     stated = np.sqrt(np.diag(patch_covariance(gains[None], residuals, numbers)[0]))
     assert stated[0] < 0.8 * truth[0]  # what the fit took
-    np.testing.assert_allclose(stated * rho.lost_factors(gains, places, numbers, columns, gains), truth, rtol=0.12)
+    np.testing.assert_allclose(stated / np.sqrt(rho.kept_by_residuals(gains, places, numbers, columns, gains).within), truth, rtol=0.12)
 
 
 def test_gains_of_the_clamped_plate_are_shift_and_small_rotations():
