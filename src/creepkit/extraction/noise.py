@@ -113,10 +113,9 @@ def estimate_noise(
     enough = len(fields.rest) >= FEWEST_REST_FRAMES
     # The clamped plate lost the least to a fit: three numbers over its whole area.
     rho = autocorrelation(fields.clamped, fields.clamped_places, spacing)
-    length = correlation_length(rho, spacing)
-    patch = max(2.0 * length, 3.0 * spacing)
+    patch = max(2.0 * rho.length, 3.0 * spacing)
     reference = int(np.nanargmax(np.where(np.isfinite(signal), np.abs(signal), -1.0)))
-    by_blocks = _block_covariance(seen, fields, patch, SpatialCorrelation(rho, spacing), reference)
+    by_blocks = _block_covariance(seen, fields, patch, rho, reference)
     at_rest = _rest_covariance(gains, fields.rest) if enough else np.full_like(by_blocks, np.nan)
     growth = _growth(fields, len(gains), enough)
     if enough:
@@ -137,7 +136,7 @@ def estimate_noise(
         rest_sd=_medians(names, at_rest[some]),
         block_sd=_medians(names, by_blocks[some]),
         point_sd=_point_sd(source),
-        correlation_length=length,
+        correlation_length=rho.length,
         patch=patch,
         lag_one=lag_one,
         integral_frames=integral,
@@ -181,13 +180,13 @@ def smooth_free(values: Floats, positions: Floats | None = None) -> Floats:
     return np.asarray(np.where(seen, left - smooth, 0.0) / np.sqrt(np.maximum(1.0 - taken, 0.2))[:, None])
 
 
-def autocorrelation(fields: Floats, places: Floats, spacing: float) -> Floats:
-    """(lags,) mean correlation of errors at 0, 1 ... 12 spacings of distance; 1 at the first.
+def autocorrelation(fields: Floats, places: Floats, spacing: float) -> SpatialCorrelation:
+    """Mean correlation of errors at about 0, 1 ... 12 spacings of distance; 1 at the first.
 
     fields : (fields, points) mm, zeros where lost. places : (points, 2) mm. spacing : mm.
     """
     if len(fields) < 2 or not np.abs(fields).max() > 0.0:
-        return np.asarray(np.eye(1, LAGS)[0])
+        return SpatialCorrelation(np.eye(1, LAGS)[0], spacing * np.arange(LAGS))
     chosen = np.arange(len(places))
     if chosen.size > 800:  # the middle ones, so that neighbours stay neighbours
         chosen = np.argsort(np.hypot(*(places - np.median(places, axis=0)).T))[:800]
@@ -196,19 +195,12 @@ def autocorrelation(fields: Floats, places: Floats, spacing: float) -> Floats:
     bins = np.round(distance / spacing).astype(int)
     seen = (E != 0.0).astype(float)
     near = bins < LAGS
-    sums = np.bincount(bins[near], (E.T @ E)[near], LAGS)
-    count = np.bincount(bins[near], (seen.T @ seen)[near], LAGS)
-    rho = sums / np.maximum(count, 1.0)
-    return np.asarray(rho / (rho[0] if rho[0] > 0.0 else 1.0))
-
-
-def correlation_length(rho: Floats, spacing: float) -> float:
-    """mm at which the autocorrelation has fallen to LEAST_CORRELATION; rho : (lags,). Twelve spacings at most."""
-    below = np.flatnonzero(rho < LEAST_CORRELATION)
-    if not below.size:
-        return (LAGS - 1) * spacing
-    k = int(below[0])
-    return spacing * float(k - 1 + (rho[k - 1] - LEAST_CORRELATION) / max(rho[k - 1] - rho[k], 1e-12))
+    pairs = (seen.T @ seen)[near]
+    count = np.maximum(np.bincount(bins[near], pairs, LAGS), 1.0)
+    rho = np.bincount(bins[near], (E.T @ E)[near], LAGS) / count
+    apart = np.bincount(bins[near], distance[near] * pairs, LAGS) / count  # neighbours across a cell are farther
+    apart = np.where(apart > 0.0, apart, spacing * np.arange(LAGS))
+    return SpatialCorrelation(rho / (rho[0] if rho[0] > 0.0 else 1.0), apart)
 
 
 def time_correlation(errors: Floats) -> tuple[float, float]:
@@ -279,19 +271,29 @@ def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: Spatia
 
 @dataclass(frozen=True, eq=False)
 class SpatialCorrelation:
-    """Autocorrelation of errors in space: values (lags,) at whole spacings, mm."""
+    """Autocorrelation of errors in space: values (lags,) at distances (lags,) mm."""
 
     values: Floats
-    spacing: float
+    distances: Floats
+
+    @property
+    def length(self) -> float:
+        """The distance, mm, at which it has fallen to LEAST_CORRELATION; the last distance at most."""
+        rho, below = self.values, np.flatnonzero(self.values < LEAST_CORRELATION)
+        if not below.size:
+            return float(self.distances[-1])
+        k = int(below[0])
+        share = (rho[k - 1] - LEAST_CORRELATION) / max(rho[k - 1] - rho[k], 1e-12)
+        return float(self.distances[k - 1] + share * (self.distances[k] - self.distances[k - 1]))
 
     def matrix(self, places: Floats) -> Floats:
-        """(points, points) of places (points, 2) mm; nothing from the first lag without correlation on."""
+        """(points, points) of places (points, 2) mm; nothing from the first distance without correlation on."""
         below = np.flatnonzero(self.values < 0.02)
         values = np.array(self.values)
         if below.size:
             values[below[0] :] = 0.0
         distance = np.hypot(*(places[:, None] - places[None, :]).T)
-        return np.asarray(np.interp(distance / self.spacing, np.arange(values.size), values, right=0.0))
+        return np.asarray(np.interp(distance, self.distances, values, right=0.0))
 
     def kept_by_residuals(
         self, gains: Floats, places: Floats, numbers: Ints, terms: Floats, fitted: Floats

@@ -7,7 +7,6 @@ from scipy.spatial.transform import Rotation
 
 from creepkit.extraction.frame_checks import frames_at_rest
 from creepkit.extraction.noise import (
-    SpatialCorrelation,
     autocorrelation,
     patch_covariance,
     patch_numbers,
@@ -67,7 +66,7 @@ def test_patches_give_the_scatter_of_a_fit_to_correlated_errors():
     gains = np.linalg.pinv(columns)
     truth = (errors @ gains.T).std(axis=0)
     residuals = errors - errors @ gains.T @ columns.T
-    rho = SpatialCorrelation(autocorrelation(residuals, places, 0.5), 0.5)
+    rho = autocorrelation(residuals, places, 0.5)
     numbers = patch_numbers(places, 3.0)
     stated = np.sqrt(np.diag(patch_covariance(gains[None], residuals, numbers)[0]))
     assert stated[0] < 0.8 * truth[0]  # what the fit took

@@ -127,7 +127,7 @@ def _observe_field(points: SurfacePoints, window: float, operator: str) -> Surfa
     weights = balance.weights(weights)
     start = _shared_start(places, heights, weights, points.subset, window)
     fits, values = _fitted(places, heights, weights, start, points.subset)
-    weights = balance.weights(weights, *balance.missed(places, heights, weights, values, points.subset))
+    weights = balance.weights(weights, *balance.missed(places, heights, weights, values, points.subset, enough))
     fits, values = _fitted(places, heights, weights, values, points.subset)
     left, columns, surface = smoothing_columns(places, values, points.subset)
     residuals = np.where(weights > 0.0, heights - surface, np.nan)
@@ -270,14 +270,20 @@ class _Balance:
         return result
 
     def missed(
-        self, places: Floats, heights: Floats, weights: Floats, values: Floats, subset: float
+        self, places: Floats, heights: Floats, weights: Floats, values: Floats, subset: float, enough: Bools
     ) -> tuple[Floats, Floats]:
-        """What the fits miss, in these terms, times what it is weighed with, (frames, 3, points); integrals (frames, 3)."""
+        """What the fits miss, in these terms, times what it is weighed with, (frames, 3, points); integrals (frames, 3).
+
+        enough : (frames,) which have points enough for it; those without a bulge above the noise have no part in it.
+        """
         left, _, surface = smoothing_columns(places, values, subset)
         normal = np.matmul(self.terms * weights[:, None, :], self.terms.T)
-        missed = np.matmul(np.where(weights > 0.0, heights - surface, 0.0) * weights, self.terms.T)
+        residuals = np.where(weights > 0.0, heights - surface, 0.0)
+        missed = np.matmul(residuals * weights, self.terms.T)
         factors = np.einsum("fij,fj->fi", np.linalg.pinv(normal, rcond=1e-6, hermitian=True), missed)
-        factors = _shared_by_neighbours(factors, values[:, :1])
+        size = np.sqrt((residuals**2).sum(axis=1) / np.maximum(np.count_nonzero(weights, axis=1), 1))
+        shown = enough & (np.abs(values[:, 0]) > 3.0 * size)
+        factors = _shared_by_neighbours(factors, np.where(shown, values[:, 0], 0.0)[:, None])
         products = left * (factors @ self.terms)[:, None, :]
         size = np.maximum(np.abs(products).max(axis=2), 1e-300)
         over_disc = smoothing_columns(self.nodes, values, subset)[0] * (factors @ self._even_node_terms)[:, None, :]
@@ -293,12 +299,12 @@ class _Balance:
 def _shared_by_neighbours(factors: Floats, amplitudes: Floats) -> Floats:
     """Factors (frames, terms) proportional to amplitudes (frames, 1) among MISS_FRAMES neighbours, by least squares.
 
-    The noise of a frame must not change its own weights.
+    The noise of a frame must not change its own weights. A frame of amplitude 0 has no part in it.
     """
     ends = np.clip(np.arange(len(factors))[:, None] + MISS_FRAMES * np.array([-0.5, 0.5]) + 0.5, 0, len(factors))
     first, last = ends.astype(int).T
-    sums = [np.concatenate([np.zeros((1, part.shape[1])), np.cumsum(part, axis=0)]) for part in
-            (amplitudes * factors, amplitudes**2)]
+    parts = amplitudes * factors, amplitudes**2
+    sums = [np.concatenate([np.zeros((1, part.shape[1])), np.cumsum(part, axis=0)]) for part in parts]
     top, bottom = (total[last] - total[first] for total in sums)
     return np.asarray(amplitudes * top / np.maximum(bottom, 1e-300))
 
