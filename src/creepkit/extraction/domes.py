@@ -27,16 +27,52 @@ LEAST_COVERAGE = 0.75
 Centers = Mapping[str, tuple[float, float]] | Sequence[tuple[float, float]]
 
 
-def find_domes(frames: Frames, plate: ReferencePlate, region: SurfaceRegion) -> dict[str, Floats]:
-    """Centres {name: (2,) mm in the plate}, named D1, D2 ... row by row from the top, each from left to right.
+class Found(NamedTuple):
+    """Test pieces in the field of view: the plate, turned over where they fall in it, and {name: (2,) mm in it}."""
+
+    plate: ReferencePlate
+    centers: dict[str, Floats]
+
+
+def find_domes(frames: Frames, plate: ReferencePlate, region: SurfaceRegion) -> Found:
+    """Domes, named D1, D2 ... row by row from the top, each from left to right.
 
     The frame among some late ones that shows most is searched: heights are averaged over a disc of half the radius
     that moves, and a maximum counts that stands out of the plate and lies nearer than that radius to no higher one.
+    Surfaces rise towards the cameras: where more falls than rises, z points away from them.
     """
-    best: list[tuple[float, Floats]] = []
-    fell = False
-    count = len(frames)
-    discs = _discs(plate, region)
+    late = _late_frames(frames, plate)
+    over = plate.turned_over()
+    found = {side.turned: _highest_domes(late, side, region) for side in (plate, over)}
+    side = max((plate, over), key=lambda one: sum(height for height, _ in found[one.turned]))
+    if not found[side.turned]:
+        raise HistoryError(
+            f"frames '{frames.name}': no dome of about {region.moving:g} mm radius stands out of the noise in the late "
+            "frames; give its centre"
+        )
+    return Found(side, _named([place for _, place in found[side.turned]], region.moving))
+
+
+def place_centers(frames: Frames, plate: ReferencePlate, region: SurfaceRegion, centers: Centers) -> Found:
+    """Given centres, in the plate turned over where the middles about them fall in the last frame that can be read."""
+    over = plate.turned_over()
+    for moved, valid in _late_frames(frames, plate):
+        heights = _heights(plate, moved, valid)
+        noise = 1.4826 * float(np.median(np.abs(heights)))
+        near = [
+            np.hypot(*(plate.places[valid, :2] - center).T) < 0.3 * region.moving
+            for center in given_centers(centers, plate).values()
+        ]
+        middles = [float(heights[some].mean()) for some in near if some.any()]
+        if middles and max(map(abs, middles)) > LEAST_HEIGHT * noise / np.sqrt(max(min(map(np.sum, near)), 1)):
+            side = over if sum(middles) < 0.0 else plate
+            return Found(side, given_centers(centers, side))
+    return Found(plate, given_centers(centers, plate))
+
+
+def _late_frames(frames: Frames, plate: ReferencePlate) -> list[tuple[Floats, Bools]]:
+    """Displacements (points, 3) mm and validity (points,) of some late frames that can be read, the last first."""
+    read, count = [], len(frames)
     for index in dict.fromkeys(int(k) for k in (count - 1, 0.95 * count, 0.75 * count, 0.5 * count)):
         if index <= plate.index or index < 0:
             continue
@@ -44,19 +80,17 @@ def find_domes(frames: Frames, plate: ReferencePlate, region: SurfaceRegion) -> 
             moved, valid = aligned_frame(frames[index], plate)
         except (CreepkitError, OSError):
             continue
-        if valid.sum() < 0.5 * plate.known.sum():
-            continue
-        domes, negative = _domes_of(plate, moved, valid, region, discs)
-        fell |= negative
-        if sum(height for height, _ in domes) > sum(height for height, _ in best):
-            best = domes
-    if not best:
-        way = "; it moves away from the cameras: turn the z axis of the frames" if fell else ""
-        raise HistoryError(
-            f"frames '{frames.name}': no dome of about {region.moving:g} mm radius stands out of the noise in the late "
-            f"frames{way or '; give its centre'}"
-        )
-    return _named([place for _, place in best], region.moving)
+        if valid.sum() >= 0.5 * plate.known.sum():
+            read.append((moved, valid))
+    return read
+
+
+def _highest_domes(
+    late: Sequence[tuple[Floats, Bools]], plate: ReferencePlate, region: SurfaceRegion
+) -> list[tuple[float, Floats]]:
+    discs = _discs(plate, region)
+    found = [_domes_of(plate, moved, valid, region, discs) for moved, valid in late]
+    return max(found, key=lambda domes: sum(height for height, _ in domes), default=[])
 
 
 def given_centers(centers: Centers, plate: ReferencePlate) -> dict[str, Floats]:
@@ -98,12 +132,9 @@ def _discs(plate: ReferencePlate, region: SurfaceRegion) -> _Discs:
 
 def _domes_of(
     plate: ReferencePlate, moved: Floats, valid: Bools, region: SurfaceRegion, discs: _Discs
-) -> tuple[list[tuple[float, Floats]], bool]:
-    """Heights in mm and centres of domes; and whether something fell instead."""
-    places = plate.places[valid]
-    risen = places + moved[valid] @ plate.axes.axes.T
-    heights = plate_axes(risen).places(risen)[:, 2]
-    heights = heights - plate_axes(places).places(places)[:, 2]  # what is not flat at rest is no dome
+) -> list[tuple[float, Floats]]:
+    """Heights in mm and centres of domes."""
+    places, heights = plate.places[valid], _heights(plate, moved, valid)
     field = np.zeros(len(valid))
     field[valid] = heights
     radius = 0.5 * region.moving
@@ -126,8 +157,15 @@ def _domes_of(
             place, sums[k], candidates, sums, region.moving
         ):
             domes.append((float(sums[k]), _center_of_mass(place, places, heights, region.moving)))
-    complete = [dome for dome in domes if _coverage(dome[1], plate, region.moving) >= LEAST_COVERAGE]
-    return complete, bool(sums.size and -sums.min() > max(LEAST_HEIGHT * scale, 2.0 * sums.max()))
+    return [dome for dome in domes if _coverage(dome[1], plate, region.moving) >= LEAST_COVERAGE]
+
+
+def _heights(plate: ReferencePlate, moved: Floats, valid: Bools) -> Floats:
+    """(valid points,) mm above the plane that the plate has moved to, less those at rest."""
+    places = plate.places[valid]
+    risen = places + moved[valid] @ plate.axes.axes.T
+    # What is not flat at rest is no dome.
+    return np.asarray(plate_axes(risen).places(risen)[:, 2] - plate_axes(places).places(places)[:, 2])
 
 
 def _is_summit(place: Floats, height: float, candidates: Floats, heights: Floats, reach: float) -> bool:

@@ -9,14 +9,13 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, HistoryError
-from creepkit.extraction.domes import Centers, find_domes, given_centers
+from creepkit.extraction.domes import Centers, find_domes, place_centers
 from creepkit.extraction.extraction import Extraction, FieldMap, PlateMotion
 from creepkit.extraction.frame_checks import fit_flags, frames_at_rest, motion_flags, read_flags, residual_flags
 from creepkit.extraction.noise import (
     NOISE_FRAMES,
     ErrorFields,
     NoiseEstimate,
-    SpatialCorrelation,
     autocorrelation,
     clamped_covariance,
     estimate_noise,
@@ -91,7 +90,9 @@ def extract_surfaces(
     _check(frames, subset)
     region = specimen.surface_region
     plate = reference_plate(frames)
-    found = find_domes(frames, plate, region) if centers is None else given_centers(centers, plate)
+    plate, found = (
+        find_domes(frames, plate, region) if centers is None else place_centers(frames, plate, region, centers)
+    )
     groups = [_group(plate, center, region, list(found.values()), name) for name, center in found.items()]
     read = read_series(frames, plate, groups)
     request = ExtractionRequest(operator or region.operator, rest, subset, load, centers is not None)
@@ -182,7 +183,7 @@ def _extract_one(
     fields, shown = _error_fields(
         seen, taken, centred, good, rest, loaded[good[loaded]], places[clamped] - np.r_[center, 0.0]
     )
-    noise = estimate_noise(names, seen.gains, fields, np.where(good, signal, np.nan), shown, plate.spacing)
+    noise = estimate_noise(seen, fields, np.where(good, signal, np.nan), shown, plate.spacing)
     # Points of overlapping subsets err together: the centre of independent ones is known less well by as much.
     inflation = np.sqrt(max(1.0, np.pi * noise.correlation_length**2 / plate.spacing**2))
     motion = PlateMotion(
@@ -218,6 +219,7 @@ def _extract_one(
         maps=_maps(taken.heights, seen, surface, good, rest),
         spacing=plate.spacing,
         first_time=float(frames.times[0]),
+        turned=plate.turned,
     )
 
 
@@ -337,7 +339,7 @@ def _positions(signal: Floats) -> Floats:
 def _motion_errors(taken: TakenOff, fields: ErrorFields, noise: NoiseEstimate, spacing: float) -> Floats:
     """(6,) standard errors of one frame's translations and rotations: along z and about x and y by patches."""
     places = fields.clamped_places
-    rho = SpatialCorrelation(autocorrelation(fields.clamped, places, spacing), spacing)
+    rho = autocorrelation(fields.clamped, places, spacing)
     out = np.sqrt(np.diag(clamped_covariance(fields.clamped, places, noise.patch, rho)))
     single = np.median(taken.motion.residual_sd, axis=0)
     independent = np.sqrt(len(places) / max(1.0, np.pi * (0.5 * noise.patch) ** 2 / _cell(places)))

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+TURNED = "z of the frames points away from the cameras, for the surface moves along -z; heights are counted against it"
+"""What is assumed of frames in which the surface falls."""
+
+
 class PlateMotion(NamedTuple):
     """Rigid motion of the clamped plate about the centre of a test piece.
 
@@ -61,7 +65,8 @@ class Extraction(Presentable):
     zeros where it was given. center_given : whether it was. region : which part moves and which is held. subset : mm,
     side of the mean that was taken out. motion, noise : see there. residual : (frames,) mm, root mean square over the
     operator's points. places : (points, 2) mm about the centre, in the plate; clamped : (points,) which of them gave
-    the motion. maps : some frames for a picture. spacing : mm of points. history : the test as creepkit identifies
+    the motion. maps : some frames for a picture. spacing : mm of points. turned : whether the z of the frames was taken
+    to point away from the cameras. history : the test as creepkit identifies
     from it, where loading and temperature were given; `history_under` makes one.
     """
 
@@ -88,6 +93,7 @@ class Extraction(Presentable):
     maps: tuple[FieldMap, ...]
     spacing: float
     first_time: float = 0.0
+    turned: bool = False
     history: History | None = field(default=None)
 
     def __post_init__(self) -> None:
@@ -123,6 +129,8 @@ class Extraction(Presentable):
             )
         record = constant_load(self.load_name, loading) if isinstance(loading, int | float) else loading
         labels = {"place": self.name, "extraction": _label(self)}
+        if self.turned:
+            labels["assumed"] = TURNED
         if not after.all():
             labels["frames_before_time_zero"] = str(np.count_nonzero(~after))
         if (missing := np.flatnonzero(after & ~complete)).size:

@@ -19,10 +19,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints, frozen
+from creepkit.records import SurfaceObservation
 
 PATCHES_WEIGHT = 40
 """Frames at rest that the covariance from patches counts for in the mean of both.
@@ -100,20 +102,20 @@ class ErrorFields:
 
 
 def estimate_noise(
-    names: Sequence[str], gains: Floats, fields: ErrorFields, signal: Floats, shown: Bools, spacing: float
+    seen: SurfaceObservation, fields: ErrorFields, signal: Floats, shown: Bools, spacing: float
 ) -> NoiseEstimate:
-    """The noise of outputs.
+    """The noise of the outputs of an observation.
 
-    gains : (frames, outputs, points) to heights. signal : (frames,) the leading output, for the correlation in time
+    signal : (frames,) the leading output, for the correlation in time
     where there are no frames at rest. shown : (frames, outputs) which outputs a frame shows. spacing : mm of points.
     """
+    names, gains = tuple(seen.outputs), seen.gains
     enough = len(fields.rest) >= FEWEST_REST_FRAMES
     # The clamped plate lost the least to a fit: three numbers over its whole area.
     rho = autocorrelation(fields.clamped, fields.clamped_places, spacing)
-    length = correlation_length(rho, spacing)
-    patch = max(2.0 * length, 3.0 * spacing)
+    patch = max(2.0 * rho.length, 3.0 * spacing)
     reference = int(np.nanargmax(np.where(np.isfinite(signal), np.abs(signal), -1.0)))
-    by_blocks = _block_covariance(gains, fields, patch, SpatialCorrelation(rho, spacing), reference)
+    by_blocks = _block_covariance(seen, fields, patch, rho, reference)
     at_rest = _rest_covariance(gains, fields.rest) if enough else np.full_like(by_blocks, np.nan)
     growth = _growth(fields, len(gains), enough)
     if enough:
@@ -134,7 +136,7 @@ def estimate_noise(
         rest_sd=_medians(names, at_rest[some]),
         block_sd=_medians(names, by_blocks[some]),
         point_sd=_point_sd(source),
-        correlation_length=length,
+        correlation_length=rho.length,
         patch=patch,
         lag_one=lag_one,
         integral_frames=integral,
@@ -178,13 +180,13 @@ def smooth_free(values: Floats, positions: Floats | None = None) -> Floats:
     return np.asarray(np.where(seen, left - smooth, 0.0) / np.sqrt(np.maximum(1.0 - taken, 0.2))[:, None])
 
 
-def autocorrelation(fields: Floats, places: Floats, spacing: float) -> Floats:
-    """(lags,) mean correlation of errors at 0, 1 ... 12 spacings of distance; 1 at the first.
+def autocorrelation(fields: Floats, places: Floats, spacing: float) -> SpatialCorrelation:
+    """Mean correlation of errors at about 0, 1 ... 12 spacings of distance; 1 at the first.
 
     fields : (fields, points) mm, zeros where lost. places : (points, 2) mm. spacing : mm.
     """
     if len(fields) < 2 or not np.abs(fields).max() > 0.0:
-        return np.asarray(np.eye(1, LAGS)[0])
+        return SpatialCorrelation(np.eye(1, LAGS)[0], spacing * np.arange(LAGS))
     chosen = np.arange(len(places))
     if chosen.size > 800:  # the middle ones, so that neighbours stay neighbours
         chosen = np.argsort(np.hypot(*(places - np.median(places, axis=0)).T))[:800]
@@ -193,19 +195,12 @@ def autocorrelation(fields: Floats, places: Floats, spacing: float) -> Floats:
     bins = np.round(distance / spacing).astype(int)
     seen = (E != 0.0).astype(float)
     near = bins < LAGS
-    sums = np.bincount(bins[near], (E.T @ E)[near], LAGS)
-    count = np.bincount(bins[near], (seen.T @ seen)[near], LAGS)
-    rho = sums / np.maximum(count, 1.0)
-    return np.asarray(rho / (rho[0] if rho[0] > 0.0 else 1.0))
-
-
-def correlation_length(rho: Floats, spacing: float) -> float:
-    """mm at which the autocorrelation has fallen to LEAST_CORRELATION; rho : (lags,). Twelve spacings at most."""
-    below = np.flatnonzero(rho < LEAST_CORRELATION)
-    if not below.size:
-        return (LAGS - 1) * spacing
-    k = int(below[0])
-    return spacing * float(k - 1 + (rho[k - 1] - LEAST_CORRELATION) / max(rho[k - 1] - rho[k], 1e-12))
+    pairs = (seen.T @ seen)[near]
+    count = np.maximum(np.bincount(bins[near], pairs, LAGS), 1.0)
+    rho = np.bincount(bins[near], (E.T @ E)[near], LAGS) / count
+    apart = np.bincount(bins[near], distance[near] * pairs, LAGS) / count  # neighbours across a cell are farther
+    apart = np.where(apart > 0.0, apart, spacing * np.arange(LAGS))
+    return SpatialCorrelation(rho / (rho[0] if rho[0] > 0.0 else 1.0), apart)
 
 
 def time_correlation(errors: Floats) -> tuple[float, float]:
@@ -242,19 +237,26 @@ def rigid_gains(places: Floats) -> Floats:
 
 
 def _block_covariance(
-    gains: Floats, fields: ErrorFields, patch: float, rho: SpatialCorrelation, reference: int
+    seen: SurfaceObservation, fields: ErrorFields, patch: float, rho: SpatialCorrelation, reference: int
 ) -> Floats:
     """(frames, outputs, outputs): squares of what each patch contributes, of points and of the clamped plate."""
+    gains = seen.gains
     used = np.abs(gains).max(axis=(0, 1)) > 0.0
     numbers = patch_numbers(fields.places[used], patch)
     total = patch_covariance(gains[:, :, used], fields.loaded[:, used], numbers)
-    edges = rho.lost_factors(gains[reference][:, used], fields.places[used], numbers)
+    places, errors = fields.places[used], fields.loaded[:, used]
+    kept = rho.kept_by_residuals(gains[reference][:, used], places, numbers, seen.terms[used], seen.fitted[:, used])
+    by_patches = total / np.sqrt(np.maximum(kept.within[:, None] * kept.within, 1e-300))
+    squares = gains[reference][:, used] ** 2
+    variance = (squares @ (errors**2).mean(axis=0)) / np.maximum(squares @ kept.variance, 1e-300)
+    by_correlation = np.matmul(np.matmul(gains[:, :, used], rho.matrix(places)), gains[:, :, used].transpose(0, 2, 1))
+    shares = np.sqrt(kept.within), np.sqrt(1.0 - kept.within)
+    scale = np.sqrt(variance) * shares[1]
+    total = by_patches * shares[0][:, None] * shares[0] + by_correlation * scale[:, None] * scale
     plane = np.stack([np.ones(len(fields.places)), fields.places[:, 1], -fields.places[:, 0]])
     tilts = np.matmul(gains, plane.T)
     covariance = clamped_covariance(fields.clamped, fields.clamped_places, patch, rho)
-    return np.asarray(
-        total * edges[:, None] * edges + np.matmul(np.matmul(tilts, covariance), tilts.transpose(0, 2, 1))
-    )
+    return np.asarray(total + np.matmul(np.matmul(tilts, covariance), tilts.transpose(0, 2, 1)))
 
 
 def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: SpatialCorrelation) -> Floats:
@@ -263,40 +265,60 @@ def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: Spatia
     errors : (fields, points) mm of the clamped plate, at places (points, 2) mm.
     """
     gains, numbers = rigid_gains(places), patch_numbers(places, patch)
-    edges = rho.lost_factors(gains, places, numbers)
-    return np.asarray(patch_covariance(gains[None], errors, numbers)[0] * edges[:, None] * edges)
+    within = rho.kept_by_residuals(gains, places, numbers, np.linalg.pinv(gains), gains).within
+    return np.asarray(patch_covariance(gains[None], errors, numbers)[0] / np.sqrt(within[:, None] * within))
 
 
 @dataclass(frozen=True, eq=False)
 class SpatialCorrelation:
-    """Autocorrelation of errors in space: values (lags,) at whole spacings, mm."""
+    """Autocorrelation of errors in space: values (lags,) at distances (lags,) mm."""
 
     values: Floats
-    spacing: float
+    distances: Floats
+
+    @property
+    def length(self) -> float:
+        """The distance, mm, at which it has fallen to LEAST_CORRELATION; the last distance at most."""
+        rho, below = self.values, np.flatnonzero(self.values < LEAST_CORRELATION)
+        if not below.size:
+            return float(self.distances[-1])
+        k = int(below[0])
+        share = (rho[k - 1] - LEAST_CORRELATION) / max(rho[k - 1] - rho[k], 1e-12)
+        return float(self.distances[k - 1] + share * (self.distances[k] - self.distances[k - 1]))
 
     def matrix(self, places: Floats) -> Floats:
-        """(points, points) of places (points, 2) mm; nothing from the first lag without correlation on."""
+        """(points, points) of places (points, 2) mm; nothing from the first distance without correlation on."""
         below = np.flatnonzero(self.values < 0.02)
         values = np.array(self.values)
         if below.size:
             values[below[0] :] = 0.0
         distance = np.hypot(*(places[:, None] - places[None, :]).T)
-        return np.asarray(np.interp(distance / self.spacing, np.arange(values.size), values, right=0.0))
+        return np.asarray(np.interp(distance, self.distances, values, right=0.0))
 
-    def lost_factors(self, gains: Floats, places: Floats, numbers: Ints) -> Floats:
-        """(outputs,) by how much standard deviations from patches are too small if errors have this correlation.
+    def kept_by_residuals(
+        self, gains: Floats, places: Floats, numbers: Ints, terms: Floats, fitted: Floats
+    ) -> KeptByResiduals:
+        """What patches of residuals show of errors with this correlation.
 
         The fit has taken a part of the errors from the residuals, and neighbours across the edges of patches err
-        together; both are worked out exactly for the linear fit.
+        together; both are worked out exactly for a linear fit.
 
-        gains : (outputs, points). places : (points, 2) mm. numbers : (points,) of patches.
+        gains : (outputs, points). places : (points, 2) mm. numbers : (points,) of patches. terms, fitted : (points,
+        terms), (terms, points), residuals are errors less terms @ fitted @ errors.
         """
         C = self.matrix(places)
         whole = np.einsum("oi,oi->o", gains @ C, gains)
-        columns, taken = np.linalg.pinv(gains), gains @ C
-        residual = C - columns @ taken - (columns @ taken).T + columns @ (taken @ gains.T) @ columns.T
+        taken = fitted @ C
+        residual = C - terms @ taken - (terms @ taken).T + terms @ (taken @ fitted.T) @ terms.T
         within = np.einsum("oi,oi->o", gains @ np.where(numbers[:, None] == numbers, residual, 0.0), gains)
-        return np.asarray(np.sqrt(np.clip(whole / np.maximum(within, 1e-300), 1.0, 9.0)))
+        return KeptByResiduals(np.clip(within / np.maximum(whole, 1e-300), 0.02, 1.0), np.diag(residual))
+
+
+class KeptByResiduals(NamedTuple):
+    """What residuals show of errors: within (outputs,) of the variance of an output, variance (points,) of a point."""
+
+    within: Floats
+    variance: Floats
 
 
 def patch_covariance(gains: Floats, errors: Floats, numbers: Ints) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -27,6 +27,7 @@ class ReferencePlate:
 
     index : of that frame. places : (points, 3) mm in the plate's axes. areas : (points,) mm2 that each stands for.
     known : (points,) which points that frame has. camera_points : (points, 3) mm in the frames' axes. spacing : mm.
+    turned : whether the plate's z is against that of the frames, which points away from the cameras.
     """
 
     index: int
@@ -36,6 +37,13 @@ class ReferencePlate:
     known: Bools
     camera_points: Floats
     spacing: float
+    turned: bool = False
+
+    def turned_over(self) -> ReferencePlate:
+        """The same plate seen from its other side: turned by half a turn about x."""
+        half = np.array([1.0, -1.0, -1.0])
+        axes = PlateAxes(self.axes.origin, self.axes.axes * half[:, None])
+        return replace(self, axes=axes, places=self.places * half, turned=not self.turned)
 
 
 @dataclass(frozen=True, eq=False)

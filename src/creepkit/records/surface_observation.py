@@ -44,7 +44,8 @@ class SurfaceObservation:
     operator : its text, as histories carry it. outputs : {name: (frames,)}; NaN where a frame does not show one.
     gains : (frames, outputs, points) derivatives of the outputs to the heights; zero of lost points.
     residuals : (frames, points) mm, heights less those of the operator's model; NaN outside of what it uses.
-    converged : (frames,) whether the frame was observed at all.
+    converged : (frames,) whether the frame was observed at all. terms : (points, terms), fitted : (terms, points) of
+    the frame of the greatest leading output: its residuals change by errors less terms @ fitted @ errors.
     """
 
     operator: str
@@ -52,9 +53,11 @@ class SurfaceObservation:
     gains: Floats
     residuals: Floats
     converged: Bools
+    terms: Floats
+    fitted: Floats
 
     def __post_init__(self) -> None:
-        for name in ("gains", "residuals"):
+        for name in ("gains", "residuals", "terms", "fitted"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         object.__setattr__(self, "converged", frozen(self.converged, dtype=bool))
         object.__setattr__(self, "outputs", MappingProxyType({n: frozen(v) for n, v in self.outputs.items()}))

@@ -30,6 +30,10 @@ def extraction_text(extraction: Extraction) -> str:
         f"one frame's error {1e3 * motion.standard_errors[2]:.2f} um along z",
         f"  zero level: {rest}",
     ]
+    if e.turned:
+        from creepkit.extraction.extraction import TURNED
+
+        lines.append(f"  assumed: {TURNED}")
     last = int(np.flatnonzero(e.used)[-1]) if e.used.any() else -1
     for name, values in e.outputs.items():
         lines.append(

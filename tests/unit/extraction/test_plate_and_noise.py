@@ -7,7 +7,6 @@ from scipy.spatial.transform import Rotation
 
 from creepkit.extraction.frame_checks import frames_at_rest
 from creepkit.extraction.noise import (
-    SpatialCorrelation,
     autocorrelation,
     patch_covariance,
     patch_numbers,
@@ -67,11 +66,11 @@ def test_patches_give_the_scatter_of_a_fit_to_correlated_errors():
     gains = np.linalg.pinv(columns)
     truth = (errors @ gains.T).std(axis=0)
     residuals = errors - errors @ gains.T @ columns.T
-    rho = SpatialCorrelation(autocorrelation(residuals, places, 0.5), 0.5)
+    rho = autocorrelation(residuals, places, 0.5)
     numbers = patch_numbers(places, 3.0)
     stated = np.sqrt(np.diag(patch_covariance(gains[None], residuals, numbers)[0]))
     assert stated[0] < 0.8 * truth[0]  # what the fit took
-    np.testing.assert_allclose(stated * rho.lost_factors(gains, places, numbers), truth, rtol=0.12)
+    np.testing.assert_allclose(stated / np.sqrt(rho.kept_by_residuals(gains, places, numbers, columns, gains).within), truth, rtol=0.12)
 
 
 def test_gains_of_the_clamped_plate_are_shift_and_small_rotations():
