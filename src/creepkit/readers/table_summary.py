@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,9 +29,12 @@ class TableSummary:
     rows: int
 
 
-def summarise_tables(path: Path) -> list[TableSummary]:
-    """The tables of a text file or a spreadsheet in one of the general layouts; [] of any other file."""
-    vocabulary = HeaderVocabulary()
+def summarise_tables(path: Path, ignored: Collection[str] = ()) -> list[TableSummary]:
+    """The tables of a text file or a spreadsheet in one of the general layouts; [] of any other file.
+
+    ignored : columns that are left out.
+    """
+    vocabulary = HeaderVocabulary(ignored=ignored)
     if SPREADSHEET.accepts(path):
         grids = [grid for grid in read_sheets(path) if names_time(grid, vocabulary)]
     elif HISTORY_CSV.accepts(path):

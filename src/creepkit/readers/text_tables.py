@@ -226,7 +226,7 @@ def column_means(table: TextTable, vocabulary: HeaderVocabulary) -> dict[str, st
 
 def how_to_ignore(column: str) -> str:
     """How to have a column left out."""
-    return f"'# ignore: {column}' above, or ignore=['{column}']"
+    return f"write '# ignore: {column}' above, or read it with --ignore '{column}'"
 
 
 def _parsed_column(table: TextTable, k: int, name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:
