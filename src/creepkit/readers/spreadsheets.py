@@ -255,7 +255,7 @@ def _conditions_by_test(grid: CellGrid, vocabulary: HeaderVocabulary) -> dict[st
         if not test or test in tests:
             raise HistoryError(f"{place}: the test is '{test:.40}', which is empty or named before; name each once")
         tests[test] = {
-            known.condition(name) if known.is_condition(name) else f"label {name}": entry
+            known.condition(name) if known.is_condition(name) else f"label {name}": replace(entry, key=name)
             for name, entry in table.entries(row).items()
             if name != table.columns[columns[0]]
         }

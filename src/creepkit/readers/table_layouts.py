@@ -207,7 +207,7 @@ def _columns_beside(
     if not head and all(block.test.isdigit() for block in blocks):
         raise HistoryError(
             f"{place}: several columns of one quantity, and no conditions above them, may be tests or sensors of one "
-            "test; name the tests, such as 'A1 strain (%)', or keep one column"
+            "test; name the tests, such as 'A1 strain (%)', or keep one column, with '# ignore: NAME' for the others"
         )
     return blocks
 
@@ -351,5 +351,5 @@ def _entries_of_columns(
         name = table.columns[k]
         key = known.condition(name) if known.is_condition(name) else f"label {name}"
         if row.cells[k]:
-            entries[key] = SourceText(row.cells[k], table.location(row.line), table.dialect.decimal)
+            entries[key] = SourceText(row.cells[k], table.location(row.line), table.dialect.decimal, name)
     return entries

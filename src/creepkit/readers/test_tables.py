@@ -5,8 +5,8 @@
     A2,100,750,,>10000,X7
 
 Names of columns may be spelled as QUANTITIES and TEXTS list them, with their unit behind `_`, `,` or `/`, or in
-brackets. A rupture time `>10000`, or a row that `ended` calls stopped, is a run-out: the test lasted so long, unbroken. Other
-columns are labels. What all rows share may stand above them as `# key: value`.
+brackets. A rupture time `>10000`, or a row that `ended` calls stopped, is a run-out: the test lasted so long, unbroken.
+Other columns are labels. What all rows share may stand above them as `# key: value`.
 """
 
 from __future__ import annotations
@@ -31,13 +31,17 @@ MEASURED = ("minimum_rate", "rupture")
 
 
 QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
-    "stress": (STRESS, ("stress", "sigma", "nominal stress", "applied stress", "initial stress", "creep stress")),
-    "temperature": (TEMPERATURE, ("temperature", "temp", "t", "test temperature", "creep temperature")),
+    "stress": (
+        STRESS,
+        ("stress", "sigma", "nominal stress", "applied stress", "initial stress", "creep stress", "spannung"),
+    ),
+    "temperature": (TEMPERATURE, ("temperature", "temp", "t", "test temperature", "creep temperature", "temperatur")),
     "minimum_rate": (
         RATE,
         (
             *("minimum rate", "min rate", "minimum creep rate", "min creep rate", "minimum strain rate", "mcr"),
             *("steady state creep rate", "steady state rate", "secondary creep rate", "steady creep rate"),
+            *("kriechrate", "minimale kriechrate", "min kriechrate"),
         ),
     ),
     "minimum_rate_sd": (RATE, ("minimum rate sd", "min rate sd", "minimum creep rate sd", "min creep rate sd")),
@@ -45,7 +49,7 @@ QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
         TIME,
         (
             *("rupture", "rupture time", "time to rupture", "creep rupture time", "rupture life", "creep life"),
-            *("t r", "tr", "t rupture", "time to failure", "failure time", "life"),
+            *("t r", "tr", "t rupture", "time to failure", "failure time", "life", "bruchzeit", "standzeit"),
         ),
     ),
     "end_time": (TIME, ("end time", "duration", "test duration", "time", "test time", "time on test", "t")),
@@ -56,7 +60,7 @@ QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
 TEXTS: Mapping[str, tuple[str, ...]] = {
     "name": ("name", "test", "test id", "test name", "test no", "test number", "id", "no", "sample", "specimen id"),
     "ended": ("ended", "end", "end of test", "outcome", "status", "state", "result"),
-    "alloy": ("alloy", "material"),
+    "alloy": ("alloy", "material", "werkstoff"),
     "control": ("control",),
     "specimen": ("specimen",),
     "label heat": ("heat", "cast", "batch", "heat number", "heat no"),

@@ -9,13 +9,14 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import overload
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import Dialect, is_number, parse_number, parse_numbers
 from creepkit.readers.column_names import NameTable, split_written_name
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
@@ -234,16 +235,18 @@ def _parsed_column(table: TextTable, k: int, name: str, kinds: Mapping[str, Quan
     location, written = table.location(table.columns_line), table.as_written(k)
     result = split_unit(name, kinds)
     if result is None:
+        unit = split_written_name(written)[1]
         sensor, names = _sensor(written, kinds), table.written or table.columns
         others = [other for other in names if other != written and sensor and _sensor(other, kinds) == sensor]
-        advice = f"or leave it out: {how_to_ignore(written)}"
+        way_out = how_to_ignore(written)
         if others:
             raise HistoryError(
                 f"{location}: '{written}' and '{others[0]}' seem to be several sensors of the {sensor}; name the one "
-                f"that counts {sensor}_{next(iter(kinds[sensor].units))} or the like, and leave the others out: "
-                f"{how_to_ignore(others[0])}"
+                f"that counts '{sensor}{unit and f' ({unit})'}', and leave the others out: {how_to_ignore(others[0])}"
             )
-        raise HistoryError(f"{location}: column '{written}' is not understood; {nearest(name, kinds)}, {advice}")
+        near = get_close_matches(written, kinds, 1, cutoff=0.55)
+        meant = f"did you mean '{near[0]}'? Else" if near else "name it as creepkit does, or"
+        raise HistoryError(f"{location}: column '{written}' is not understood; {meant} leave it out: {way_out}")
     quantity, suffix = result
     kinds[quantity].unit(suffix, location, written)
     return result

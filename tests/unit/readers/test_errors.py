@@ -67,7 +67,7 @@ CASES = {
     "column twice": (HEAD + "time_s,strain_1,strain_1\n0,0,0\n", "x.csv:3: the column 'strain_1' stands there twice"),
     "quantity twice": (
         HEAD + "time_s,time_h,strain_1\n0,0,0\n",
-        "x.csv:3: 'time_s' and 'time_h' both hold the time; keep one and leave the other out: '# ignore: time_h'",
+        "x.csv:3: 'time_s' and 'time_h' both hold the time; keep one and leave the other out: write '# ignore: time_h'",
     ),
     "nameless column": (HEAD + "time_s,,strain\n0,0,0\n", "x.csv:3: a column has no name"),
     "no loading": (
