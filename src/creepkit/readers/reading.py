@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import is_dataclass, replace
 from glob import glob
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from creepkit.errors import HistoryError, nearest
 from creepkit.hookspecs import hookimpl
@@ -60,12 +60,13 @@ def reader_without(ignored: Collection[str], reader: Reader) -> Reader:
 
     ignored : names of columns as they are written, or but for capitals and unit.
     """
-    if isinstance(ignored, str) or not all(isinstance(name, str) and name.strip() for name in ignored):
+    if isinstance(ignored, str) or not all(str(name).strip() for name in ignored):
         raise HistoryError(f"ignore is {ignored!r:.60}; give a list of names of columns, such as ['load_kN', 'date']")
     vocabulary = getattr(reader, "vocabulary", None)
-    if not is_dataclass(reader) or isinstance(reader, type) or not isinstance(vocabulary, HeaderVocabulary):
+    if not is_dataclass(reader) or not isinstance(vocabulary, HeaderVocabulary):
         return reader
-    return cast(Reader, replace(reader, vocabulary=replace(vocabulary, ignored=tuple(ignored))))
+    changes: Any = {"vocabulary": replace(vocabulary, ignored=tuple(ignored))}
+    return cast(Reader, replace(cast(Any, reader), **changes))
 
 
 def _reader_named(name: str, readers: Sequence[Reader]) -> Reader:

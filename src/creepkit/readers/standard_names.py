@@ -144,10 +144,10 @@ def _with_decided_strains(
         names[name] = f"{name}_{suffix or base.rpartition('_')[2]}"
     if not names:
         return stated, table
-    columns, written = [names.get(name, name) for name in table.columns], table.written or table.columns
+    columns = [names.get(name, name) for name in table.columns]
     return (
         {names.get(key, key): entry for key, entry in stated.items()},
-        replace(table, columns=columns, written=written, assumptions=tuple(assumptions)),
+        replace(table, columns=columns, written=table.written or table.columns, assumptions=tuple(assumptions)),
     )
 
 

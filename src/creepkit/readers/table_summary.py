@@ -11,6 +11,7 @@ from creepkit.readers.column_names import KnownNames
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
 from creepkit.readers.table_layouts import names_time, tests_in
+from creepkit.readers.test_tables import TEST_TABLE, columns_of_tests, key_of_column
 from creepkit.readers.vocabulary import HeaderVocabulary
 
 
@@ -35,6 +36,11 @@ def summarise_tables(path: Path, ignored: Collection[str] = ()) -> list[TableSum
     ignored : columns that are left out.
     """
     vocabulary = HeaderVocabulary(ignored=ignored)
+    if TEST_TABLE.accepts(path):
+        return [
+            TableSummary(str(path), "", "", {name: key_of_column(name)[0] or name for name in names}, rows)
+            for names, rows in columns_of_tests(path, ignored)
+        ]
     if SPREADSHEET.accepts(path):
         grids = [grid for grid in read_sheets(path) if names_time(grid, vocabulary)]
     elif HISTORY_CSV.accepts(path):

@@ -12,7 +12,7 @@ Other columns are labels. What all rows share may stand above them as `# key: va
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -117,11 +117,9 @@ class RowPerTestReader:
 
     def read(self, path: Path) -> list[History]:
         """Return one history a row, in the order of the rows; of a spreadsheet those of all its tables of tests."""
-        grids = [grid for grid in _grids(path) if not grid.sheet or _is_test_table(grid.rows[0].cells)]
-        grids = [without_ignored(grid, 0, self.vocabulary.ignored) for grid in grids]
         places: dict[str, str] = {}
         histories = []
-        for table in map(table_of, grids):
+        for table in _tables(path, self.vocabulary.ignored):
             keys = _keys(table)
             for row in table.rows:
                 history, place = self._history(table, row, keys), table.location(row.line)
@@ -160,6 +158,17 @@ def _grids(path: Path) -> list[CellGrid]:
     from creepkit.readers.spreadsheets import read_sheets
 
     return read_sheets(path)
+
+
+def _tables(path: Path, ignored: Collection[str]) -> list[TextTable]:
+    """The tables of tests in a file; ignored : columns that are left out."""
+    grids = [grid for grid in _grids(path) if not grid.sheet or _is_test_table(grid.rows[0].cells)]
+    return [table_of(without_ignored(grid, 0, ignored)) for grid in grids]
+
+
+def columns_of_tests(path: Path, ignored: Collection[str]) -> list[tuple[Sequence[str], int]]:
+    """Names of columns, and number of rows, of each table of tests in a file."""
+    return [(table.columns, len(table.rows)) for table in _tables(path, ignored)]
 
 
 def _is_test_table(names: Sequence[str]) -> bool:
@@ -221,7 +230,7 @@ def _check_unit(quantity: str, unit: str, written: str, location: str) -> None:
 
 def _quantity(key: str) -> str:
     """The quantity of a key, without its unit; other keys as they are."""
-    found = split_unit(key, CONDITION_KINDS | {quantity: kind for quantity, (kind, _) in QUANTITIES.items()})
+    found = split_unit(key, {**CONDITION_KINDS, **_NAMES.kinds})
     return found[0] if found else key_of_column(key)[0] or key
 
 

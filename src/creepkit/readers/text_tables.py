@@ -244,6 +244,11 @@ def _parsed_column(table: TextTable, k: int, name: str, kinds: Mapping[str, Quan
                 f"{location}: '{written}' and '{others[0]}' seem to be several sensors of the {sensor}; name the one "
                 f"that counts '{sensor}{unit and f' ({unit})'}', and leave the others out: {how_to_ignore(others[0])}"
             )
+        if sensor and sensor not in {(split_unit(other, kinds) or ("",))[0] for other in table.columns}:
+            raise HistoryError(
+                f"{location}: '{written}' seems to be a sensor of the {sensor}; name it "
+                f"'{sensor}{unit and f' ({unit})'}', or leave it out: {way_out}"
+            )
         near = get_close_matches(written, kinds, 1, cutoff=0.55)
         meant = f"did you mean '{near[0]}'? Else" if near else "name it as creepkit does, or"
         raise HistoryError(f"{location}: column '{written}' is not understood; {meant} leave it out: {way_out}")
