@@ -2,13 +2,13 @@
 
     python tests/benchmarks/reader_fuzz.py [--samples NAME ...] [--count 12000] [--only SEED] [--write]
 
-Each sample of a format (tests/helpers/samples_*.py) is mutated `count` times, by seed, and read in a process without
-privileges. Counted are tracebacks (anything but an error of creepkit in one sentence that names the file), hangs (more
-than 5 s of CPU), files that take more than 1 GB of memory, and wrong acceptances: a file whose mutation changes what it
-says (a column twice, another decimal sign, a unit removed, a name misspelt, no number in a cell, rows in another order,
-a row cut amid its columns) was read with other values than the sample's, and the reader did not say that it decided
-something. Swapped, lost or added digits make other numbers that no reader can tell; they are among the mutations, and
-only have to be read or refused. "read" counts files that gave a result, of all mutations.
+Samples of each reader (tests/helpers/samples_*.py) are mutated `count` times in all, by seed, and read in a process
+without privileges. Counted are tracebacks (anything but an error of creepkit in one sentence that names the file),
+hangs (more than 5 s of CPU), files that take more than 1 GB of memory, and wrong acceptances: a file whose mutation
+changes what it says (a column twice, another decimal sign, a unit removed, a name misspelt, no number in a cell, rows
+in another order, a row cut amid its columns) was read with other values than the sample's, and the reader did not say
+that it decided something. Swapped, lost or added digits make other numbers that no reader can tell; they are among the
+mutations, and only have to be read or refused. "read" counts files that gave a result, of all mutations.
 """
 
 from __future__ import annotations
@@ -130,22 +130,27 @@ def main() -> int:
         return 0
     parser = arguments(__doc__)
     parser.add_argument("--samples", nargs="*", help="names of samples, all by default")
-    parser.add_argument("--count", type=int, default=12000, help="mutations of each sample")
+    parser.add_argument("--count", type=int, default=12000, help="mutations for each reader, shared by its samples")
     parser.add_argument("--only", type=int, help="one seed alone")
     options = parser.parse_args()
     page = Page("reader_fuzz", __doc__)
-    page.table("sample", "mutations", *OUTCOMES)
+    page.table("reader", "sample", "mutations", *OUTCOMES)
     faults: list[str] = []
     kinds: dict[str, Counter[str]] = {}
     first, last = (0, options.count) if options.only is None else (options.only, options.only + 1)
-    for name in options.samples or all_samples():
+    samples = all_samples()
+    readers = {name: sample.reader or name for name, sample in samples.items()}
+    for name in options.samples or samples:
         counts: Counter[str] = Counter()
+        last = (
+            first + -(-options.count // list(readers.values()).count(readers[name])) if options.only is None else last
+        )
         for seed, kind, found, detail in outcomes(name, first, last):
             counts[found] += 1
             kinds.setdefault(kind, Counter())[found] += 1
             if found in FAULTS and len(faults) < 60:
                 faults.append(f"{name}, seed {seed}, {kind}: {found}: {detail}")
-        page.row(name, counts.total(), *(counts[o] for o in OUTCOMES))
+        page.row(readers[name], name, counts.total(), *(counts[o] for o in OUTCOMES))
     page.heading("By kind of mutation")
     page.table("mutation", *OUTCOMES)
     for kind in sorted(kinds):

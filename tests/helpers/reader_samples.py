@@ -20,7 +20,8 @@ class ReaderSample:
     the path of the mutated file into a result, or raises an error of creepkit. difference : what distinguishes two
     results, "" for nothing. decided : what a reader says that it assumed of a result, so that it is no silent change.
     delimiter : between cells, where the file is a table of text; "" where it is none. misspelling : (key or name,
-    misspelt) that the file holds, and another (head with a unit, without it).
+    misspelt) that the file holds, and another (head with a unit, without it). reader : name of the reader, "" where no
+    other sample is of the same one.
     """
 
     name: str
@@ -32,6 +33,7 @@ class ReaderSample:
     delimiter: str = ""
     misspelt: tuple[tuple[str, str], ...] = ()
     without_unit: tuple[tuple[str, str], ...] = ()
+    reader: str = ""
 
     def write(self, folder: Path, content: bytes | None = None) -> Path:
         """Write the files into a folder, with other content of the mutated one; the path of that."""

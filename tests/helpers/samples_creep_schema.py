@@ -73,8 +73,12 @@ def samples() -> Iterator[ReaderSample]:
     text = json.dumps(document(), indent=1, ensure_ascii=False).encode()
     files = {"Q7.json": text, SERIES_NAME: LIS.encode()}
     keys = (("initialStress", "intialStress"), ("specifiedTemperature", "specifiedTemprature"))
-    yield ReaderSample("creep schema document", files, "Q7.json", read, difference, decided, misspelt=keys)
+    yield ReaderSample(
+        "creep schema document", files, "Q7.json", read, difference, decided, misspelt=keys, reader="creep-schema"
+    )
     entries = (("Initial stress", "Intial stress"), ("Specified temperature", "Specified temprature"))
     alone = {SERIES_NAME: LIS.encode()}
     units = (("\tMPa\t", "\t\t"), ("\th\t", "\t\t"), ("h\t%\t", "\t%\t"), ("h\t%\t", "h\t\t"))
-    yield ReaderSample("creep schema series", alone, SERIES_NAME, read, difference, decided, "", entries, units)
+    yield ReaderSample(
+        "creep schema series", alone, SERIES_NAME, read, difference, decided, "", entries, units, "creep-schema"
+    )

@@ -87,6 +87,16 @@ FRAMES = """time_h,creep_extension_pct,T_top_C,T_mid_C,T_bot_C
 """
 
 
+READERS = {
+    "csv": "csv",
+    "index of a table": "indexed-table",
+    "table with": "indexed-table",
+    "index of files": "indexed-files",
+    "files with": "indexed-files",
+}
+"""{beginning of a sample's name: its reader}."""
+
+
 def read(path: Path) -> list[History]:
     """The histories in a file, or in the folder of an index."""
     return ck.read_histories(path)
@@ -117,6 +127,7 @@ def table(name: str, files: dict[str, str], mutated: str, misspelt: str, without
         delimiter=",",
         misspelt=tuple((key, key[:2] + key[3:]) for key in misspelt.split()),
         without_unit=tuple((key, key.rpartition("_")[0]) for key in without_unit.split()),
+        reader=next((one for beginning, one in READERS.items() if name.startswith(beginning)), ""),
     )
 
 

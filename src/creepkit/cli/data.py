@@ -62,9 +62,12 @@ def _describe_data_set(file: Path, as_json: bool, plots: Path | None, seed: int)
 def _check_measured_tests(file: Path, as_json: bool, reader: str | None, activation_energy: float | None) -> None:
     import creepkit as ck
     from creepkit.report.data_quality import data_quality_to_json
+    from creepkit.report.histories import assumptions_text
 
-    quality = ck.check_data_quality(ck.read_histories(file, reader=reader), activation_energy=activation_energy)
+    histories = ck.read_histories(file, reader=reader)
+    quality = ck.check_data_quality(histories, activation_energy=activation_energy)
+    assumed = assumptions_text(histories)
     if as_json:
-        print_json(data_quality_to_json(quality))
+        print_json({**data_quality_to_json(quality), "assumed": assumed.splitlines()})
     else:
-        typer.echo(str(quality))
+        typer.echo("\n".join(filter(None, (str(quality), assumed))))

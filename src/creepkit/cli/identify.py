@@ -135,6 +135,7 @@ def command(
     histories = select_by_label(ck.read_histories(files, reader), only)
     if up_to is not None:
         histories = _truncate_at_strain(histories, up_to)
+    _tell_assumptions(histories)
     _warn_of_duplicates(histories)
     if temperature == "auto":
         candidate_laws = [ck.with_arrhenius(candidate_law, histories) for candidate_law in candidate_laws]
@@ -187,6 +188,14 @@ def _truncate_at_strain(histories: list[History], limit: float) -> list[History]
 
         raise FitError(f"no test has two frames below a strain of {limit:g}; raise --up-to")
     return retained
+
+
+def _tell_assumptions(histories: list[History]) -> None:
+    """What readers assumed of the tests, for a fit rests on it."""
+    from creepkit.report.histories import assumptions_text
+
+    for line in assumptions_text(histories).splitlines():
+        typer.echo(f"note: {line}", err=True)
 
 
 def _warn_of_duplicates(histories: list[History]) -> None:

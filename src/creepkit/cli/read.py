@@ -21,6 +21,9 @@ def command(
     reader: Annotated[
         str | None, typer.Option(help="Reader of the files; by default the one that accepts them.")
     ] = None,
+    ignore: Annotated[
+        str | None, typer.Option(metavar="A,B", help="Columns that nobody needs, such as load_kN,date.")
+    ] = None,
     to: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Write each test there as CSV, in s, MPa, mm and K.")
     ] = None,
@@ -36,10 +39,11 @@ def command(
 
     if plot is not None:
         check_figure_target(plot, ck.errors.HistoryError)
-    found = ck.read_histories(files, reader=reader)
+    ignored = [name.strip() for name in (ignore or "").split(",") if name.strip()]
+    found = ck.read_histories(files, reader=reader, ignore=ignored)
     general = {str(path) for path in files if path.is_file() and reader in (None, "csv", "xlsx")}
     sources = {history.source.partition(" (")[0] for history in found}
-    tables = [table for path in sorted(general & sources) for table in summarise_tables(Path(path))]
+    tables = [table for path in sorted(general & sources) for table in summarise_tables(Path(path), ignored)]
     quality = ck.check_data_quality([history for history in found if history.outputs])
     if as_json:
         print_json({**report.histories_to_json(found, tables), "quality": data_quality_to_json(quality)})

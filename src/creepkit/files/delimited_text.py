@@ -57,6 +57,12 @@ _GROUPED = re.compile(r"[+-]?\d+(?:[.,'’  \s]\d+)+(?:[eEdD][+-]?\d+)?", re.ASC
 """Digits in groups, with several separators or with one that is no decimal sign."""
 
 
+_CLOCK_TIME = re.compile(
+    r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[T ] *\d.{0,20})?|\d{1,6}:\d{2}(?::\d{2}(?:[.,]\d{1,12})?)?"
+)
+"""A date, a time stamp or an elapsed time: as sound a cell as a number."""
+
+
 _THOUSANDS_LIKE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 """Three digits behind one comma: a number below 1000 with a decimal comma, or a larger one with a separator."""
 
@@ -220,7 +226,7 @@ def _score(sample: Sequence[str], delimiter: str) -> tuple[bool, int, int]:
         for cell in (cell.rstrip("% ") for cell in cells):
             if cell and (cell[0] in "+-.," or "0" <= cell[0] <= "9"):
                 is_numeric = _NUMBERS["."].fullmatch(cell) or (delimiter != "," and _NUMBERS[","].fullmatch(cell))
-                numbers += 1 if is_numeric else -2
+                numbers += 1 if is_numeric or _CLOCK_TIME.fullmatch(cell) else -2
     return bool(counts), numbers, 0 if delimiter == " " else max(counts.values(), default=0)
 
 

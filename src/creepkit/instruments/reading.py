@@ -12,9 +12,9 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest
+from creepkit.files.time_stamps import DATE_ORDERS, ResolvedTimes, resolve
 from creepkit.instruments.column_heads import KNOWN_UNITS, TIME_UNITS, ChannelUnit, channel_unit, split_head
 from creepkit.instruments.record_tables import MISSING, KeptColumns, TableHead, block_means, find_head, numbered_lines
-from creepkit.instruments.time_stamps import DATE_ORDERS, ResolvedTimes, resolve
 from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
 
 TIME_NAMES = (

@@ -12,8 +12,8 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import Dialect, decode_text, detect_dialect, is_number, parse_numbers, split_line
 from creepkit.files.reading import FileKind, open_binary
+from creepkit.files.time_stamps import ClockColumn, is_clock_time
 from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
-from creepkit.instruments.time_stamps import ClockColumn, is_clock_time
 
 RECORD_FILE = FileKind(
     "a record of an instrument", HistoryError, "export the record as a table of text", maximum_bytes=8_000_000_000

@@ -7,18 +7,19 @@ from dataclasses import replace
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, SolveError
+from creepkit.readers.column_names import KnownNames
 from creepkit.readers.conditions import END_OF_TEST_TERMS, StatedConditions, StatedNumber, errors_located_at
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.loading_strain import without_loading
 from creepkit.readers.noise_correlation import read_noise_correlation
-from creepkit.readers.standard_names import in_standard_names
-from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, read_frames
+from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
+from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, how_to_ignore, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, outputs_of_test, specimen_of
 
@@ -64,36 +65,43 @@ def assemble_history(
         outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
     else:
         elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
-    minimum_rate, minimum_rate_sd = _minimum_rate(conditions)
     rupture_time, unruptured = _end_of_test(conditions, frames, used)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
     history = History(
-        name=conditions.take_text("name", name),
         times=frames.times,
         outputs=outputs,
         loading=loading,
         temperature=temperature,
         specimen=specimen,
-        elastic=elastic,
         strain_measure="engineering" if strain_measure == "engineering" else "logarithmic",
         includes_elastic=elastic_included,
         standard_deviation=_standard_deviations(conditions, frames, outputs),
         used=used,
-        geometry=conditions.geometry,
-        operator=conditions.take_text("operator"),
-        alloy=conditions.take_text("alloy"),
         source=source,
         rupture_time=rupture_time,
         unruptured=unruptured,
-        minimum_rate=minimum_rate,
-        minimum_rate_sd=minimum_rate_sd,
-        stated=conditions.stated,
+        **_stated_fields(conditions, name, elastic),
         noise_correlation=read_noise_correlation(conditions, outputs),
         # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
     )
     _check_operator(history, columns)
     return history
+
+
+def _stated_fields(conditions: StatedConditions, name: str, elastic: Elastic | None = None) -> dict[str, Any]:
+    """Fields of a history that its conditions alone state, with frames or without; elastic : where it was read."""
+    minimum_rate, minimum_rate_sd = _minimum_rate(conditions)
+    return {
+        "name": conditions.take_text("name", name),
+        "elastic": elastic or _elastic(conditions),
+        "geometry": conditions.geometry,
+        "operator": conditions.take_text("operator"),
+        "alloy": conditions.take_text("alloy"),
+        "stated": conditions.stated,
+        "minimum_rate": minimum_rate,
+        "minimum_rate_sd": minimum_rate_sd,
+    }
 
 
 def _check_operator(history: History, location: str) -> None:
@@ -111,13 +119,14 @@ def assemble_without_frames(
 
     Its one time is that of its end, where that is stated, as rupture or as `end_time`, else UNKNOWN_DURATION.
     """
-    conditions = StatedConditions(entries, vocabulary, location)
-    minimum_rate, minimum_rate_sd = _minimum_rate(conditions)
+    known = KnownNames.of(vocabulary, specimen_named(entries, vocabulary))
+    conditions = StatedConditions(in_standard_keys(entries, known), vocabulary, location)
+    rate_known = conditions.states("minimum_rate")
     time = conditions.take_number("rupture")
     end = conditions.take_number("end_time")
     ended = conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
     _check_end_without_frames(time, end, ended, location)
-    if minimum_rate is None and time is None and ended != "stopped":
+    if not rate_known and time is None and ended != "stopped":
         raise conditions.missing_error(
             "frames, no minimum creep rate and no end of the test",
             "write minimum_rate_1/h, rupture_h, or end_time_h with 'ended: stopped'; or columns of frames, such as "
@@ -126,30 +135,21 @@ def assemble_without_frames(
     duration = (time or end or StatedNumber(UNKNOWN_DURATION, "", location)).value
     only = TableFrames(TextTable(Path(source), {}, (), 0, ()), {"time": np.array([duration])}, np.array([0]))
     loading = read_loading(conditions, only)
-    strain_measure = conditions.take_choice(
-        "strain_measure", ("engineering", "logarithmic"), required=minimum_rate is not None
-    )
+    strain_measure = conditions.take_choice("strain_measure", ("engineering", "logarithmic"), required=rate_known)
     conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
     named = conditions.take_text("specimen", conditions.default_specimen)
     _refuse_unknown_specimen(named, conditions.terms, location)
     with errors_located_at(location):
         history = History(
-            name=conditions.take_text("name", name),
             times=only.times,
             outputs={},
             loading=loading,
             temperature=read_temperature(conditions, only),
-            elastic=_elastic(conditions),
             strain_measure="logarithmic" if strain_measure == "logarithmic" else "engineering",
-            geometry=conditions.geometry,
-            operator=conditions.take_text("operator"),
-            alloy=conditions.take_text("alloy"),
             source=source,
             rupture_time=None if time is None else time.value,
             unruptured=ended == "stopped",
-            stated=conditions.stated,
-            minimum_rate=minimum_rate,
-            minimum_rate_sd=minimum_rate_sd,
+            **_stated_fields(conditions, name),
             labels=conditions.all_labels(),  # last: entries that nothing has used by now are refused
         )
         return history.replace(specimen=named) if named else history
@@ -187,7 +187,7 @@ def _without_readings_before_steps(
     A reading before a change of load and one after it state when it was; the mean of both would be neither.
     """
     kinds = terms.column_kinds
-    found = [split_unit(terms.spelled(vocabulary.synonyms.get(name, name)), kinds) for name in table.columns]
+    found = [split_unit(vocabulary.synonyms.get(name, name), kinds) for name in table.columns]
     quantities = ["" if one is None else one[0] for one in found]
     imposed = [k for k, q in enumerate(quantities) if q in {*terms.number_kinds, "temperature", "step"}]
     if "time" not in quantities or not imposed:
@@ -251,7 +251,12 @@ def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], l
     unread = [name for name in frames.values if name.removesuffix("_sd") not in {"time", "used", "step", *read_columns}]
     if unread:
         read_text = ", ".join(sorted(read_columns))
-        raise HistoryError(f"{location}: a column of {unread[0]} has no meaning beside {read_text}; remove it")
+        table = frames.table
+        column = next(k for k, name in enumerate(table.columns) if name.startswith(unread[0]))
+        how = how_to_ignore(table.as_written(column))
+        raise HistoryError(
+            f"{location}: a column of {unread[0]} has no meaning beside {read_text}; leave it out: {how}"
+        )
 
 
 def _elastic(conditions: StatedConditions) -> Elastic | None:

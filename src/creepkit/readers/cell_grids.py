@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,9 @@ from creepkit.arrays import Ints
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import Dialect, decode_text, detect_dialect, split_line, text_lines
 from creepkit.files.reading import FileKind, read_bytes
+from creepkit.readers.column_names import split_written_name
 from creepkit.readers.text_tables import NumberRows, SourceText, TableRow, TextTable, check_columns, location_in
+from creepkit.readers.vocabulary import plain_name
 
 TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
 
@@ -37,7 +39,8 @@ class CellGrid:
 
     sheet : of a spreadsheet, "" of a text. header : the entries of `# key: value` lines. rows : those of them that are
     no comment and not empty. numbers : the rows below the last of `rows`, where they hold numbers alone.
-    comments : line, key and entry of each `# key: value` below the first row.
+    comments : line, key and entry of each `# key: value` below the first row. positions : the column of the file, from
+    0, in which each cell of a row stands, where some were left out.
     """
 
     path: Path
@@ -47,6 +50,7 @@ class CellGrid:
     rows: Sequence[TableRow]
     numbers: NumberRows | None = None
     comments: Sequence[tuple[int, str, SourceText]] = ()
+    positions: Sequence[int] = ()
 
     def location(self, line: int) -> str:
         """Where a row stands."""
@@ -80,6 +84,44 @@ def read_text_grid(path: Path) -> CellGrid:
                 _late_entries(path, comments, dialect),
             )
     return _grid_of_lines(path, text_lines(text))
+
+
+def without_ignored(grid: CellGrid, names_at: int, ignored: Collection[str]) -> CellGrid:
+    """The grid without the columns that its key `ignore` names, all of which must be there, and those in `ignored`.
+
+    names_at : the row of the names. A name is told as it is written; else but for capitals and its unit.
+    """
+    key = next((key for key in grid.header if plain_name(key) == "ignore"), None)
+    cells = grid.rows[names_at].cells
+    left_out = {k for name in ignored for k in _columns_called(name, cells)}
+    if key is not None:
+        entry = grid.header[key]
+        names = [name.strip() for name in entry.text.split(";" if ";" in entry.text else ",")]
+        for name in [entry.text] if entry.text in cells else names:
+            found = _columns_called(name, cells)
+            if not found:
+                raise HistoryError(
+                    f"{entry.location}: ignore names '{name:.40}', which is no column; the columns are: "
+                    f"{', '.join(filter(None, cells))}"
+                )
+            left_out.update(found)
+    header = {name: entry for name, entry in grid.header.items() if name != key}
+    if not left_out:
+        return replace(grid, header=header)
+    width = max(len(row.cells) for row in grid.rows)
+    kept = [k for k in range(width) if k not in left_out]
+    rows = [TableRow(row.line, [row.cells[k] for k in kept if k < len(row.cells)]) for row in grid.rows]
+    numbers = grid.numbers and replace(grid.numbers, numbers=grid.numbers.numbers[:, kept])
+    return replace(grid, header=header, rows=[r for r in rows if any(r.cells)], numbers=numbers, positions=kept)
+
+
+def _columns_called(name: str, cells: Sequence[str]) -> list[int]:
+    """The columns of a name as it is written, else of one that differs in capitals, or lacks the unit."""
+    plain = plain_name(name)
+    filled = [k for k, cell in enumerate(cells) if cell]
+    exact = [k for k in filled if cells[k] == name]
+    alike = exact or [k for k in filled if plain_name(cells[k]) == plain]
+    return alike or [k for k in filled if plain_name(split_written_name(cells[k])[0]) == plain]
 
 
 def read_head_alone(path: Path) -> dict[str, SourceText]:
@@ -162,6 +204,8 @@ def _number_rows(
         return None
     body = text[sum(len(line) + 1 for line in lines[: start + 1]) :].rstrip("\n")
     body, line_numbers, comments = _without_comments(body, start + 2)
+    if not body:
+        return None
     allowed = f"0123456789+-eE\n{dialect.delimiter}{dialect.decimal}"
     if not body.isascii() or body.encode().translate(None, allowed.encode()):
         return None
@@ -193,7 +237,7 @@ def _without_comments(body: str, first_line: int) -> tuple[str, Ints, list[tuple
 def _stated_decimal(path: Path, head: Sequence[str]) -> str | None:
     for number, line in enumerate(head, 1):
         key, colon, text = _entry_of(line)
-        if colon and key == "decimal":
+        if colon and plain_name(key) == "decimal":
             sign = text if text in DECIMAL_SIGNS else text.rstrip(";,\t ")
             if sign not in DECIMAL_SIGNS:
                 raise HistoryError(f"{path}:{number}: decimal is '{text:.40}'; allowed: point, comma")
@@ -221,7 +265,7 @@ def _header(path: Path, lines: Sequence[str], names: Sequence[str], dialect: Dia
     header: dict[str, SourceText] = {}
     for number, line in enumerate(lines, 1):
         key, colon, text = _entry_of(line.rstrip(" ").removesuffix(padding) if is_padded else line)
-        if not colon or key == "decimal":
+        if not colon or plain_name(key) == "decimal":
             continue
         if key in header:
             first = header[key].location.rpartition(":")[2]
@@ -230,9 +274,9 @@ def _header(path: Path, lines: Sequence[str], names: Sequence[str], dialect: Dia
     return header
 
 
-def read_table(path: Path) -> TextTable:
-    """Read a file of one table: its first row names the columns, whatever they are."""
-    return table_of(read_text_grid(path))
+def read_table(path: Path, ignored: Collection[str] = ()) -> TextTable:
+    """Read a file of one table: its first row names the columns, whatever they are, but those left out."""
+    return table_of(without_ignored(read_text_grid(path), 0, ignored))
 
 
 def table_of(grid: CellGrid) -> TextTable:
@@ -245,7 +289,7 @@ def table_of(grid: CellGrid) -> TextTable:
     if not body:
         place = grid.location(names.line)
         raise HistoryError(f"{place}: no rows below the line of columns; a table needs at least one")
-    return TextTable(grid.path, grid.header, columns, names.line, body, grid.dialect, grid.sheet)
+    return TextTable(grid.path, grid.header, columns, names.line, body, grid.dialect, grid.sheet, grid.positions)
 
 
 def _cut_rows(grid: CellGrid, rows: Sequence[TableRow], width: int) -> Iterator[TableRow]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
-from creepkit.records.quantities import LENGTH, QuantityKind
+from creepkit.readers.vocabulary import LABEL_KEYS, HeaderVocabulary, Terms, plain_name, split_unit
+from creepkit.records.quantities import LENGTH, TIME, QuantityKind
 
 UNIT_SPELLINGS: Mapping[str, str] = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), "s"),
@@ -31,22 +32,26 @@ UNIT_SPELLINGS: Mapping[str, str] = {
 """{spelling in small letters: creepkit's suffix}. Capitals do not matter but where they tell units apart."""
 
 
-_CAPITALS_THAT_MATTER = frozenset(("mPa", "M", "nm", "mN", "Mn", "Pct"))
+_CAPITALS_THAT_MATTER = frozenset(("mPa", "M", "nm", "mN", "Mn"))
 """Spellings that in other capitals mean another unit, millipascal or nanometre: they are not understood."""
 
 
 NAME_SYNONYMS: Mapping[str, str] = {
-    **dict.fromkeys(("elapsed time", "time elapsed", "test time", "creep time"), "time"),
-    **dict.fromkeys(("temp", "temp.", "test temperature", "test temp", "creep temperature"), "temperature"),
-    **dict.fromkeys(("applied stress", "nominal stress", "initial stress", "creep stress"), "stress"),
     **dict.fromkeys(
-        ("creep strain", "total strain", "engineering strain", "true strain", "logarithmic strain"), "strain"
+        ("elapsed time", "time elapsed", "test time", "creep time", "zeit", "prüfzeit", "laufzeit"), "time"
     ),
-    **dict.fromkeys(("young's modulus", "youngs modulus", "elastic modulus"), "modulus"),
+    **dict.fromkeys(
+        ("timestamp", "time stamp", "datetime", "date time", "date/time", "time of day", "uhrzeit"), "time"
+    ),
+    **dict.fromkeys(("temp", "test temperature", "test temp", "creep temperature", "temperatur"), "temperature"),
+    **dict.fromkeys(("applied stress", "nominal stress", "initial stress", "creep stress", "spannung"), "stress"),
+    **dict.fromkeys(("creep strain", "total strain", "engineering strain", "true strain"), "strain"),
+    **dict.fromkeys(("logarithmic strain", "dehnung", "kriechdehnung", "gesamtdehnung"), "strain"),
+    **dict.fromkeys(("young's modulus", "youngs modulus", "elastic modulus", "e modul"), "modulus"),
     **dict.fromkeys(("poisson's ratio", "poissons ratio", "poisson ratio"), "poisson"),
     **dict.fromkeys(("rupture time", "time to rupture", "rupture life"), "rupture"),
     **dict.fromkeys(("standard deviation of strain", "strain standard deviation"), "strain_sd"),
-    **{"material": "alloy", "test name": "name", "test id": "name", "test": "name"},
+    **{"material": "alloy", "werkstoff": "alloy", "test name": "name", "test id": "name", "test": "name"},
 }
 """{name in small letters: quantity or text key}."""
 
@@ -61,8 +66,8 @@ SYMBOLS: Mapping[str, str] = {
 STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
     **dict.fromkeys(("true strain", "logarithmic strain"), ("strain_measure", "logarithmic")),
     "engineering strain": ("strain_measure", "engineering"),
-    "total strain": ("includes_elastic", "yes"),
-    "creep strain": ("includes_elastic", "no"),
+    **dict.fromkeys(("total strain", "gesamtdehnung"), ("includes_elastic", "yes")),
+    **dict.fromkeys(("creep strain", "kriechdehnung"), ("includes_elastic", "no")),
 }
 """{name of a column in small letters: key and text of the condition that it states}."""
 
@@ -70,10 +75,24 @@ STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
 _IN_BRACKETS = re.compile(r"([^()\[\]]*)[(\[]([^()\[\]]*)[)\]]\s*([^()\[\]]*)")
 
 
+_RATE_UNIT = re.compile(r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:(/|per )\s*)?([a-z]+)(\^?-1)?")
+
+
+@lru_cache(maxsize=4096)
 def unit_suffix(text: str) -> str | None:
     """creepkit's suffix of a unit as it is written, None where it is no unit that is known."""
     text = text.strip().strip("()[]").strip()
-    return None if text in _CAPITALS_THAT_MATTER else UNIT_SPELLINGS.get(text.lower())
+    if text in _CAPITALS_THAT_MATTER:
+        return None
+    plain = text.lower()
+    rate = _RATE_UNIT.fullmatch(plain)
+    if (
+        rate
+        and (rate[4] or rate[2] == "per " or (rate[1] and rate[2]))
+        and (time := UNIT_SPELLINGS.get(rate[3])) in TIME.units
+    ):
+        return f"{'pct' if UNIT_SPELLINGS.get(rate[1]) == 'pct' else '1'}/{time}"
+    return UNIT_SPELLINGS.get(plain)
 
 
 def split_written_name(text: str) -> tuple[str, str]:
@@ -86,46 +105,67 @@ def split_written_name(text: str) -> tuple[str, str]:
         name, unit, rest = (part.strip() for part in match.groups())
         if not rest or unit_suffix(unit):
             return f"{name} {rest}".strip(), unit
-    for separator in ("/", ",", " in ", " ", "_"):
-        name, found, unit = text.partition(separator) if separator == "/" else text.rpartition(separator)
-        if found and name and unit_suffix(unit):
-            return name.strip(" ,_/"), unit.strip()
+    for separator in (",", " in ", "_", " ", "/"):
+        parts = text.split(separator)
+        for k in range(1, len(parts)):
+            name, unit = separator.join(parts[:k]), separator.join(parts[k:])
+            # A blank before 1 sets a number apart, as of a sensor, and no unit.
+            if name and unit_suffix(unit) and not (separator == " " and unit in ("1", "-")):
+                return name.strip(" ,_/"), unit.strip()
     return text, ""
 
 
 def words_of(name: str) -> str:
     """A name in small letters, with single blanks between its words."""
-    return " ".join(name.replace("_", " ").lower().split())
+    return plain_name(name).replace("_", " ")
 
 
-def quantity_named(name: str, known: Collection[str]) -> str | None:
-    """The quantity, or the key of a text, that a name without its unit means; None when it means none."""
-    if name in known:
-        return name
-    meaning = SYMBOLS.get(name) or NAME_SYNONYMS.get(words_of(name))
-    if meaning in known:
-        return meaning
-    return next((one for one in known if words_of(one) == words_of(name)), None)
+@dataclass(frozen=True)
+class NameTable:
+    """What names may mean: quantities with their units, and texts.
 
+    kinds : {quantity: kind}. texts : keys of texts. synonyms : {name in small letters: quantity or key}. symbols :
+    {symbol: quantity}, whose capitals matter.
+    """
 
-def standard_name(text: str, kinds: Mapping[str, QuantityKind], text_keys: Collection[str] = ()) -> str:
-    """creepkit's name, `time_h` of `Time (h)`, where one is meant; else the text as it is."""
-    exact = split_unit(text, kinds)
-    if text in text_keys or (exact and exact[1] in kinds[exact[0]].units):
-        return text
-    name, unit = split_written_name(text)
-    quantity = quantity_named(name, {*kinds, *text_keys})
-    if quantity is None or (unit and quantity not in kinds):
-        return text
-    return f"{quantity}_{unit_suffix(unit) or unit}" if unit else quantity
+    kinds: Mapping[str, QuantityKind]
+    texts: Collection[str] = ()
+    synonyms: Mapping[str, str] = field(default_factory=lambda: NAME_SYNONYMS)
+    symbols: Mapping[str, str] = field(default_factory=lambda: SYMBOLS)
+
+    @cached_property
+    def _plain_names(self) -> dict[str, str]:
+        """{name without its unit, in small letters: what it means}."""
+        own = {plain_name(name): name for name in (*self.texts, *self.kinds)}
+        return {**{plain_name(name): meaning for name, meaning in self.synonyms.items()}, **own}
+
+    @cached_property
+    def _plain_keys(self) -> dict[str, str]:
+        """{name with its unit, in small letters with underscores: the same as creepkit writes it}."""
+        return {
+            plain_name(f"{name}_{unit}"): f"{name}_{unit}" for name in self.kinds for unit in self.kinds[name].units
+        }
+
+    def meaning(self, name: str) -> str | None:
+        """The quantity, or the key of a text, that a name without its unit means; None when it means none."""
+        meant = self.symbols.get(name) or self._plain_names.get(plain_name(name))
+        return meant if meant in self.kinds or meant in self.texts else None
+
+    def standard(self, text: str) -> str:
+        """creepkit's name, `time_h` of `Time (h)`, where one is meant; else the text as it is."""
+        exact = split_unit(text, self.kinds)
+        if text in self.texts or (exact and exact[1] in self.kinds[exact[0]].units):
+            return text
+        name, unit = split_written_name(text)
+        quantity = self.meaning(name)
+        if quantity is None or (unit and quantity not in self.kinds):
+            last = re.split(r"[\s_\-()\[\],]+", text.strip(" )]"))[-1]
+            return text if last in ("1", *_CAPITALS_THAT_MATTER) else self._plain_keys.get(plain_name(text), text)
+        return f"{quantity}_{unit_suffix(unit) or unit}" if unit else quantity
 
 
 TEST_NAME_COLUMNS = ("test", "test id", "test name", "test no", "test number", "sample", "sample id", "specimen id")
 """Names, in small letters, of columns and rows that tell which test it is where a table holds several."""
-
-
-LABEL_NAMES = ("heat", "laboratory")
-"""Labels that are understood without the word `label`."""
 
 
 @dataclass(frozen=True)
@@ -134,43 +174,43 @@ class KnownNames:
 
     vocabulary: HeaderVocabulary
     terms: Terms
-    column_kinds: Mapping[str, QuantityKind]
-    condition_kinds: Mapping[str, QuantityKind]
-    text_keys: Collection[str]
+    columns: NameTable
+    conditions: NameTable
 
     @classmethod
     def of(cls, vocabulary: HeaderVocabulary, specimen: str = "") -> KnownNames:
         """The names of a file; specimen : that it states."""
         terms = vocabulary.terms(specimen or vocabulary.default_texts.get("specimen", ""))
         lengths = dict.fromkeys(terms.dimensions, LENGTH)
-        return cls(vocabulary, terms, terms.column_kinds, {**lengths, **terms.condition_kinds}, terms.text_keys)
+        conditions = NameTable({**lengths, **terms.condition_kinds}, terms.text_keys)
+        return cls(vocabulary, terms, NameTable(terms.column_kinds), conditions)
 
     def column(self, name: str) -> str:
         """A name of a column in creepkit's form, where it is understood."""
-        return name if name in self.declared else standard_name(name, self.column_kinds)
+        return name if name in self.declared else self.columns.standard(name)
 
     def quantity(self, name: str) -> str | None:
         """The quantity of a column, None where its name means none."""
-        found = split_unit(self.column(self.vocabulary.synonyms.get(name, name)), self.column_kinds)
+        found = split_unit(self.column(self.vocabulary.synonyms.get(name, name)), self.columns.kinds)
         return found[0] if found else None
 
     def condition(self, name: str) -> str:
         """A name of a condition in creepkit's form, where it is understood."""
         words = words_of(name)
-        if name in self.vocabulary.synonyms or name.startswith(("label ", "geometry ")):
+        if name in self.vocabulary.synonyms or name in self.vocabulary.labels:
+            return name
+        if name.startswith(("label ", "geometry ")):
             return name
         if words in (*TEST_NAME_COLUMNS, "specimen name"):
             return "name"
-        if words in LABEL_NAMES:
-            return f"label {words}"
-        return "strain_unit" if words == "strain unit" else standard_name(name, self.condition_kinds, self.text_keys)
+        return f"label {LABEL_KEYS[words]}" if words in LABEL_KEYS else self.conditions.standard(name)
 
     def is_condition(self, name: str) -> bool:
         """Whether a name is that of a condition."""
         standard = self.condition(name)
         return (
-            standard in (*self.text_keys, "strain_unit", *self.vocabulary.synonyms)
-            or split_unit(standard, self.condition_kinds) is not None
+            standard in (*self.conditions.texts, *self.vocabulary.synonyms)
+            or split_unit(standard, self.conditions.kinds) is not None
             or standard.startswith(("label ", "geometry "))
         )
 

@@ -15,7 +15,6 @@ from creepkit.errors import CreepkitError, HistoryError, nearest
 from creepkit.readers.text_tables import SourceText
 from creepkit.readers.vocabulary import (
     CLOSE_SPELLING,
-    LABEL_KEYS,
     SPECIMEN_NAME_PATTERN,
     HeaderVocabulary,
     Terms,
@@ -44,11 +43,12 @@ TimeValuePairs = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class StatedNumber:
-    """A number in creepkit's unit, and the key and place that it came from."""
+    """A number in creepkit's unit; the key, as it was written, place and unit that it came from."""
 
     value: float
     key: str
     location: str
+    unit: str = ""
 
 
 class StatedConditions:
@@ -71,7 +71,8 @@ class StatedConditions:
         self.labels: dict[str, str] = {}
         self.stated: dict[str, Program] = {}
         self._vocabulary = vocabulary
-        self.terms = vocabulary.terms(_stated_specimen(entries, vocabulary))
+        stated = entries["specimen"].text.casefold() if "specimen" in entries else ""
+        self.terms = vocabulary.terms(stated or vocabulary.default_texts.get("specimen", ""))
         self.default_specimen = vocabulary.default_texts.get("specimen", "")
         self._kinds = self.terms.condition_kinds
         self._text_keys = self.terms.text_keys
@@ -109,7 +110,8 @@ class StatedConditions:
         if entry is None:
             return ""
         if entry.text not in allowed:
-            raise HistoryError(f"{entry.location}: {key} is '{entry.text}'; allowed: {', '.join(allowed)}")
+            written = entry.key or key
+            raise HistoryError(f"{entry.location}: {written} is '{entry.text}'; allowed: {', '.join(allowed)}")
         return entry.text
 
     def take_pairs(self, key: str, kind: QuantityKind) -> TimeValuePairs | None:
@@ -140,7 +142,7 @@ class StatedConditions:
     def all_labels(self) -> dict[str, str]:
         """The labels, with what was assumed; refuses numbers and texts that nothing has used."""
         unread = [(number.location, number.key) for number in self._numbers.values()]
-        unread += [(entry.location, key) for key, entry in self._texts.items()]
+        unread += [(entry.location, entry.key or key) for key, entry in self._texts.items()]
         for location, key in unread:
             raise HistoryError(
                 f"{location}: '{key}' has no meaning beside the other conditions; {_ALLOWED_COMBINATIONS}"
@@ -153,11 +155,10 @@ class StatedConditions:
         """Put an entry where it belongs; False where nothing is known of its key."""
         name = self._vocabulary.synonyms.get(key, key)
         kept_as_label = name in self._vocabulary.labels
-        name = name if kept_as_label else self.terms.spelled(name)
         result = None if kept_as_label else split_unit(name, self._kinds)
         word, _, rest = name.strip().partition(" ")
-        if kept_as_label or name in LABEL_KEYS:
-            _put_once(self.labels, LABEL_KEYS.get(name, name), entry.text, entry.location)
+        if kept_as_label:
+            _put_once(self.labels, name, entry.text, entry.location)
         elif word.casefold() == "label" and rest.strip():
             _put_once(self.labels, rest.strip(), entry.text, entry.location)
         elif word.casefold() == "geometry" and rest.strip():
@@ -171,13 +172,15 @@ class StatedConditions:
             _put_once(self._texts, name, entry, entry.location)
             self._locations[name] = entry.location
         elif dimension := _dimension_with_unit(name, self.terms.dimensions):
-            value = LENGTH.convert(entry.number(key), dimension[1], entry.location, key)
+            written = entry.key or key
+            value = LENGTH.convert(entry.number(written), dimension[1], entry.location, written)
             _put_once(self.geometry, dimension[0], value, entry.location)
         elif result is None or (result[1] not in self._kinds[result[0]].units and self._is_misspelt_text(name)):
             _refuse_misread_length(name, entry, self.terms)
             return False
         else:
-            _put_once(self._numbers, result[0], self._stated_number(result, key, entry), entry.location)
+            number = self._stated_number(result, entry.key or key, entry)
+            _put_once(self._numbers, result[0], number, entry.location)
             self._locations[result[0]] = entry.location
         return True
 
@@ -205,23 +208,16 @@ class StatedConditions:
         quantity, suffix = found
         kind = self._kinds[quantity]
         kind.unit(suffix, entry.location, key)
-        return StatedNumber(kind.convert(entry.number(key), suffix, entry.location, key), key, entry.location)
-
-
-def _stated_specimen(entries: Mapping[str, SourceText], vocabulary: HeaderVocabulary) -> str:
-    """The specimen that a file names, "" where it names none."""
-    synonyms = vocabulary.synonyms
-    named = [e.text.casefold() for key, e in entries.items() if plain_name(synonyms.get(key, key)) == "specimen"]
-    return named[0] if named else vocabulary.default_texts.get("specimen", "")
+        return StatedNumber(kind.convert(entry.number(key), suffix, entry.location, key), key, entry.location, suffix)
 
 
 def _unknown_key(refused: Sequence[str], unknown: Mapping[str, SourceText], suggestion: str) -> HistoryError:
     """The error about unknown keys: what the first may have meant, and which others there are."""
-    key, others = refused[0], refused[1:]
+    key, others = unknown[refused[0]].key or refused[0], refused[1:]
     advice = f"did you mean '{suggestion}'? A label is written" if suggestion else "a label is written"
     places = (f"'{other}' in line {unknown[other].location.rpartition(':')[2]}" for other in others)
     also = f"; unknown too: {', '.join(places)}" if others else ""
-    return HistoryError(f"{unknown[key].location}: unknown key '{key}'; {advice} 'label {key or 'NAME'}'{also}")
+    return HistoryError(f"{unknown[refused[0]].location}: unknown key '{key}'; {advice} 'label {key or 'NAME'}'{also}")
 
 
 def _dimension_with_unit(name: str, dimensions: Mapping[str, str]) -> tuple[str, str] | None:

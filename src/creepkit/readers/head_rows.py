@@ -90,7 +90,8 @@ def put_entry(
     entries: dict[str, SourceText], key: str, text: str, place: str, grid: CellGrid, known: KnownNames
 ) -> None:
     """Add an entry under creepkit's name of its key; HistoryError where it is there already."""
-    key = known.condition(key.rstrip(": "))
+    written = key.rstrip(": ")
+    key = known.condition(written)
     if key in entries:
-        raise HistoryError(f"{place}: '{key:.60}' was already given; keep one of them")
-    entries[key] = SourceText(text, place, grid.dialect.decimal)
+        raise HistoryError(f"{place}: '{written:.60}' was already given; keep one of them")
+    entries[key] = SourceText(text, place, grid.dialect.decimal, written)

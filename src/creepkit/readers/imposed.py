@@ -207,7 +207,7 @@ def _agrees(program: Program, times: Floats, column: Floats) -> bool:
 
 def _check_bare_strain(conditions: StatedConditions, quantity: str, kind: QuantityKind, number: StatedNumber) -> None:
     """Ask for the unit of a held strain that may be a fraction or a percentage."""
-    if "pct" not in kind.units or number.key.rpartition("_")[2] in kind.units:
+    if "pct" not in kind.units or number.unit:
         return
     if abs(number.value) > LARGEST_BARE_STRAIN:
         raise HistoryError(

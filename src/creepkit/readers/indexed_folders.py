@@ -43,10 +43,10 @@ class IndexedFolderReader:
     def read(self, path: Path) -> list[History]:
         """Return the histories in the folder, in the order of the index; of one file of frames, when it is named."""
         folder = path if path.is_dir() else path.parent
-        index = read_table(folder / self.index_file)
+        index = read_table(folder / self.index_file, self.vocabulary.ignored)
         tests = self._index_rows(index)
         if self._has_common_frames_file:
-            parts = self._split_common_file(read_table(folder / self.frames_file), index, tests)
+            parts = self._split_common_file(self._frames(folder / self.frames_file), index, tests)
         else:
             only = path if path.is_file() and path.name != self.index_file else None
             parts = self._read_files(folder, index, tests, only)
@@ -108,7 +108,10 @@ class IndexedFolderReader:
                     f"{index.location(tests[key].line)}: test '{key}' has no file {path.name} in {folder}"
                 )
             if only is None or path == only:
-                yield key, read_table(path)
+                yield key, self._frames(path)
+
+    def _frames(self, path: Path) -> TextTable:
+        return read_table(path, self.vocabulary.ignored)
 
     def _history(self, index: TextTable, row: TableRow, key: str, frames: TextTable) -> History:
         entries = {name: entry for name, entry in index.entries(row).items() if name != self.key_column}

@@ -81,7 +81,7 @@ def without_loading(
     if total is not None and not (includes_loading or stated):
         includes_loading = "yes" if strain[first] > 0.5 * total.value else "no"
         contained = "contained" if includes_loading == "yes" else "not contained"
-        conditions.record_assumption(f"loading strain {contained}, for the first strain is {strain[first]:.3g}")
+        conditions.record_assumption(f"loading strain {contained} (the first strain is {strain[first]:.3g})")
     if includes_loading != "yes":
         return StrainRecord(strain, used, elastic == "yes")
     if elastic == "yes":
@@ -109,16 +109,16 @@ def _decided(
         if first > max(SMALLEST_STRAIN, NOISE_FACTOR * _noise(strain[frames[:SEARCHED_FRAMES]])):
             if elastic_strain and _is_elastic(first, elastic_strain):
                 ratio = f"{first / elastic_strain:.2f} of stress over modulus"
-                conditions.record_assumption(f"includes_elastic yes, for the strain at time 0 is {ratio}")
+                conditions.record_assumption(f"includes_elastic yes (the strain at time 0 is {ratio})")
                 return StrainRecord(strain, used, includes_elastic=True)
-            conditions.record_assumption(f"includes_elastic no, loading strain {first:.3g} at time 0 subtracted")
+            conditions.record_assumption(f"includes_elastic no (loading strain {first:.3g} at time 0 subtracted)")
             return StrainRecord(strain - first, used, includes_elastic=False)
         end = _end_of_loading(times[frames], strain[frames], elastic_strain) if elastic_strain else None
         if end is not None and elastic_strain:
             ratio, time = strain[frames[end]] / elastic_strain, times[frames[end]]
             conditions.record_assumption(
-                f"includes_elastic yes and frames before {time:g} s not used, for the strain then stays at {ratio:.2f} "
-                "of stress over modulus"
+                f"includes_elastic yes and frames before {time:g} s not used (the strain then stays at {ratio:.2f} "
+                "of stress over modulus)"
             )
             return StrainRecord(strain, used & (times >= time), includes_elastic=True)
     included = conditions.take_choice("includes_elastic", ("yes", "no"), required=True)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import is_dataclass, replace
 from glob import glob
 from pathlib import Path
+from typing import Any, cast
 
 from creepkit.errors import HistoryError, nearest
 from creepkit.hookspecs import hookimpl
@@ -14,6 +16,7 @@ from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
 from creepkit.readers.spreadsheets import SPREADSHEET
 from creepkit.readers.test_tables import TEST_TABLE
+from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History, Reader, accepts_path, histories_in
 
 
@@ -23,29 +26,47 @@ def creepkit_readers() -> list[Reader]:
     return [INDEXED_TABLE, INDEXED_FILES, CREEP_SCHEMA, TEST_TABLE, HISTORY_CSV, SPREADSHEET]
 
 
-GENERAL_READERS: tuple[Reader, ...] = (HISTORY_CSV, SPREADSHEET)
-"""Readers that accept every file of their format, and so get only those that no other reader wants."""
+GENERAL_READERS: tuple[tuple[str, ...], ...] = ((HISTORY_CSV.name, SPREADSHEET.name), (TEST_TABLE.name,))
+"""Readers that get only the files that no other reader wants, the most general ones first: they accept every file of
+their format; a table of tests with frames beside it is an index."""
 
 
 PathsLike = str | Path | Iterable[str | Path]
 
 
-def read_histories(paths: PathsLike, readers: Sequence[Reader], reader: str | None = None) -> list[History]:
+def read_histories(
+    paths: PathsLike, readers: Sequence[Reader], reader: str | None = None, ignore: Collection[str] = ()
+) -> list[History]:
     """Read the histories in files, folders and glob patterns, in the order given and sorted within each.
 
     reader : the name of the reader to use; None asks each of `readers` which files it accepts. `csv` and `xlsx`
     accept every file of their format, and so get only those that no other reader wants. A folder is read as a whole
     when a reader accepts it, else file by file. What is reached twice is kept once; tests of one name get the name of
-    their folder in front.
+    their folder in front. ignore : columns that are left out wherever they stand.
     """
     if reader is not None:
         readers = [_reader_named(reader, readers)]
+    readers = [reader_without(ignore, one) for one in readers] if ignore else readers
     read: dict[tuple[str, str], tuple[Path, History]] = {}
     for path in _existing_paths(paths):
         for source in _readable_paths(path, readers):
             for history in histories_in(_reader_of(source, readers), source):
                 read.setdefault((history.source or str(source), history.name), (source, history))
     return _with_unique_names(list(read.values()))
+
+
+def reader_without(ignored: Collection[str], reader: Reader) -> Reader:
+    """The reader that leaves columns out, where its laboratory's names are declared; the same one where they are not.
+
+    ignored : names of columns as they are written, or but for capitals and unit.
+    """
+    if isinstance(ignored, str) or not all(str(name).strip() for name in ignored):
+        raise HistoryError(f"ignore is {ignored!r:.60}; give a list of names of columns, such as ['load_kN', 'date']")
+    vocabulary = getattr(reader, "vocabulary", None)
+    if not is_dataclass(reader) or not isinstance(vocabulary, HeaderVocabulary):
+        return reader
+    changes: Any = {"vocabulary": replace(vocabulary, ignored=tuple(ignored))}
+    return cast(Reader, replace(cast(Any, reader), **changes))
 
 
 def _reader_named(name: str, readers: Sequence[Reader]) -> Reader:
@@ -93,8 +114,9 @@ def _reader_of(path: Path, readers: Sequence[Reader]) -> Reader:
     if len(readers) == 1:
         return readers[0]
     accepting = [reader for reader in readers if accepts_path(reader, path)]
-    if len(accepting) > 1:
-        accepting = [reader for reader in accepting if reader not in GENERAL_READERS]
+    for general in GENERAL_READERS:
+        if len(accepting) > 1:
+            accepting = [reader for reader in accepting if reader.name not in general]
     if not accepting:
         reader_list = "; ".join(f"{reader.name}: {reader.title}" for reader in readers)
         raise HistoryError(f"{path}: no reader understands it; known are {reader_list or 'none'}")

@@ -12,7 +12,7 @@ import warnings
 import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from typing import Any
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number
 from creepkit.files.reading import FileKind, check_readable, read_bytes
-from creepkit.readers.cell_grids import CellGrid, grid_of_rows, table_of
+from creepkit.readers.cell_grids import CellGrid, grid_of_rows, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
@@ -37,6 +37,10 @@ MAXIMUM_UNPACKED_BYTES, MAXIMUM_CELLS = 500_000_000, 5_000_000
 
 _FILLED_ROWS = 60
 """Rows from the top in which a merged cell counts for all the columns that it covers."""
+
+
+_DAY_ZERO, _FIRST_DATE = datetime(1899, 12, 31), datetime(1902, 1, 1)
+"""The day that a spreadsheet counts as 0, and the first on which a creep test may have been made."""
 
 
 _MERGED = re.compile(rb'<(?:\w+:)?mergeCell\s[^>]*?ref="([A-Z]{1,3})(\d{1,7}):([A-Z]{1,3})\d{1,7}"')
@@ -157,7 +161,18 @@ def _cell_text(cell: Any) -> str:
     if isinstance(value, (int, float)):
         text = repr(value)
         return f"{Decimal(text).scaleb(2).normalize():f}%" if "%" in str(cell.number_format) else text
-    return value.isoformat(" ") if isinstance(value, datetime) else str(value)
+    if isinstance(value, datetime) and value >= _FIRST_DATE:
+        return value.isoformat(" ")
+    if isinstance(value, datetime):  # an elapsed time above a day, shown as h:mm:ss
+        return _clock_text(value - _DAY_ZERO)
+    return _clock_text(value) if isinstance(value, timedelta) else str(value)
+
+
+def _clock_text(elapsed: timedelta) -> str:
+    """An elapsed time as h:mm:ss, with the part of a second where there is one."""
+    seconds, part = divmod(elapsed // timedelta(microseconds=1), 1_000_000)
+    hours, rest = divmod(seconds, 3600)
+    return f"{hours}:{rest // 60:02d}:{rest % 60:02d}{f'.{part:06d}' if part else ''}"
 
 
 def _with_points(rows: list[TableRow], texts: list[str], place: str) -> list[TableRow]:
@@ -230,14 +245,17 @@ def _conditions_by_test(grid: CellGrid, vocabulary: HeaderVocabulary) -> dict[st
     columns = [k for k, name in enumerate(names) if words_of(name) in (*TEST_NAME_COLUMNS, "name", "sheet")]
     if not columns or len(grid.rows) < 2:
         return {}
-    table, known = table_of(grid), KnownNames.of(vocabulary)
+    table, known = table_of(without_ignored(grid, 0, vocabulary.ignored)), KnownNames.of(vocabulary)
+    columns = [k for k, name in enumerate(table.columns) if words_of(name) in (*TEST_NAME_COLUMNS, "name", "sheet")]
+    if not columns:
+        return {}
     tests: dict[str, dict[str, SourceText]] = {}
     for row in table.rows:
         test, place = row.cells[columns[0]], table.location(row.line)
         if not test or test in tests:
             raise HistoryError(f"{place}: the test is '{test:.40}', which is empty or named before; name each once")
         tests[test] = {
-            known.condition(name) if known.is_condition(name) else f"label {name}": entry
+            known.condition(name) if known.is_condition(name) else f"label {name}": replace(entry, key=name)
             for name, entry in table.entries(row).items()
             if name != table.columns[columns[0]]
         }

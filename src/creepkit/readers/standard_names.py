@@ -15,9 +15,10 @@ from dataclasses import replace
 import numpy as np
 
 from creepkit.errors import HistoryError
+from creepkit.readers.clock_times import with_elapsed_times
 from creepkit.readers.column_names import STATED_BY_NAME, KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.text_tables import NumberRows, SourceText, TableRow, TextTable
-from creepkit.readers.vocabulary import HeaderVocabulary, split_unit
+from creepkit.readers.vocabulary import HeaderVocabulary, plain_name, split_unit
 
 SURELY_PER_CENT, SURELY_FRACTION = 1.0, 1e-3
 """Largest strain above which, and below which, a strain without unit is decided by its values."""
@@ -38,33 +39,39 @@ def in_standard_names(
     entries: Mapping[str, SourceText], table: TextTable, vocabulary: HeaderVocabulary
 ) -> tuple[dict[str, SourceText], TextTable]:
     """Entries and columns of one test under creepkit's names, with units, and a strain whose unit is decided."""
-    written = next(
-        (e.text for key, e in entries.items() if vocabulary.synonyms.get(key, key).lower() == "specimen"), ""
-    )
-    known = KnownNames.of(vocabulary, written)
-    stated = _standard_entries(entries, known)
+    known = KnownNames.of(vocabulary, specimen_named(entries, vocabulary))
+    stated = in_standard_keys(entries, known)
     for key, entry in _stated_by_columns(table):
         if stated.setdefault(key, entry).text != entry.text:
             raise HistoryError(
                 f"{stated[key].location}: {key} is '{stated[key].text}', but {entry.location} says {entry.text}"
             )
     columns = [known.column(name) for name in table.columns]
-    table = replace(table, columns=columns) if columns != list(table.columns) else table
+    table = replace(table, columns=columns, written=table.columns) if columns != list(table.columns) else table
+    table = with_elapsed_times(stated, table, known)
     return _with_decided_strains(stated, _without_per_cent_signs(table, known), known, entries)
 
 
-def _standard_entries(entries: Mapping[str, SourceText], known: KnownNames) -> dict[str, SourceText]:
+def specimen_named(entries: Mapping[str, SourceText], vocabulary: HeaderVocabulary) -> str:
+    """The specimen that a file names, "" where it names none."""
+    synonyms = vocabulary.synonyms
+    named = (e.text.casefold() for key, e in entries.items() if plain_name(synonyms.get(key, key)) == "specimen")
+    return next(named, "")
+
+
+def in_standard_keys(entries: Mapping[str, SourceText], known: KnownNames) -> dict[str, SourceText]:
+    """Entries under creepkit's names of their keys, with the units that stand in their texts."""
     stated: dict[str, SourceText] = {}
     for key, entry in entries.items():
         name = known.condition(key)
-        found = split_unit(name, known.condition_kinds)
+        found = split_unit(name, known.conditions.kinds)
         if found and (match := _VALUE_WITH_UNIT.fullmatch(entry.text)):
             suffix = unit_suffix(match[2])
-            if suffix in known.condition_kinds[found[0]].units and found[1] in ("", suffix):
+            if suffix in known.conditions.kinds[found[0]].units and found[1] in ("", suffix):
                 name, entry = f"{found[0]}_{suffix}", replace(entry, text=match[1])
         if name in stated:
-            raise HistoryError(f"{entry.location}: '{name}' is given twice (perhaps in two units); keep one of them")
-        stated[name] = entry
+            raise HistoryError(f"{entry.location}: '{key}' is given twice (perhaps in two units); keep one of them")
+        stated[name] = entry if name == key else replace(entry, key=entry.key or key)
     return stated
 
 
@@ -88,7 +95,7 @@ def _without_per_cent_signs(table: TextTable, known: KnownNames) -> TextTable:
         return table
     columns = list(table.columns)
     for k in signed:
-        name, suffix = split_unit(columns[k], known.column_kinds) or (columns[k], "")
+        name, suffix = split_unit(columns[k], known.columns.kinds) or (columns[k], "")
         if suffix not in ("", "pct", "percent"):
             place = table.location(table.columns_line, k)
             raise HistoryError(f"{place}: '{columns[k]}' is not in per cent, but its cells are; correct one of them")
@@ -102,13 +109,13 @@ def _without_per_cent_signs(table: TextTable, known: KnownNames) -> TextTable:
                 raise HistoryError(f"{place}: '{columns[k]}' is '{cells[k]:.40}' without the sign % of other cells")
             cells[k] = cells[k].removesuffix("%").rstrip()
         rows.append(TableRow(row.line, cells))
-    return replace(table, columns=columns, rows=rows)
+    return replace(table, columns=columns, rows=rows, written=table.written or table.columns)
 
 
 def _kind(name: str, known: KnownNames) -> bool:
     """Whether a column holds a quantity that may be in per cent."""
-    found = split_unit(name, known.column_kinds)
-    return found is not None and "pct" in known.column_kinds[found[0]].units
+    found = split_unit(name, known.columns.kinds)
+    return found is not None and "pct" in known.columns.kinds[found[0]].units
 
 
 def _with_decided_strains(
@@ -140,14 +147,14 @@ def _with_decided_strains(
     columns = [names.get(name, name) for name in table.columns]
     return (
         {names.get(key, key): entry for key, entry in stated.items()},
-        replace(table, columns=columns, assumptions=tuple(assumptions)),
+        replace(table, columns=columns, written=table.written or table.columns, assumptions=tuple(assumptions)),
     )
 
 
 def _is_undecided(name: str, known: KnownNames) -> bool:
     if name in known.declared:
         return False
-    kinds = known.column_kinds
+    kinds = known.columns.kinds
     found = split_unit(name, kinds)
     return bool(found) and found == (name, "") and kinds[name].is_ambiguous_without_unit
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import is_number
-from creepkit.readers.cell_grids import CellGrid, table_of
+from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.head_rows import entries_above, entries_of_blocks
 from creepkit.readers.text_tables import SourceText, TableRow, TextTable, check_columns
@@ -57,7 +57,11 @@ def tests_in(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TabulatedTest
     stated = grid.header.get("specimen")
     known = KnownNames.of(vocabulary, stated.text if stated else "")
     names_at = _row_of_names(grid, known)
-    grid = _with_comments(grid, grid.rows[names_at].line, known)
+    names_line = grid.rows[names_at].line
+    grid = without_ignored(_with_comments(grid, names_line, known), names_at, vocabulary.ignored)
+    names_at = next((k for k, row in enumerate(grid.rows) if row.line == names_line), -1)
+    if names_at < 0:
+        raise HistoryError(f"{grid.location(names_line)}: every column is left out by ignore; keep those of the test")
     head, names = grid.rows[:names_at], grid.rows[names_at]
     cells, tests_below, body_at = _joined_names(grid, names_at)
     below = replace(grid, rows=[TableRow(names.line, cells), *grid.rows[body_at:]])
@@ -163,7 +167,7 @@ def _is_wide(cells: Sequence[str], time: int, known: KnownNames, has_head: bool)
         return has_head and len(set(others)) == 1
     if any(words_of(cell) in TEST_NAME_COLUMNS or known.is_condition(cell) for cell in others):
         return False
-    spelled = {words_of(name) for name in known.column_kinds}
+    spelled = {words_of(name) for name in known.columns.kinds}
     return not any(get_close_matches(words_of(split_written_name(cell)[0]), spelled, 1, cutoff=0.75) for cell in others)
 
 
@@ -203,7 +207,7 @@ def _columns_beside(
     if not head and all(block.test.isdigit() for block in blocks):
         raise HistoryError(
             f"{place}: several columns of one quantity, and no conditions above them, may be tests or sensors of one "
-            "test; name the tests, such as 'A1 strain (%)', or keep one column"
+            "test; name the tests, such as 'A1 strain (%)', or keep one column, with '# ignore: NAME' for the others"
         )
     return blocks
 
@@ -280,7 +284,8 @@ def _table_of_block(grid: CellGrid, rows: Sequence[TableRow], name: str, columns
         raise HistoryError(
             f"{grid.location(line)}: test '{name:.40}' has no rows below the names of its columns; remove it or fill it"
         )
-    return TextTable(grid.path, {}, list(columns.values()), line, cut, grid.dialect, grid.sheet, positions)
+    places = [grid.positions[k] if grid.positions else k for k in positions]
+    return TextTable(grid.path, {}, list(columns.values()), line, cut, grid.dialect, grid.sheet, places)
 
 
 def _without_footers(grid: CellGrid) -> tuple[CellGrid, tuple[str, ...]]:
@@ -346,5 +351,5 @@ def _entries_of_columns(
         name = table.columns[k]
         key = known.condition(name) if known.is_condition(name) else f"label {name}"
         if row.cells[k]:
-            entries[key] = SourceText(row.cells[k], table.location(row.line), table.dialect.decimal)
+            entries[key] = SourceText(row.cells[k], table.location(row.line), table.dialect.decimal, name)
     return entries

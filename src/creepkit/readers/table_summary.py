@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from creepkit.readers.column_names import KnownNames
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
 from creepkit.readers.table_layouts import names_time, tests_in
+from creepkit.readers.test_tables import TEST_TABLE, columns_of_tests, key_of_column
 from creepkit.readers.vocabulary import HeaderVocabulary
 
 
@@ -29,9 +30,17 @@ class TableSummary:
     rows: int
 
 
-def summarise_tables(path: Path) -> list[TableSummary]:
-    """The tables of a text file or a spreadsheet in one of the general layouts; [] of any other file."""
-    vocabulary = HeaderVocabulary()
+def summarise_tables(path: Path, ignored: Collection[str] = ()) -> list[TableSummary]:
+    """The tables of a text file or a spreadsheet in one of the general layouts; [] of any other file.
+
+    ignored : columns that are left out.
+    """
+    vocabulary = HeaderVocabulary(ignored=ignored)
+    if TEST_TABLE.accepts(path):
+        return [
+            TableSummary(str(path), "", "", {name: key_of_column(name)[0] or name for name in names}, rows)
+            for names, rows in columns_of_tests(path, ignored)
+        ]
     if SPREADSHEET.accepts(path):
         grids = [grid for grid in read_sheets(path) if names_time(grid, vocabulary)]
     elif HISTORY_CSV.accepts(path):

@@ -4,25 +4,25 @@
     A1,120,750,2.1e-6,8200,X7
     A2,100,750,,>10000,X7
 
-Names of columns may be spelled as COLUMN_NAMES lists them, with their unit behind `_`, `,` or `/`, or in brackets. A
-rupture time `>10000`, or a row that `ended` calls stopped, is a run-out: the test lasted so long, unbroken. Other
-columns are labels. What all rows share may stand above them as `# key: value`.
+Names of columns may be spelled as QUANTITIES and TEXTS list them, with their unit behind `_`, `,` or `/`, or in
+brackets. A rupture time `>10000`, or a row that `ended` calls stopped, is a run-out: the test lasted so long, unbroken.
+Other columns are labels. What all rows share may stand above them as `# key: value`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
 from creepkit.errors import HistoryError
 from creepkit.readers.assembly import assemble_without_frames
-from creepkit.readers.cell_grids import CellGrid, peek_columns, read_text_grid, table_of
-from creepkit.readers.column_names import unit_suffix
+from creepkit.readers.cell_grids import CellGrid, peek_columns, read_text_grid, table_of, without_ignored
+from creepkit.readers.column_names import NameTable, split_written_name, unit_suffix, words_of
 from creepkit.readers.text_tables import SourceText, TableRow, TextTable
-from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary
+from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary, plain_name, split_unit
 from creepkit.records import History
 from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
 
@@ -31,13 +31,17 @@ MEASURED = ("minimum_rate", "rupture")
 
 
 QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
-    "stress": (STRESS, ("stress", "sigma", "nominal stress", "applied stress", "initial stress", "creep stress")),
-    "temperature": (TEMPERATURE, ("temperature", "temp", "t", "test temperature", "creep temperature")),
+    "stress": (
+        STRESS,
+        ("stress", "sigma", "nominal stress", "applied stress", "initial stress", "creep stress", "spannung"),
+    ),
+    "temperature": (TEMPERATURE, ("temperature", "temp", "t", "test temperature", "creep temperature", "temperatur")),
     "minimum_rate": (
         RATE,
         (
             *("minimum rate", "min rate", "minimum creep rate", "min creep rate", "minimum strain rate", "mcr"),
             *("steady state creep rate", "steady state rate", "secondary creep rate", "steady creep rate"),
+            *("kriechrate", "minimale kriechrate", "min kriechrate"),
         ),
     ),
     "minimum_rate_sd": (RATE, ("minimum rate sd", "min rate sd", "minimum creep rate sd", "min creep rate sd")),
@@ -45,7 +49,7 @@ QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
         TIME,
         (
             *("rupture", "rupture time", "time to rupture", "creep rupture time", "rupture life", "creep life"),
-            *("t r", "tr", "t rupture", "time to failure", "failure time", "life"),
+            *("t r", "tr", "t rupture", "time to failure", "failure time", "life", "bruchzeit", "standzeit"),
         ),
     ),
     "end_time": (TIME, ("end time", "duration", "test duration", "time", "test time", "time on test", "t")),
@@ -56,7 +60,7 @@ QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
 TEXTS: Mapping[str, tuple[str, ...]] = {
     "name": ("name", "test", "test id", "test name", "test no", "test number", "id", "no", "sample", "specimen id"),
     "ended": ("ended", "end", "end of test", "outcome", "status", "state", "result"),
-    "alloy": ("alloy", "material"),
+    "alloy": ("alloy", "material", "werkstoff"),
     "control": ("control",),
     "specimen": ("specimen",),
     "label heat": ("heat", "cast", "batch", "heat number", "heat no"),
@@ -75,8 +79,16 @@ ENDED: Mapping[str, str] = {
 """{word in small letters: how a test ended}."""
 
 
-_RATE_UNIT = re.compile(r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:(?:/|per )\s*([a-z]+)|([a-z]+)\^?-1)")
-"""`1/h`, `%/h`, `per hour`, `h-1`."""
+_NAMES = NameTable(
+    {quantity: kind for quantity, (kind, _) in QUANTITIES.items()},
+    tuple(TEXTS),
+    {
+        name: key
+        for key, names in (*TEXTS.items(), *((q, names) for q, (_, names) in QUANTITIES.items()))
+        for name in names
+    },
+    {},
+)
 
 
 RUN_OUT = re.compile(r">=?|\N{GREATER-THAN OR EQUAL TO}")
@@ -105,10 +117,9 @@ class RowPerTestReader:
 
     def read(self, path: Path) -> list[History]:
         """Return one history a row, in the order of the rows; of a spreadsheet those of all its tables of tests."""
-        grids = [grid for grid in _grids(path) if not grid.sheet or _is_test_table(grid.rows[0].cells)]
         places: dict[str, str] = {}
         histories = []
-        for table in map(table_of, grids):
+        for table in _tables(path, self.vocabulary.ignored):
             keys = _keys(table)
             for row in table.rows:
                 history, place = self._history(table, row, keys), table.location(row.line)
@@ -123,7 +134,8 @@ class RowPerTestReader:
 
     def _history(self, table: TextTable, row: TableRow, keys: Sequence[str]) -> History:
         location = table.location(row.line)
-        cells = {keys[table.columns.index(name)]: entry for name, entry in table.entries(row).items()}
+        written = table.entries(row).items()
+        cells = {keys[table.columns.index(name)]: replace(entry, key=name) for name, entry in written}
         entries = {**table.header, **_with_end(cells, location)}
         name = f"{table.sheet or table.path.stem} {row.line}"
         where = f"sheet {table.sheet}, " if table.sheet else ""
@@ -148,6 +160,17 @@ def _grids(path: Path) -> list[CellGrid]:
     return read_sheets(path)
 
 
+def _tables(path: Path, ignored: Collection[str]) -> list[TextTable]:
+    """The tables of tests in a file; ignored : columns that are left out."""
+    grids = [grid for grid in _grids(path) if not grid.sheet or _is_test_table(grid.rows[0].cells)]
+    return [table_of(without_ignored(grid, 0, ignored)) for grid in grids]
+
+
+def columns_of_tests(path: Path, ignored: Collection[str]) -> list[tuple[Sequence[str], int]]:
+    """Names of columns, and number of rows, of each table of tests in a file."""
+    return [(table.columns, len(table.rows)) for table in _tables(path, ignored)]
+
+
 def _is_test_table(names: Sequence[str]) -> bool:
     keys = [key_of_column(name)[0] for name in names]
     return "stress" in keys and any(name in keys for name in MEASURED) and not _has_frames(names)
@@ -155,22 +178,22 @@ def _is_test_table(names: Sequence[str]) -> bool:
 
 def _has_frames(names: Sequence[str]) -> bool:
     """Whether a column is a strain, and no rate of it."""
-    words = [set(_words(name).split()) for name in names]
+    words = [set(words_of(name).split()) for name in names]
     return any("strain" in one and "rate" not in one for one in words)
 
 
 def key_of_column(written: str) -> tuple[str, str]:
     """The quantity, or key, that the name of a column means, and its unit; ("", "") where it means none."""
-    name, unit = _split(written)
-    for quantity, (kind, names) in QUANTITIES.items():
-        if name in names and unit in kind.units:
-            return quantity, unit
-    meant = [quantity for quantity, (_, names) in QUANTITIES.items() if name in names]
-    if meant:
-        return meant[0], unit
-    whole = _words(written)
-    texts = [key for key, names in TEXTS.items() if whole in names or (name in names and unit in ("pct", "%"))]
-    return (texts[0], "") if texts else ("", "")
+    name, unit = split_written_name(written)
+    unit = unit_suffix(unit) or unit
+    if plain_name(name) == "t":
+        return "temperature" if unit in TEMPERATURE.units else "end_time", unit
+    meant = _NAMES.meaning(name) or ""
+    if meant in QUANTITIES:
+        return meant, unit
+    whole = _NAMES.meaning(written) or ""
+    text = whole if whole in TEXTS else meant if unit in ("", "pct") else ""
+    return text, ""
 
 
 def _keys(table: TextTable) -> list[str]:
@@ -207,14 +230,12 @@ def _check_unit(quantity: str, unit: str, written: str, location: str) -> None:
 
 def _quantity(key: str) -> str:
     """The quantity of a key, without its unit; other keys as they are."""
-    found = max(
-        (q for q in CONDITION_KINDS.keys() | QUANTITIES if key == q or key.startswith(f"{q}_")), key=len, default=""
-    )
-    return found or key
+    found = split_unit(key, {**CONDITION_KINDS, **_NAMES.kinds})
+    return found[0] if found else key_of_column(key)[0] or key
 
 
 def _refuse_misspelt(written: str, location: str) -> None:
-    name = _split(written)[0]
+    name = words_of(split_written_name(written)[0])
     known = {one: key for key, (_, names) in QUANTITIES.items() for one in names}
     known |= {one: key for key, names in TEXTS.items() for one in names}
     near = get_close_matches(name, [one for one in known if len(one) > 3], 1, cutoff=0.8)
@@ -252,7 +273,7 @@ def _with_end(cells: Mapping[str, SourceText], location: str) -> dict[str, Sourc
                     f"{location}: it was stopped at '{time.text}' and at '{entries[taken].text}'; keep one"
                 )
             if taken is None:
-                entries[f"end_time_{key.rpartition('_')[2]}"] = SourceText(text, location)
+                entries[f"end_time_{key.rpartition('_')[2]}"] = replace(time, text=text)
             ended = "stopped"
     ruptures = any(_quantity(key) == "rupture" for key in entries)
     if ended == "ruptured" and not ruptures:
@@ -269,35 +290,3 @@ def _with_end(cells: Mapping[str, SourceText], location: str) -> dict[str, Sourc
     if ended == "stopped":
         entries["ended"] = SourceText("stopped", location)
     return entries
-
-
-def _split(written: str) -> tuple[str, str]:
-    """Name in small letters with single blanks, and unit as creepkit spells it, "" for none."""
-    text = " ".join(written.split())
-    if match := re.fullmatch(r"([^(\[]*)[(\[]([^)\]]*)[)\]]", text):
-        return _words(match[1]), _unit(match[2])
-    for separator in (",", " in ", "_", " ", "/"):
-        for k in range(1, text.count(separator) + 1):
-            parts = text.split(separator)
-            name, unit = separator.join(parts[:k]), separator.join(parts[k:])
-            if name and _is_unit(unit):
-                return _words(name), _unit(unit)
-    return _words(text), ""
-
-
-def _words(name: str) -> str:
-    return " ".join(re.sub(r"[_\-.]+", " ", name.strip(" /,_")).casefold().split())
-
-
-def _is_unit(text: str) -> bool:
-    return any(_unit(text) in kind.units for kind, _ in QUANTITIES.values()) or _unit(text) == "pct"
-
-
-def _unit(text: str) -> str:
-    """A unit as creepkit spells it; the text where it is none."""
-    if match := _RATE_UNIT.fullmatch(text.strip().casefold()):
-        share = "pct" if match[1] in ("%", "pct", "percent") else "1"
-        time = unit_suffix(match[2] or match[3])
-        if time in TIME.units:
-            return f"{share}/{time}"
-    return unit_suffix(text) or text.strip()

@@ -9,14 +9,16 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import overload
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import Dialect, is_number, parse_number, parse_numbers
+from creepkit.readers.column_names import NameTable, split_written_name
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records.quantities import QuantityKind
 
@@ -26,11 +28,13 @@ class SourceText:
     """One piece of text and its place, 'file:line'.
 
     decimal : the decimal sign of the table that it stands beside; a decimal point is understood in any case.
+    key : the key or column as it was written, where it is known by another name; "" else.
     """
 
     text: str
     location: str
     decimal: str = "."
+    key: str = ""
 
     def number(self, name: str) -> float:
         """The text as a finite number; `name` says in the error what it was meant to be."""
@@ -81,7 +85,8 @@ class TextTable:
     """A table as it was written: the entries of its head, its columns, its rows; all still text.
 
     sheet : of a spreadsheet, "" elsewhere. positions : the column of the file, from 0, in which each column stands,
-    where errors must tell it. assumptions : what was assumed of the table, for the label "assumed".
+    where errors must tell it. assumptions : what was assumed of the table, for the label "assumed". written : the
+    columns as they were written, where they were given creepkit's names.
     """
 
     path: Path
@@ -93,6 +98,7 @@ class TextTable:
     sheet: str = ""
     positions: Sequence[int] = ()
     assumptions: tuple[str, ...] = ()
+    written: Sequence[str] = ()
 
     def location(self, line_number: int, column: int | None = None) -> str:
         """Where a line stands, 'file:line', or 'file, sheet 'creep', row 3' in a spreadsheet; or a cell of it."""
@@ -106,13 +112,17 @@ class TextTable:
             raise HistoryError(f"{self.location(self.columns_line)}: missing column '{name}'; found: {result}")
         return self.columns.index(name)
 
+    def as_written(self, column: int) -> str:
+        """The name of a column as the file has it."""
+        return (self.written or self.columns)[column]
+
     def numbers(self, name: str) -> Floats:
         """(rows,) One column as numbers."""
         k = self.column(name)
         if isinstance(self.rows, NumberRows):
             return self.rows.numbers[:, k]
         cells = [row.cells[k] for row in self.rows]
-        return parse_numbers(cells, self.dialect, lambda row: self.location(self.rows[row].line, k), name)
+        return parse_numbers(cells, self.dialect, lambda row: self.location(self.rows[row].line, k), self.as_written(k))
 
     @property
     def lines(self) -> Ints:
@@ -185,18 +195,24 @@ class TableFrames:
 def read_frames(
     table: TextTable, vocabulary: HeaderVocabulary, terms: Terms, skipped_columns: Collection[str] = ()
 ) -> TableFrames:
-    """Read the frames in a table, except the columns in `skip` and those that are averaged to labels."""
+    """Read the frames in a table, except `skipped_columns` and those that are averaged to labels."""
     kinds = terms.column_kinds
     ignored = {*skipped_columns, *(name for names in vocabulary.averaged_columns.values() for name in names)}
     values: dict[str, Floats] = {}
-    for name in table.columns:
+    found: dict[str, str] = {}
+    for k, name in enumerate(table.columns):
         if name not in ignored:
-            quantity, suffix = _parsed_column(table, vocabulary.synonyms.get(name, name), kinds)
+            written = table.as_written(k)
+            quantity, suffix = _parsed_column(table, k, vocabulary.synonyms.get(name, name), kinds)
             if quantity in values:
-                raise HistoryError(f"{table.location(table.columns_line)}: two columns hold the {quantity}; keep one")
+                raise HistoryError(
+                    f"{table.location(table.columns_line)}: '{found[quantity]}' and '{written}' both hold the "
+                    f"{quantity}; keep one and leave the other out: {how_to_ignore(written)}"
+                )
             values[quantity] = _converted_column(table, name, kinds[quantity], suffix)
+            found[quantity] = written
     if "time" not in values:
-        place, result = table.location(table.columns_line), ", ".join(table.columns)
+        place, result = table.location(table.columns_line), ", ".join(table.written or table.columns)
         raise HistoryError(f"{place}: missing column: no time among {result}; name one time_s, time_min or time_h")
     return _strictly_increasing(TableFrames(table, values, table.lines))
 
@@ -209,21 +225,50 @@ def column_means(table: TextTable, vocabulary: HeaderVocabulary) -> dict[str, st
     }
 
 
-def _parsed_column(table: TextTable, name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:
+def how_to_ignore(column: str) -> str:
+    """How to have a column left out."""
+    return f"write '# ignore: {column}' above, or read it with --ignore '{column}'"
+
+
+def _parsed_column(table: TextTable, k: int, name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:
     """Quantity and unit suffix of a column."""
-    location = table.location(table.columns_line)
+    location, written = table.location(table.columns_line), table.as_written(k)
     result = split_unit(name, kinds)
     if result is None:
-        raise HistoryError(f"{location}: column '{name}' is not understood; {nearest(name, kinds)}")
+        unit = split_written_name(written)[1]
+        sensor, names = _sensor(written, kinds), table.written or table.columns
+        others = [other for other in names if other != written and sensor and _sensor(other, kinds) == sensor]
+        way_out = how_to_ignore(written)
+        if others:
+            raise HistoryError(
+                f"{location}: '{written}' and '{others[0]}' seem to be several sensors of the {sensor}; name the one "
+                f"that counts '{sensor}{unit and f' ({unit})'}', and leave the others out: {how_to_ignore(others[0])}"
+            )
+        if sensor and sensor not in {(split_unit(other, kinds) or ("",))[0] for other in table.columns}:
+            raise HistoryError(
+                f"{location}: '{written}' seems to be a sensor of the {sensor}; name it "
+                f"'{sensor}{unit and f' ({unit})'}', or leave it out: {way_out}"
+            )
+        near = get_close_matches(written, kinds, 1, cutoff=0.55)
+        meant = f"did you mean '{near[0]}'? Else" if near else "name it as creepkit does, or"
+        raise HistoryError(f"{location}: column '{written}' is not understood; {meant} leave it out: {way_out}")
     quantity, suffix = result
-    kinds[quantity].unit(suffix, location, name)
+    kinds[quantity].unit(suffix, location, written)
     return result
+
+
+def _sensor(name: str, kinds: Mapping[str, QuantityKind]) -> str:
+    """The quantity that one sensor of several measures, `T1_C` or `Temperature top (C)`; "" where it is none."""
+    words = split_written_name(name)[0]
+    stem = re.split(r"(?<=[^\d\s_])[\s_.-]*\d+$|[\s_]+(?:top|mid|middle|bot|bottom|[A-Z])$", words)[0]
+    return NameTable(kinds).meaning(stem) or ("temperature" if stem.casefold() in ("tc", "thermocouple") else "")
 
 
 def _converted_column(table: TextTable, name: str, kind: QuantityKind, suffix: str) -> Floats:
     """One column in creepkit's unit."""
     k = table.column(name)
-    return kind.convert_all(table.numbers(name), suffix, lambda row: table.location(table.rows[row].line, k), name)
+    written = table.as_written(k)
+    return kind.convert_all(table.numbers(name), suffix, lambda row: table.location(table.rows[row].line, k), written)
 
 
 def _strictly_increasing(frames: TableFrames) -> TableFrames:

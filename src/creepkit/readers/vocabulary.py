@@ -29,8 +29,8 @@ from creepkit.records.quantities import (
 
 @lru_cache(maxsize=4096)
 def plain_name(name: str) -> str:
-    """A name in small letters, with underscores for blanks, hyphens and what sets a unit apart: `Stress [MPa]`."""
-    return re.sub(r"[\s_\-()\[\],]+", "_", name.strip().casefold()).strip("_")
+    """A name in small letters, with underscores for blanks, hyphens, points and what sets a unit apart."""
+    return re.sub(r"[\s_\-.()\[\],]+", "_", name.strip().casefold()).strip("_")
 
 
 def is_misspelling(name: str, known: str) -> bool:
@@ -62,10 +62,8 @@ def _edit_distance(first: str, second: str, limit: int) -> int:
 
 def split_unit(name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str] | None:
     """Split `stress_MPa` into the longest known quantity and the unit behind it; None when it begins with none."""
-    for quantity in sorted(kinds, key=len, reverse=True):
-        if name == quantity or name.startswith(f"{quantity}_"):
-            return quantity, name[len(quantity) + 1 :]
-    return None
+    found = max((one for one in kinds if name == one or name.startswith(f"{one}_")), key=len, default=None)
+    return None if found is None else (found, name[len(found) + 1 :])
 
 
 COMPONENT_LOADING_KINDS: Mapping[str, QuantityKind] = {
@@ -89,9 +87,10 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 
 TEXT_KEYS = (
     *("name", "alloy", "specimen", "operator", "control", "strain_measure", "stress_measure"),
-    *("includes_elastic", "includes_loading", "ended", "noise_correlation", "strain_unit"),
+    *("includes_elastic", "includes_loading", "ended", "noise_correlation"),
+    *("decimal", "columns", "ignore", "strain_unit", "date_order", "time_zone"),
 )
-"""Words that stand once for a whole test, beside steps and programs."""
+"""Words that stand once for a whole test, beside steps and programs; the last line says how its table is written."""
 
 
 LABEL_KEYS: Mapping[str, str] = {
@@ -99,10 +98,6 @@ LABEL_KEYS: Mapping[str, str] = {
     **dict.fromkeys(("laboratory", "lab"), "laboratory"),
 }
 """{key: label} of what tests share with others: a forecast tells the scatter between heats and laboratories apart."""
-
-
-OTHER_UNITS = re.compile(r"(?<![A-Za-z])(mPa|mN|Mn|nm|M)\W*$")
-"""Units that in other capitals are known ones, millipascal or nanometre: a key in them is not understood."""
 
 
 HIGHEST_STEP = 9
@@ -136,6 +131,7 @@ class HeaderVocabulary:
     end_of_test_terms : {its word: "ruptured" or "stopped"} for how a test ended, beside these two themselves; in a
         column of rupture times such a word may stand in the place of a number.
     labels : its keys and columns that are kept as labels though nothing is known of them.
+    ignored : columns, as they are written in its files, that are left out.
     """
 
     synonyms: Mapping[str, str] = field(default_factory=dict)
@@ -144,6 +140,7 @@ class HeaderVocabulary:
     outputs: Mapping[str, Mapping[str, QuantityKind]] = field(default_factory=dict)
     end_of_test_terms: Mapping[str, str] = field(default_factory=dict)
     labels: Collection[str] = ()
+    ignored: Collection[str] = ()
 
     def terms(self, specimen: str = "") -> Terms:
         """What headers and columns of a file may say; specimen : that the file names, whose own terms then count most.
@@ -215,10 +212,6 @@ class Terms:
     def spellings(self) -> dict[str, str]:
         """{name in small letters with underscores: key} of every key that a head may hold, units included."""
         return {plain_name(key): key for key in self._keys(self.condition_kinds, self.dimensions)}
-
-    def spelled(self, name: str) -> str:
-        """The key that a name is but for capitals, blanks, hyphens and brackets; the name itself where it is none."""
-        return name if OTHER_UNITS.search(name) else self.spellings.get(plain_name(name), name)
 
     def misspelt(self, name: str) -> str:
         """The key of which an unknown name is a misspelling, first of those of the file's own specimen; "" for none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,13 +74,14 @@ def check_histories(values: Sequence[History]) -> list[History]:
     return histories
 
 
-def read_histories(paths: reading.PathsLike, reader: str | None = None) -> list[History]:
+def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: Collection[str] = ()) -> list[History]:
     """Read measured histories from a file, a folder, a pattern such as "in625/*.csv", or several of these.
 
     reader : name of the reader; by default the one that accepts the file.
+    ignore : columns that nobody needs, such as ["load_kN", "date"]; they are left out wherever they stand.
     """
     readers = [entry.value for entry in default_registry().readers().values()]
-    return reading.read_histories(paths, readers, reader)
+    return reading.read_histories(paths, readers, reader, ignore)
 
 
 def read_frames(

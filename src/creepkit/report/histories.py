@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,18 @@ def tables_text(tables: Sequence[TableSummary]) -> str:
 def histories_text(histories: Sequence[History]) -> str:
     """A paragraph for each test: its conditions, what was measured, how it ended, what was assumed, its labels."""
     return "\n".join(line for history in histories for line in _lines(history))
+
+
+def assumptions_text(histories: Sequence[History]) -> str:
+    """One line for each thing that was assumed of tests, with the number of tests; numbers may differ among them."""
+    groups: dict[str, list[str]] = {}
+    for history in histories:
+        for text in filter(None, history.labels.get("assumed", "").split(", ")):
+            groups.setdefault(re.sub(r"\d[\w.:+-]*", "0", text), []).append(text)
+    return "\n".join(
+        f"assumed of {len(texts)} of {len(histories)} tests: {texts[0]}{' or the like' * (len(set(texts)) > 1)}"
+        for texts in groups.values()
+    )
 
 
 def _lines(history: History) -> list[str]:

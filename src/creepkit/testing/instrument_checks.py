@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from creepkit.files.time_stamps import DATE_ORDERS
 from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
-from creepkit.instruments.time_stamps import DATE_ORDERS
 from creepkit.records import InstrumentFormat
 from creepkit.testing.reports import ConformanceCheck
 

@@ -164,7 +164,7 @@ def total(*, elastic: float = 8e-4) -> str:
 def test_the_end_of_loading_is_found(read):
     history = read(LOADED + total())
     assert (history.includes_elastic, history.used.tolist()) == (True, [False, False, *[True] * 8])
-    assert "includes_elastic yes and frames before 30 s not used, for the strain then stays at 1.00" in assumed(history)
+    assert "includes_elastic yes and frames before 30 s not used (the strain then stays at 1.00" in assumed(history)
 
 
 def test_a_file_that_says_what_its_strain_is_is_believed(read):

@@ -65,7 +65,10 @@ CASES = {
     "too many cells": (HEAD + "time_s,strain_1\n0,0,0\n", "x.csv:4: number of cells 3, of columns 2"),
     "stray quote": (HEAD + 'time_s,strain_1\n0,"0\n1,0\n', "x.csv:4: not a line of a CSV table .*; look for stray"),
     "column twice": (HEAD + "time_s,strain_1,strain_1\n0,0,0\n", "x.csv:3: the column 'strain_1' stands there twice"),
-    "quantity twice": (HEAD + "time_s,time_h,strain_1\n0,0,0\n", "x.csv:3: two columns hold the time; keep one"),
+    "quantity twice": (
+        HEAD + "time_s,time_h,strain_1\n0,0,0\n",
+        "x.csv:3: 'time_s' and 'time_h' both hold the time; keep one and leave the other out: write '# ignore: time_h'",
+    ),
     "nameless column": (HEAD + "time_s,,strain\n0,0,0\n", "x.csv:3: a column has no name"),
     "no loading": (
         "# temperature_C: 850\n# label furnace: 4\n" + BODY,

@@ -113,8 +113,8 @@ def test_numbers_entered_as_text_with_decimal_commas(tmp_path: Path):
 
 REFUSED = {
     "formula": ([*FRAMES, [2, "=B3*2"]], "x.xlsx, sheet 'S', row 7, column 2: a formula without a computed value"),
-    "error value": ([*FRAMES, ["#N/A", 2]], "x.xlsx, sheet 'S', row 7: 'time_h' is '#N/A'; write a finite number"),
-    "time of day": ([*FRAMES, ["01:30:00", 2]], "x.xlsx, sheet 'S', row 7: 'time_h' is '01:30:00'"),
+    "error value": ([*FRAMES, ["#N/A", 2]], "x.xlsx, sheet 'S', row 7: 'Time .h.' is '#N/A'; write a finite number"),
+    "time of day": ([*FRAMES, ["01:30:00", 2]], "x.xlsx, sheet 'S', row 7: 'Time .h.' is '01:30:00'"),
     "falling time": ([*FRAMES, [0.05, 2]], "x.xlsx, sheet 'S', row 7: time falls from 1200 s to 180 s"),
     "no time": ([["Strain (%)"], [1]], "x.xlsx: no sheet has a column of time .sheets: 'S'.; name one time_h"),
     "thousands": ([["Time (h)", "Strain (%)"], [0, "1,234"]], "x.xlsx, sheet 'S': '1,234' may be 1.234 or 1234"),

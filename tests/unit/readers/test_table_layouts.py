@@ -209,7 +209,7 @@ REFUSED = {
     ),
     "cell of a test in wide rows": (
         "Time (h);A1 strain (%);A2 strain (%)\n0;0;0\n1;a lot;1\n",
-        "x.csv:5, column 2: 'strain_pct' is 'a lot'; write a finite number",
+        "x.csv:5, column 2: 'strain .%.' is 'a lot'; write a finite number",
     ),
     "cell beside the columns": (
         "Time (h);A1 strain (%);A2 strain (%);\n0;0;0;\n1;1;1;5\n",

@@ -235,7 +235,7 @@ HOOKS: dict[str, tuple[str, str, bool]] = {
     "file that raises": (GOOD + "\n1 / 0\n", "ZeroDivisionError", True),
     "file with an error of syntax": (GOOD + "\nreturn (\n", "SyntaxError", True),
     "nothing": ("x = 1\n", "offers nothing; mark one of its functions @hookimpl", False),
-    "an empty list": (GOOD.replace("[LAW]", "[]"), "offers no law, specimen, reader, exporter", False),
+    "an empty list": (GOOD.replace("[LAW]", "[]"), "offers no law, specimen, reader", False),
     "a reader without read": (
         "import creepkit as ck\nclass R:\n    name = title = 'r'\n    def accepts(self, path):\n        return False\n"
         "@ck.hookimpl\ndef creepkit_readers():\n    return [R()]\n",

@@ -194,7 +194,7 @@ def _days(
     text = next(iter(column.dates))
     raise HistoryError(
         f"{places[0]}: the date '{text}' may have the month or the day first, and no other row tells; state "
-        "date_order='month first' or 'day first'"
+        "date_order, 'month first' or 'day first'"
     )
 
 
