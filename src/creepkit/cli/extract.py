@@ -44,6 +44,9 @@ def command(
     temperature: Annotated[
         float | None, typer.Option("--temperature-c", metavar="C", help="Constant temperature, for no record.")
     ] = None,
+    modulus: Annotated[
+        float | None, typer.Option("--modulus-gpa", metavar="GPA", help="Young's modulus, for the history.")
+    ] = None,
     center: Annotated[
         list[str] | None, typer.Option(metavar="X,Y", help="Centre in mm, in the frames' axes; for several, repeat it.")
     ] = None,
@@ -107,6 +110,8 @@ def command(
     for one, path in zip(found, sheets, strict=False):
         one.plot(path)
         typer.echo(f"written: {path}")
+    if modulus is not None:
+        histories = [history.replace(elastic=ck.Elastic(E=1e3 * modulus)) for history in histories]
     for history, path in zip(histories, files, strict=False):
         path.parent.mkdir(parents=True, exist_ok=True)
         ck.write_history(history, path)
