@@ -63,7 +63,9 @@ def case(k: int, rest: int = REST):
 
 
 def virtual_truth(page, cases, seeds) -> None:
-    page.heading(f"Eq. (7), and means on rings, about one centre: {LOADED} frames under load, {REST} at rest before them")
+    page.heading(
+        f"Eq. (7), and means on rings, about one centre: {LOADED} frames under load, {REST} at rest before them"
+    )
     page.paragraph(
         "Seeds from 31000 on, fixed before the first run with them. Length of correlation of the noise in spacings; in time "
         "it is that of a first-order autoregression. Each row: some seeds of one law under one noise. Scatter: root mean "

@@ -42,7 +42,10 @@ Table = FrameText | ArrayTable
 
 
 def read_frames(
-    path: FramePath, formats: Sequence[CameraFormat], format: FormatLike = None, times: ArrayLike | str | Path | None = None
+    path: FramePath,
+    formats: Sequence[CameraFormat],
+    format: FormatLike = None,
+    times: ArrayLike | str | Path | None = None,
 ) -> Frames:
     """The frames in a folder, in a file, in files that match a pattern, or in a list of files in order.
 

@@ -12,7 +12,9 @@ from creepkit.files.delimited_text import decode_text, detect_dialect, is_number
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.records.camera_format import TIME_UNITS, ColumnName, shown
 
-TIME_FILE = FileKind("a table of the times of frames", HistoryError, "name a table of numbers", maximum_bytes=50_000_000)
+TIME_FILE = FileKind(
+    "a table of the times of frames", HistoryError, "name a table of numbers", maximum_bytes=50_000_000
+)
 
 
 TIME_NAMES = ("time", "t", "timestamp", "time stamp", "unix", "unix time", "zeit")
@@ -30,7 +32,9 @@ def read_frame_times(path: str | Path) -> Floats:
     """
     file = Path(path).expanduser()
     lines = text_lines(decode_text(read_bytes(file, TIME_FILE), file))
-    rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
+    rows = [
+        (number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")
+    ]
     if not rows:
         raise HistoryError(f"{file}: is empty; write the time of each frame, one a line")
     dialect = detect_dialect([line for _, line in rows], str(file))

@@ -84,7 +84,9 @@ def read_histories(paths: reading.PathsLike, reader: str | None = None) -> list[
 
 
 def read_frames(
-    path: camera_reading.FramePath, format: camera_reading.FormatLike = None, times: ArrayLike | str | Path | None = None
+    path: camera_reading.FramePath,
+    format: camera_reading.FormatLike = None,
+    times: ArrayLike | str | Path | None = None,
 ) -> Frames:
     """Read what cameras measured of a surface: a folder of one file a frame, a file of several images, a pattern.
 

@@ -271,7 +271,9 @@ class _Balance:
             terms = self.terms if more is None else np.concatenate([self.terms, more[k]])
             goal = self.wanted if wanted is None else np.concatenate([self.wanted, wanted[k]])
             normal = (terms * row) @ terms.T
-            normal += RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal))  # terms may nearly be one another's sum
+            normal += (
+                RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal))
+            )  # terms may nearly be one another's sum
             result[k] = row * np.clip(1.0 + np.linalg.solve(normal, goal - terms @ row) @ terms, *WEIGHT_CHANGE)
         return result
 
