@@ -1,6 +1,6 @@
 """Extraction of histories from camera frames, against what a virtual camera saw.
 
-    python tests/benchmarks/camera_extraction.py [--cases 3] [--seeds 4] [--write]
+    python tests/benchmarks/camera_extraction.py [--cases 3] [--seeds 8] [--write]
 
 Dimples are simulated by finite elements (Norton's law, several stress exponents and rates, none of them of the tests of
 the package) and watched by a camera of our own: subsets of 1.2 mm side every 0.56 mm, over which displacements are
@@ -14,7 +14,9 @@ Intervals are 95 % of each frame's outputs. The released pipeline's steps are ou
 
 from __future__ import annotations
 
+import os
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -34,13 +36,13 @@ from helpers.static_test import FOLDER, static_test
 from helpers.virtual_camera import VirtualCamera, rotation, simulated_dimple
 
 LAWS = (dict(A=2e-14, n=4.0), dict(A=4e-18, n=5.5, pressure=9.0), dict(A=6e-12, n=3.0))
-REST, LOADED = 40, 200
+REST, LOADED = 40, 100
 
 
 def main() -> None:
     parser = measured.arguments(__doc__)
     parser.add_argument("--cases", type=int, default=3)
-    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--seeds", type=int, default=8)
     options = parser.parse_args()
     page = measured.Page("camera_extraction", __doc__)
     virtual_truth(page, options.cases, options.seeds)
@@ -56,38 +58,66 @@ def main() -> None:
 
 
 def case(k: int, rest: int = REST):
-    dimple = simulated_dimple(frames=rest + LOADED, rest=rest, interval=120.0, **LAWS[k])
+    dimple = simulated_dimple(frames=rest + LOADED, rest=rest, interval=240.0, refinement=3.0, **LAWS[k])
     return dimple, dimple.truth()
 
 
 def virtual_truth(page, cases, seeds) -> None:
-    page.heading(f"Eq. (7) about one centre: {LOADED} frames under load, {REST} at rest before them")
-    page.table(
-        "stress exponent", "seed", "largest D, mm", "bias of D, um", "scatter of D, um", "stated sd of D, um",
-        "D within 95 %", "S within 95 %", "p within 95 %", "centre off, um",
-    )  # fmt: skip
-    inside, biases = [], []
-    for k in range(cases):
-        dimple, truth = case(k)
-        for seed in range(100 * k, 100 * k + seeds):
-            camera = VirtualCamera(seed=seed, points=2500, centers=((0.3 * k - 0.2, 0.5 - 0.4 * k),))
-            (found,) = ck.extract(camera.frames(dimple), subset=camera.subset)
-            errors, within = errors_of(found, truth)
-            D, sd = 1e3 * errors[0], 1e3 * np.nanmedian(found.standard_deviation["amplitude"][REST:])
-            away = 1e3 * np.hypot(*(found.center - true_center(camera)))
-            biases.append(np.nanmean(D))
-            inside.append(within)
-            shares = [f"{100 * np.nanmean(row):.1f} %" for row in within]
-            page.row(
-                LAWS[k]["n"], seed, f"{truth[-1, 0]:.3f}", f"{np.nanmean(D):+.2f}", f"{np.nanstd(D):.2f}", f"{sd:.2f}",
-                *shares, f"{away:.1f}",
-            )  # fmt: skip
-    every = np.concatenate(inside, axis=1)
-    page.paragraph(
-        f"Over all {every.shape[1]} frames: D within its interval in {100 * np.nanmean(every[0]):.1f} %, S in "
-        f"{100 * np.nanmean(every[1]):.1f} %, p in {100 * np.nanmean(every[2]):.1f} % of them; mean bias of D "
-        f"{np.mean(biases):+.2f} um, largest {max(map(abs, biases)):.2f} um. Goals: below 1 um; 90 to 98 %."
+    page.heading(
+        f"Eq. (7), and means on rings, about one centre: {LOADED} frames under load, {REST} at rest before them"
     )
+    page.paragraph(
+        "Seeds from 31000 on, fixed before the first run with them. Length of correlation of the noise in spacings; in time "
+        "it is that of a first-order autoregression. Each row: some seeds of one law under one noise. Scatter: root mean "
+        "square of errors less each test's own mean error."
+    )
+    page.table(
+        "stress exponent", "largest D, mm", "correlation in space", "in time", "output", "largest bias of a test",
+        "scatter", "stated sd", "within 95 %",
+    )  # fmt: skip
+    inside, biases = {}, []
+    for k, (length, memory) in enumerate(((0.9, 0.0), (1.3, 0.0), (0.7, 0.5))[:cases]):
+        dimple, truth = case(k)
+        truths = {
+            "field 0-7.5 mm": truth,
+            "rings 0, 2, 4 mm": dimple.rise @ surface_interpolation(dimple.radii, [0.0, 2.0, 4.0]).T,
+        }
+        results = {operator: [] for operator in truths}
+        for seed in range(31000 + 100 * k, 31000 + 100 * k + seeds):
+            camera = VirtualCamera(
+                seed=seed, points=2500, centers=((0.3 * k - 0.2, 0.5 - 0.4 * k),), correlation=length, memory=memory
+            )
+            frames = held(camera.frames(dimple))
+            for operator, true in truths.items():
+                (found,) = ck.extract(frames, subset=camera.subset, operator=operator)
+                sd = np.array([values[REST:] for values in found.standard_deviation.values()])
+                results[operator].append((*errors_of(found, true), sd))
+        for operator, found_all in results.items():
+            errors, within, sd = (np.array(part) for part in zip(*found_all, strict=True))
+            own = np.nanmean(errors, axis=2)
+            for j, name in enumerate(("D", "S", "p") if "field" in operator else ("u_z at 0", "at 2 mm", "at 4 mm")):
+                unit, factor = (" um", 1e3) if name not in ("S", "p") else ("", 1.0)
+                values = (
+                    np.abs(own[:, j]).max(), np.sqrt(np.nanmean((errors[:, j] - own[:, j, None]) ** 2)),
+                    np.sqrt(np.nanmean(sd[:, j] ** 2)),
+                )  # fmt: skip
+                page.row(
+                    LAWS[k]["n"], f"{truth[-1, 0]:.3f}", length, memory, name,
+                    *(f"{factor * value:.3g}{unit}" for value in values), f"{100 * np.nanmean(within[:, j]):.1f} %",
+                )  # fmt: skip
+                inside.setdefault(name, []).append(within[:, j])
+                if name == "D":
+                    biases += list(own[:, j])
+    shares = ", ".join(f"{name} {100 * np.nanmean(parts):.1f} %" for name, parts in inside.items())
+    page.paragraph(
+        f"Within its interval over all: {shares}. Mean bias of D {1e3 * np.mean(biases):+.2f} um, largest of a test "
+        f"{1e3 * np.abs(biases).max():.2f} um. Goals: below 1 um; 90 to 98 %."
+    )
+
+
+def held(frames) -> Frames:
+    kept = [frames[k] for k in range(len(frames))]
+    return Frames(frames.name, frames.times, kept.__getitem__)
 
 
 def without_rest(page, seeds) -> None:
@@ -95,7 +125,7 @@ def without_rest(page, seeds) -> None:
     page.table("seed", "bias of D, um", "stated sd of D, um", "D within 95 %", "S within 95 %", "p within 95 %")
     dimple, truth = case(0, rest=1)
     inside = []
-    for seed in range(500, 500 + 3 * seeds):
+    for seed in range(35000, 35000 + 2 * seeds):
         camera = VirtualCamera(seed=seed, points=2500)
         (found,) = ck.extract(camera.frames(dimple), subset=camera.subset)
         errors, within = errors_of(found, truth, rest=1)
@@ -113,25 +143,20 @@ def without_rest(page, seeds) -> None:
 
 
 def rings(page) -> None:
-    page.heading("Means on rings of 0, 2 and 4 mm")
-    page.table("noise, um", "radius, mm", "largest, mm", "bias, um", "stated sd, um", "within 95 %")
-    dimple, _ = case(1)
-    truth = dimple.rise @ surface_interpolation(dimple.radii, [0.0, 2.0, 4.0]).T
-    for noise in (0.0, 1.5e-3):
-        camera = VirtualCamera(seed=31, points=2500, noise=noise)
-        (found,) = ck.extract(camera.frames(dimple), operator="rings 0, 2, 4 mm", subset=camera.subset)
-        errors, within = errors_of(found, truth)
-        for k, name in enumerate(found.outputs):
-            sd = 1e3 * np.nanmedian(found.standard_deviation[name][REST:])
-            share = f"{100 * np.nanmean(within[k]):.0f} %" if noise else ""
-            page.row(
-                1e3 * noise,
-                (0, 2, 4)[k],
-                f"{truth[-1, k]:.3f}",
-                f"{1e3 * np.nanmean(errors[k]):+.2f}",
-                f"{sd:.2f}",
-                share,
-            )
+    page.heading("Without noise: what subsets, lost ones and polynomials leave")
+    page.table("stress exponent", "subsets, mm", "operator", "largest error of its outputs, um, mm and 1")
+    for k in (1, 2):
+        dimple, truth = case(k)
+        for subset in (0.6, 1.2, 2.0):
+            camera = VirtualCamera(seed=31900, points=2500, noise=0.0, subset=subset)
+            frames = held(camera.frames(dimple))
+            for operator in ("field 0-7.5 mm", "rings 0, 2, 4 mm"):
+                (found,) = ck.extract(frames, operator=operator, subset=subset)
+                rise = dimple.rise @ surface_interpolation(dimple.radii, [0.0, 2.0, 4.0]).T
+                errors = errors_of(found, truth if "field" in operator else rise)[0]
+                scale = [1e3, 1.0, 1.0] if "field" in operator else [1e3] * 3
+                largest = np.nanmax(np.abs(errors), axis=1) * scale
+                page.row(LAWS[k]["n"], subset, operator, ", ".join(f"{value:.2g}" for value in largest))
 
 
 def released(page, cases) -> None:
@@ -198,18 +223,50 @@ def cost(page) -> None:
     page.heading("Cost")
     dimple = simulated_dimple(frames=474, rest=60, interval=60.0, **LAWS[0])
     frames = VirtualCamera(seed=77, points=10424).frames(dimple)
-    kept = [frames[k] for k in range(len(frames))]
-    held = Frames("held in memory", frames.times, kept.__getitem__)
-    ck.extract(held, subset=1.2)
+    kept = held(frames)
+    ck.extract(kept, subset=1.2)
     start = time.process_time()
-    (found,) = ck.extract(held, subset=1.2)
+    (found,) = ck.extract(kept, subset=1.2)
     seconds = time.process_time() - start
     inside = int((np.hypot(*found.places.T) < 7.5).sum())
     page.paragraph(
         f"474 frames of 10,424 points, held in memory, {inside} of them in the window, "
         f"{found.motion.points} of the clamped "
-        f"plate: {seconds:.1f} CPU-s for the whole extraction (goal with reading: 10)."
+        f"plate: {seconds:.1f} CPU-s for the whole extraction."
     )
+    with tempfile.TemporaryDirectory() as place:
+        written = write_dice(kept, Path(place))
+        start = time.process_time()
+        read = ck.read_frames(place, times=frames.times)
+        opened = time.process_time() - start
+        ck.extract(read, subset=1.2)
+        seconds = time.process_time() - start
+    page.paragraph(
+        f"The same as 474 files of DICe ({written} of them written, the others links to these): {seconds:.1f} CPU-s for "
+        f"ck.read_frames and ck.extract (goal: 10), {opened:.1f} of them to find and order the files by their heads. The "
+        "first frame and the four late ones that domes are looked for in are read twice, the others once."
+    )
+
+
+def write_dice(frames, folder, step=10) -> int:
+    """Every tenth frame as a file of 14 columns, links to the last such file between; how many were written."""
+    head = (
+        "SUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,MODEL_COORDINATES_X,MODEL_COORDINATES_Y,"
+        "MODEL_COORDINATES_Z,MODEL_DISPLACEMENT_X,MODEL_DISPLACEMENT_Y,MODEL_DISPLACEMENT_Z,SIGMA,GAMMA,BETA"
+    )
+    count = 0
+    for k in range(len(frames)):
+        path = folder / f"DICe_solution_{k:03d}.txt"
+        if k > 1 and k % step:
+            os.link(last, path)
+            continue
+        frame = frames[k]
+        lost = np.where(frame.valid, 0.02, -1.0)
+        image = np.stack([np.arange(len(lost)), *frame.points.T[:2] * 20, *frame.displacements.T[:2] * 20])
+        rows = np.c_[image.T, frame.points, frame.displacements, lost, lost, lost]
+        np.savetxt(path, rows, "%.5E", ",", header=head, comments="")
+        last, count = path, count + 1
+    return count
 
 
 def static(page) -> None:
@@ -252,9 +309,8 @@ def static(page) -> None:
         "um; the published fit: "
         f"{1e3 * (published - highest).mean():+.2f} and {1e3 * np.sqrt(((published - highest) ** 2).mean()):.2f} um. "
         f"The file of the apex of every frame lies {100 * (1 - (test.apex[test.frames] / highest)[8:]).mean():.0f} % "
-        "below the profiles in the frames above 0.2 mm, as where a rigid motion over all points "
-        "follows the mean of the "
-        "dome; the profiles are what can be compared."
+        "below the profiles in the frames above 0.2 mm. The cause is not known; a rigid motion over all points, which "
+        "follows the mean of the dome, is one possibility. The profiles are what can be compared."
     )
 
 

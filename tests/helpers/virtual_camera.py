@@ -54,7 +54,8 @@ class VirtualCamera:
     """How frames are made; lengths in mm, angles in degrees.
 
     points : about how many, spacing apart. subset : side of the square over which a displacement is a mean.
-    noise : of z; a third of it in x and y. correlation : of the noise, in spacings. lost : share of lost subsets, half
+    noise : of z; a third of it in x and y. correlation : of the noise, in spacings. memory : correlation of the noise of
+    successive frames, of a first-order autoregression. lost : share of lost subsets, half
     of them for good. motion, turn : largest rigid motion. centers : of the dimples, in the plate.
     """
 
@@ -63,6 +64,7 @@ class VirtualCamera:
     subset: float = 1.2
     noise: float = 1.5e-3
     correlation: float = 0.9
+    memory: float = 0.0
     lost: float = 0.05
     motion: float = 0.3
     turn: float = 0.2
@@ -102,7 +104,10 @@ class VirtualCamera:
                 + np.array([12.0, -7.0, 400.0]) @ np.eye(3)
                 + self.motion * walk * direction
             )
-            noise = (self._noise(random, side) - reference) * (index > 0)
+            noise = self._noise(random, side) if not self.memory else self._innovation(index, side)
+            for lag in range(1, 9 if self.memory else 1):  # what is left of earlier frames, to 0.4 % of it
+                noise += self.memory**lag * self._innovation(index - lag, side)
+            noise = (noise * np.sqrt(1.0 - self.memory**2) - reference) * (index > 0)
             displacements = moved - points + noise @ tilt.T
             lost = gone | (self._blobs(random, side, 0.5 * self.lost) if self.lost else False)
             valid = ~lost[chosen]
@@ -113,6 +118,10 @@ class VirtualCamera:
             )  # fmt: skip
 
         return Frames(name, times, frame, "virtual camera", "pixel")
+
+    def _innovation(self, index: int, side: int) -> Floats:
+        """Noise that begins in a frame; those before the first count from 10^6 on."""
+        return self._noise(np.random.default_rng([self.seed, index % 10**6, 1]), side)
 
     def _noise(self, random: np.random.Generator, side: int) -> Floats:
         white = random.normal(size=(3, side, side))

@@ -26,6 +26,7 @@ from creepkit.cameras.text_files import (
     table_in_file,
     table_in_range,
 )
+from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import HistoryError, nearest
 from creepkit.files.reading import read_bytes
 from creepkit.records import CameraFrame, Frames
@@ -41,12 +42,15 @@ Table = FrameText | ArrayTable
 
 
 def read_frames(
-    path: FramePath, formats: Sequence[CameraFormat], format: FormatLike = None, times: ArrayLike | None = None
+    path: FramePath,
+    formats: Sequence[CameraFormat],
+    format: FormatLike = None,
+    times: ArrayLike | str | Path | None = None,
 ) -> Frames:
     """The frames in a folder, in a file, in files that match a pattern, or in a list of files in order.
 
     formats : those that are known. format : the one to take, its name, or {quantity: column}; None: that of the head.
-    times : (frames,) s, increasing; None: as the files say, NaN where they do not.
+    times : (frames,) s, increasing, or a file of them; None: as the files say, NaN where they do not.
     """
     candidates = _candidates(format, formats)
     files = _files(path, candidates, chosen=format is not None)
@@ -54,7 +58,8 @@ def read_frames(
     tables = _tables(files, first)
     columns = columns_of(first.format, tables.names, tables.place)
     name = str(path) if isinstance(path, (str, Path)) else str(files[0].parent)
-    stated = _checked_times(name, len(tables.files), times)
+    listed = read_frame_times(times) if isinstance(times, (str, Path)) else times
+    stated = _checked_times(name if listed is times else str(times), len(tables.files), listed)
     moments = _times_of_files(first.format, tables, columns) if stated is None else stated
 
     def frame(index: int) -> CameraFrame:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from creepkit.cli.options import PAPER_SPECIMEN, check_file, check_folder
+from creepkit.cli.options import PAPER_SPECIMEN, check_folder
 
 if TYPE_CHECKING:
     from creepkit.extraction import Extraction
@@ -19,8 +20,14 @@ def command(
     frames: Annotated[str, typer.Argument(metavar="FOLDER", help="Folder, file or pattern of a camera's exports.")],
     specimen: Annotated[str, typer.Option(metavar="NAME", help="What the camera watched.")] = PAPER_SPECIMEN,
     format: Annotated[str | None, typer.Option(metavar="NAME", help="Camera format; by default by the head.")] = None,
+    columns: Annotated[
+        str | None, typer.Option(metavar="x=X_mm,...", help="Columns x, y, z, u, v, w of files of no known format.")
+    ] = None,
     interval: Annotated[
         float | None, typer.Option("--interval-s", metavar="S", help="Time between frames whose files hold none.")
+    ] = None,
+    times: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Times of frames, a column in s, or in ms since 1970.")
     ] = None,
     record: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Instrument record of loads, temperatures.")
@@ -37,6 +44,9 @@ def command(
     temperature: Annotated[
         float | None, typer.Option("--temperature-c", metavar="C", help="Constant temperature, for no record.")
     ] = None,
+    modulus: Annotated[
+        float | None, typer.Option("--modulus-gpa", metavar="GPA", help="Young's modulus, for the history.")
+    ] = None,
     center: Annotated[
         list[str] | None, typer.Option(metavar="X,Y", help="Centre in mm, in the frames' axes; for several, repeat it.")
     ] = None,
@@ -49,6 +59,7 @@ def command(
     ] = None,
     subset: Annotated[float, typer.Option("--subset", metavar="MM", help="Side of a subset, taken out.")] = 0.0,
     to: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Write a history of each here.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")] = False,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write a contact sheet, .png, .svg or .pdf.")
     ] = None,
@@ -57,6 +68,7 @@ def command(
     import creepkit as ck
     from creepkit.api.extraction import operator_of
     from creepkit.errors import HistoryError
+    from creepkit.files.writing import check_target
     from creepkit.records import ZERO_CELSIUS
     from creepkit.report.figures import check_figure_target
     from creepkit.report.terminal import ProgressBar
@@ -65,38 +77,43 @@ def command(
         check_folder(to)
     if plot is not None:
         check_figure_target(plot, HistoryError)
+        if not center:
+            check_target(plot, HistoryError, force=force)
     if to is not None and record is None and (load is None or temperature is None):
         raise HistoryError(
             "a history needs what was imposed: give --record FILE, or --load-mpa and --temperature-c, beside --to"
         )
     operator = operator_of(specimen, window, _numbers(rings, "--rings", "0,2,4") if rings else ())
     centers = _named_centers(center, names) if center else None
+    sequence = _frames(frames, format, columns, _Times(interval, times))
     with ProgressBar() as progress:
         found = ck.extract(
-            _reporting(_frames(frames, format, interval), progress.tick), specimen, operator=operator, centers=centers,
-            rest=_frame_range(rest), subset=subset,
+            _reporting(sequence, progress.tick), specimen, operator=operator, centers=centers, rest=_frame_range(rest),
+            subset=subset,
         )  # fmt: skip
     if names and not center:
         found = [one.replace(name=name) for one, name in zip(found, _names(names, len(found)), strict=True)]
     for one in found:
         typer.echo(str(one))
-    for one in found:
-        if plot is not None:
-            path = plot if len(found) == 1 else plot.with_stem(f"{plot.stem}_{one.name}")
-            one.plot(path)
-            typer.echo(f"written: {path}")
-    if to is None:
-        return
-    to.mkdir(parents=True, exist_ok=True)
-    for one in found:
-        if record is None:
+    sheets = [plot if len(found) == 1 else plot.with_stem(f"{plot.stem}_{one.name}") for one in found] if plot else []
+    files = [to / f"{one.name}.csv" for one in found] if to is not None else []
+    for path in (*sheets, *files):
+        check_target(path, HistoryError, force=force)
+    histories = []
+    for one in found if to is not None else ():  # all of them, before any is written
+        if record is not None:
+            histories.append(_under_record(one, record, time_zone))
+        else:
             assert load is not None
             assert temperature is not None
-            history = one.history_under(load, temperature + ZERO_CELSIUS)
-        else:
-            history = _under_record(one, record, time_zone)
-        path = to / f"{one.name}.csv"
-        check_file("--to", path)
+            histories.append(one.history_under(load, temperature + ZERO_CELSIUS))
+    for one, path in zip(found, sheets, strict=False):
+        one.plot(path)
+        typer.echo(f"written: {path}")
+    if modulus is not None:
+        histories = [history.replace(elastic=ck.Elastic(E=1e3 * modulus)) for history in histories]
+    for history, path in zip(histories, files, strict=False):
+        path.parent.mkdir(parents=True, exist_ok=True)
         ck.write_history(history, path)
         typer.echo(f"written: {path}")
 
@@ -125,26 +142,45 @@ def _under_record(one: Extraction, record: Path, time_zone: str | None) -> Any:
     )
 
 
-def _frames(path: str, format: str | None, interval: float | None) -> Frames:
-    from dataclasses import replace
+class _Times(NamedTuple):
+    """What was said of the times of frames: the interval between two, s, or a file."""
 
+    interval: float | None
+    file: Path | None
+
+
+def _frames(path: str, format: str | None, columns: str | None, times: _Times) -> Frames:
     import numpy as np
 
     import creepkit as ck
     from creepkit.errors import HistoryError
 
-    frames = ck.read_frames(path, format)
-    if interval is None:
-        return frames
-    if not 0.0 < interval < 1e9:
-        raise HistoryError(f"--interval-s {interval:g}: give the time between frames, s, above zero")
-    return replace(frames, times=interval * np.arange(len(frames), dtype=float))
+    if columns is not None and format is not None:
+        raise HistoryError("--columns and --format were given: named columns are of no known format; leave one out")
+    if times.interval is not None and times.file is not None:
+        raise HistoryError("--interval-s and --times were given; leave one of them out")
+    if times.interval is not None and not 0.0 < times.interval < 1e9:
+        raise HistoryError(f"--interval-s {times.interval:g}: give the time between frames, s, above zero")
+    frames = ck.read_frames(path, format if columns is None else _columns(columns), times.file)
+    if times.interval is not None:
+        return replace(frames, times=times.interval * np.arange(len(frames), dtype=float))
+    return frames
+
+
+def _columns(text: str) -> dict[str, str]:
+    from creepkit.errors import HistoryError
+
+    pairs = [part.partition("=") for part in text.split(",")]
+    if not all(sign and name.strip() and column.strip() for name, sign, column in pairs):
+        raise HistoryError(
+            f"--columns {text}: write quantity=column with commas between them, as in "
+            "--columns x=X_mm,y=Y_mm,z=Z_mm,u=U_mm,v=V_mm,w=W_mm"
+        )
+    return {name.strip(): column.strip() for name, _, column in pairs}
 
 
 def _reporting(frames: Frames, tick: Any) -> Frames:
     """The same frames; each that is read is told to a progress bar."""
-    from dataclasses import replace
-
     done: set[int] = set()
 
     def read(index: int) -> Any:

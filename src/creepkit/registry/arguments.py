@@ -85,7 +85,9 @@ def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: 
 
 
 def read_frames(
-    path: camera_reading.FramePath, format: camera_reading.FormatLike = None, times: ArrayLike | None = None
+    path: camera_reading.FramePath,
+    format: camera_reading.FormatLike = None,
+    times: ArrayLike | str | Path | None = None,
 ) -> Frames:
     """Read what cameras measured of a surface: a folder of one file a frame, a file of several images, a pattern.
 
@@ -94,7 +96,8 @@ def read_frames(
     path : folder, file, pattern such as "run_3/*.csv", or a list of files in their order.
     format : a ck.CameraFormat, the name of one of ck.available("cameras"), or {quantity: column} for x y z u v w; by
         default the one whose columns the head of the first file names.
-    times : (frames,) s, increasing; by default as the files say, and NaN where they do not.
+    times : (frames,) s, increasing, or a file with a column of them, in s or as "time [ms]"; by default as the files
+        say, and NaN where they do not.
     """
     formats = [entry.value for entry in default_registry().cameras().values()]
     return camera_reading.read_frames(path, formats, format, times)

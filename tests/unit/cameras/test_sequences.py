@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tracemalloc
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import HistoryError
 from helpers.camera_samples import dice, dice_blanks, dome, matchid_2023, pyvale, vic_3d, zeiss
 
@@ -162,3 +164,34 @@ def test_one_frame_at_a_time_in_memory(tmp_path: Path) -> None:
 def test_a_test_of_pyvale(tmp_path: Path) -> None:
     frames = ck.read_frames(folder_of(tmp_path / "test", [f"dic_results_{k:04d}.csv" for k in range(3)], pyvale))
     assert apexes(frames) == [0.0, 0.1, 0.2]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("index,time\n0,1755561113266\n1,1755561113466\n", [1755561113.266, 1755561113.466]),
+        ("0\n20\n", [0.0, 20.0]),
+        ("# remarks\nt [ms];frame\n500,5;1\n1500,0;2\n", [0.5005, 1.5]),
+        ("Time (min)\n0\n2\n", [0.0, 120.0]),
+    ],
+)
+def test_times_of_frames_from_a_file(tmp_path, text, expected):
+    (tmp_path / "times.csv").write_text(text)
+    np.testing.assert_allclose(read_frame_times(tmp_path / "times.csv"), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty"),
+        ("0,1\n1,2\n", "2 columns without names; call the one of times time"),
+        ("a,b\n1,2\n", "which of 'a', 'b' is the time of a frame is not clear"),
+        ("index,time\n0,1\n1\n", "3: 1 cells in a table of 2 columns"),
+        ("index,time\n0,x\n", "2: 'time' is 'x'"),
+        ("time [mm]\n1\n", "times in 'mm'"),
+    ],
+)
+def test_times_of_frames_that_are_not_understood(tmp_path, text, message):
+    (tmp_path / "times.csv").write_text(text)
+    with pytest.raises(HistoryError, match=re.escape(message)):
+        read_frame_times(tmp_path / "times.csv")

@@ -6,13 +6,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.spatial.transform import Rotation
 
 from creepkit.extraction.frame_checks import frames_at_rest
-from creepkit.extraction.noise import (
-    autocorrelation,
-    patch_covariance,
-    patch_numbers,
-    rigid_gains,
-    time_correlation,
-)
+from creepkit.extraction.noise import autocorrelation, patch_covariance, patch_numbers, rigid_gains, time_correlation
 from creepkit.extraction.plate import plate_axes, point_areas, rigid_motions
 
 
@@ -70,7 +64,9 @@ def test_patches_give_the_scatter_of_a_fit_to_correlated_errors():
     numbers = patch_numbers(places, 3.0)
     stated = np.sqrt(np.diag(patch_covariance(gains[None], residuals, numbers)[0]))
     assert stated[0] < 0.8 * truth[0]  # what the fit took
-    np.testing.assert_allclose(stated / np.sqrt(rho.kept_by_residuals(gains, places, numbers, columns, gains).within), truth, rtol=0.12)
+    np.testing.assert_allclose(
+        stated / np.sqrt(rho.kept_by_residuals(gains, places, numbers, columns, gains).within), truth, rtol=0.12
+    )
 
 
 def test_gains_of_the_clamped_plate_are_shift_and_small_rotations():

@@ -66,6 +66,10 @@ MISS_FRAMES = 25
 """Neighbours in time that say together what Eq. (7) misses, as a share of D."""
 
 
+RIDGE = 1e-4
+"""Of the mean diagonal of the equations of these weights, added to it."""
+
+
 WEIGHT_CHANGE = (0.2, 4.0)
 """Least and greatest factor on a weight for that."""
 
@@ -262,11 +266,15 @@ class _Balance:
     def weights(self, weights: Floats, more: Floats | None = None, wanted: Floats | None = None) -> Floats:
         """Weights (frames, points) for these terms, and more (frames, terms, points) with integrals (frames, terms)."""
         result = np.array(weights)
-        for k, row in enumerate(weights):
+        for k in np.flatnonzero(weights.any(axis=1)):
+            row = weights[k]
             terms = self.terms if more is None else np.concatenate([self.terms, more[k]])
             goal = self.wanted if wanted is None else np.concatenate([self.wanted, wanted[k]])
-            factor = np.linalg.lstsq((terms * row) @ terms.T, goal - terms @ row, rcond=1e-6)[0] @ terms
-            result[k] = row * np.clip(1.0 + factor, *WEIGHT_CHANGE)
+            normal = (terms * row) @ terms.T
+            normal += (
+                RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal))
+            )  # terms may nearly be one another's sum
+            result[k] = row * np.clip(1.0 + np.linalg.solve(normal, goal - terms @ row) @ terms, *WEIGHT_CHANGE)
         return result
 
     def missed(
@@ -283,7 +291,8 @@ class _Balance:
         factors = np.einsum("fij,fj->fi", np.linalg.pinv(normal, rcond=1e-6, hermitian=True), missed)
         size = np.sqrt((residuals**2).sum(axis=1) / np.maximum(np.count_nonzero(weights, axis=1), 1))
         shown = enough & (np.abs(values[:, 0]) > 3.0 * size)
-        factors = _shared_by_neighbours(factors, np.where(shown, values[:, 0], 0.0)[:, None])
+        trust = np.where(shown, np.maximum(size, 1e-9) ** -2.0, 0.0)
+        factors = _shared_by_neighbours(factors, values[:, :1], trust[:, None])
         products = left * (factors @ self.terms)[:, None, :]
         size = np.maximum(np.abs(products).max(axis=2), 1e-300)
         over_disc = smoothing_columns(self.nodes, values, subset)[0] * (factors @ self._even_node_terms)[:, None, :]
@@ -296,17 +305,17 @@ class _Balance:
         return self.node_terms * even[:, None]
 
 
-def _shared_by_neighbours(factors: Floats, amplitudes: Floats) -> Floats:
+def _shared_by_neighbours(factors: Floats, amplitudes: Floats, trust: Floats) -> Floats:
     """Factors (frames, terms) proportional to amplitudes (frames, 1) among MISS_FRAMES neighbours, by least squares.
 
-    The noise of a frame must not change its own weights. A frame of amplitude 0 has no part in it.
+    trust : (frames, 1), weights. The noise of a frame must not change its own weights of points.
     """
     ends = np.clip(np.arange(len(factors))[:, None] + MISS_FRAMES * np.array([-0.5, 0.5]) + 0.5, 0, len(factors))
     first, last = ends.astype(int).T
-    parts = amplitudes * factors, amplitudes**2
+    parts = trust * amplitudes * factors, trust * amplitudes**2
     sums = [np.concatenate([np.zeros((1, part.shape[1])), np.cumsum(part, axis=0)]) for part in parts]
     top, bottom = (total[last] - total[first] for total in sums)
-    return np.asarray(amplitudes * top / np.maximum(bottom, 1e-300))
+    return np.asarray(np.where(trust > 0.0, amplitudes, 0.0) * top / np.maximum(bottom, 1e-300))
 
 
 def _smooth_terms(places: Floats) -> Floats:

@@ -39,6 +39,9 @@ _FRAMES_AT_ONCE = 48
 """Of a fit: so many keep its arrays in the processor's cache."""
 
 
+_GAUSS_POINTS = np.polynomial.legendre.leggauss(3)
+
+
 class Bells(NamedTuple):
     """exp(-|x/S|^p) averaged over subsets, and its derivatives.
 
@@ -159,7 +162,7 @@ def model(places: Floats, values: Floats, subset: float = 0.0) -> tuple[Floats, 
 
 def _bells(x: Floats, values: Floats, subset: float) -> Bells:
     """x : (points,) mm; values : (frames, 3)."""
-    places, shares = (np.zeros(1), np.ones(1)) if subset == 0.0 else np.polynomial.legendre.leggauss(3)
+    places, shares = (np.zeros(1), np.ones(1)) if subset == 0.0 else _GAUSS_POINTS
     p = np.exp(values[:, 2:])
     sums = [np.zeros((len(values), x.size)) for _ in range(4)]
     for place, share in zip(places, shares / shares.sum(), strict=True):
