@@ -13,7 +13,6 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
-from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from creepkit.files.reading import FileKind, check_readable, read_bytes
 from creepkit.readers.cell_grids import CellGrid, grid_of_rows, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
 from creepkit.readers.history_csv import histories_of_tests
+from creepkit.readers.number_formats import number_text
 from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
 from creepkit.readers.text_tables import SourceText, TableRow
 from creepkit.readers.vocabulary import HeaderVocabulary
@@ -159,8 +159,7 @@ def _cell_text(cell: Any) -> str:
     if isinstance(value, bool):
         return str(value).upper()
     if isinstance(value, (int, float)):
-        text = repr(value)
-        return f"{Decimal(text).scaleb(2).normalize():f}%" if "%" in str(cell.number_format) else text
+        return number_text(value, str(cell.number_format))
     if isinstance(value, datetime) and value >= _FIRST_DATE:
         return value.isoformat(" ")
     if isinstance(value, datetime):  # an elapsed time above a day, shown as h:mm:ss
