@@ -24,21 +24,16 @@ from creepkit.errors import HistoryError, nearest
 from creepkit.files.json_documents import read_json
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.assembly import assemble_history
+from creepkit.readers.column_names import unit_suffix
 from creepkit.readers.text_tables import SourceText, TableRow, TextTable
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History, constant_stress
-from creepkit.records.quantities import STRESS, TEMPERATURE, TIME
+from creepkit.records.quantities import STRAIN, STRESS, TEMPERATURE, TIME, QuantityKind
 
 DOCUMENT = FileKind("a creep test after the NFDI-MatWerk schema", HistoryError, "name its JSON document or LIS file")
 
 
 SERIES = FileKind("a LIS file of a creep test", HistoryError, "save it as text", maximum_bytes=200_000_000)
-
-
-UNITS: Mapping[str, str] = {
-    **{"°c": "C", "c": "C", "degc": "C", "k": "K", "mpa": "MPa", "h": "h", "s": "s", "min": "min", "%": "pct"}
-}
-"""{unit in small letters: creepkit's}."""
 
 
 NOT_STATED = ("", "not applicable", "n/a", "todo", "unknown")
@@ -53,10 +48,11 @@ AFTER_END, DURING_TEST = "PrimaryData/TestResult/valuesRecordedAfterTestEnd", "T
 
 @dataclass(frozen=True)
 class SchemaKey:
-    """Where an entry stands: in the document, below MeasurementData, and by its name in a LIS file."""
+    """Where an entry stands: below MeasurementData in the document, by its name in a LIS file; kind : of a number."""
 
     path: str
     entry: str
+    kind: QuantityKind | None = None
 
 
 NAME = SchemaKey("AdditionalMetadata/TestInfo/testJobDetails/testID", "test id")
@@ -65,15 +61,28 @@ KIND_OF_LOADING = SchemaKey(f"{TEST}/typeOfLoading", "type of loading")
 CONTROL = SchemaKey(f"{TEST}/loadControlType", "load control type")
 END_CRITERION = SchemaKey(f"{TEST}/endOfTestCriterium/endOfTestCriteriumOptions", "end of test criterium")
 NUMBERS: Mapping[str, SchemaKey] = {
-    "temperature": SchemaKey(f"{TEST}/specifiedTemperature", "specified temperature"),
-    "stress": SchemaKey(f"{TEST}/initialStress", "initial stress"),
-    "rupture": SchemaKey(f"{AFTER_END}/creepRuptureTime", "creep rupture time"),
-    "duration": SchemaKey(f"PrimaryData/{DURING_TEST}/testDuration", "test duration"),
+    "temperature": SchemaKey(f"{TEST}/specifiedTemperature", "specified temperature", TEMPERATURE),
+    "stress": SchemaKey(f"{TEST}/initialStress", "initial stress", STRESS),
+    "rupture": SchemaKey(f"{AFTER_END}/creepRuptureTime", "creep rupture time", TIME),
+    "duration": SchemaKey(f"PrimaryData/{DURING_TEST}/testDuration", "test duration", TIME),
     "loading_strain": SchemaKey(
-        "SecondaryData/TestResult/extensionValues/percentageInitialTotalExtension", "percentage initial total extension"
+        "SecondaryData/TestResult/extensionValues/percentageInitialTotalExtension",
+        "percentage initial total extension",
+        STRAIN,
     ),
 }
 """{quantity: where it stands}."""
+
+
+ENTRIES = frozenset(key.entry for key in (NAME, ALLOY, KIND_OF_LOADING, CONTROL, END_CRITERION, *NUMBERS.values()))
+
+
+_DIGITAL = "(digital) "
+"""What stands before the name of an entry in some versions of LIS files."""
+
+
+BROKEN = ("test piece break", "break", "rupture", "fracture")
+"""Criteria of the end of a test, in small letters, that say that it broke."""
 
 
 SERIES_LINKS = (
@@ -173,11 +182,13 @@ class _Entries:
                 f"{self.location(key)}: '{number}' may be a thousand or a decimal; write a decimal point"
             )
         written = own_unit.strip() or unit
-        if written.casefold() not in UNITS:
+        units = key.kind.units if key.kind else {}
+        suffix = unit_suffix(written)
+        if suffix is None or suffix not in units:
             raise HistoryError(
-                f"{self.location(key)}: the unit '{written}' is not understood; {nearest(written, UNITS)}"
+                f"{self.location(key)}: the unit '{written}' is not understood; {nearest(written, units)}"
             )
-        return number.replace(",", "."), UNITS[written.casefold()]
+        return number.replace(",", "."), suffix
 
     def choice(self, key: SchemaKey, meanings: Mapping[str, str]) -> str:
         """What one of the allowed texts means; "" where it is not stated."""
@@ -189,7 +200,7 @@ class _Entries:
     def _value_and_unit(self, key: SchemaKey) -> tuple[str, str]:
         value: Any
         if self._is_flat:
-            value, unit = next((self.data[name] for name in self.data if name.endswith(key.entry)), ("", ""))
+            value, unit = self.data.get(key.entry, ("", ""))
         else:
             value, unit = self._nested(key)
         if not isinstance(value, (str, int, float)) or isinstance(value, bool) or not isinstance(unit, str):
@@ -230,6 +241,22 @@ def _series_of(entries: _Entries, path: Path) -> Path | None:
     return None
 
 
+def _broke(entries: _Entries) -> bool | None:
+    """Whether the test broke, None where nothing says so."""
+    criterion, place = entries.text(END_CRITERION).casefold(), entries.location(END_CRITERION)
+    if entries.number(NUMBERS["rupture"]) is None:
+        return criterion in BROKEN if criterion else None
+    if criterion and criterion not in BROKEN:
+        raise HistoryError(f"{place}: it is '{criterion:.60}', and a rupture time is stated; correct one of them")
+    return True
+
+
+def _control(entries: _Entries) -> str:
+    """What was held constant, "" where it is not stated; HistoryError for a test that is none in tension."""
+    entries.choice(KIND_OF_LOADING, {"tension": "tension"})
+    return entries.choice(CONTROL, {"constant force": "load", "constant stress": "stress"})
+
+
 def _history(entries: _Entries, path: Path, table: TextTable, extension: str) -> History:
     """The history; `extension` : one of EXTENSIONS, that of the series."""
     stated: dict[str, SourceText] = {}
@@ -241,13 +268,9 @@ def _history(entries: _Entries, path: Path, table: TextTable, extension: str) ->
         number = entries.number(where)
         if number is not None and quantity != "duration":
             state(f"{quantity}_{number[1]}", number[0], where)
-    if not any(key.startswith("rupture") for key in stated) and entries.text(END_CRITERION).casefold() not in (
-        "",
-        "test piece break",
-    ):
+    if _broke(entries) is False:
         state("ended", "stopped", END_CRITERION)
-    entries.choice(KIND_OF_LOADING, {"tension": "tension"})
-    control = entries.choice(CONTROL, {"constant force": "load", "constant stress": "stress"})
+    control = _control(entries)
     for key, text, where in (("control", control, CONTROL), ("alloy", entries.text(ALLOY), ALLOY)):
         if text:
             state(key, text, where)
@@ -267,19 +290,27 @@ def _history(entries: _Entries, path: Path, table: TextTable, extension: str) ->
 def _without_frames(entries: _Entries, path: Path) -> History:
     """A rupture time, or how long a test lasted that was stopped."""
     values = {}
-    for quantity, kind in (("temperature", TEMPERATURE), ("stress", STRESS), ("rupture", TIME), ("duration", TIME)):
-        number = entries.number(NUMBERS[quantity])
-        place = entries.location(NUMBERS[quantity])
-        if number is not None:
-            values[quantity] = kind.convert(float(number[0]), number[1], place, quantity)
+    for quantity in ("temperature", "stress", "rupture", "duration"):
+        where = NUMBERS[quantity]
+        number, place = entries.number(where), entries.location(where)
+        if number is not None and where.kind is not None:
+            values[quantity] = where.kind.convert(float(number[0]), number[1], place, quantity)
+            if not values[quantity] > 0:
+                raise HistoryError(f"{place}: it is {number[0]} {number[1]}; it must be above zero")
         elif quantity in ("temperature", "stress"):
             raise HistoryError(f"{place}: it is not stated; a test needs its {quantity}")
-    end = values.get("rupture", values.get("duration"))
-    if not end:
+    end, broke = values.get("rupture", values.get("duration")), _broke(entries)
+    if end is None:
         raise HistoryError(
             f"{path}: it names no series, no creepRuptureTime and no testDuration; a test needs one of them"
         )
-    control = entries.choice(CONTROL, {"constant force": "load", "constant stress": "stress"}) or "load"
+    if "rupture" not in values and broke is not False:
+        found = "the test piece broke" if broke else "it is not stated"
+        raise HistoryError(
+            f"{entries.location(END_CRITERION)}: {found}, and there is no creepRuptureTime; state it, or the criterion "
+            "by which the test was stopped"
+        )
+    control = _control(entries)
     return History(
         name=entries.text(NAME) or path.stem,
         times=np.array([end]),
@@ -291,6 +322,7 @@ def _without_frames(entries: _Entries, path: Path) -> History:
         source=str(path),
         rupture_time=values.get("rupture"),
         unruptured="rupture" not in values,
+        labels={} if control else {"assumed": "control load"},
     )
 
 
@@ -310,10 +342,14 @@ def _read_series(path: Path) -> tuple[dict[str, tuple[str, str]], TextTable, str
     if start is None or len(lines) < start + 4:
         raise HistoryError(f"{path}: no line '[data]' with rows of names, symbols and units below it; {SERIES.advice}")
     head: dict[str, tuple[str, str]] = {}
-    for line in lines[:start]:
+    for number, line in enumerate(lines[:start], 1):
         cells = [cell.strip().strip('"') for cell in line.split("\t")]
-        if len(cells) > 3 and cells[0]:
-            head.setdefault(" ".join(cells[0].casefold().split()), (cells[3], cells[2]))
+        if len(cells) < 4 or not cells[0]:
+            continue
+        name, entry = " ".join(cells[0].casefold().split()).removeprefix(_DIGITAL), (cells[3], cells[2])
+        if name in ENTRIES and head.get(name, entry) != entry:
+            raise HistoryError(f"{path}:{number}: '{name}' stands there twice, with other values; keep one of them")
+        head.setdefault(name, entry)
     columns, width = _columns(path, start, lines)
     rows = []
     for number, line in enumerate(lines[start + 4 :], start + 5):
@@ -338,7 +374,7 @@ def _columns(path: Path, start: int, lines: Sequence[str]) -> tuple[tuple[str, .
         raise HistoryError(f"{path}:{start + 4}: {len(units)} units for {len(names)} columns; write one for each")
     columns = []
     for name, written in zip(names, units, strict=True):
-        plain, unit = name.casefold(), UNITS.get(written.casefold(), written)
+        plain, unit = name.casefold(), unit_suffix(written) or written
         if plain.startswith("elapsed time from end of loading") and unit in TIME.units:
             columns.append(f"time_{unit}")
         elif plain in EXTENSIONS and unit == "pct":

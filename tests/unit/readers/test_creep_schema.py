@@ -78,7 +78,38 @@ def test_a_rupture_time_without_a_series(tmp_path: Path):
     assert (test.rupture_time, test.condition) == (61.5 * 3600, "950 C, 152.5 MPa")
 
 
+def test_entries_are_known_by_their_whole_name(tmp_path: Path):
+    """An uncertainty, a tolerance, an expected time or an earlier test is not the quantity that its name ends with."""
+    others = (
+        "Uncertainty of initial stress\tu\tMPa\t2\t\t\t\nTolerance of specified temperature\tdT\t°C\t3\t\t\t\n"
+        "Expected creep rupture time\ttu\th\t5000\t\t\t\nPrevious test ID\t\t\tQ1\t\t\t\n"
+    )
+    (tmp_path / SERIES_NAME).write_text(LIS.replace("Date of test start", f"{others}Date of test start"))
+    (test,) = ck.read_histories(tmp_path)
+    assert (test.name, test.condition, test.rupture_time) == ("Q7", "950 C, 152.5 MPa", 61.5 * 3600)
+
+
+def test_a_rupture_time_without_load_control_says_what_was_assumed(tmp_path: Path):
+    (test,) = ck.read_histories(write(tmp_path, document(link="", loadControlType=""), series=None))
+    assert (test.loading.control, test.labels) == ("load", {"assumed": "control load"})
+
+
+STRESS_LINE = "Initial stress\tRo\tMPa\t152.5\t\t\t\n"
+NO_TIME = {"link": "", "rupture": value("")}
+TIME_LIMIT = {"endOfTestCriterium": {"endOfTestCriteriumOptions": "Time limit"}}
 BAD = {
+    "millipascal": (document(initialStress=value("152.5", "mPa")), LIS, "initialStress: the unit 'mPa' is not underst"),
+    "two stresses": (
+        document(),
+        LIS.replace(STRESS_LINE, f"{STRESS_LINE}{STRESS_LINE.replace('152.5', '15.2')}"),
+        f"{SERIES_NAME}:9: 'initial stress' stands there twice",
+    ),
+    "broke, no time": (document(**NO_TIME), None, "Options: the test piece broke, and there is no creepRuptureTime"),
+    "no criterion": (document(**NO_TIME, endOfTestCriterium=""), None, "Options: it is not stated, and there is no cr"),
+    "stopped and broke": (document(**TIME_LIMIT), LIS, "Options: it is 'time limit', and a rupture time is stated"),
+    "both, no series": (document(link="", **TIME_LIMIT), None, "it is 'time limit', and a rupture time is stated"),
+    "compression, no series": (document(link="", typeOfLoading="Compression"), None, "'Compression' is not underst"),
+    "no rupture time": (document(link="", rupture=value("0", "h")), None, "RuptureTime: it is 0 h; it must be above"),
     "no stress": (document(initialStress=value("")), LIS, "Q7.json: no loading"),
     "unit": (document(initialStress=value("152.5", "N")), LIS, "testParameters/initialStress: the unit 'N' is not und"),
     "no number": (document(specifiedTemperature=value("hot", "°C")), LIS, "specifiedTemperature: 'hot' is no number"),
