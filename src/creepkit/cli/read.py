@@ -19,8 +19,7 @@ def command(
         list[Path], typer.Argument(metavar="FILE...", help="Tables as text or .xlsx, folders, or any file of a reader.")
     ],
     reader: Annotated[
-        str | None,
-        typer.Option(help="Reader of the files, or format of records; by default what accepts them."),
+        str | None, typer.Option(help="Reader of the files, or format of records; by default what accepts them.")
     ] = None,
     to: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Write each test there as CSV, in s, MPa, mm and K.")

