@@ -127,8 +127,8 @@ def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTe
         seen.add(key)
     if repeated:
         notes.append(
-            f"{len(repeated)} tests have the stress, temperature and time of another one, such as '{repeated[0]}'; leave "
-            "them out if a table was read twice, for each counts"
+            f"{len(repeated)} tests have the stress, temperature and time of another one, such as '{repeated[0]}'; "
+            "leave them out if a table was read twice, for each counts"
         )
     return _as_arrays(known), _as_arrays(with_rate), tuple(notes)
 
