@@ -296,7 +296,8 @@ def _numbers(values: Any, name: str, example: str) -> list[float]:
     for one in values:
         if isinstance(one, bool) or not isinstance(one, Real):
             raise FitError(f"{name} holds {one!r:.40}; give {example}")
-        found.append(np.inf if bool(abs(one) > 10**30) else float(one))
+        number: Any = one  # an integer may be too large for float()
+        found.append(np.inf if abs(number) > 10**30 else float(number))
     if not found:
         raise FitError(f"{name} is empty; give {example}")
     return found
