@@ -6,17 +6,31 @@ Truth is the reduced-order model of the dimple under a programme of pressure (st
 with and without unloading), with a law of creep that the alignment does not know (sinh, Norton, strain hardening, time
 hardening; values as in planted_bulge_tests), so that the apex moves elastically and creeps before, during and after the
 ramps. The record holds the pressure with noise of 0.02 MPa, the frames the apex with noise of 1 um. The clock of the
-instrument is ahead by 0.1 s to 5 min, of either sign, and gains a normal deviate of 1e-4; lags of 15 min to either side
-are searched.
+instrument is ahead by 0.1 s to 5 min, of either sign, and gains a normal deviate of 1e-4.
 
-Columns: tests; those refused because several lags fit; answers whose 95 % intervals hold the planted lag and the
-planted drift (with 95 % binomial bounds); the median error of the lag, the median width of its interval, CPU time of
-one alignment. The frames do not tell lags apart that put every ramp between the same frames, so that an interval is
-often nearly as wide as that of the frames.
+Columns: tests; those refused because several lags fit, or because no lag does; answers whose 95 % intervals hold the
+planted lag and the planted drift (with 95 % binomial bounds); gross misses, lags that are wrong by more than ten half
+widths of their interval; the median error of the lag, the median width of its interval, CPU time of one alignment. The
+frames do not tell lags apart that put every ramp between the same frames, so that an interval is often nearly as wide
+as that of the frames. The default search takes every lag at which frames and record meet; every third test is aligned
+with a narrower one too.
+
+Gross misses are of frames 150 s apart: lags that are wrong by 16 and 22 s, with intervals that are far too narrow. The
+second is of the narrower search alone.
+
+The seed of these tests was chosen once, after the alignment was finished; the alignment was not changed after they were
+seen. The slow ramp of 300 s fails: its intervals hold too rarely, and nearly all its lags are too small. The cause was
+looked for with the first of these tests and with others. Where the displacement is proportional to the pressure the lag
+is found to 0.1 to 1 s, so neither the record nor the search is to blame. But in these tests creep grows during the ramp
+until the apex moves four to six times as far per MPa at its end as at its start, and goes on after it; the model takes
+that for a compliance that grows, and the end of the ramp for later than it is. Two remedies were tried, with other
+tests: a creep rate that changes with time only under load, and, with that, two exponents of the creep rate on the load
+in the place of one; the bias stayed, so the alignment was left as it was. After a slow ramp take the interval for twice
+as wide, or align on a fast change of the load, such as an unloading.
 
 The last section compares with the alignment by hand of the static test of dimple D1 (shared/data/cameras/dabi_static):
-its lag is read from the file by finding at which lag the record gives the aligned values; that is repeated for ten
-channels of temperature.
+its lag is read from the file by finding at which lag the record gives the aligned values, for every channel that both
+files have.
 """
 
 from __future__ import annotations
@@ -218,23 +232,40 @@ def lag_by_hand(record: InstrumentRecord, aligned: dict[str, np.ndarray], channe
     return lags[np.argmin([np.square(np.interp(frames + lag, times, values) - wanted).sum() for lag in lags])]
 
 
+def lags_by_hand(record: InstrumentRecord, aligned: dict[str, np.ndarray]) -> list[float]:
+    """Of all channels of both files that change."""
+    factors = {"PSIG": 6.894757293168361e-3, "Torr": 0.101325 / 760.0}
+    return [
+        lag_by_hand(
+            record,
+            aligned,
+            name,
+            factors.get(channel.written_unit, 1.0),
+            273.15 if channel.quantity == "temperature" else 0.0,
+        )
+        for name, channel in record.channels.items()
+        if any(one.startswith(name) for one in aligned) and np.ptp(record.readings(name)[1]) > 0
+    ]
+
+
 def static_test(page: Page) -> None:
     """The alignment of dimple D1, found and by hand."""
     record = ck.read_record(DATA / "D1_record.csv", time_zone="America/Chicago")
     frames = columns_of(DATA / "D1_frame_times.csv")["time"] / 1e3
     apexes = columns_of(DATA / "D1_apex_displacement.csv")["apex_displacement_mm"]
     aligned = columns_of(DATA / "D1_record_aligned_by_hand.csv")
-    hand = [lag_by_hand(record, aligned, f"{row}{k}: Temp.", 1.0, 273.15) for row in "AD" for k in range(1, 6)]
+    hand = lags_by_hand(record, aligned)
     page.heading("Dimple D1, static test")
     page.table("alignment", "lag, s", "from, s", "to, s")
-    page.row("by hand, ten channels", f"{np.median(hand):.3f}", f"{min(hand):.3f}", f"{max(hand):.3f}")
+    page.row(f"by hand, {len(hand)} channels", f"{np.median(hand):.3f}", f"{min(hand):.3f}", f"{max(hand):.3f}")
     found = align_clocks(record, "D1: Press.", frames, apexes)
     page.row("found", f"{found.lag:.3f}", *(f"{bound:.3f}" for bound in found.lag_interval))
     other = align_clocks(record, "High Acc. Transducer", frames, apexes)
     page.row("found, by the other transducer", f"{other.lag:.3f}", *(f"{bound:.3f}" for bound in other.lag_interval))
     page.paragraph(
         "By hand plateaus were laid upon each other; frames are 0.2 s apart, so that the moment at which a plateau "
-        "begins is known to 0.1 s at best."
+        "begins is known to 0.1 s at best. By the other transducer the lag differs by 0.1 s, more "
+        "than its interval says; why is not known."
     )
 
 

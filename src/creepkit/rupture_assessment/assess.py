@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
@@ -114,7 +115,8 @@ def _known_names(methods: Sequence[str] | str | None) -> list[str] | None:
     if methods is None:
         return None
     known = [name for name in METHODS if name != MINIMUM_RATE.name]
-    if not isinstance(methods, str | Sequence):
+    given: Any = methods
+    if not isinstance(given, str | Sequence):
         raise FitError(f"methods is {methods!r:.40}; give a list of names, such as ['larson-miller']")
     asked = list(dict.fromkeys([methods] if isinstance(methods, str) else methods))
     for name in asked:
@@ -221,7 +223,7 @@ def _relation(
 def _nothing_left(rejected: Mapping[str, str], relation: MinimumRateRelation | None) -> str:
     """Why nothing is ranked: of each method the reason of its lowest degree, methods with one reason together."""
     if rejected:
-        reasons = {}
+        reasons: dict[str, str] = {}
         for label, why in rejected.items():
             reasons.setdefault(label.partition(",")[0], why)
         alike: dict[str, list[str]] = {}

@@ -78,7 +78,7 @@ class RuptureSettings:
                 if name not in METHODS[method].fixable:
                     allowed = ", ".join(METHODS[method].fixable) or "none"
                     raise FitError(f"fixed= gives {method} a constant '{name}'; those that may be given: {allowed}")
-                if isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= LARGEST_CONSTANT:
+                if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST_CONSTANT:
                     raise FitError(f"fixed= gives {method} {name}={value!r:.40}; give a number, at most 1e7 in size")
 
 
@@ -228,7 +228,8 @@ class RuptureAssessment(Presentable):
         if of not in BOUND_KINDS:
             raise FitError(f"of is {of!r:.40}; allowed are {', '.join(BOUND_KINDS)}")
         check_temperatures([temperature])
-        if isinstance(stress, bool) or not isinstance(stress, Real) or not 0 < stress < 1e9:
+        given: Any = stress
+        if isinstance(given, bool) or not isinstance(given, Real) or not 0 < float(given) < 1e9:
             raise FitError(f"stress is {stress!r:.40}; give MPa above zero")
         T, s = np.array([float(temperature)]), np.array([float(stress)])
         at = Conditions(s, T, self.tensile(T), np.full(1, np.nan))
@@ -295,7 +296,8 @@ def _numbers(values: Any, name: str, example: str) -> list[float]:
     for one in values:
         if isinstance(one, bool) or not isinstance(one, Real):
             raise FitError(f"{name} holds {one!r:.40}; give {example}")
-        found.append(float(one) if abs(one) < 1e30 else np.inf)
+        number: Any = one  # an integer may be too large for float()
+        found.append(np.inf if abs(number) > 10**30 else float(number))
     if not found:
         raise FitError(f"{name} is empty; give {example}")
     return found
