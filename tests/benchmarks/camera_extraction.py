@@ -254,7 +254,7 @@ def write_dice(frames, folder, step=10) -> int:
         "SUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,MODEL_COORDINATES_X,MODEL_COORDINATES_Y,"
         "MODEL_COORDINATES_Z,MODEL_DISPLACEMENT_X,MODEL_DISPLACEMENT_Y,MODEL_DISPLACEMENT_Z,SIGMA,GAMMA,BETA"
     )
-    count = 0
+    count, last = 0, folder
     for k in range(len(frames)):
         path = folder / f"DICe_solution_{k:03d}.txt"
         if k > 1 and k % step:
