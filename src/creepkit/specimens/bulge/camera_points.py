@@ -50,8 +50,8 @@ UNSMOOTHED_FOURTH = 0.75 * (1.0 / 576.0 - 1.0 / 1920.0) + 1.0 / (8.0 * 576.0)
 """Of h^4 and the second Laplacian in the mean on a circle of what was smoothed over squares of side h.
 
 The mean over such a square is 1 + (h^2 / 24) (a + b) + (h^4 / 1920) (a^2 + b^2) + (h^4 / 576) a b of a and b, the
-second derivatives along x and y. Its inverse is 1 - (h^2 / 24) (a + b) + h^4 ((1 / 576 - 1 / 1920) (a^2 + b^2) + a b / 576);
-on a circle the mean of a^2 + b^2 is 3/4 of the second Laplacian, that of a b one eighth.
+second derivatives along x and y. Its inverse is 1 - (h^2 / 24) (a + b) + h^4 ((1 / 576 - 1 / 1920) (a^2 + b^2) + a b
+/ 576); on a circle the mean of a^2 + b^2 is 3/4 of the second Laplacian, that of a b one eighth.
 """
 
 
