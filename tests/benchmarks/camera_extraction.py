@@ -67,8 +67,10 @@ def virtual_truth(page, cases, seeds) -> None:
         f"Eq. (7), and means on rings, about one centre: {LOADED} frames under load, {REST} at rest before them"
     )
     page.paragraph(
-        "Seeds from 31000 on, fixed before the first run with them. Length of correlation of the noise in spacings; in time "
-        "it is that of a first-order autoregression. Each row: some seeds of one law under one noise. Scatter: root mean "
+        "Seeds from 31000 on, fixed before the first run with them. Length of correlation of the "
+        "noise in spacings; in time "
+        "it is that of a first-order autoregression. Each row: some seeds of one law under one "
+        "noise. Scatter: root mean "
         "square of errors less each test's own mean error."
     )
     page.table(
@@ -242,8 +244,10 @@ def cost(page) -> None:
         ck.extract(read, subset=1.2)
         seconds = time.process_time() - start
     page.paragraph(
-        f"The same as 474 files of DICe ({written} of them written, the others links to these): {seconds:.1f} CPU-s for "
-        f"ck.read_frames and ck.extract (goal: 10), {opened:.1f} of them to find and order the files by their heads. The "
+        f"The same as 474 files of DICe ({written} of them written, the others links to these): "
+        f"{seconds:.1f} CPU-s for "
+        f"ck.read_frames and ck.extract (goal: 10), {opened:.1f} of them to find and order the "
+        f"files by their heads. The "
         "first frame and the four late ones that domes are looked for in are read twice, the others once."
     )
 
@@ -254,7 +258,7 @@ def write_dice(frames, folder, step=10) -> int:
         "SUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,MODEL_COORDINATES_X,MODEL_COORDINATES_Y,"
         "MODEL_COORDINATES_Z,MODEL_DISPLACEMENT_X,MODEL_DISPLACEMENT_Y,MODEL_DISPLACEMENT_Z,SIGMA,GAMMA,BETA"
     )
-    count = 0
+    count, last = 0, folder
     for k in range(len(frames)):
         path = folder / f"DICe_solution_{k:03d}.txt"
         if k > 1 and k % step:

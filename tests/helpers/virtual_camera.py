@@ -38,7 +38,8 @@ def simulated_dimple(
     """
     loaded = interval * np.arange(1, frames - rest + 1)
     run = ck.simulate(
-        law, ck.specimen("bulge").replace(refinement=refinement), dict(A=A, n=n), loading=ck.PressureJump(pressure, pressure, 1e9), times=loaded,
+        law, ck.specimen("bulge").replace(refinement=refinement), dict(A=A, n=n), times=loaded,
+        loading=ck.PressureJump(pressure, pressure, 1e9),
         temperature=temperature, elastic=ck.Elastic(E=1e5, nu=0.3),
     )  # fmt: skip
     top = run.setup.model.top
@@ -54,7 +55,8 @@ class VirtualCamera:
     """How frames are made; lengths in mm, angles in degrees.
 
     points : about how many, spacing apart. subset : side of the square over which a displacement is a mean.
-    noise : of z; a third of it in x and y. correlation : of the noise, in spacings. memory : correlation of the noise of
+    noise : of z; a third of it in x and y. correlation : of the noise, in spacings.
+    memory : correlation of the noise of
     successive frames, of a first-order autoregression. lost : share of lost subsets, half
     of them for good. motion, turn : largest rigid motion. centers : of the dimples, in the plate.
     """

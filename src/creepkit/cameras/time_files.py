@@ -27,8 +27,8 @@ FIRST_UNIX_MILLISECONDS = 1e11
 def read_frame_times(path: str | Path) -> Floats:
     """(frames,) s, from the column of times of a table, one row a frame.
 
-    The column is called time, t, timestamp or unix, with its unit, as "time [ms]"; seconds by default, milliseconds where
-    numbers are so large that they count from 1970. A single column needs no name.
+    The column is called time, t, timestamp or unix, with its unit, as "time [ms]"; seconds by default, milliseconds
+    where numbers are so large that they count from 1970. A single column needs no name.
     """
     file = Path(path).expanduser()
     lines = text_lines(decode_text(read_bytes(file, TIME_FILE), file))

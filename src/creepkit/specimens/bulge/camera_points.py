@@ -49,9 +49,9 @@ dimple of 7.5 mm (docs/measured/camera_extraction.md).
 UNSMOOTHED_FOURTH = 0.75 * (1.0 / 576.0 - 1.0 / 1920.0) + 1.0 / (8.0 * 576.0)
 """Of h^4 and the second Laplacian in the mean on a circle of what was smoothed over squares of side h.
 
-The mean over such a square is 1 + (h^2 / 24) (a + b) + (h^4 / 1920) (a^2 + b^2) + (h^4 / 576) a b of a and b, the second
-derivatives along x and y. Its inverse is 1 - (h^2 / 24) (a + b) + h^4 ((1 / 576 - 1 / 1920) (a^2 + b^2) + a b / 576); on a
-circle the mean of a^2 + b^2 is 3/4 of the second Laplacian, that of a b one eighth.
+The mean over such a square is 1 + (h^2 / 24) (a + b) + (h^4 / 1920) (a^2 + b^2) + (h^4 / 576) a b of a and b, the
+second derivatives along x and y. Its inverse is 1 - (h^2 / 24) (a + b) + h^4 ((1 / 576 - 1 / 1920) (a^2 + b^2) + a b
+/ 576); on a circle the mean of a^2 + b^2 is 3/4 of the second Laplacian, that of a b one eighth.
 """
 
 
@@ -238,8 +238,8 @@ class _Balance:
     """Smooth functions over the disc, whose sums over the points that a frame shows are made their integrals.
 
     What Eq. (7) misses of a surface is balanced over the whole disc, on which a simulation is observed, and would not
-    be where subsets are lost. Weights of the seen points are changed, as little as can be, so that it is: calibration of
-    the weights of a sample (Deville and Saerndal, 1992). No height is put in the place of a lost one.
+    be where subsets are lost. Weights of the seen points are changed, as little as can be, so that it is: calibration
+    of the weights of a sample (Deville and Saerndal, 1992). No height is put in the place of a lost one.
 
     terms : (terms, points). wanted : (terms,) their integrals over the area of a point. nodes, shares : (nodes, 2) mm,
     (nodes,) of a quadrature over an eighth of the disc, all of its area. node_terms : (terms, nodes).
@@ -280,7 +280,7 @@ class _Balance:
     def missed(
         self, places: Floats, heights: Floats, weights: Floats, values: Floats, subset: float, enough: Bools
     ) -> tuple[Floats, Floats]:
-        """What the fits miss, in these terms, times what it is weighed with, (frames, 3, points); integrals (frames, 3).
+        """What the fits miss, in these terms, times its weights, (frames, 3, points), and integrals (frames, 3).
 
         enough : (frames,) which have points enough for it; those without a bulge above the noise have no part in it.
         """
@@ -300,7 +300,7 @@ class _Balance:
 
     @property
     def _even_node_terms(self) -> Floats:
-        """The terms on the quadrature's nodes, but those that change sign over the disc: with even ones they have no sum."""
+        """The terms on the quadrature's nodes, but those that change sign over the disc: they have no sum."""
         even = np.concatenate([[k % 4 == 0] * (2 * count) for k, count in BALANCED_TERMS.items()])
         return self.node_terms * even[:, None]
 
