@@ -24,8 +24,10 @@ from scipy.stats import f
 
 from creepkit.arrays import Floats
 from creepkit.inverse.known_noise import KnownNoise
+from creepkit.inverse.largest_deviation import LargestDeviation, largest_deviation
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
+from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
@@ -47,10 +49,6 @@ LARGEST_SCATTER = 1.0
 
 TREND_SIGNIFICANCE, FEWEST_TREND_TESTS = 0.01, 5
 """p-value below which rates of tests bend over the stress, and the tests that it takes to see that."""
-
-
-LOCAL_FRAMES = 5
-"""Frames whose mean deviation says where a law misses the tests."""
 
 
 AdequacyVerdict = Literal["explains", "leaves a discrepancy", "cannot be judged"]
@@ -81,28 +79,6 @@ class OutputAdequacy:
 
 
 @dataclass(frozen=True)
-class LargestDeviation:
-    """Where a law misses the tests most: the mean of a few frames of one output, in its unit and in their noises.
-
-    test, output : names. time : s. deviation : predicted less measured. noises : over the noise of one frame.
-    """
-
-    test: str
-    output: str
-    time: float
-    deviation: float
-    noises: float
-
-    def __str__(self) -> str:
-        unit = output_unit(self.output)
-        side = "above" if self.deviation > 0 else "below"
-        return (
-            f"{self.output} of '{self.test}' about {self.time:.4g} s, where it lies {abs(self.deviation):.2g}"
-            f"{' ' + unit if unit else ''} {side} what was measured"
-        )
-
-
-@dataclass(frozen=True)
 class Adequacy:
     """Whether a law explains the tests to their noise.
 
@@ -113,6 +89,7 @@ class Adequacy:
     remedies : unmodelled effects, such as "a thickness of 0.01 mm", with any of which the law would explain the tests.
     rate_scatter : standard deviation of ln rate between tests, which was estimated from them, and rate_trend_p_value :
         of a bend of these rates over stress, by which a law shows that it misses the dependence on stress.
+    implausible : nuisances that lie far from their priors, without which the law would not explain the tests.
     """
 
     verdict: AdequacyVerdict
@@ -125,11 +102,26 @@ class Adequacy:
     remedies: tuple[str, ...] = ()
     rate_scatter: float = 0.0
     rate_trend_p_value: float = 1.0
+    implausible: tuple[ImplausibleNuisance, ...] = ()
 
     @property
     def explains(self) -> bool:
         """Whether the law explains the tests to their noise."""
         return self.verdict == "explains"
+
+    @property
+    def explains_plausibly(self) -> bool:
+        """Whether it explains them with nuisances of plausible size."""
+        return self.explains and not self.implausible
+
+    @property
+    def qualification(self) -> str:
+        """What follows "explains the tests" where it takes nuisances of implausible size; "" where it does not."""
+        if not self.implausible:
+            return ""
+        more = len(self.implausible) - 1
+        others = f" (and {more} more such {'nuisance' if more == 1 else 'nuisances'})" if more else ""
+        return f" only with {self.implausible[0].description}{others}"
 
     @property
     def discrepancy_in_noises(self) -> float:
@@ -159,8 +151,8 @@ class Adequacy:
             if self.chi_square < IMPLAUSIBLE_CHI_SQUARE:
                 scatter += " (far larger than what the frames show: check its unit)"
             return (
-                f"explains the tests to their {source} noise{scatter}: reduced chi-square {self.chi_square:.3g}, "
-                f"p = {self.p_value:.2g}{correlated}"
+                f"explains the tests to their {source} noise{self.qualification}{scatter}: "
+                f"reduced chi-square {self.chi_square:.3g}, p = {self.p_value:.2g}{correlated}"
             )
         parts = [
             f"{o.discrepancy:.2g}{' ' + output_unit(o.output) if output_unit(o.output) else ''} of {o.output} "
@@ -234,7 +226,7 @@ def adequacy_of(
         freedom,
         p_value,
         _correlation(noise_model),
-        _largest_deviation(observations, known, _white_part(residuals, solution, independent), histories),
+        largest_deviation(observations, known, _white_part(residuals, solution, independent), histories),
         rate_scatter=scatter,
         rate_trend_p_value=trend,
     )
@@ -369,25 +361,3 @@ def _white_part(residuals: Residuals, solution: LinearSolution, noise_model: Noi
     """(tests, observations) what is left in the output's unit once offsets and rates of tests are taken out."""
     white = residuals.white_covariance_times(solution.weighted_residuals, noise_model)
     return np.asarray(white / np.where(residuals.offset_sensitivity > 0, residuals.offset_sensitivity, 1.0))
-
-
-def _largest_deviation(
-    observations: ObservationVector, known: KnownNoise, deviation: Floats, histories: Sequence[History]
-) -> LargestDeviation | None:
-    """The mean deviation of a few neighbouring frames that is largest over its noise."""
-    judged, noise = known.judged, known.sd
-    best: LargestDeviation | None = None
-    for test, history in enumerate(histories):
-        for position, name in enumerate(observations.outputs):
-            index = np.flatnonzero(judged[test] & (observations.output_index[test] == position))
-            if not index.size:
-                continue
-            width = min(LOCAL_FRAMES, index.size)
-            weights = np.full(width, 1.0 / width)
-            means = np.convolve(deviation[test, index], weights, mode="valid")
-            noises = np.abs(np.convolve(deviation[test, index] / noise[test, index], weights, mode="valid"))
-            k = int(np.argmax(noises))
-            time = float(observations.times[test, index[k + width // 2]])
-            if best is None or noises[k] > best.noises:
-                best = LargestDeviation(history.name, name, time, float(means[k]), float(noises[k]))
-    return best

@@ -18,6 +18,7 @@ from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, RateCompar
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
+from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.inverse.predictor_documents import predictor_documents, predictor_from_documents
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
@@ -81,6 +82,7 @@ CODEC = RecordCodec(
             NOT_NEGATIVE_OR_NAN,
         ),
         OutputAdequacy: {"frames": NOT_NEGATIVE, "noise": POSITIVE, "discrepancy": NOT_NEGATIVE},
+        ImplausibleNuisance: {"standard_deviations": NOT_NEGATIVE, "size": POSITIVE, "share": NOT_NEGATIVE_OR_NAN},
         NumericalError: {"noises": NOT_NEGATIVE, "shift": NOT_NEGATIVE_OR_NAN},
         UnmodelledEffect: {
             "size": NOT_NEGATIVE,

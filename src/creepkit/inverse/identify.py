@@ -44,6 +44,7 @@ from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS, NoiseModel, initial_noise_model
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
+from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rupture_prediction import compare_rupture_times
 from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
@@ -304,6 +305,7 @@ def _result(
     nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]
     )
+    implausible = implausible_nuisances(problem, random_effects, nuisance_estimates)
     adequacy = adequacy_with_remedies(
         problem, linear, noise_model, working_estimator.predictor_errors, histories, unmodelled
     )
@@ -325,13 +327,14 @@ def _result(
         errors=pooled_errors(histories, prediction, tests),
         nuisances=nuisance_estimates,
         converged=best.minimum.converged,
-        adequacy=adequacy,
+        adequacy=replace(adequacy, implausible=implausible),
         numerical_error=numerical_error,
         unmodelled=unmodelled,
         rate_scatter=scatter,
         notes=(
             *suspect_frames_note(histories),
             *identification_notes(best, tests, nuisance_estimates),
+            *(nuisance.sentence for nuisance in implausible),
             *domain_notes(prediction, histories),
             *([numerical_error.sentence] if numerical_error is not None else []),
             *unmodelled_note(unmodelled),

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
+from creepkit.inverse.nuisance_plausibility import NUISANCE_UNITS
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import is_length_nuisance, is_logarithmic, kind_and_start, output_unit
@@ -22,12 +23,6 @@ if TYPE_CHECKING:
 
 LISTED_TESTS = 15
 """With more tests than this their rupture times, or minimum rates, are summed up alone."""
-
-
-UNITS = {
-    **{"rate step": "in ln", "rate drift": "in ln", "modulus": "relative", "load step": "relative"},
-    **{"temperature": "K", "temperature step": "K", "temperature drift": "K"},
-}
 
 
 def identification_text(fit: Identification) -> str:
@@ -234,7 +229,7 @@ def _plus_minus(n: NuisanceEstimate) -> str:
 
 def _unit(key: str) -> str:
     kind = kind_and_start(key)[0]
-    unit = "mm" if is_length_nuisance(kind) else UNITS.get(kind, "")
+    unit = "mm" if is_length_nuisance(kind) else NUISANCE_UNITS.get(kind, "")
     return f", {unit}" if unit else ""
 
 

@@ -35,6 +35,9 @@ def _explains(fit: Identification) -> str:
     """Whether a law explains the tests to their noise, and what it leaves, in noises."""
     if fit.adequacy is None or fit.adequacy.verdict == "cannot be judged":
         return "?"
+    if fit.adequacy.explains and fit.adequacy.implausible:
+        kind = fit.adequacy.implausible[0].kind
+        return f"only with a large {kind}"
     return "yes" if fit.adequacy.explains else f"no: leaves {fit.adequacy.discrepancy_in_noises:.2g} noises"
 
 

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, f
 
-from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy, adequacy_of
+from creepkit.inverse.adequacy import Adequacy, OutputAdequacy, adequacy_of
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
+from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.observation_vector import frame_noise
 from creepkit.inverse.problem import LeastSquaresProblem

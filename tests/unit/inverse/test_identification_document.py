@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
+from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.identification_document import (
     identification_from_json,
@@ -15,6 +15,7 @@ from creepkit.inverse.identification_document import (
     read_identification,
 )
 from creepkit.inverse.identify import identify
+from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.unmodelled_effects import UnmodelledEffect

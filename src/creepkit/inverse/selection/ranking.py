@@ -92,6 +92,8 @@ class Ranking(Presentable):
             and self.best.law.name not in self.further
             and self.challenges is not None
             and not self.challenges
+            and self.adequacy is not None
+            and self.adequacy.explains_plausibly
         )
 
     @property
@@ -174,8 +176,11 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
         unexamined = "what else the tests allow was not examined"
         return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}; {unexamined}"
     if ranking.challenges:
+        only = "" if adequacy is None else adequacy.qualification
         but = "; and ".join(challenge.sentence for challenge in ranking.challenges)
-        return f"of {count} laws tried {best} has nearly all the weight ({weight}) and explains the tests, but {but}"
+        return (
+            f"of {count} laws tried {best} has nearly all the weight ({weight}) and explains the tests{only}, but {but}"
+        )
     return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}"
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
+from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
+from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.selection.challenges import Challenge
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores, verdict_of
 

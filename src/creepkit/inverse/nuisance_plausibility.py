@@ -1,0 +1,165 @@
+"""Plausibility of nuisances: what a law explains the tests with only if a nuisance is far larger than it should be.
+
+A nuisance parameter stands for something small about a test. A law that fits only with a large one does not explain the
+test. Each estimate is compared with the standard deviation that was stated for it; where none was, an offset with the
+noise of a frame and the size of the output, another one with the size that is usual for its kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.inverse.nuisance_parameters import NuisanceEstimate, initial_prior_sd
+from creepkit.inverse.observation_vector import ObservationVector
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.records import Nuisance, is_length_nuisance, output_unit
+
+MOST_STANDARD_DEVIATIONS = 3.0
+"""Distance of a nuisance from its prior mean, in standard deviations that were stated or are usual, that is plausible;
+and that it must be in its own, so that a value that says nothing is not named."""
+
+
+MOST_OFFSET_NOISES, MOST_OFFSET_SHARE = 5.0, 0.1
+"""An offset without a stated prior is named above both: in noises of a frame, and as a share of the largest value."""
+
+
+NUISANCE_UNITS = {
+    **{"rate": "in ln", "rate step": "in ln", "rate drift": "in ln", "modulus": "relative", "load step": "relative"},
+    **{"temperature": "K", "temperature step": "K", "temperature drift": "K"},
+}
+"""Units of the kinds, but for offsets (that of the output) and lengths (mm)."""
+
+
+@dataclass(frozen=True)
+class ImplausibleNuisance:
+    """A nuisance whose estimate lies far from its prior.
+
+    kind, owner : which, of which test (or alloy, group, "all"). output : of an offset, else "". value : in `unit`.
+    standard_deviations : its distance from the prior mean, over `size`, in the same unit. size_source : "stated" of a
+        prior, "noise" of a frame, or what is "usual" for the kind. share : of an offset in the largest value of that
+        output of the test; of a length the change relative to its mean; NaN for others.
+    """
+
+    kind: str
+    owner: str
+    output: str
+    value: float
+    unit: str
+    standard_deviations: float
+    size: float
+    size_source: str
+    share: float
+
+    @property
+    def description(self) -> str:
+        """Such as "an offset of 0.095 mm in amplitude of 'D1', 24 % of its largest value"."""
+        article = "an" if self.kind[0] in "aeiou" else "a"
+        where = f"in {self.output} of '{self.owner}'" if self.output else f"in '{self.owner}'"
+        return f"{article} {self.kind} of {self._amount} {where}{self._share}"
+
+    @property
+    def sentence(self) -> str:
+        """The note of an identification."""
+        size = {
+            "stated": "the standard deviation that was stated for it",
+            "noise": "the noise of a frame",
+            "usual": f"a usual {self.kind}",
+        }[self.size_source]
+        return (
+            f"the {self.kind}{f' of {self.output}' if self.output else ''} of '{self.owner}' is {self._amount}"
+            f"{self._share}, {self.standard_deviations:.2g} times {size} ({_amount(self.size, self.unit)}): it stands "
+            "for more than its name says, look at the test or try another law"
+        )
+
+    @property
+    def _amount(self) -> str:
+        return _amount(self.value, self.unit)
+
+    @property
+    def _share(self) -> str:
+        if not np.isfinite(self.share):
+            return ""
+        whole = "its largest value" if self.output else "its nominal length"
+        return f", {100 * self.share:.2g} % {'of' if self.output else 'from'} {whole}"
+
+
+def _amount(value: float, unit: str) -> str:
+    return f"{value:.2g}{' ' + unit if unit else ''}"
+
+
+def implausible_nuisances(
+    problem: LeastSquaresProblem, random_effects: tuple[Floats, Floats], estimates: Sequence[NuisanceEstimate]
+) -> tuple[ImplausibleNuisance, ...]:
+    """Those of a fit, the furthest from its prior first.
+
+    random_effects : offsets (tests, outputs) in the output's unit, and ln rate factors (tests,).
+    """
+    found = [*_offsets(problem, random_effects[0]), *_rates(problem, random_effects[1]), *_explicit(problem, estimates)]
+    return tuple(sorted(found, key=lambda one: -one.standard_deviations))
+
+
+def _offsets(problem: LeastSquaresProblem, offsets: Floats) -> list[ImplausibleNuisance]:
+    """Offsets of tests, (tests, outputs) in the output's unit."""
+    observations, found = problem.observations, []
+    for position, output in enumerate(observations.outputs):
+        stated = _stated_sd(problem.settings.nuisances, "offset", output)
+        size = float(observations.noise[position]) if stated is None else stated
+        if not (size > 0 and np.isfinite(size)):
+            continue
+        for test, history in enumerate(problem.histories):
+            value, largest = float(offsets[test, position]), _largest(observations, test, position)
+            share, ratio = abs(value) / largest if largest > 0 else np.nan, abs(value) / size
+            far = ratio > MOST_STANDARD_DEVIATIONS
+            if stated is None:
+                far = ratio > MOST_OFFSET_NOISES and share > MOST_OFFSET_SHARE
+            if far:
+                source, unit = "noise" if stated is None else "stated", output_unit(output)
+                found.append(
+                    ImplausibleNuisance("offset", history.name, output, value, unit, ratio, size, source, share)
+                )
+    return found
+
+
+def _largest(observations: ObservationVector, test: int, position: int) -> float:
+    """The largest measured value of one output of a test; 0 where it has none."""
+    mask = observations.present[test] & (observations.output_index[test] == position)
+    return float(np.abs(observations.values[test, mask]).max(initial=0.0))
+
+
+def _stated_sd(nuisances: Sequence[Nuisance], kind: str, output: str = "") -> float | None:
+    return next((n.sd for n in nuisances if n.kind == kind and n.output in ("", output)), None)
+
+
+def _rates(problem: LeastSquaresProblem, log_factors: Floats) -> list[ImplausibleNuisance]:
+    """ln factors on the rates of tests, (tests,), where their scatter was stated; else it was estimated from them."""
+    sd = _stated_sd(problem.settings.nuisances, "rate")
+    if sd is None or not np.isfinite(sd):
+        return []
+    return [
+        ImplausibleNuisance(
+            "rate", history.name, "", float(value), NUISANCE_UNITS["rate"], abs(value) / sd, sd, "stated", float("nan")
+        )
+        for history, value in zip(problem.histories, log_factors, strict=True)
+        if abs(value) > MOST_STANDARD_DEVIATIONS * sd
+    ]
+
+
+def _explicit(problem: LeastSquaresProblem, estimates: Sequence[NuisanceEstimate]) -> list[ImplausibleNuisance]:
+    """Estimated nuisance parameters; a prior that is free or estimated counts as one of the usual size."""
+    found = []
+    for nuisance, one in zip(problem.nuisance_parameters.nuisances, estimates, strict=True):
+        stated = nuisance.sd is not None and np.isfinite(nuisance.sd)
+        size = one.prior_sd if stated else initial_prior_sd(replace(nuisance, sd=None), one.prior_mean)
+        distance = abs(one.value - one.prior_mean)
+        if not size > 0 or distance <= MOST_STANDARD_DEVIATIONS * max(size, one.sd):
+            continue
+        is_length = is_length_nuisance(one.kind)
+        unit = "mm" if is_length else NUISANCE_UNITS[one.kind]
+        share = distance / abs(one.prior_mean) if is_length and one.prior_mean else float("nan")
+        source = "stated" if stated else "usual"
+        found.append(ImplausibleNuisance(one.key, one.owner, "", one.value, unit, distance / size, size, source, share))
+    return found
