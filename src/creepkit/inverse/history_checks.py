@@ -13,7 +13,7 @@ from creepkit.inverse.observation_vector import ObservationVector, frames_with_d
 from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
-from creepkit.quality import check_rig, exclude_suspect_frames
+from creepkit.quality import check_loading_strain, check_rig, exclude_suspect_frames
 from creepkit.records import History, Predictor, is_logarithmic, output_named, outputs_of_test
 
 SUSPECT_LABEL = "suspect"
@@ -48,6 +48,15 @@ def rig_notes(histories: Sequence[History], settings: IdentificationSettings) ->
     sound = exclude_suspect_frames(histories) if settings.suspect_frames == "keep" else histories
     with single_threaded_blas():
         return tuple(f"the rig: {flag}" for flag in check_rig(sound))
+
+
+def loading_notes(histories: Sequence[History]) -> tuple[str, ...]:
+    """Strain of loading that histories seem to hold, which a fit takes for creep: one sentence for all of them."""
+    flags = check_loading_strain(histories)
+    if not flags:
+        return ()
+    others = f" (also: {', '.join(flag.history for flag in flags[1:])})" if len(flags) > 1 else ""
+    return (f"{flags[0]}{others}",)
 
 
 def check_creep(observations: ObservationVector, histories: Sequence[History]) -> None:

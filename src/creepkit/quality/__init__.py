@@ -23,6 +23,7 @@ from creepkit.quality.comparison import (
 )
 from creepkit.quality.flags import DataQuality, FlagKind, QualityFlag, frame_ranges_text
 from creepkit.quality.frames import FlaggedFrames, decreasing_frames, outlier_frames, unloading_frames
+from creepkit.quality.loading_strain import unstated_loading_strain
 from creepkit.quality.rig_flags import ACTIVATION_ENERGY, jump_flags, rate_change_flag, record_flags
 from creepkit.records import History, Predictor
 
@@ -32,6 +33,7 @@ __all__ = [
     "DataQuality",
     "QualityFlag",
     "check_data_quality",
+    "check_loading_strain",
     "check_rig",
     "exclude_suspect_frames",
 ]
@@ -69,8 +71,20 @@ def check_data_quality(
         _with_frames_unused(h, [k for flag in each for k in flag.frames if flag.kind in FRAME_FLAG_KINDS])
         for h, each in zip(histories, results, strict=True)
     ]
+    flags += check_loading_strain(sound)
     flags += check_rig(sound, activation_energy=activation_energy)
     return DataQuality(tuple(flags), len(histories))
+
+
+def check_loading_strain(histories: Sequence[History]) -> list[QualityFlag]:
+    """Histories whose strain seems to hold strain of loading that nothing states; whole, for no frame is to blame."""
+    found = [(history.name, unstated_loading_strain(history)) for history in histories]
+    advice = "state loading_strain_pct, with loading_time_s where frames were taken before, or includes_loading"
+    return [
+        QualityFlag((name,), "loading", (finding[0],), finding[1], proposal=advice)
+        for name, finding in found
+        if finding is not None
+    ]
 
 
 def check_rig(histories: Sequence[History], *, activation_energy: float = ACTIVATION_ENERGY) -> list[QualityFlag]:

@@ -15,6 +15,7 @@ FlagKind = Literal[
     "outlier",
     "replicate",
     "first frame",
+    "loading",
     "temperature",
     "modulus",
     "record",

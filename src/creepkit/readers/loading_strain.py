@@ -5,12 +5,14 @@ zero is often not the end of loading. ISO 204 calls the strain at the end of loa
 state it (`loading_strain`, `includes_loading`), and when loading ended (`loading_time`). Where a file states neither
 these nor `includes_elastic`, the first frames decide:
 
-- a strain at time zero that is the stress over the modulus is elastic, any other is subtracted;
+- a strain at time zero that is the stress over the modulus is elastic; any other is subtracted, for part of it is
+  plastic or the modulus is off, and creep has had no time yet;
 - a strain that jumps to about the stress over the modulus from less than half of it, and then stays while time
   trebles, is elastic strain at the end of loading. Creep rises in that time by 44 % or more: as the cube root of time,
   or faster.
 
-What was decided is recorded. A file that states `includes_elastic` is taken at its word.
+What was decided is recorded, and what looks like loading but is neither, a jump that is not about the stress over the
+modulus or has no modulus beside it, is told by the check of data quality. A file that states `includes_elastic` is taken at its word.
 """
 
 from __future__ import annotations
@@ -23,8 +25,12 @@ from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError
 from creepkit.readers.conditions import StatedConditions
 
-ELASTIC_RANGE = (0.6, 1.6)
-"""Ratios of a strain to the stress over the modulus at which it is elastic: moduli of creep tests are uncertain."""
+ELASTIC_RANGE = (0.9, 1.15)
+"""Ratios of a strain at time zero to the stress over the modulus at which it is elastic, and not plastic too."""
+
+
+PLATEAU_RANGE = (0.6, 1.6)
+"""The same of a plateau behind frames of loading, which no frame at time zero tells from creep."""
 
 
 PLATEAU_GROWTH, PLATEAU_TIMES = 0.25, 3.0
@@ -107,11 +113,13 @@ def _decided(
     if frames.size > 2 and times[frames[0]] == 0.0:
         first = float(strain[frames[0]])
         if first > max(SMALLEST_STRAIN, NOISE_FACTOR * _noise(strain[frames[:SEARCHED_FRAMES]])):
-            if elastic_strain and _is_elastic(first, elastic_strain):
-                ratio = f"{first / elastic_strain:.2f} of stress over modulus"
+            ratio = f"{first / elastic_strain:.2f} of stress over modulus" if elastic_strain else ""
+            if elastic_strain and _is_elastic(first, elastic_strain, ELASTIC_RANGE):
                 conditions.record_assumption(f"includes_elastic yes (the strain at time 0 is {ratio})")
                 return StrainRecord(strain, used, includes_elastic=True)
-            conditions.record_assumption(f"includes_elastic no (loading strain {first:.3g} at time 0 subtracted)")
+            conditions.record_assumption(
+                f"includes_elastic no (loading strain {first:.3g} at time 0 subtracted{ratio and f'; {ratio}'})"
+            )
             return StrainRecord(strain - first, used, includes_elastic=False)
         end = _end_of_loading(times[frames], strain[frames], elastic_strain) if elastic_strain else None
         if end is not None and elastic_strain:
@@ -129,7 +137,7 @@ def _end_of_loading(times: Floats, strain: Floats, elastic_strain: float) -> int
     """The first frame of a plateau of about the elastic strain, None where the strain shows none."""
     noise = _noise(strain[:SEARCHED_FRAMES])
     for k in range(1, min(SEARCHED_FRAMES, times.size - 2)):
-        if not _is_elastic(float(strain[k]), elastic_strain):
+        if not _is_elastic(float(strain[k]), elastic_strain, PLATEAU_RANGE):
             continue
         if max(strain[k - 1], noise * JUMP_FROM / LARGEST_NOISE) > JUMP_FROM * strain[k]:
             return None
@@ -140,8 +148,8 @@ def _end_of_loading(times: Floats, strain: Floats, elastic_strain: float) -> int
     return None
 
 
-def _is_elastic(strain: float, elastic_strain: float) -> bool:
-    return ELASTIC_RANGE[0] * elastic_strain <= strain <= ELASTIC_RANGE[1] * elastic_strain
+def _is_elastic(strain: float, elastic_strain: float, ratios: tuple[float, float]) -> bool:
+    return ratios[0] * elastic_strain <= strain <= ratios[1] * elastic_strain
 
 
 def _noise(strain: Floats) -> float:

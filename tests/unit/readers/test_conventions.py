@@ -191,6 +191,10 @@ def test_strain_at_time_zero(read):
     assert not plastic.includes_elastic
     np.testing.assert_allclose(plastic.outputs["strain"], 1e-8 * times, atol=1e-12)
     assert "loading strain 0.003 at time 0 subtracted" in assumed(plastic)
+    # elastic and plastic: 1.57 of stress over modulus
+    partly = read(LOADED + "time_s,strain_pct\n" + rows(times, 100 * (1.256e-3 + 1e-8 * times)))
+    assert not partly.includes_elastic
+    np.testing.assert_allclose(partly.outputs["strain"], 1e-8 * times, atol=1e-12)
 
 
 def test_stated_loading_strain(read):
