@@ -214,7 +214,7 @@ def _number_rows(
         return None
     if numbers.shape != (line_numbers.size, len(split_line(lines[start], dialect))) or not np.isfinite(numbers).all():
         return None
-    return dialect, NumberRows(numbers, line_numbers), comments
+    return dialect, NumberRows(numbers, line_numbers, dialect.decimal), comments
 
 
 def _without_comments(body: str, first_line: int) -> tuple[str, Ints, list[tuple[int, str]]]:

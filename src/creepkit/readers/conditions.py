@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import TypeVar
 
@@ -97,6 +97,10 @@ class StatedConditions:
         entry = self._texts.pop(key, None)
         return default if entry is None else entry.text or default
 
+    def take_entry(self, key: str) -> SourceText | None:
+        """Take a text with its place, if it was given."""
+        return self._texts.pop(key, None)
+
     def states(self, key: str) -> bool:
         """Whether a number or text is given that nothing has taken yet."""
         return key in self._numbers or key in self._texts
@@ -119,7 +123,7 @@ class StatedConditions:
         entry = self._texts.pop(key, None)
         if entry is None:
             return None
-        pairs = tuple(_time_value_pair(item, key, kind, entry.location) for item in entry.text.split(";"))
+        pairs = tuple(_time_value_pair(item, key, kind, entry) for item in entry.text.split(";"))
         times = [time for time, _ in pairs]
         if times[0] != 0.0 or times != sorted(times):
             description = f"the times of {key} are {', '.join(f'{time:g}' for time in times)} s"
@@ -164,7 +168,7 @@ class StatedConditions:
         elif word.casefold() == "geometry" and rest.strip():
             _put_once(self.geometry, *_specimen_dimension(rest.strip(), entry, self.terms), entry.location)
         elif name == "ended" or (result and result[0] == "rupture" and entry.text in self._end_of_test_terms):
-            ended = SourceText(self._end_of_test_terms.get(entry.text, entry.text), entry.location)
+            ended = replace(entry, text=self._end_of_test_terms.get(entry.text, entry.text))
             _put_once(self._texts, "ended", ended, entry.location)
         elif name == "specimen":
             self._name_specimen(entry)
@@ -187,7 +191,7 @@ class StatedConditions:
     def _name_specimen(self, entry: SourceText) -> None:
         """A text that is no name, such as `Round bar, 6 mm`, is a label, unless it is a misspelt name."""
         if SPECIMEN_NAME_PATTERN.fullmatch(entry.text) or entry.text.casefold() in self.terms.outputs:
-            _put_once(self._texts, "specimen", SourceText(entry.text.casefold(), entry.location), entry.location)
+            _put_once(self._texts, "specimen", replace(entry, text=entry.text.casefold()), entry.location)
             self._locations["specimen"] = entry.location
             return
         near = get_close_matches(entry.text.casefold(), self.terms.outputs, 1, cutoff=CLOSE_SPELLING)
@@ -269,8 +273,8 @@ def _specimen_dimension(stem: str, entry: SourceText, terms: Terms) -> tuple[str
     return (base, LENGTH.convert(number, suffix, entry.location, stem)) if has_unit else (stem, number)
 
 
-def _time_value_pair(item: str, key: str, kind: QuantityKind, location: str) -> tuple[float, float]:
-    parts = item.split()
+def _time_value_pair(item: str, key: str, kind: QuantityKind, entry: SourceText) -> tuple[float, float]:
+    parts, location = item.split(), entry.location
     if len(parts) == 3 and "" in kind.units:
         parts.append("")
     if len(parts) != 4:
@@ -278,5 +282,5 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, location: str) -> 
         raise HistoryError(
             f"{location}: {key} holds '{item.strip()}'; write time and value with units, such as {example}"
         )
-    time, value = (SourceText(word, location).number(key) for word in (parts[0], parts[2]))
+    time, value = (replace(entry, text=word).number(key) for word in (parts[0], parts[2]))
     return TIME.convert(time, parts[1], location, key), kind.convert(value, parts[3], location, key)

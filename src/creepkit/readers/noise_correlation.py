@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from creepkit.errors import HistoryError, nearest
 from creepkit.readers.conditions import StatedConditions
-from creepkit.readers.text_tables import SourceText
 
 KEY = "noise_correlation"
 
 
 def read_noise_correlation(conditions: StatedConditions, outputs: Collection[str]) -> dict[tuple[str, str], float]:
     """{(output, output): correlation} as the head states them; HistoryError for what cannot be one."""
-    location, text = conditions.location_of(KEY), conditions.take_text(KEY)
+    entry = conditions.take_entry(KEY)
+    location, text = (entry.location, entry.text) if entry is not None else ("", "")
     known, correlations = list(outputs), dict[tuple[str, str], float]()
-    for item in text.split(";") if text else ():
+    for item in text.split(";") if entry is not None and text else ():
         words = item.split()
         if len(words) != 3:
             raise HistoryError(
@@ -32,7 +33,7 @@ def read_noise_correlation(conditions: StatedConditions, outputs: Collection[str
         if first == second or pair in correlations or pair[::-1] in correlations:
             problem = "correlates with itself" if first == second else f"and {second} are given twice"
             raise HistoryError(f"{location}: {KEY}: {first} {problem}; give each pair of two outputs once")
-        value = SourceText(number, location).number(f"{KEY} of {first} {second}")
+        value = replace(entry, text=number).number(f"{KEY} of {first} {second}")
         if not -1.0 < value < 1.0:
             raise HistoryError(f"{location}: {KEY} of {first} {second} is {value:g}; allowed is between -1 and 1")
         correlations[pair] = value

@@ -60,11 +60,12 @@ class TableRow:
 class NumberRows(Sequence[TableRow]):
     """The rows of a table of numbers alone, whose text is not kept.
 
-    numbers : (rows, columns). lines : (rows,) of the file.
+    numbers : (rows, columns). lines : (rows,) of the file. decimal : the sign of the table, in the text of its rows.
     """
 
     numbers: Floats
     lines: Ints
+    decimal: str = "."
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -77,7 +78,7 @@ class NumberRows(Sequence[TableRow]):
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
         row = range(len(self))[index]
-        return TableRow(int(self.lines[row]), [repr(float(x)) for x in self.numbers[row]])
+        return TableRow(int(self.lines[row]), [repr(float(x)).replace(".", self.decimal) for x in self.numbers[row]])
 
 
 @dataclass(frozen=True)
