@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
+
+from creepkit.errors import HistoryError
 
 PSI = 6.894757293168361e-3
 """MPa."""
@@ -35,7 +37,14 @@ _PRESSURES = {
 }
 
 
-_REFERENCES = {"": "", "g": "gauge", "a": "absolute", "(g)": "gauge", "(a)": "absolute"}
+_REFERENCES = {
+    "": "",
+    **dict.fromkeys(("g", "(g)", " g", " gauge", " gage", "(gauge)"), "gauge"),
+    **dict.fromkeys(("a", "(a)", " a", " abs", " absolute", "(abs)"), "absolute"),
+}
+
+
+_REFERENCE_IN_NAME = re.compile(r"(?<![a-z])p?(?:(abs(?:olute)?)|(gauge|gage))(?![a-z])")
 
 
 _UNITS: dict[str, ChannelUnit] = {
@@ -61,7 +70,7 @@ _UNITS: dict[str, ChannelUnit] = {
 
 
 _ANY_CASE = {unit.lower(): found for unit, found in _UNITS.items() if len(unit) > 1}
-"""Units of several letters, which no capitals tell apart; mPa would be, and is refused."""
+"""Units of several letters, which no capitals tell apart; mPa and Mbar would be, and are refused."""
 
 
 TIME_UNITS = {
@@ -87,7 +96,7 @@ def channel_unit(text: str) -> ChannelUnit | None:
     unit = " ".join(text.split())
     if unit in _UNITS:
         return _UNITS[unit]
-    return None if unit[:3] == "mPa" else _ANY_CASE.get(unit.lower())
+    return None if unit[:3] in ("mPa", "Mba") else _ANY_CASE.get(unit.lower())
 
 
 KNOWN_UNITS = ("psi", "psig", "psia", "bar", "barg", "MPa", "kPa", "Torr", "C", "F", "K", "mm", "um", "in", "N", "kN")
@@ -111,6 +120,33 @@ def near_unit_of_name(name: str) -> tuple[str, str]:
     words = re.split(r"[\s_/,]+", name.strip())
     unit = near_unit(words[-1]) if len(words) > 1 else ""
     return (words[-1], unit) if unit else ("", "")
+
+
+def reference_in_name(name: str) -> str:
+    """What the name of a pressure says of it, as `P abs` and `gauge pressure` do; "" where it says nothing."""
+    found = _REFERENCE_IN_NAME.search(name[:200].lower().replace("_", " "))
+    return "" if found is None else "absolute" if found[1] else "gauge"
+
+
+def stated_unit(place: str, head: str, in_name: str, in_row: str) -> str:
+    """The unit of a column from its head and the row of units; HistoryError where these contradict each other.
+
+    A text that is no known unit, such as "upper" in brackets, gives way to the other.
+    """
+    known = [unit for unit in (in_row, in_name) if unit and (unit in TIME_UNITS or channel_unit(unit))]
+    if len(known) < 2:
+        return (known or [in_row or in_name])[0]
+    first, second = (TIME_UNITS.get(unit) or channel_unit(unit) for unit in known)
+    if first == second:
+        return in_row
+    if (
+        isinstance(first, ChannelUnit)
+        and isinstance(second, ChannelUnit)
+        and not (first.reference and second.reference)
+    ):
+        if replace(first, reference="") == replace(second, reference=""):
+            return in_row if first.reference else in_name
+    raise HistoryError(f"{place}: '{head:.60}' has the unit {in_name}, the row of units says {in_row}; correct one")
 
 
 def split_head(head: str) -> tuple[str, str]:

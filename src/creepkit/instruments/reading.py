@@ -20,7 +20,9 @@ from creepkit.instruments.column_heads import (
     channel_unit,
     near_unit,
     near_unit_of_name,
+    reference_in_name,
     split_head,
+    stated_unit,
 )
 from creepkit.instruments.record_tables import MISSING, KeptColumns, TableHead, block_means, find_head, numbered_lines
 from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
@@ -168,7 +170,7 @@ class _Layout:
         place = f"{path}:{head.names_line}"
         split = [split_head(text) for text in head.names]
         names = [name for name, _ in split]
-        written = [head.units[k] or unit for k, (_, unit) in enumerate(split)]
+        written = [stated_unit(place, head.names[k], unit, head.units[k]) for k, (_, unit) in enumerate(split)]
         plain = ["" if channel_unit(unit) else name for name, unit in zip(names, written, strict=True)]
         clock = _named(place, options.time or chosen.time, head.names, names)
         day = _named(place, options.date or chosen.date, head.names, names)
@@ -278,7 +280,14 @@ class _Layout:
         values = unit.factor * numbers + unit.offset
         reference = unit.reference
         if unit.quantity == "pressure":
-            reference = reference or self.options.pressure_reference or self.format.pressure_reference
+            named, stated = reference_in_name(name), self.options.pressure_reference
+            if named and (reference or stated or named) != named:
+                other = f"its unit {written}" if reference else "pressure_reference"
+                raise HistoryError(
+                    f"{self.path}:{self.head.names_line}: '{name:.60}' is called {named}, while {other} says "
+                    f"{reference or stated}; keep one"
+                )
+            reference = reference or named or stated or self.format.pressure_reference
             if reference == "absolute" and self.options.ambient_pressure is not None:
                 values, reference = values - self.options.ambient_pressure, "gauge"
                 notes.append(

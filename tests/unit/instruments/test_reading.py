@@ -165,6 +165,11 @@ def test_files_of_several_parts_are_read_as_one(tmp_path: Path, monkeypatch: pyt
         ("time_s,p_bar\n0,1\n", {"chanels": ["p"]}, "no option 'chanels'; did you mean 'channels'"),
         ("time_s,p_bar\n0,1\n", {"channels": ["q"]}, ":1: there is no channel 'q'; known: p"),
         ("time_s,p_bar\n0,1\n", {"format": "tabel"}, "no instrument format is called 'tabel'; did you mean 'table'"),
+        ("time_s,p\nh,bar\n0,1\n1,2\n", {}, ":1: 'time_s' has the unit s, the row of units says h"),
+        ("time,p [psi]\ns,bar\n0,1\n1,2\n", {}, ":1: 'p [psi]' has the unit psi, the row of units says bar"),
+        ("time_s,p [psig]\ns,psia\n0,1\n1,2\n", {}, ":1: 'p [psig]' has the unit psig, the row of units says psia"),
+        ("time_s,P abs [bar]\n0,1\n", {"pressure_reference": "gauge"}, ":1: 'P abs' is called absolute, while press"),
+        ("time_s,P abs [psig]\n0,1\n", {}, ":1: 'P abs' is called absolute, while its unit psig says gauge"),
         ("time,p\n2025-02-30 10:00,1\n", {}, ":2: '2025-02-30' is no date"),
         ("time,p\n2025-02-20 10:00,1\n", {"time_zone": "Mars"}, "time_zone is 'Mars'"),
     ],
@@ -204,6 +209,29 @@ def test_damaged_files_are_read_or_refused_in_one_sentence(tmp_path: Path, name:
         else:
             assert (np.diff(record.times) > 0).all()
     assert not any("\n" in message for message in messages)
+
+
+@pytest.mark.parametrize(
+    ("names", "reference"),
+    [
+        ("P abs [bar]", "absolute"),
+        ("P [bar abs]", "absolute"),
+        ("Pabs (psi)", "absolute"),
+        ("gauge pressure_bar", "gauge"),
+        ("P [bar]", ""),
+        ("Absorber [bar]", ""),
+    ],
+)
+def test_whether_a_pressure_is_absolute_stands_in_its_unit_or_its_name(
+    tmp_path: Path, names: str, reference: str
+) -> None:
+    (channel,) = ck.read_record(written(tmp_path, f"time_s,{names}\n0,1\n1,2\n")).channels.values()
+    assert (channel.quantity, channel.reference) == ("pressure", reference)
+
+
+def test_a_row_of_units_that_says_more_than_the_names(tmp_path: Path) -> None:
+    record = ck.read_record(written(tmp_path, "time_s,p [bar],T (upper)\ns,barg,K\n0,1,800\n1,2,800\n"))
+    assert [(c.reference, c.quantity) for c in record.channels.values()] == [("gauge", "pressure"), ("", "temperature")]
 
 
 def test_units_in_heads() -> None:
