@@ -143,9 +143,8 @@ def stated_unit(place: str, head: str, in_name: str, in_row: str) -> str:
         isinstance(first, ChannelUnit)
         and isinstance(second, ChannelUnit)
         and not (first.reference and second.reference)
-    ):
-        if replace(first, reference="") == replace(second, reference=""):
-            return in_row if first.reference else in_name
+    ) and replace(first, reference="") == replace(second, reference=""):
+        return in_row if first.reference else in_name
     raise HistoryError(f"{place}: '{head:.60}' has the unit {in_name}, the row of units says {in_row}; correct one")
 
 
