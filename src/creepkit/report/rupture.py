@@ -173,7 +173,7 @@ def _fit_to_json(fit: RuptureFit) -> dict[str, Any]:
 
 
 def _strength_to_json(one: StrengthEstimate) -> dict[str, Any]:
-    bounds = {of: list(getattr(one, of)) for of in ("mean", "heat", "test")}
+    bounds = {of: list(getattr(one, of)) for of in ("bounds_of_mean", "bounds_of_heat", "bounds_of_test")}
     return {
         "method": one.method,
         "hours": one.hours,
