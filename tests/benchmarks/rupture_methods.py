@@ -9,15 +9,16 @@ test ended, and its laboratory; "average" is `ck.rupture` with its defaults, the
 method. Their bands are those of a test in a new laboratory. With "laboratories not told apart" the scatter between
 laboratories counts as scatter between tests. Laws with tertiary creep see the whole curves: `ck.identify`, then
 `fit.rupture_time`. They know no laboratories: their bands hold the scatter between all tests fitted, each taken for
-independent of the others, as those of the methods do where laboratories are not told apart. Monkman-Grant's relation by its rate law sees minimum rates of the fitted tests; "by own rates" it is also given those
-of the predicted tests, which nobody knows before a test has run for a while. In "with the others as run-outs" the
-predicted tests count among the fitted ones, as run-outs at a third of the longest test: what a laboratory would know at
-that time.
+independent of the others, as those of the methods do where laboratories are not told apart. Monkman-Grant's relation
+by its rate law sees minimum rates of the fitted tests; "by own rates" it is also given those of the predicted tests,
+which nobody knows before a test has run for a while. In "with the others as run-outs" the predicted tests count among
+the fitted ones, as run-outs at a third of the longest test: what a laboratory would know at that time.
 
-Errors are log10(measured / predicted median) of the predicted tests that broke: their mean, their root mean square, and
-the largest. Inside counts the tests within the 95 % band; a run-out is inside where the upper end is later. So few tests,
-of which some share a laboratory, cannot tell a band that is right from one that is too wide: bands of normal errors that
-are right have half widths of about 1.96 rms errors. The half width is the median over tests of log10(upper end / median).
+Errors are log10(measured / predicted median) of the predicted tests that broke: their mean, their root mean square,
+and the largest. Inside counts the tests within the 95 % band; a run-out is inside where the upper end is later. So few
+tests, of which some share a laboratory, cannot tell a band that is right from one that is too wide: bands of normal
+errors that are right have half widths of about 1.96 rms errors. The half width is the median over tests of log10(upper
+end / median).
 
 Alloy 617 is base metal, 750 to 1000 °C, in air and helium, the folder of a record being its laboratory; no heats are
 named. Its first laboratory does not say how its tests ended: they count as run-outs at their last frame. A test that is

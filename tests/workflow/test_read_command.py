@@ -53,3 +53,23 @@ def test_what_is_ambiguous_is_asked_for_in_one_line(tmp_path: Path):
     assert "x.csv:3: 'strain' has no unit, and values up to 0.5 may be fractions or per cent" in result.output
     assert len(result.output.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_record_of_an_instrument(tmp_path: Path):
+    path = tmp_path / "logger.csv"
+    rows = [f"18.08.2025;18:51:{22 + k};{k};78{k}" for k in range(8)] + ["18.08.2025;18:53:00;9;OL"]
+    path.write_text("\n".join(["Datum;Uhrzeit;Druck [barg];T1 [°C]", *rows]) + "\n", encoding="utf-8")
+    result = creepkit("read", path, "--plot", tmp_path / "record.png")
+    assert result.exit_code == 0, result.output
+    assert "record 'logger': 9 rows every 1 s over 98 s, time zero of unknown date or zone" in result.stdout
+    assert "1 gap between rows, the longest of 91 s" in result.stdout
+    assert "Druck  gauge pressure, 0 to 0.9 MPa (written in barg)" in result.stdout
+    assert "its time zone is not stated" in result.stdout
+    assert (tmp_path / "record.png").stat().st_size > 1000
+    told = json.loads(creepkit("read", path, "--json").stdout)["records"][0]
+    assert [channel["missing"] for channel in told["channels"]] == [0, 1]
+    assert "leave --to away" in creepkit("read", path, "--to", tmp_path / "out").output
+    plain = tmp_path / "plain.csv"
+    plain.write_text("time_s,P_bar\n0,0\n1,5\n2,5\n3,5\n")
+    assert "P  pressure, 0 to 0.5 MPa" in creepkit("read", plain, "--reader", "table").stdout
+    assert creepkit("read", plain).exit_code != 0

@@ -11,7 +11,7 @@ import typer
 from creepkit.report.terminal import print_json
 
 if TYPE_CHECKING:
-    from creepkit.records import History
+    from creepkit.records import History, InstrumentRecord
 
 
 def command(
@@ -19,7 +19,7 @@ def command(
         list[Path], typer.Argument(metavar="FILE...", help="Tables as text or .xlsx, folders, or any file of a reader.")
     ],
     reader: Annotated[
-        str | None, typer.Option(help="Reader of the files; by default the one that accepts them.")
+        str | None, typer.Option(help="Reader of the files, or format of records; by default what accepts them.")
     ] = None,
     to: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Write each test there as CSV, in s, MPa, mm and K.")
@@ -27,13 +27,20 @@ def command(
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the outputs over time.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Show what measured files are understood to hold: tests, conditions, units, and what was assumed."""
+    """Show what measured files are understood to hold: tests, conditions, units, and what was assumed.
+
+    A record of an instrument is shown with its channels, units, gaps and clock.
+    """
     import creepkit as ck
     from creepkit.readers.table_summary import summarise_tables
     from creepkit.report import histories as report
     from creepkit.report.data_quality import data_quality_to_json
     from creepkit.report.figures import check_figure_target
 
+    records = _records(files, reader)
+    if records:
+        _show_records(records, to, plot, as_json)
+        return
     if plot is not None:
         check_figure_target(plot, ck.errors.HistoryError)
     found = ck.read_histories(files, reader=reader)
@@ -67,3 +74,54 @@ def _write(histories: list[History], folder: Path) -> list[Path]:
         history_text(history)  # an error of the last one must not leave the others written
     make_folder(folder, ck.errors.HistoryError)
     return [ck.write_history(h, folder / f"{name}.csv") for h, name in zip(histories, names, strict=True)]
+
+
+def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:
+    """The records, where all files are records of instruments: a format names their columns, or they have clock times.
+
+    Where a reader takes a table with clock times for tests, it is none.
+    """
+    import creepkit as ck
+    from creepkit.instruments.record_tables import find_head, has_clock, numbered_lines
+    from creepkit.registry import default_registry
+
+    formats = [entry.value for entry in default_registry().instruments().values()]
+    if reader is not None and reader in [one.name for one in formats]:
+        return [ck.read_record(path, reader) for path in files]
+    if reader is not None or not all(path.is_file() for path in files):
+        return []
+    special = [one for one in formats if one.required]
+    try:
+        heads = [find_head(path, next(numbered_lines(path), [])).names for path in files]
+        if not all(any(one.accepts(names) for one in special) for names in heads):
+            if not all(has_clock(path) for path in files):
+                return []
+            try:
+                ck.read_histories(files)
+                return []
+            except ck.errors.CreepkitError:
+                pass
+    except ck.errors.HistoryError:
+        return []
+    return [ck.read_record(path) for path in files]
+
+
+def _show_records(records: list[InstrumentRecord], to: Path | None, plot: Path | None, as_json: bool) -> None:
+    """Print records, and draw the one there is."""
+    from creepkit.errors import HistoryError
+    from creepkit.report.figures import check_figure_target
+    from creepkit.report.instrument_records import record_to_json
+
+    if to is not None:
+        raise HistoryError(f"--to writes tests, and {records[0].origin} is an instrument's record; leave --to away")
+    if plot is not None:
+        check_figure_target(plot, HistoryError)
+        if len(records) > 1:
+            raise HistoryError(f"--plot draws one record, found {len(records)}; name one file")
+    if as_json:
+        print_json({"records": [record_to_json(record) for record in records]})
+    else:
+        typer.echo("\n".join(str(record) for record in records))
+    if plot is not None:
+        records[0].plot(plot)
+        typer.echo(f"wrote {plot}", err=as_json)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 PSI = 6.894757293168361e-3
 """MPa."""
@@ -91,6 +92,25 @@ def channel_unit(text: str) -> ChannelUnit | None:
 
 KNOWN_UNITS = ("psi", "psig", "psia", "bar", "barg", "MPa", "kPa", "Torr", "C", "F", "K", "mm", "um", "in", "N", "kN")
 """Units of channels, for errors."""
+
+
+def near_unit(text: str) -> str:
+    """The known unit that a text may mean but does not say, such as "MPa" for "mPa" or "C" for "c"; "" if none."""
+    unit = " ".join(text.split())
+    if not unit or channel_unit(unit) is not None or unit in TIME_UNITS:
+        return ""
+    alike = [known for known in _UNITS if known.lower() == unit.lower()]
+    if alike:
+        return alike[0]
+    found = get_close_matches(unit, _UNITS, 1, 0.74) if len(unit) > 2 else []
+    return found[0] if found else ""
+
+
+def near_unit_of_name(name: str) -> tuple[str, str]:
+    """The last word of a channel's name and the unit that it may mean, such as ("mPa", "MPa") of "P_mPa"; else ""."""
+    words = re.split(r"[\s_/,]+", name.strip())
+    unit = near_unit(words[-1]) if len(words) > 1 else ""
+    return (words[-1], unit) if unit else ("", "")
 
 
 def split_head(head: str) -> tuple[str, str]:

@@ -12,7 +12,15 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest
-from creepkit.instruments.column_heads import KNOWN_UNITS, TIME_UNITS, ChannelUnit, channel_unit, split_head
+from creepkit.instruments.column_heads import (
+    KNOWN_UNITS,
+    TIME_UNITS,
+    ChannelUnit,
+    channel_unit,
+    near_unit,
+    near_unit_of_name,
+    split_head,
+)
 from creepkit.instruments.record_tables import MISSING, KeptColumns, TableHead, block_means, find_head, numbered_lines
 from creepkit.instruments.time_stamps import DATE_ORDERS, ResolvedTimes, resolve
 from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
@@ -267,9 +275,10 @@ class _Layout:
     def _channel(self, name: str, written: str, numbers: Floats) -> tuple[Channel, list[str]]:
         """A channel in creepkit's unit, and what was found about it."""
         unit = channel_unit(written) if written else None
+        notes = [] if unit else self._unknown_unit(name, written)
         unit = unit or ChannelUnit("number")
         values = unit.factor * numbers + unit.offset
-        reference, notes = unit.reference, []
+        reference = unit.reference
         if unit.quantity == "pressure":
             reference = reference or self.options.pressure_reference or self.format.pressure_reference
             if reference == "absolute" and self.options.ambient_pressure is not None:
@@ -289,6 +298,21 @@ class _Layout:
         if lost:
             notes.append(f"{name}: {lost} of {values.size} readings are missing")
         return Channel(name, unit.quantity, values, reference, written), notes
+
+    def _unknown_unit(self, name: str, written: str) -> list[str]:
+        """What is to be said of a channel without a known unit; HistoryError where capitals decide, as in mPa."""
+        found, meant = (written, near_unit(written)) if written else near_unit_of_name(name)
+        if found.lower() == meant.lower() and len(meant) > 1:
+            advice = "" if written else f", or state units={{'{name:.60}': '{meant}'}}"
+            raise HistoryError(
+                f"{self.path}:{self.head.names_line}: '{found}' in the head of '{name:.60}' is no unit; write {meant} "
+                f"into the head if that is meant{advice}"
+            )
+        if meant:
+            return [
+                f"{name}: taken for numbers without a unit; if '{found}' means {meant}, write {meant} into the head"
+            ]
+        return [f"{name}: numbers in '{written}', which is not converted"] if written else []
 
 
 def _named(place: str, wanted: str, heads: Sequence[str], names: Sequence[str]) -> int | None:

@@ -146,6 +146,14 @@ def find_head(path: Path, lines: Sequence[tuple[int, str]]) -> TableHead:
     )
 
 
+def has_clock(path: Path) -> bool:
+    """Whether the first row of readings has a date or a time of day, as records of instruments do."""
+    lines = next(numbered_lines(path), [])
+    head = find_head(path, lines)
+    first = next((line for number, line in lines if number == head.first_row), "")
+    return any(is_clock_time(cell) for cell in _cells(first, head.dialect, f"{path}:{head.first_row}"))
+
+
 def _cells(line: str, dialect: Dialect, location: str) -> list[str]:
     if '"' in line:
         return split_line(line, dialect, location)

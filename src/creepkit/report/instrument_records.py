@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,6 +39,33 @@ def record_text(record: InstrumentRecord) -> str:
     width = max((len(name) for name in record.channels), default=0)
     lines += [f"  {name:{width}}  {_channel_text(channel)}" for name, channel in record.channels.items()]
     return "\n".join([*lines, *(f"  note: {note}" for note in record.notes)])
+
+
+def record_to_json(record: InstrumentRecord) -> dict[str, Any]:
+    """What record_text says, as data; values in MPa, K, mm, N or as written."""
+    channels = [
+        {
+            "name": channel.name,
+            "quantity": channel.quantity,
+            "reference": channel.reference,
+            "written_unit": channel.written_unit,
+            "missing": channel.missing,
+            "least": None if channel.missing == channel.values.size else float(np.nanmin(channel.values)),
+            "largest": None if channel.missing == channel.values.size else float(np.nanmax(channel.values)),
+        }
+        for channel in record.channels.values()
+    ]
+    return {
+        "name": record.name,
+        "source": record.source,
+        "rows": int(record.times.size),
+        "interval_s": record.interval,
+        "duration_s": float(np.ptp(record.times)),
+        "start_unix_s": record.start,
+        "gaps_s": record.gaps.tolist(),
+        "channels": channels,
+        "notes": list(record.notes),
+    }
 
 
 def _channel_text(channel: Channel) -> str:

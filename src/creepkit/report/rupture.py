@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from creepkit.rupture_assessment.log_time_distributions import power_of_ten
 from creepkit.rupture_assessment.observed_tests import celsius
 
 if TYPE_CHECKING:
@@ -85,8 +86,8 @@ def _method_rows(assessment: RuptureAssessment) -> list[tuple[str, ...]]:
             one.fit.name,
             f"{one.weight:.3f}",
             f"{one.excess:.1f}",
-            f"factor {10**one.fit.scale_corrected:.2f}",
-            *(f"factor {10**scatter:.2f}" for scatter in one.fit.scatter_corrected.values()),
+            f"factor {power_of_ten(one.fit.scale_corrected):.3g}",
+            *(f"factor {power_of_ten(scatter):.3g}" for scatter in one.fit.scatter_corrected.values()),
         )
         for one in assessment.ranked
         if one.weight >= SHOWN_WEIGHT or one.fit.name in best_of_method
@@ -110,7 +111,7 @@ def _effect_lines(fit: RuptureFit) -> list[str]:
     for group, effects in fit.effects.items():
         if fit.scatter[group] < LEAST_SCATTER_SHOWN:
             continue
-        ordered = [f"{name} {10**effects[name]:.2f}" for name in sorted(effects, key=lambda name: effects[name])]
+        ordered = [f"{name} {10 ** effects[name]:.2f}" for name in sorted(effects, key=lambda name: effects[name])]
         if len(ordered) > 2 * SHOWN_EFFECTS:
             ordered = [*ordered[:SHOWN_EFFECTS], "...", *ordered[-SHOWN_EFFECTS:]]
         lines.append(f"  times of {_plural(group)} over those of the average one: {', '.join(ordered)}")

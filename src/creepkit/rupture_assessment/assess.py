@@ -105,7 +105,9 @@ def rupture(
         )
         wanted = list(observed.isotherms) if temperatures is None else temperatures
         by_name = [AVERAGE, *assessment.methods, *([] if relation is None else [MONKMAN_GRANT.name])]
-        stated = [one for name in by_name for t in wanted for one in assessment.strengths_at(t, hours=hours, method=name)]
+        stated = [
+            one for name in by_name for t in wanted for one in assessment.strengths_at(t, hours=hours, method=name)
+        ]
         checks = _checks(assessment, tensile, max(hours), wanted)
     return replace(assessment, strengths=tuple(stated), checks=tuple(checks))
 
@@ -225,7 +227,7 @@ def _relation(
 def _nothing_left(rejected: Mapping[str, str], relation: MinimumRateRelation | None) -> str:
     """Why nothing is ranked: of each method the reason of its lowest degree, methods with one reason together."""
     if rejected:
-        reasons = {}
+        reasons: dict[str, str] = {}
         for label, why in rejected.items():
             reasons.setdefault(label.partition(",")[0], why)
         alike: dict[str, list[str]] = {}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
@@ -100,7 +99,8 @@ class RankedRuptureFit:
 class RuptureAssessment(Presentable):
     """The result of rupture().
 
-    ranked : methods, each with every degree that was tried, the highest weight first. rejected : {method: why it is not ranked}.
+    ranked : methods, each with every degree that was tried, the highest weight first. rejected : {method: why it is
+    not ranked}.
     relation : Monkman-Grant's, where rates are known; it is not ranked, for it uses rates that the others do not.
     strengths : by the average, by the best fit of each method, and by the relation.
     checks : post-assessment checks of the best fit. tensile_temperatures, tensile_strengths : (known,) K and
@@ -299,10 +299,11 @@ def check_temperatures(temperatures: Any) -> list[float]:
 def _numbers(values: Any, name: str, example: str) -> list[float]:
     if isinstance(values, str | Mapping) or not isinstance(values, Iterable):
         raise FitError(f"{name} is {values!r:.40}; give {example}")
-    found = list(values)
-    for one in found:
-        if isinstance(one, bool) or not isinstance(one, Real) or abs(one) > sys.float_info.max:
+    found = []
+    for one in values:
+        if isinstance(one, bool) or not isinstance(one, Real):
             raise FitError(f"{name} holds {one!r:.40}; give {example}")
+        found.append(np.inf if abs(one) > 1e30 else float(one))
     if not found:
         raise FitError(f"{name} is empty; give {example}")
-    return [float(one) for one in found]
+    return found

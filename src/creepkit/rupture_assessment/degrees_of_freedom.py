@@ -100,6 +100,4 @@ def variance_freedom(
         side = C @ (columns.T @ VZ[:, part])
         slopes.append(side @ side.T)
     uncertainty = np.linalg.pinv(0.5 * information, rcond=LEAST_INFORMATION, hermitian=True)
-    return VarianceFreedom(
-        frozen([within, *(v for _, v in kept)]), frozen(uncertainty), frozen(np.array(slopes)), free
-    )
+    return VarianceFreedom(frozen([within, *(v for _, v in kept)]), frozen(uncertainty), frozen(np.array(slopes)), free)

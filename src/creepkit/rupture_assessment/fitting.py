@@ -244,7 +244,9 @@ def _result(
         -float(problem.cost(point[None])[0]),
         variances,
         tests.ruptured,
-        _parameters(method, degree, fixed, centre, np.array([*coefficients, curvature]), (covariance, variances), level),
+        _parameters(
+            method, degree, fixed, centre, np.array([*coefficients, curvature]), (covariance, variances), level
+        ),
         named,
         level,
     )

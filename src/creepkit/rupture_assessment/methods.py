@@ -18,8 +18,8 @@ x, g the polynomial and k = 1 / (T_0 - T_a), log10 t = m_0 + m_1 (T - T_0) + (1 
 this form parallel isotherms (k = 0) are a point like any other.
 
 Wilshire's k_1 and u are the same at all stresses here. The literature fits one pair above and another below the yield
-stress, or some share of the tensile strength (Gray, Whittaker (2015), Mater. Sci. Eng. A 632, 96), which takes more tests
-and the yield stress at each temperature.
+stress, or some share of the tensile strength (Gray, Whittaker (2015), Mater. Sci. Eng. A 632, 96), which takes more
+tests and the yield stress at each temperature.
 """
 
 from __future__ import annotations

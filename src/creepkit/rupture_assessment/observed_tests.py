@@ -117,6 +117,19 @@ def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTe
     silent = sum(not h.end_known and h.minimum_rate is None for h in histories)
     if silent:
         notes.append(f"{silent} tests say neither when they broke nor that they were stopped before; they are left out")
+    seen: set[tuple[object, ...]] = set()
+    repeated = []
+    for h in known:
+        numbers = (h.rupture_time or float(h.times[-1]), h.unruptured, _constant_stress(h), _constant_temperature(h))
+        key = (*numbers, h.labels.get("heat", ""))
+        if key in seen:
+            repeated.append(h.name)
+        seen.add(key)
+    if repeated:
+        notes.append(
+            f"{len(repeated)} tests have the stress, temperature and time of another one, such as '{repeated[0]}'; "
+            "leave them out if a table was read twice, for each counts"
+        )
     return _as_arrays(known), _as_arrays(with_rate), tuple(notes)
 
 

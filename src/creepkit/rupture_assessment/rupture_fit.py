@@ -22,6 +22,7 @@ from creepkit.rupture_assessment.methods import METHODS, Centre, Conditions
 LEAST_SCALE = 1e-6
 """Standard deviation of log10 of times at which a fit is taken for exact."""
 
+
 @dataclass(frozen=True)
 class RuptureParameter:
     """A constant of a method with its interval: observed information, the delta method, Student's distribution."""

@@ -227,3 +227,17 @@ def test_the_record_of_dimple_d1() -> None:
     assert sum(c.quantity == "temperature" for c in record.channels.values()) == 25
     first = ck.read_record(SHARED / "dabi/log/dimple_D1_log.csv")
     assert first.times.size > 300
+
+
+def test_units_that_are_nearly_known_are_not_taken_in_silence(tmp_path: Path) -> None:
+    for head in ("P_mPa", "P [mPa]", "P mPag"):
+        with pytest.raises(HistoryError, match=r"is no unit; write MPag? into the head if that is meant"):
+            ck.read_record(written(tmp_path, f"time_s,{head}\n0,1\n1,2\n2,3\n".encode()))
+    table = b"time_s,T_c,p [psgi],valve,V (rpm),T_set,p_in_mbar\n" + b"".join(b"%d,1,2,3,4,5,6\n" % k for k in range(4))
+    record = ck.read_record(written(tmp_path, table))
+    assert [channel.quantity for channel in record.channels.values()] == [*["number"] * 5, "pressure"]
+    text = str(record)
+    assert "T_c: taken for numbers without a unit; if 'c' means C, write C into the head" in text
+    assert "p: taken for numbers without a unit; if 'psgi' means psi, write psi into the head" in text
+    assert "V: numbers in 'rpm', which is not converted" in text
+    assert not any(note.startswith(("valve", "T_set")) for note in record.notes)

@@ -95,7 +95,15 @@ def test_extrapolation_is_flagged_and_what_is_not_bracketed_is_none(with_heats):
     far = with_heats.strength(873.15, hours=1e5)
     assert far.extrapolation.startswith("25 times the longest test (4000 h)")
     assert "temperature outside" in with_heats.strength(1000.0, hours=1e4).extrapolation
-    assert far.bounds_of_test[0] < far.bounds_of_heat[0] < far.bounds_of_mean[0] < far.value < far.bounds_of_mean[1] < far.bounds_of_heat[1] < far.bounds_of_test[1]
+    assert (
+        far.bounds_of_test[0]
+        < far.bounds_of_heat[0]
+        < far.bounds_of_mean[0]
+        < far.value
+        < far.bounds_of_mean[1]
+        < far.bounds_of_heat[1]
+        < far.bounds_of_test[1]
+    )
     longer = with_heats.strength(1100.0, hours=1e11)
     assert longer.value is None
     assert longer.bounds_of_mean == (None, None)
@@ -110,7 +118,9 @@ def test_one_temperature_has_its_own_method():
     assert assessment.verdict.startswith("only isothermal was fitted")
     assert assessment.strength(900.0, hours=1e4).reason == "all tests are at 600 °C"
     given = ck.rupture(tests, "larson-miller", settings=ck.RuptureSettings(fixed={"larson-miller": {"C": 20.0}}))
-    assert given.strength(873.15, hours=1e4).value == pytest.approx(assessment.strength(873.15, hours=1e4).value, rel=0.02)
+    assert given.strength(873.15, hours=1e4).value == pytest.approx(
+        assessment.strength(873.15, hours=1e4).value, rel=0.02
+    )
 
 
 def test_monkman_grant_predicts_by_rates_and_by_a_rate_law():
@@ -154,7 +164,13 @@ def test_a_weibull_distribution_gives_the_same_strength(with_heats):
     settings = ck.RuptureSettings(degrees=(2,), distribution="weibull")
     weibull = ck.rupture(tests, **options, settings=settings).strength(873.15, hours=1e3)
     assert weibull.value == pytest.approx(normal.value, rel=0.01)
-    assert weibull.bounds_of_test[0] < weibull.bounds_of_mean[0] < weibull.value < weibull.bounds_of_mean[1] < weibull.bounds_of_test[1]
+    assert (
+        weibull.bounds_of_test[0]
+        < weibull.bounds_of_mean[0]
+        < weibull.value
+        < weibull.bounds_of_mean[1]
+        < weibull.bounds_of_test[1]
+    )
 
 
 def test_a_method_is_not_decisive_where_a_check_fails():
