@@ -4,20 +4,24 @@
                                                [--keep FOLDER] [--write]
 
 Everything is fitted to the tests that ended before a third of the longest test of the set, and predicts the time to
-rupture of the others: a single test of a new heat and laboratory, with a 95 % band. "Time-temperature methods" see
-stress, temperature, and how each test ended; "average" is `ck.rupture` with its defaults, the others are the best
-degree of each method. Laws with tertiary creep see the whole curves: `ck.identify`, then `fit.rupture_time`.
-Monkman-Grant's relation by its rate law sees minimum rates of the fitted tests; "by own rates" it is also given those
-of the predicted tests, which nobody knows before a test has run for a while. In "with the others as run-outs" the
-predicted tests count among the fitted ones, as unbroken at a third of the longest test: what a laboratory would know at
-that time.
+rupture of the others, with a 95 % band of a single test. "Time-temperature methods" see stress, temperature, how each
+test ended, and its laboratory; "average" is `ck.rupture` with its defaults, the others are the best degree of each
+method. Their bands are those of a test in a new laboratory. With "laboratories not told apart" the scatter between
+laboratories counts as scatter between tests. Laws with tertiary creep see the whole curves: `ck.identify`, then
+`fit.rupture_time`. They know no laboratories: their bands hold the scatter between all tests fitted, each taken for
+independent of the others, as those of the methods do where laboratories are not told apart. Monkman-Grant's relation
+by its rate law sees minimum rates of the fitted tests; "by own rates" it is also given those of the predicted tests,
+which nobody knows before a test has run for a while. In "with the others as run-outs" the predicted tests count among
+the fitted ones, as run-outs at a third of the longest test: what a laboratory would know at that time.
 
-Errors are log10(measured / predicted median) of the predicted tests that broke: their mean, their root mean square, and
-the largest. Inside counts the tests within the 95 % band; a test that was stopped is inside where the upper end is
-later. The width is the median over tests of the factor between the upper end and the median.
+Errors are log10(measured / predicted median) of the predicted tests that broke: their mean, their root mean square,
+and the largest. Inside counts the tests within the 95 % band; a run-out is inside where the upper end is later. So few
+tests, of which some share a laboratory, cannot tell a band that is right from one that is too wide: bands of normal
+errors that are right have half widths of about 1.96 rms errors. The half width is the median over tests of log10(upper
+end / median).
 
 Alloy 617 is base metal, 750 to 1000 °C, in air and helium, the folder of a record being its laboratory; no heats are
-named. Its first laboratory does not say how its tests ended: they count as unbroken at their last frame. A test that is
+named. Its first laboratory does not say how its tests ended: they count as run-outs at their last frame. A test that is
 there twice counts once. Minimum rates are those of the index of the data. Its tensile strength is not in the data, so
 Wilshire's method is not among them. CMSX-6 is at 980 °C, so the methods are one, a polynomial of log stress at one
 temperature.
@@ -97,13 +101,13 @@ def errors(predicted, tests):
         f"{np.sqrt((error**2).mean()):.3f}",
         f"{error[np.abs(error).argmax()]:+.3f}",
         f"{inside.sum()} of {inside.size}",
-        f"{np.median(high / median):.3g}",
+        f"{np.median(np.log10(high / median)):.3f}",
     )
 
 
-def by_methods(fitted, predicted, own_rates=True):
+def by_methods(fitted, predicted, own_rates=True, settings=None):
     """{name: [(median, low, high) s of each predicted test]}, and the verdict."""
-    assessment = ck.rupture(fitted, hours=[1e4])
+    assessment = ck.rupture(fitted, hours=[1e4], settings=settings)
     names = ["average", *assessment.methods]
     rows = {
         name: [assessment.rupture_time(stress_of(h), h.mean_temperature, method=name) for h in predicted]
@@ -152,11 +156,12 @@ def table_of(page, title, histories, options):
     page.heading(title)
     stops = [sum(h.rupture_time is None for h in group) for group in (fitted, predicted)]
     page.paragraph(
-        f"Fitted: {len(fitted)} tests that ended before {SHARE * longest / HOUR:.0f} h, {stops[0]} of them unbroken. "
-        f"Predicted: {len(predicted)} tests, {stops[1]} of them unbroken; those that broke lasted "
+        f"Fitted: {len(fitted)} tests that ended before {SHARE * longest / HOUR:.0f} h, {stops[0]} of them run-outs. "
+        f"Predicted: {len(predicted)} tests, {stops[1]} of them run-outs; those that broke lasted "
         f"{min(map(end_of, broken)) / HOUR:.0f} to {max(map(end_of, broken)) / HOUR:.0f} h."
     )
     rows, assessment = by_methods(fitted, predicted)
+    pooled, _ = by_methods(fitted, predicted, settings=ck.RuptureSettings(random_effects=False))
     as_run_outs = [
         ck.History(
             h.name,
@@ -171,9 +176,11 @@ def table_of(page, title, histories, options):
         )
         for h in predicted
     ]
-    page.table("predicted by", "mean error", "rms error", "largest error", "inside", "width, factor", "CPU time, s")
+    page.table("predicted by", "mean error", "rms error", "largest error", "inside", "half width", "CPU time, s")
     for name, values in rows.items():
         page.row(name, *errors(values, predicted), "")
+    if assessment.tests.groups:
+        page.row("average, laboratories not told apart", *errors(pooled["average"], predicted), "")
     more, _ = by_methods([*fitted, *as_run_outs], predicted, own_rates=False)
     for name, values in more.items():
         page.row(f"{name}, with the others as run-outs", *errors(values, predicted), "")

@@ -47,8 +47,8 @@ def command(
 ) -> None:
     """Assess rupture tests by parametric methods.
 
-    Run-outs count as censored, heats and laboratories as random effects. Strengths have bounds of the mean, of a new
-    heat and of one test of it; what lies beyond three times the longest test is flagged.
+    Run-outs count as tests that last longer, heats and laboratories as random effects. Strengths have bounds of the
+    mean, of a new heat and of one test of it; what lies beyond three times the longest test is flagged.
     """
     import creepkit as ck
     from creepkit.report.figures import check_figure_target

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 SHOWN_WEIGHT = 1e-3
 """Fits of less weight are shown where they are the best of their method."""
 
+LEAST_SCATTER_SHOWN = 1e-3
+"""Standard deviation of log10 of time: a quarter of a per cent of the time."""
+
+SHOWN_EFFECTS = 6
+"""Heats at each end of the list."""
+
 PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 
 
@@ -48,6 +54,7 @@ def rupture_text(assessment: RuptureAssessment) -> str:
         *(f"{name}: not ranked, for {why}" for name, why in assessment.rejected.items()),
         "",
         *_constants(best),
+        *_effect_lines(best),
     ]
     if assessment.relation is not None:
         lines += ["not ranked, for they use minimum rates:", *_constants(assessment.relation.times)]
@@ -98,37 +105,56 @@ def _constants(fit: RuptureFit) -> list[str]:
     ]
 
 
+def _effect_lines(fit: RuptureFit) -> list[str]:
+    """Heats and laboratories, the weakest first, where they scatter at all."""
+    lines = []
+    for group, effects in fit.effects.items():
+        if fit.scatter[group] < LEAST_SCATTER_SHOWN:
+            continue
+        ordered = [f"{name} {10 ** effects[name]:.2f}" for name in sorted(effects, key=lambda name: effects[name])]
+        if len(ordered) > 2 * SHOWN_EFFECTS:
+            ordered = [*ordered[:SHOWN_EFFECTS], "...", *ordered[-SHOWN_EFFECTS:]]
+        lines.append(f"  times of {_plural(group)} over those of the average one: {', '.join(ordered)}")
+    return lines
+
+
 def _strength_lines(assessment: RuptureAssessment) -> list[str]:
     level = f"{100 * assessment.settings.level:g} %"
-    heads = (
-        "strength, MPa",
-        "temperature",
-        "time, h",
-        "value",
-        f"{level} of the mean",
-        "of a new heat",
-        "of one test",
-        "",
-    )
     shown = [one for one in assessment.strengths if one.method == "average"]
     if assessment.relation is not None:
         shown += [one for one in assessment.strengths if one.method == assessment.relation.times.method]
-    rows = [
-        (
-            one.method,
-            celsius(one.temperature),
-            f"{one.hours:g}",
-            "none" if one.value is None else f"{one.value:.1f}",
-            _pair(one.mean),
-            _pair(one.heat),
-            _pair(one.test),
-            "; ".join(
-                text for text in (one.extrapolation and f"extrapolated: {one.extrapolation}", one.reason) if text
-            ),
+    scattering = [g for g in assessment.tests.groups if _largest_scatter(assessment, g) >= LEAST_SCATTER_SHOWN]
+    heads = ["strength, MPa", "temperature", "time, h", "value", f"{level} of the mean"]
+    heads += [f"of a new {' and '.join(scattering)}"] if scattering else []
+    rows = []
+    for one in shown:
+        bounds = [one.bounds_of_mean, *([one.bounds_of_heat] if scattering else []), one.bounds_of_test]
+        remarks = (one.extrapolation and f"extrapolated: {one.extrapolation}", one.reason)
+        rows.append(
+            (
+                one.method,
+                celsius(one.temperature),
+                f"{one.hours:g}",
+                "none" if one.value is None else f"{one.value:.1f}",
+                *map(_pair, bounds),
+                "; ".join(text for text in remarks if text),
+            )
         )
-        for one in shown
-    ]
-    return _aligned(heads, rows)
+    lines = _aligned([*heads, "of one test", ""], rows)
+    if not assessment.tests.groups:
+        lines.append("no bounds of a new heat: the tests tell no heats or laboratories apart")
+    elif not scattering:
+        groups = " and ".join(map(_plural, assessment.tests.groups))
+        lines.append(f"no bounds of a new heat: no scatter between {groups} is found")
+    return lines
+
+
+def _largest_scatter(assessment: RuptureAssessment, group: str) -> float:
+    """Of the methods that count."""
+    fits = [one.fit for one in assessment.ranked if one.weight >= SHOWN_WEIGHT]
+    if assessment.relation is not None:
+        fits.append(assessment.relation.times)
+    return max(fit.scatter.get(group, 0.0) for fit in fits)
 
 
 def _pair(ends: tuple[float | None, float | None]) -> str:
@@ -169,12 +195,13 @@ def _fit_to_json(fit: RuptureFit) -> dict[str, Any]:
         "fixed": dict(fit.fixed),
         "scale_log10": fit.scale,
         "scatter_log10": dict(fit.scatter),
+        "effects_log10": {group: dict(effects) for group, effects in fit.effects.items()},
         "log_likelihood": fit.log_likelihood,
     }
 
 
 def _strength_to_json(one: StrengthEstimate) -> dict[str, Any]:
-    bounds = {of: list(getattr(one, of)) for of in ("mean", "heat", "test")}
+    bounds = {of: list(getattr(one, of)) for of in ("bounds_of_mean", "bounds_of_heat", "bounds_of_test")}
     return {
         "method": one.method,
         "hours": one.hours,

@@ -64,7 +64,7 @@ def _colours(assessment: RuptureAssessment) -> dict[float, Any]:
     from matplotlib import colormaps
 
     isotherms = assessment.tests.isotherms
-    return {T: colormaps["plasma"](0.85 * k / max(len(isotherms) - 1, 1)) for k, T in enumerate(isotherms)}
+    return {T: colormaps["plasma"](0.78 * k / max(len(isotherms) - 1, 1)) for k, T in enumerate(isotherms)}
 
 
 def _colour_of(temperature: float, colours: dict[float, Any]) -> Any:
@@ -105,7 +105,7 @@ def _draw_isotherms(axes: Axes, assessment: RuptureAssessment, colours: dict[flo
     axes.plot([], [], "o", color="0.3", ms=4, label="test that broke")
     axes.plot([], [], ls="", marker=RUN_OUT, color="0.3", ms=9, label="run-out")
     axes.fill_between([], [], [], color="0.3", alpha=0.35, lw=0, label=f"{per_cent} of the mean")
-    axes.fill_between([], [], [], color="0.3", alpha=0.13, lw=0, label=f"{per_cent} of one test of a new heat")
+    axes.fill_between([], [], [], color="0.3", alpha=0.13, lw=0, label=f"{per_cent} of one test")
     axes.plot([], [], "--", color="0.3", lw=1.2, label="beyond the stresses tested at this temperature")
     axes.fill_between([], [], [], color="#d9d9d9", label="beyond 3 times the longest test")
 
@@ -136,18 +136,18 @@ def _draw_isotherm(
     tested = (stress >= 0.99 * tests.stress[near].min()) & (stress <= 1.01 * tests.stress[near].max())
     axes.plot(times, stress, "--", color=colour, lw=1.2)
     axes.plot(np.where(tested, times, np.nan), stress, color=colour, lw=1.8)
-    shown = (times > hours[0]) & (times < 0.8 * hours[1])
-    if shown.any():
-        k = int(np.flatnonzero(shown)[0])
+    shown = np.flatnonzero(tested & (times > hours[0]) & (times < 0.8 * hours[1]))
+    if shown.size:  # above the isotherm at the highest stress tested, where bands are narrow
         axes.annotate(
             f"{temperature - ZERO_CELSIUS:.0f} °C",
-            (times[k], stress[k]),
-            xytext=(-3, 5),
+            (times[shown[-1]], stress[shown[-1]]),
+            xytext=(7, 3),
             textcoords="offset points",
-            ha="right",
             fontsize=8,
             fontweight="bold",
             color=colour,
+            bbox={"boxstyle": "square,pad=0.1", "color": "white", "alpha": 0.8, "lw": 0},
+            zorder=6,
         )
 
 
@@ -219,13 +219,15 @@ def _draw_predicted(axes: Axes, assessment: RuptureAssessment, colours: dict[flo
                 color=colour,
             )
     both = np.concatenate([tests.log_time, predicted])
-    low, high = 10.0 ** (both.min() - 0.1), 10.0 ** (both.max() + 0.1)
+    low, high = 10.0 ** (both.min() - 0.25), 10.0 ** (both.max() + 0.25)
     line = np.array([low, high])
     axes.plot(line, line, color="black", lw=1.0)
     for factor in (BAND_FACTOR, 1.0 / BAND_FACTOR):
         axes.plot(line, factor * line, ":", color="black", lw=0.8)
     for which in ("x", "y"):
         set_range(axes, which, low, high, logarithmic=True, most=6)
+    axes.set_xlim(low, high)
+    axes.set_ylim(low, high)
     axes.set_xlabel("measured, h (dotted: a factor of 2)", fontsize=8)
     axes.set_ylabel("predicted, h", fontsize=8)
     axes.set_title(f"{fit.name}: predicted against measured", fontsize=9)

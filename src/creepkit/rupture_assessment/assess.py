@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -105,7 +106,9 @@ def rupture(
         )
         wanted = list(observed.isotherms) if temperatures is None else temperatures
         by_name = [AVERAGE, *assessment.methods, *([] if relation is None else [MONKMAN_GRANT.name])]
-        stated = [one for name in by_name for t in wanted for one in assessment.strengths_at(hours, t, name)]
+        stated = [
+            one for name in by_name for t in wanted for one in assessment.strengths_at(t, hours=hours, method=name)
+        ]
         checks = _checks(assessment, tensile, max(hours), wanted)
     return replace(assessment, strengths=tuple(stated), checks=tuple(checks))
 
@@ -187,8 +190,11 @@ def _ranked(
         return (), rejected
     penalty = bic_penalty if settings.criterion == "bic" else aicc_penalty
     scores = [-2.0 * fit.log_likelihood + penalty(fit.parameter_count, fit.observations) for fit in fits]
-    excess, weight = criterion_weights(scores)
-    order = np.argsort(excess, kind="stable")
+    excess, by_fit = criterion_weights(scores)
+    degrees = Counter(fit.method for fit in fits)
+    shares = by_fit / [degrees[fit.method] for fit in fits]  # every method has the same weight before the tests
+    weight = shares / shares.sum()
+    order = np.argsort(-weight, kind="stable")
     return tuple(RankedRuptureFit(fits[k], float(excess[k]), float(weight[k])) for k in order), rejected
 
 
@@ -264,7 +270,7 @@ def _checks(
                 [(fit, 1.0)], fit.name, of_tests, tensile, hours=[hours], temperature=T, level=best.level
             )[0].value
             for T in temperatures
-            if not _unknown(assessment, T)
+            if not assessment.obstacle([(fit, 1.0)], T)
         ]
 
     original = strengths_of(best, tests)
@@ -278,10 +284,3 @@ def _checks(
         *effectiveness(best, tests, conditions_of(tests, tensile)),
         *repeatability(tests, original, repeated, hours=hours, seed=assessment.settings.seed),
     ]
-
-
-def _unknown(assessment: RuptureAssessment, temperature: float) -> bool:
-    """Whether no strength can be stated at a temperature."""
-    return bool(
-        assessment.strengths_at([1.0], temperature, assessment.best.name)[0].reason.startswith(("no tensile", "all"))
-    )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -84,7 +84,11 @@ class RuptureSettings:
 
 @dataclass(frozen=True)
 class RankedRuptureFit:
-    """A fitted method in the ranking: its criterion less the best, and its weight."""
+    """A fitted method in the ranking: its criterion less the lowest, and its weight.
+
+    The weight is exp(-excess / 2) over the number of degrees of the method that are ranked, normalised: before the
+    tests are seen all methods have the same weight, however many degrees are tried.
+    """
 
     fit: RuptureFit
     excess: float
@@ -95,7 +99,8 @@ class RankedRuptureFit:
 class RuptureAssessment(Presentable):
     """The result of rupture().
 
-    ranked : methods, each with every degree that was tried, best first. rejected : {method: why it is not ranked}.
+    ranked : methods, each with every degree that was tried, the highest weight first. rejected : {method: why it is
+    not ranked}.
     relation : Monkman-Grant's, where rates are known; it is not ranked, for it uses rates that the others do not.
     strengths : by the average, by the best fit of each method, and by the relation.
     checks : post-assessment checks of the best fit. tensile_temperatures, tensile_strengths : (known,) K and
@@ -116,7 +121,7 @@ class RuptureAssessment(Presentable):
 
     @property
     def best(self) -> RuptureFit:
-        """The fit of lowest criterion."""
+        """The fit of highest weight."""
         return self.ranked[0].fit
 
     @property
@@ -181,30 +186,26 @@ class RuptureAssessment(Presentable):
         """
         return interpolated(self.tensile_temperatures, self.tensile_strengths, temperature)
 
-    def strength(self, hours: float, temperature: float, method: str | None = None) -> StrengthEstimate:
-        """The rupture strength at a time, h, and a temperature, K; by the average, or by one method."""
+    def strength(self, temperature: float, *, hours: float, method: str | None = None) -> StrengthEstimate:
+        """The rupture strength at a temperature, K, and a time, h; by the average, or by one method."""
         for one in self.strengths:
             if one.method == (method or AVERAGE) and one.hours == hours and abs(one.temperature - temperature) < 1e-6:
                 return one
-        return self.strengths_at([hours], temperature, method or AVERAGE)[0]
+        return self.strengths_at(temperature, hours=[hours], method=method)[0]
 
-    def strengths_at(self, hours: list[float], temperature: float, method: str = AVERAGE) -> list[StrengthEstimate]:
-        """Strengths at several times, h, of one temperature, K."""
+    def strengths_at(
+        self, temperature: float, *, hours: Sequence[float], method: str | None = None
+    ) -> list[StrengthEstimate]:
+        """Strengths at one temperature, K, and several times, h."""
         hours, [temperature] = check_hours(hours), check_temperatures([temperature])
-        models, unknown = self.models(method), (None, None)
-        reason = ""
-        if any(_needs(model, "tensile_strength") for model, _ in models) and not np.isfinite(
-            self.tensile(np.array([temperature]))[0]
-        ):
-            reason = f"no tensile strength is known at {celsius(temperature)}"
-        elif self.tests.isothermal and abs(temperature - self.tests.temperature.mean()) > ISOTHERMAL_TOLERANCE:
-            reason = f"all tests are at {celsius(float(self.tests.temperature.mean()))}"
+        models, name, unknown = self.models(method), method or AVERAGE, (None, None)
+        reason = self.obstacle(models, temperature)
         if reason:
             return [
                 StrengthEstimate(
                     h,
                     temperature,
-                    method,
+                    name,
                     None,
                     unknown,
                     unknown,
@@ -215,14 +216,25 @@ class RuptureAssessment(Presentable):
                 for h in hours
             ]
         return strength_estimates(
-            models, method, self.tests, self.tensile, hours=hours, temperature=temperature, level=self.settings.level
+            models, name, self.tests, self.tensile, hours=hours, temperature=temperature, level=self.settings.level
         )
+
+    def obstacle(self, models: WeightedModels, temperature: float) -> str:
+        """Why models state no strength at a temperature, K, whatever the time; "" where they do."""
+        if any(_needs(model, "tensile_strength") for model, _ in models) and not np.isfinite(
+            self.tensile(np.array([temperature]))[0]
+        ):
+            return f"no tensile strength is known at {celsius(temperature)}"
+        if self.tests.isothermal and abs(temperature - self.tests.temperature.mean()) > ISOTHERMAL_TOLERANCE:
+            return f"all tests are at {celsius(float(self.tests.temperature.mean()))}"
+        return ""
 
     def rupture_time(
         self, stress: float, temperature: float, *, of: str = "test", method: str | None = None
     ) -> tuple[float, float, float]:
         """Rupture time at a stress, MPa, and a temperature, K: median, low and high, s.
 
+        In s as of an identification, so that methods and laws compare; hours stand only where a name says so.
         of : "test", one test of a new heat; "heat", the median of a new heat; "mean", of the average heat.
         """
         if of not in BOUND_KINDS:
@@ -245,10 +257,6 @@ class RuptureAssessment(Presentable):
     def save(self, path: str | Path) -> Path:
         """Write the assessment to a JSON file."""
         return present(self, "save", path)
-
-    def with_strengths(self, strengths: tuple[StrengthEstimate, ...]) -> RuptureAssessment:
-        """The same assessment with other strengths."""
-        return replace(self, strengths=strengths)
 
 
 ISOTHERMAL_TOLERANCE = 5.0

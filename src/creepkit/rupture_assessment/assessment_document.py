@@ -10,6 +10,7 @@ from creepkit.files.json_documents import DocumentFormat, check_heading, read_js
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, NumberRange, RecordCodec, RecordError
 from creepkit.rupture_assessment.assessment import RankedRuptureFit, RuptureAssessment
+from creepkit.rupture_assessment.degrees_of_freedom import VarianceFreedom
 from creepkit.rupture_assessment.methods import METHODS
 from creepkit.rupture_assessment.observed_tests import RuptureTests
 from creepkit.rupture_assessment.rupture_fit import RuptureFit, RuptureParameter
@@ -33,7 +34,8 @@ CODEC = RecordCodec(
             "minimum_rate": POSITIVE_OR_NAN,
         },
         RankedRuptureFit: {"excess": NumberRange(low=0.0), "weight": NumberRange(low=0.0, high=1.0)},
-        RuptureFit: {"scale": POSITIVE, "scale_corrected": POSITIVE, "freedom": POSITIVE},
+        RuptureFit: {"scale": POSITIVE, "scale_corrected": POSITIVE},
+        VarianceFreedom: {"most": NumberRange(low=1.0)},
         RuptureParameter: dict.fromkeys(("value", "low", "high"), ANY_NUMBER),
     }
 )
@@ -78,4 +80,8 @@ def _problem(assessment: RuptureAssessment) -> str:
         count = len(fit.coefficients) + METHODS[fit.method].bilinear + 1 + len(fit.scatter)
         if fit.covariance.shape != (count, count):
             return f"the covariance of {fit.name} does not belong to its {count} estimates"
+        freedom, location = fit.variance_freedom, count - 1 - len(fit.scatter)
+        kinds = len(freedom.variances)
+        if freedom.derivatives.shape != (kinds, location, location) or freedom.uncertainty.shape != (kinds, kinds):
+            return f"the degrees of freedom of {fit.name} do not belong to its {location} location parameters"
     return ""

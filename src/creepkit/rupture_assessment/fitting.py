@@ -13,6 +13,7 @@ from scipy.special import stdtrit
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.rupture_assessment.degrees_of_freedom import VarianceFreedom, variance_freedom
 from creepkit.rupture_assessment.likelihood import Distribution, GroupedTimes
 from creepkit.rupture_assessment.methods import Basis, Centre, Conditions, RuptureMethod
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
@@ -29,6 +30,9 @@ MOST_NUMBERS = 200_000
 
 NEWTON_STEPS = 6
 """After the quasi-Newton method: to the last digits."""
+
+EXTREME_VALUE_VARIANCE = np.pi**2 / 6.0
+"""Of the smallest extreme value of scale one."""
 
 LEAST_INDEPENDENCE = 1e-9
 """Smallest singular value of the scaled functions of a method at which its coefficients are determined."""
@@ -215,7 +219,8 @@ def _result(
     covariance = jacobian @ covariance @ jacobian.T
     coefficients = problem.transform @ point[:count]
     curvature = float(point[count]) if problem.bilinear is not None else 0.0
-    quantile = float(stdtrit(freedom, 0.5 + 0.5 * level))
+    variances = _variance_freedom(problem, point, scale_corrected, scatter_corrected)
+    variances = variances.transformed(jacobian[:location, :location])
     mean = problem.mean(point[None])[0]
     effects = problem.times.effects(mean, scale, scatter)
     named = {
@@ -237,12 +242,25 @@ def _result(
         scale_corrected,
         dict(zip(tests.groups, map(float, scatter_corrected), strict=True)),
         -float(problem.cost(point[None])[0]),
-        freedom,
+        variances,
         tests.ruptured,
-        _parameters(method, degree, fixed, centre, coefficients, curvature, covariance, quantile),
+        _parameters(
+            method, degree, fixed, centre, np.array([*coefficients, curvature]), (covariance, variances), level
+        ),
         named,
         level,
     )
+
+
+def _variance_freedom(problem: _Scaled, point: Floats, scale: float, scatter: Floats) -> VarianceFreedom:
+    """Of the tests that broke, about the estimates."""
+    broken, count = ~problem.times.censored, problem.linear.shape[1]
+    columns = problem.linear
+    if problem.bilinear is not None:
+        columns = np.column_stack([columns + point[count] * problem.bilinear, problem.bilinear @ point[:count]])
+    within = scale**2 * (EXTREME_VALUE_VARIANCE if problem.times.distribution == "weibull" else 1.0)
+    members = [m[broken] for m in problem.times.members]
+    return variance_freedom(columns[broken], members, within, [float(v) for v in scatter**2])
 
 
 def _covariance(problem: _Scaled, point: Floats, corrected: Floats) -> Floats:
@@ -266,32 +284,36 @@ def _parameters(
     degree: int,
     fixed: Mapping[str, float],
     centre: Centre,
-    coefficients: Floats,
-    curvature: float,
-    covariance: Floats,
-    quantile: float,
+    estimates: Floats,
+    uncertainty: tuple[Floats, VarianceFreedom],
+    level: float,
 ) -> tuple[RuptureParameter, ...]:
-    """Constants as the literature writes them, by the delta method."""
-    point = np.array([*coefficients, curvature] if method.bilinear else [*coefficients])
+    """Constants as the literature writes them, by the delta method.
+
+    estimates : (coefficients + 1,), the curvature last. uncertainty : their covariance, and its degrees of freedom.
+    """
+    covariance, freedom = uncertainty
+    point = estimates if method.bilinear else estimates[:-1]
 
     def values(p: Floats) -> dict[str, float]:
-        return method.parameters(
-            p[: coefficients.size], float(p[-1]) if method.bilinear else 0.0, degree, fixed, centre
-        )
+        c, k = (p[:-1], float(p[-1])) if method.bilinear else (p, 0.0)
+        return method.parameters(c, k, degree, fixed, centre)
 
     spread = np.sqrt(np.maximum(np.diag(covariance)[: point.size], 0.0))
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         at = values(point)
         steps = [1e-3 * s * e for s, e in zip(spread, np.eye(point.size), strict=True)]
-        jacobian = [
-            (np.array([*values(point + h).values()]) - np.array([*values(point - h).values()]))
-            / (2e-3 * max(s, 1e-300))
-            for h, s in zip(steps, spread, strict=True)
-        ]
+        jacobian = np.array(
+            [
+                (np.array([*values(point + h).values()]) - np.array([*values(point - h).values()]))
+                / (2e-3 * max(s, 1e-300))
+                for h, s in zip(steps, spread, strict=True)
+            ]
+        ).T
         part = covariance[: point.size, : point.size]
-        variance = np.einsum("im,ij,jm->m", np.array(jacobian), part, np.array(jacobian))
-    half = quantile * np.sqrt(np.maximum(variance, 0.0))
+        variance = np.einsum("mi,ij,mj->m", jacobian, part, jacobian)
+        half = stdtrit(freedom.of(jacobian), 0.5 + 0.5 * level) * np.sqrt(np.maximum(variance, 0.0))
     return tuple(
-        RuptureParameter(name, value, value - float(h), value + float(h), method.units.get(name, ""))
+        RuptureParameter(name, value, value - float(h), value + float(h), method.unit(name))
         for (name, value), h in zip(at.items(), half, strict=True)
     )

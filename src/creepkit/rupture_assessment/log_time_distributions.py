@@ -4,18 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
+from scipy.special import chdtri, stdtr, stdtrit
 
 from creepkit.arrays import Floats
 
-BISECTIONS = 60
-"""Of a bracket some units of log10 wide: to 1e-15."""
+BISECTIONS = 50
+"""Of a bracket some units of log10 wide: to 1e-14."""
 
 NODES = 21
 """Of the quadrature over the normal part of a Weibull test's time."""
+
+WEIBULL_MEDIAN = float(np.log(np.log(2.0)))
+"""Of the smallest extreme value."""
+
+_places, _lengths = np.polynomial.legendre.leggauss(15)
+CHI_PROBABILITIES, CHI_WEIGHTS = 0.5 * (1.0 + _places), 0.5 * _lengths
+"""Of the quadrature over chi^2."""
 
 
 class LogTimeDistribution(Protocol):
@@ -49,25 +57,35 @@ class StudentLogTime:
 
 @dataclass(frozen=True, eq=False)
 class WeibullLogTime:
-    """A location that is normal, plus a scale times the smallest extreme value.
+    """A median that is normal plus a scale times the smallest extreme value about its median.
 
-    location, spread : (points,). scale : of log10 of time.
+    All deviations from the median are times sqrt(freedom / chi^2), as in Student's distribution, which this is where
+    the extreme value is normal.
+    median, spread, freedom : (points,). scale : of log10 of time.
     """
 
-    location: Floats
+    median: Floats
     spread: Floats
     scale: float
+    freedom: Floats
 
     def cumulative(self, log_time: Floats) -> Floats:
         """(points,) probability of less than log_time (points,)."""
         nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
-        z = (np.asarray(log_time - self.location)[:, None] - self.spread[:, None] * nodes) / self.scale
-        return np.asarray(-np.expm1(-np.exp(np.clip(z, -700.0, 50.0))) @ (weights / weights.sum()))
+        deviation = np.asarray(log_time - self.median)[:, None, None] * self._contractions[:, :, None]
+        z = (deviation - self.spread[:, None, None] * nodes) / self.scale + WEIBULL_MEDIAN
+        by_chi = -np.expm1(-np.exp(np.clip(z, -700.0, 50.0))) @ (weights / weights.sum())
+        return np.asarray(by_chi @ CHI_WEIGHTS)
+
+    @cached_property
+    def _contractions(self) -> Floats:
+        """(points, nodes) of sqrt(chi^2 / freedom)."""
+        return np.asarray(np.sqrt(chdtri(self.freedom[:, None], CHI_PROBABILITIES) / self.freedom[:, None]))
 
     def quantile(self, probability: float) -> Floats:
         """(points,) the log time that is not reached with a probability."""
-        reach = 40.0 * self.scale + 10.0 * self.spread
-        return _halved(self, probability, self.location - reach, self.location + reach)
+        reach = (40.0 * self.scale + 10.0 * self.spread) / self._contractions.min(axis=1)
+        return _halved(self, probability, self.median - reach, self.median + reach)
 
 
 @dataclass(frozen=True, eq=False)

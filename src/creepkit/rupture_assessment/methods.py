@@ -16,6 +16,10 @@ Proc. ASTM 56, 593.
 All are linear in their coefficients but Manson-Haferd's, which is bilinear: with T_0 the mean temperature, x_0 the mean
 x, g the polynomial and k = 1 / (T_0 - T_a), log10 t = m_0 + m_1 (T - T_0) + (1 + k (T - T_0)) h(x - x_0), h(0) = 0. In
 this form parallel isotherms (k = 0) are a point like any other.
+
+Wilshire's k_1 and u are the same at all stresses here. The literature fits one pair above and another below the yield
+stress, or some share of the tensile strength (Gray, Whittaker (2015), Mater. Sci. Eng. A 632, 96), which takes more
+tests and the yield stress at each temperature.
 """
 
 from __future__ import annotations
@@ -68,10 +72,6 @@ class Basis:
     bilinear: Floats | None = None
 
 
-Polynomial = int
-"""Degree of a polynomial of log10 of the stress."""
-
-
 @dataclass(frozen=True)
 class RuptureMethod:
     """A time-temperature method.
@@ -81,6 +81,7 @@ class RuptureMethod:
     basis : (conditions, degree, fixed, centre) -> Basis.
     parameters : (coefficients, k, degree, fixed, centre) -> {name: value}, as the literature writes them.
     needs : what of a test it needs beside stress and temperature: "", "tensile_strength" or "rate".
+    units : of constants by name, for t in h, T in K and x of MPa; "a" of all a_0, a_1 ...; the others have none.
     """
 
     name: str
@@ -93,6 +94,10 @@ class RuptureMethod:
     bilinear: bool = False
     thermal: bool = True
     needs: str = ""
+
+    def unit(self, name: str) -> str:
+        """Of a constant."""
+        return self.units.get("a" if name.startswith("a_") else name, "")
 
 
 def _powers(x: Floats, degree: int) -> Floats:
@@ -143,7 +148,7 @@ def _manson_haferd_parameters(
     c: Floats, k: float, _degree: int, _: Mapping[str, float], centre: Centre
 ) -> dict[str, float]:
     inverse = 1.0 / k if k else np.inf
-    about_centre = k * np.array([c[1] * inverse, *c[2:]])
+    about_centre = np.array([c[1], *(k * c[2:])])
     shifted = np.zeros(about_centre.size)
     power = np.ones(1)
     for value in about_centre:
@@ -210,7 +215,7 @@ LARSON_MILLER = RuptureMethod(
     "log10 t = -C + (a_0 + a_1 x + ...) / T",
     _larson_miller,
     _larson_miller_parameters,
-    {},
+    {"a": "K"},
     fixable=("C",),
 )
 ORR_SHERBY_DORN = RuptureMethod(
@@ -226,7 +231,7 @@ MANSON_HAFERD = RuptureMethod(
     "log10 t = log10 t_a + (T - T_a) (a_0 + a_1 x + ...)",
     _manson_haferd,
     _manson_haferd_parameters,
-    {"T_a": "K"},
+    {"T_a": "K", "a": "1/K"},
     bilinear=True,
 )
 WILSHIRE = RuptureMethod(
@@ -234,7 +239,7 @@ WILSHIRE = RuptureMethod(
     "stress / tensile strength = exp(-k_1 (t exp(-Q / (R T)))^u)",
     _wilshire,
     _wilshire_parameters,
-    ENERGY,
+    {**ENERGY, "ln k_1": "k_1 in h^-u"},
     fixable=("Q",),
     degrees=False,
     needs="tensile_strength",

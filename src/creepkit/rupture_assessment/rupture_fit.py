@@ -9,20 +9,23 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.rupture_assessment.degrees_of_freedom import VarianceFreedom
 from creepkit.rupture_assessment.likelihood import Distribution
-from creepkit.rupture_assessment.log_time_distributions import LogTimeDistribution, StudentLogTime, WeibullLogTime
+from creepkit.rupture_assessment.log_time_distributions import (
+    WEIBULL_MEDIAN,
+    LogTimeDistribution,
+    StudentLogTime,
+    WeibullLogTime,
+)
 from creepkit.rupture_assessment.methods import METHODS, Centre, Conditions
 
 LEAST_SCALE = 1e-6
 """Standard deviation of log10 of times at which a fit is taken for exact."""
 
-WEIBULL_MEDIAN = float(np.log(np.log(2.0)))
-"""Of the smallest extreme value."""
-
 
 @dataclass(frozen=True)
 class RuptureParameter:
-    """A constant of a method with its interval: observed information and the delta method, Student's distribution."""
+    """A constant of a method with its interval: observed information, the delta method, Student's distribution."""
 
     name: str
     value: float
@@ -39,9 +42,9 @@ class RuptureFit:
     scale : of log10 of the times of one heat; a standard deviation for lognormal times. scatter : {group: standard
     deviation of its effect}. levels : {group: how many}.
     covariance : (estimates, estimates) of coefficients, curvature where the method has one, scale and scatters, by
-    observed information, with the correction of `freedom` below.
+    observed information, with the corrections below.
     scale_corrected, scatter_corrected : with which predictions are made: scale^2 n / (n - p), scatter^2 h / (h - 1).
-    freedom : tests that broke less location parameters, at least one. level : of intervals.
+    variance_freedom : degrees of freedom of variances. level : of intervals.
     """
 
     method: str
@@ -58,7 +61,7 @@ class RuptureFit:
     scale_corrected: float
     scatter_corrected: Mapping[str, float]
     log_likelihood: float
-    freedom: float
+    variance_freedom: VarianceFreedom
     observations: int
     parameters: tuple[RuptureParameter, ...]
     effects: Mapping[str, Mapping[str, float]]
@@ -110,20 +113,13 @@ class RuptureFit:
         """
         median, derivatives = self._location(at)
         estimates = np.einsum("pi,ij,pj->p", derivatives, self.covariance, derivatives)
-        estimates = np.maximum(estimates, LEAST_SCALE**2)
-        if of == "mean":
-            return StudentLogTime(median, np.sqrt(estimates), np.full(median.shape, self.freedom))
-        between = sum(v**2 for v in self.scatter_corrected.values())
+        total = np.maximum(estimates, LEAST_SCALE**2)
+        if of != "mean":
+            total = total + sum(v**2 for v in self.scatter_corrected.values())
+        location = derivatives[:, : self.parameter_count - 1 - len(self.scatter)]
+        freedom = self.variance_freedom.of(location, between=of != "mean", within=of == "test")
         if of == "test" and self.distribution == "weibull":
-            location = median - WEIBULL_MEDIAN * self.scale
-            return WeibullLogTime(location, np.sqrt(estimates + between), self.scale_corrected)
-        within = self.scale_corrected**2 if of == "test" else 0.0
-        total = estimates + between + within
-        return StudentLogTime(median, np.sqrt(total), self._freedom_of(total, estimates, within))
-
-    def _freedom_of(self, total: Floats, estimates: Floats, within: float) -> Floats:
-        """Satterthwaite's (1946) degrees of freedom of a sum of variances, each with its own."""
-        parts = (estimates + within) ** 2 / self.freedom
-        for group, scatter in self.scatter_corrected.items():
-            parts = parts + scatter**4 / max(self.levels[group] - 1, 1)
-        return np.asarray(np.maximum(total**2 / np.maximum(parts, 1e-300), 1.0))
+            return WeibullLogTime(median, np.sqrt(total), self.scale_corrected, freedom)
+        if of == "test":
+            total = total + self.scale_corrected**2
+        return StudentLogTime(median, np.sqrt(total), freedom)

@@ -49,10 +49,12 @@ WeightedModels = Sequence[tuple[LogTimeModel, float]]
 class StrengthEstimate:
     """Rupture strength at a time and a temperature.
 
-    hours; temperature : K; method : or "average". value : MPa, at which the median time of the average heat is that
+    hours : h, as the name says; other times are in s.
+    temperature : K. method : or "average". value : MPa, at which the median time of the average heat is that
     time.
-    mean : (low, high) of that value. heat : of a new heat. test : of one test of a new heat. None where it is not
-    bracketed.
+    bounds_of_mean : (low, high) of that value. bounds_of_heat : of a new heat (and laboratory). bounds_of_test : of one
+    test of it. None where a bound is not bracketed. Where nothing tells heats or laboratories apart, bounds_of_heat are
+    those of the mean.
     extrapolation : what lies beyond the tests, "" where nothing does. reason : why a value or a bound is None, or "".
     """
 
@@ -60,9 +62,9 @@ class StrengthEstimate:
     temperature: float
     method: str
     value: float | None
-    mean: tuple[float | None, float | None]
-    heat: tuple[float | None, float | None]
-    test: tuple[float | None, float | None]
+    bounds_of_mean: tuple[float | None, float | None]
+    bounds_of_heat: tuple[float | None, float | None]
+    bounds_of_test: tuple[float | None, float | None]
     extrapolation: str = ""
     reason: str = ""
 
@@ -120,7 +122,7 @@ def _estimate(
         bounds[of].append(bound)
         if reason:
             reasons.append(f"no {'upper' if k % 2 else 'lower'} bound of the {of}: {reason}")
-    pairs = {of: (ends[0], ends[1]) for of, ends in bounds.items()}
+    pairs = {f"bounds_of_{of}": (ends[0], ends[1]) for of, ends in bounds.items()}
     flag = extrapolation(tests, hours, temperature, value)
     return StrengthEstimate(hours, temperature, name, value, **pairs, extrapolation=flag, reason="; ".join(reasons))
 

@@ -77,8 +77,8 @@ def test_bounds_of_a_strength_are_those_of_a_regression():
     X = row(tests.stress, tests.temperature).T
     coefficients, (squares,), *_ = np.linalg.lstsq(X, tests.log_time, rcond=None)
     variance, inverse = squares / 36, np.linalg.inv(X.T @ X)
-    strength = assessment.strength(1e4, 873.15)
-    for bounds, own in ((strength.mean, 0.0), (strength.test, 1.0)):
+    strength = assessment.strength(873.15, hours=1e4)
+    for bounds, own in ((strength.bounds_of_mean, 0.0), (strength.bounds_of_test, 1.0)):
         for stress, sign in zip(bounds, (-1.0, 1.0), strict=True):
             at = row(np.array(stress), np.array(873.15))
             deviation = np.sqrt(variance * (own + at @ inverse @ at))
@@ -91,14 +91,22 @@ def test_bounds_of_a_strength_are_those_of_a_regression():
 
 
 def test_extrapolation_is_flagged_and_what_is_not_bracketed_is_none(with_heats):
-    assert with_heats.strength(1e4, 873.15).extrapolation == ""
-    far = with_heats.strength(1e5, 873.15)
+    assert with_heats.strength(873.15, hours=1e4).extrapolation == ""
+    far = with_heats.strength(873.15, hours=1e5)
     assert far.extrapolation.startswith("25 times the longest test (4000 h)")
-    assert "temperature outside" in with_heats.strength(1e4, 1000.0).extrapolation
-    assert far.test[0] < far.heat[0] < far.mean[0] < far.value < far.mean[1] < far.heat[1] < far.test[1]
-    longer = with_heats.strength(1e11, 1100.0)
+    assert "temperature outside" in with_heats.strength(1000.0, hours=1e4).extrapolation
+    assert (
+        far.bounds_of_test[0]
+        < far.bounds_of_heat[0]
+        < far.bounds_of_mean[0]
+        < far.value
+        < far.bounds_of_mean[1]
+        < far.bounds_of_heat[1]
+        < far.bounds_of_test[1]
+    )
+    longer = with_heats.strength(1100.0, hours=1e11)
     assert longer.value is None
-    assert longer.mean == (None, None)
+    assert longer.bounds_of_mean == (None, None)
     assert "a tenth of the lowest stress tested" in longer.reason or "turn back" in longer.reason
 
 
@@ -108,9 +116,11 @@ def test_one_temperature_has_its_own_method():
     assert [*assessment.methods] == ["isothermal"]
     assert not assessment.decisive
     assert assessment.verdict.startswith("only isothermal was fitted")
-    assert assessment.strength(1e4, 900.0).reason == "all tests are at 600 °C"
+    assert assessment.strength(900.0, hours=1e4).reason == "all tests are at 600 °C"
     given = ck.rupture(tests, "larson-miller", settings=ck.RuptureSettings(fixed={"larson-miller": {"C": 20.0}}))
-    assert given.strength(1e4, 873.15).value == pytest.approx(assessment.strength(1e4, 873.15).value, rel=0.02)
+    assert given.strength(873.15, hours=1e4).value == pytest.approx(
+        assessment.strength(873.15, hours=1e4).value, rel=0.02
+    )
 
 
 def test_monkman_grant_predicts_by_rates_and_by_a_rate_law():
@@ -126,8 +136,8 @@ def test_monkman_grant_predicts_by_rates_and_by_a_rate_law():
     assert rates["n"].low < 5.0 < rates["n"].high
     assert rates["Q"].low < 300e3 < rates["Q"].high
     assert "monkman-grant" not in assessment.methods
-    assert assessment.strength(1e3, 900.0, "monkman-grant").value == pytest.approx(
-        assessment.strength(1e3, 900.0).value, rel=0.03
+    assert assessment.strength(900.0, hours=1e3, method="monkman-grant").value == pytest.approx(
+        assessment.strength(900.0, hours=1e3).value, rel=0.03
     )
 
 
@@ -150,11 +160,17 @@ def test_laboratories_scatter_beside_heats():
 def test_a_weibull_distribution_gives_the_same_strength(with_heats):
     tests = planted(larson_miller, count=48, seed=7)
     options = {"methods": "larson-miller", "hours": [1e3], "temperatures": [873.15]}
-    normal = ck.rupture(tests, **options, settings=NO_POLYNOMIAL_BUT_2).strength(1e3, 873.15)
+    normal = ck.rupture(tests, **options, settings=NO_POLYNOMIAL_BUT_2).strength(873.15, hours=1e3)
     settings = ck.RuptureSettings(degrees=(2,), distribution="weibull")
-    weibull = ck.rupture(tests, **options, settings=settings).strength(1e3, 873.15)
+    weibull = ck.rupture(tests, **options, settings=settings).strength(873.15, hours=1e3)
     assert weibull.value == pytest.approx(normal.value, rel=0.01)
-    assert weibull.test[0] < weibull.mean[0] < weibull.value < weibull.mean[1] < weibull.test[1]
+    assert (
+        weibull.bounds_of_test[0]
+        < weibull.bounds_of_mean[0]
+        < weibull.value
+        < weibull.bounds_of_mean[1]
+        < weibull.bounds_of_test[1]
+    )
 
 
 def test_a_method_is_not_decisive_where_a_check_fails():

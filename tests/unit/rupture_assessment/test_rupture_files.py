@@ -34,7 +34,7 @@ def test_a_file_gives_the_same_assessment(assessment, tmp_path):
     path = assessment.save(tmp_path / "rupture.json")
     read = ck.load_rupture_assessment(path)
     assert str(read) == str(assessment)
-    assert read.strength(2e4, 860.0) == assessment.strength(2e4, 860.0)
+    assert read.strength(860.0, hours=2e4) == assessment.strength(860.0, hours=2e4)
     assert read.provenance["data"] == assessment.tests.fingerprint
     data = json.loads(path.read_text())
     data["ranked"][0]["fit"]["covariance"] = [[1.0]]
