@@ -31,6 +31,7 @@ from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.scatter_of_lives import with_scatter_of_lives
 from creepkit.inverse.unmodelled_effects import UnmodelledEffect, with_random_effects
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution
 from creepkit.records import History, is_logarithmic, output_unit
@@ -60,8 +61,8 @@ class OutputAdequacy:
 
     frames : how many values count. noise : typical standard deviation of one, in the output's unit; noise_source :
     "stated" by the histories, or "estimated" from neighbouring frames. chi_square : over its degrees of freedom.
-    p_value : of a larger one by chance. discrepancy : standard deviation of what the law leaves beyond noise, in the
-    output's unit; 0 where there is nothing.
+    p_value : of a larger one by chance. discrepancy : rms of predicted less measured beyond noise, in the output's
+    unit, offsets and the scatter of rates and rupture lives taken out; 0 where there is nothing.
     """
 
     output: str
@@ -74,8 +75,8 @@ class OutputAdequacy:
 
     @property
     def discrepancy_in_noises(self) -> float:
-        """The discrepancy over the noise."""
-        return self.discrepancy / self.noise
+        """The discrepancy over the noise, each frame's over its own; 0 where there is no discrepancy."""
+        return float(np.sqrt(max(self.chi_square - 1.0, 0.0))) if self.discrepancy > 0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -189,7 +190,8 @@ def adequacy_of(
     histories : with all frames. known : the noise that these show, where it was found before.
     """
     observations = problem.observations
-    known = known or KnownNoise.of_histories(observations, histories)
+    linear = with_scatter_of_lives(linear, observations, noise_model)
+    known = (known or KnownNoise.of_histories(observations, histories)).where(linear.residuals.offset_sensitivity > 0)
     if not known.judged.any():
         nan = float("nan")
         return Adequacy("cannot be judged", (), nan, 0.0, nan, nan, None)
@@ -197,6 +199,7 @@ def adequacy_of(
     independent = _independent_noise(observations, known, noise_model, predictor_errors)
     judged_problem = replace(linear, residuals=residuals)
     solution = _within_bounds(judged_problem, CovarianceFactor.of_residuals(residuals, independent))
+    white = _white_part(residuals, solution, independent)
     share_of_freedom = _freedom(judged_problem, solution) / float(known.judged.sum())
     contributions = solution.residuals * solution.weighted_residuals
     marginal = _marginal_contributions(residuals, solution, independent)
@@ -209,7 +212,9 @@ def adequacy_of(
         reduced = float(marginal[mask].sum()) / freedom
         p_value = known.chance_of_larger(reduced, share_of_freedom, mask)
         noise = float(np.median(known.sd[mask]))
-        discrepancy = noise * float(np.sqrt(max(reduced - 1.0, 0.0))) if p_value < SIGNIFICANCE else 0.0
+        # In its unit from the deviations themselves: their share of chi-square is another where noise varies.
+        square = float((white[mask] ** 2).mean()) / share_of_freedom * max(1.0 - 1.0 / reduced, 0.0)
+        discrepancy = float(np.sqrt(square)) if p_value < SIGNIFICANCE else 0.0
         source: Literal["stated", "estimated"] = "stated" if observations.stated[position] else "estimated"
         outputs.append(OutputAdequacy(name, int(mask.sum()), noise, source, reduced, p_value, discrepancy))
     freedom = share_of_freedom * float(known.judged.sum())
@@ -226,7 +231,7 @@ def adequacy_of(
         freedom,
         p_value,
         _correlation(noise_model),
-        largest_deviation(observations, known, _white_part(residuals, solution, independent), histories),
+        largest_deviation(observations, known, white, histories),
         rate_scatter=scatter,
         rate_trend_p_value=trend,
     )

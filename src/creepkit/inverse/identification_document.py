@@ -16,6 +16,7 @@ from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, RateComparison, RuptureComparison, TestFit
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
@@ -83,6 +84,7 @@ CODEC = RecordCodec(
         ),
         OutputAdequacy: {"frames": NOT_NEGATIVE, "noise": POSITIVE, "discrepancy": NOT_NEGATIVE},
         ImplausibleNuisance: {"standard_deviations": NOT_NEGATIVE, "size": POSITIVE, "share": NOT_NEGATIVE_OR_NAN},
+        LargestDeviation: {"rms": NOT_NEGATIVE},
         NumericalError: {"noises": NOT_NEGATIVE, "shift": NOT_NEGATIVE_OR_NAN},
         UnmodelledEffect: {
             "size": NOT_NEGATIVE,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2, f
@@ -61,6 +61,10 @@ class KnownNoise:
         ruptures = observations.rupture_mask
         judged = observations.present & ~ruptures & (sd > 0) & (freedom >= LEAST_NOISE_FREEDOM)
         return cls(judged, np.where(judged, sd, 1.0), freedom)
+
+    def where(self, mask: Bools) -> KnownNoise:
+        """The same of some observations alone; mask : (tests, observations)."""
+        return replace(self, judged=self.judged & mask)
 
     def chance_of_larger(self, reduced: float, share_of_freedom: float, mask: Bools) -> float:
         """The probability of a larger reduced chi-square by chance.

@@ -156,6 +156,28 @@ def test_a_planted_discrepancy_is_measured_in_its_unit(stated):
     assert found.largest.noises == pytest.approx(found.largest.deviation / 2e-3)
 
 
+def test_what_is_left_is_stated_in_the_outputs_own_unit_where_noise_varies(stated):
+    """A bump where half of the frames are ten times as exact: the rms of numpy's weighted fit."""
+    tests, _, _ = stated
+    sd = np.where(np.arange(40) < 20, 2e-4, 2e-3)
+    tests = [h.replace(standard_deviation={**h.standard_deviation, "amplitude": sd}) for h in tests]
+    problem, linear = at_the_truth(tests)
+    mask = problem.observations.output_index == 0
+    share = problem.observations.times / problem.observations.times.max(axis=1, keepdims=True)
+    bump = np.where(mask, 3e-3 * np.sin(12 * share), 0.0)
+    bump[[0, 2]] = 0.0
+    found = judged(tests, problem, linear, bump * linear.residuals.offset_sensitivity)
+    unit, sizes = linear.residuals.offset_sensitivity, np.where(mask, np.tile(np.r_[sd, sd], (3, 1)), NOISE["width"])
+    design = (linear.residuals.jacobian / (unit * sizes)[..., None]).reshape(-1, 2)
+    moved = np.linalg.lstsq(design, -(bump / sizes).ravel(), rcond=None)[0]
+    left = bump + (linear.residuals.jacobian @ moved) / unit
+    beyond_noise = (left[mask] ** 2).mean() * (1.0 - 1.0 / found["amplitude"].chi_square)
+    assert found["amplitude"].discrepancy == pytest.approx(np.sqrt(beyond_noise), rel=0.02)
+    assert found["amplitude"].discrepancy_in_noises == pytest.approx(np.sqrt(found["amplitude"].chi_square - 1.0))
+    assert found.largest.test == tests[1].name
+    assert found.largest.rms == pytest.approx(np.sqrt((left[1][mask[1]] ** 2).mean()), rel=0.01)
+
+
 def test_what_the_values_can_follow_is_no_discrepancy(stated):
     """A move along the Jacobian, of many noises, is taken up by the values."""
     tests, problem, linear = stated
