@@ -152,7 +152,8 @@ class StatedConditions:
                 f"{location}: '{key}' has no meaning beside the other conditions; {_ALLOWED_COMBINATIONS}"
             )
         earlier = [self.labels["assumed"]] if self.labels.get("assumed") else []
-        assumed = ", ".join(dict.fromkeys([*earlier, *self._assumptions]))
+        new = [one for one in self._assumptions if not earlier or one not in earlier[0]]
+        assumed = ", ".join(dict.fromkeys([*earlier, *new]))
         return {**self.labels, **({"assumed": assumed} if assumed else {})}
 
     def _classify(self, key: str, entry: SourceText) -> bool:

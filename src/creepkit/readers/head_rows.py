@@ -80,10 +80,18 @@ def entries_above(grid: CellGrid, head: Sequence[TableRow], known: KnownNames) -
                 put_entry(entries, f"label line {row.line}", key, place, grid, known)
                 break
             value, cells = rest[0], rest[1:]
-            if cells and is_number(value, grid.dialect) and unit_suffix(cells[0]) and not split_written_name(key)[1]:
-                key, cells = f"{key} ({cells[0]})", cells[1:]
+            if cells and is_number(value, grid.dialect) and unit_suffix(cells[0]):
+                key, cells = _with_unit(key, cells[0], place), cells[1:]
             put_entry(entries, key, value, place, grid, known)
     return entries
+
+
+def _with_unit(key: str, unit: str, place: str) -> str:
+    """A key with the unit that stands behind its value; HistoryError where the key has another one."""
+    _, stated = split_written_name(key.rstrip(": "))
+    if stated and unit_suffix(stated) != unit_suffix(unit):
+        raise HistoryError(f"{place}: '{key:.60}' has the unit '{unit:.20}' behind its value; keep one of the two units")
+    return key if stated else f"{key} ({unit})"
 
 
 def put_entry(

@@ -1,8 +1,8 @@
 """What a file states in creepkit's names and with units: `Stress: 120 MPa` as stress_MPa, a strain as what it is.
 
 A strain without a unit may be a fraction or in per cent. It is decided by, in this order: the key `strain_unit` (1, %),
-the head of a file that earlier versions of creepkit wrote (fractions), and its values: above 1 they are per cent, for
-few creep tests are stretched to twice their length; below 0.001 they are fractions, for no extensometer resolves
+the head of a file that earlier versions of creepkit wrote (fractions), and its values: above 1, up to 100, they are per
+cent, for few creep tests are stretched to twice their length; below 0.001 they are fractions, for no extensometer resolves
 0.001 %. Else it is asked for. What was decided by head or values is recorded in the label "assumed".
 """
 
@@ -22,6 +22,10 @@ from creepkit.readers.vocabulary import HeaderVocabulary, plain_name, split_unit
 
 SURELY_PER_CENT, SURELY_FRACTION = 1.0, 1e-3
 """Largest strain above which, and below which, a strain without unit is decided by its values."""
+
+
+LARGEST_PER_CENT = 100.0
+"""Largest strain without unit that may be in per cent; above, it may be microstrain."""
 
 
 STRAIN_UNITS: Mapping[str, str] = {"1": "1", "pct": "pct", "microstrain": "microstrain"}
@@ -164,6 +168,12 @@ def _decided_by_table(name: str, table: TextTable, written: Mapping[str, SourceT
     if set(_WRITTEN_HEAD) <= written.keys() and "time_s" in table.columns:
         return "1", f"{name} a fraction as in files of write_history"
     largest = float(np.abs(table.numbers(name)).max())
+    if largest > LARGEST_PER_CENT:
+        place = table.location(table.columns_line, table.column(name))
+        raise HistoryError(
+            f"{place}: '{name}' has no unit, and values up to {largest:g} are no fractions and hardly per cent; name "
+            f"it {name}_microstrain or {name}_pct, or write '# strain_unit: microstrain' or '# strain_unit: %' above"
+        )
     if largest > SURELY_PER_CENT:
         return "pct", f"{name} in per cent (up to {largest:g})"
     if largest < SURELY_FRACTION:

@@ -286,7 +286,34 @@ def _with_end(cells: Mapping[str, SourceText], location: str) -> dict[str, Sourc
         else:
             entries["ended"] = SourceText("ruptured", location)
     elif ruptures:
+        _check_duration(entries)
         entries = {key: entry for key, entry in entries.items() if _quantity(key) != "end_time"}
     if ended == "stopped":
         entries["ended"] = SourceText("stopped", location)
     return entries
+
+
+_ROUNDING = 0.01
+"""Part of a rupture time by which the duration of the same test may differ."""
+
+
+def _check_duration(entries: Mapping[str, SourceText]) -> None:
+    """Refuse a duration of a test that is not its rupture time."""
+    times = {
+        quantity: (key, TIME.convert(entry.number(entry.key or key), _unit_of(key), entry.location, entry.key or key))
+        for key, entry in entries.items()
+        if (quantity := _quantity(key)) in ("rupture", "end_time")
+    }
+    if "end_time" not in times:
+        return
+    (rupture, broken), (end, ended) = times["rupture"], times["end_time"]
+    if abs(ended - broken) > _ROUNDING * broken:
+        one, other = entries[rupture], entries[end]
+        raise HistoryError(
+            f"{one.location}: '{one.key or rupture}' is {one.text:.40}, and '{other.key or end}' is {other.text:.40}; a "
+            "test that ruptured lasted until then; correct one of them"
+        )
+
+
+def _unit_of(key: str) -> str:
+    return key.rpartition("_")[2]

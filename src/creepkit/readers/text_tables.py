@@ -211,6 +211,8 @@ def read_frames(
                     f"{quantity}; keep one and leave the other out: {how_to_ignore(written)}"
                 )
             values[quantity] = _converted_column(table, name, kinds[quantity], suffix)
+            if quantity == "used":
+                _check_marks(table, k, values[quantity])
             found[quantity] = written
     if "time" not in values:
         place, result = table.location(table.columns_line), ", ".join(table.written or table.columns)
@@ -270,6 +272,15 @@ def _converted_column(table: TextTable, name: str, kind: QuantityKind, suffix: s
     k = table.column(name)
     written = table.as_written(k)
     return kind.convert_all(table.numbers(name), suffix, lambda row: table.location(table.rows[row].line, k), written)
+
+
+def _check_marks(table: TextTable, k: int, marks: Floats) -> None:
+    """Refuse what neither uses a frame nor leaves it out."""
+    for row in np.flatnonzero((marks != 0.0) & (marks != 1.0))[:1]:
+        raise HistoryError(
+            f"{table.location(table.rows[row].line, k)}: '{table.as_written(k)}' is {marks[row]:g}; allowed: 1 for a "
+            "frame that is used, 0 for one that is not"
+        )
 
 
 def _strictly_increasing(frames: TableFrames) -> TableFrames:
