@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import TypeVar
 
 from creepkit.errors import CreepkitError, HistoryError, nearest
+from creepkit.readers.column_names import unit_suffix
 from creepkit.readers.text_tables import SourceText
 from creepkit.readers.vocabulary import (
     CLOSE_SPELLING,
@@ -119,7 +120,7 @@ class StatedConditions:
         entry = self._texts.pop(key, None)
         if entry is None:
             return None
-        pairs = tuple(_time_value_pair(item, key, kind, entry.location) for item in entry.text.split(";"))
+        pairs = tuple(_time_value_pair(item, key, kind, entry) for item in entry.text.split(";"))
         times = [time for time, _ in pairs]
         if times[0] != 0.0 or times != sorted(times):
             description = f"the times of {key} are {', '.join(f'{time:g}' for time in times)} s"
@@ -269,8 +270,9 @@ def _specimen_dimension(stem: str, entry: SourceText, terms: Terms) -> tuple[str
     return (base, LENGTH.convert(number, suffix, entry.location, stem)) if has_unit else (stem, number)
 
 
-def _time_value_pair(item: str, key: str, kind: QuantityKind, location: str) -> tuple[float, float]:
-    parts = item.split()
+def _time_value_pair(item: str, key: str, kind: QuantityKind, entry: SourceText) -> tuple[float, float]:
+    """Time and value of `1 h 120 MPa`; units are spelled as in names of columns, `°C` or `deg C`."""
+    location, parts = entry.location, item.split(maxsplit=3)
     if len(parts) == 3 and "" in kind.units:
         parts.append("")
     if len(parts) != 4:
@@ -278,5 +280,8 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, location: str) -> 
         raise HistoryError(
             f"{location}: {key} holds '{item.strip()}'; write time and value with units, such as {example}"
         )
-    time, value = (SourceText(word, location).number(key) for word in (parts[0], parts[2]))
-    return TIME.convert(time, parts[1], location, key), kind.convert(value, parts[3], location, key)
+    time, value = (replace(entry, text=word).number(key) for word in (parts[0], parts[2]))
+    time_unit, unit = (
+        part if part in one.units else unit_suffix(part) or part for part, one in ((parts[1], TIME), (parts[3], kind))
+    )
+    return TIME.convert(time, time_unit, location, key), kind.convert(value, unit, location, key)
