@@ -1,6 +1,6 @@
 """Mutated files for every reader: no traceback, no hang, no wrong acceptance.
 
-    python tests/benchmarks/reader_fuzz.py [--samples NAME ...] [--count 12000] [--only SEED] [--write]
+    python tests/benchmarks/reader_fuzz.py [--samples NAME ...] [--count 12000] [--jobs 2] [--only SEED] [--write]
 
 Samples of each reader (tests/helpers/samples_*.py) are mutated `count` times in all, by seed, and read in a process
 without privileges. Counted are tracebacks (anything but an error of creepkit in one sentence that names the file),
@@ -24,6 +24,7 @@ import tempfile
 import traceback
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import FrameType
 
@@ -131,21 +132,29 @@ def main() -> int:
     parser = arguments(__doc__)
     parser.add_argument("--samples", nargs="*", help="names of samples, all by default")
     parser.add_argument("--count", type=int, default=12000, help="mutations for each reader, shared by its samples")
+    parser.add_argument("--jobs", type=int, default=1, help="samples at a time")
     parser.add_argument("--only", type=int, help="one seed alone")
     options = parser.parse_args()
     page = Page("reader_fuzz", __doc__)
     page.table("reader", "sample", "mutations", *OUTCOMES)
     faults: list[str] = []
     kinds: dict[str, Counter[str]] = {}
-    first, last = (0, options.count) if options.only is None else (options.only, options.only + 1)
+    first = 0 if options.only is None else options.only
     samples = all_samples()
     readers = {name: sample.reader or name for name, sample in samples.items()}
-    for name in options.samples or samples:
+
+    def found_of(name: str) -> list[tuple[int, str, str, str]]:
+        share = -(-options.count // list(readers.values()).count(readers[name]))
+        found = list(outcomes(name, first, first + share if options.only is None else first + 1))
+        progress(f"{name}: {len(found)} read or refused")
+        return found
+
+    names = options.samples or list(samples)
+    with ThreadPoolExecutor(options.jobs) as pool:  # each thread waits for a process that reads
+        results = dict(zip(names, pool.map(found_of, names), strict=True))
+    for name in sorted(names, key=lambda name: readers[name]):
         counts: Counter[str] = Counter()
-        last = (
-            first + -(-options.count // list(readers.values()).count(readers[name])) if options.only is None else last
-        )
-        for seed, kind, found, detail in outcomes(name, first, last):
+        for seed, kind, found, detail in results[name]:
             counts[found] += 1
             kinds.setdefault(kind, Counter())[found] += 1
             if found in FAULTS and len(faults) < 60:

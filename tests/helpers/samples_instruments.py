@@ -22,7 +22,7 @@ def read(path: Path) -> InstrumentRecord:
 
 
 def difference(first: InstrumentRecord, second: InstrumentRecord) -> str:
-    """What distinguishes two records; a reading that is called lost is no silent change."""
+    """What distinguishes two records; a reading that is lost, or a channel without a unit, is no silent change."""
     if not np.array_equal(first.times, second.times):
         return "other times"
     if list(first.channels) != list(second.channels):
@@ -30,6 +30,8 @@ def difference(first: InstrumentRecord, second: InstrumentRecord) -> str:
     for name, one in first.channels.items():
         other = second.channels[name]
         both = ~np.isnan(one.values) & ~np.isnan(other.values)
+        if other.quantity == "number":
+            continue
         if (one.quantity, one.reference) != (other.quantity, other.reference):
             return f"{name} is another quantity"
         if not np.array_equal(one.values[both], other.values[both]):

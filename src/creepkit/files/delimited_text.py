@@ -17,6 +17,10 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError, HistoryError
 
+ERROR_VALUES = ("#REF!", "#DIV/0!", "#N/A", "#VALUE!", "#NAME?", "#NUM!", "#NULL!", "#SPILL!", "#CALC!", "#####")
+"""What spreadsheets write for a value that could not be computed or shown; no remark begins so."""
+
+
 _BYTE_ORDER_MARKS = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
 
 

@@ -316,6 +316,9 @@ def _time_columns(
         raise HistoryError(
             f"{place}: no column of time among {', '.join(heads):.200}; name one time, or state time='its name'"
         )
+    for k in found:
+        if list(heads).count(heads[k]) > 1:
+            raise HistoryError(f"{place}: the column '{heads[k]:.60}' stands there twice; rename one of them")
     return found
 
 

@@ -10,7 +10,15 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError
-from creepkit.files.delimited_text import Dialect, decode_text, detect_dialect, is_number, parse_numbers, split_line
+from creepkit.files.delimited_text import (
+    ERROR_VALUES,
+    Dialect,
+    decode_text,
+    detect_dialect,
+    is_number,
+    parse_numbers,
+    split_line,
+)
 from creepkit.files.reading import FileKind, open_binary
 from creepkit.files.time_stamps import ClockColumn, is_clock_time
 from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
@@ -62,6 +70,12 @@ class TableHead:
     names_line: int
     first_row: int
     remarks: tuple[str, ...]
+
+
+def is_remark(line: str) -> bool:
+    """Whether a line is a remark, and no row that begins with #N/A."""
+    text = line.lstrip()
+    return text.startswith("#") and not text.startswith(ERROR_VALUES)
 
 
 def numbered_lines(path: Path) -> Iterator[list[tuple[int, str]]]:
@@ -117,10 +131,10 @@ def find_head(path: Path, lines: Sequence[tuple[int, str]]) -> TableHead:
     sample = [(number, line) for number, line in lines[:_HEAD_LINES] if line.strip()]
     if not sample:
         raise HistoryError(f"{path}: the file is empty; a record needs a line of names and rows of readings")
-    plain = [line for _, line in sample if not line.lstrip().startswith("#")]
+    plain = [line for _, line in sample if not is_remark(line)]
     dialect = detect_dialect(plain[len(plain) // 2 :] or plain, str(path))
     for k, (number, line) in enumerate(sample):
-        if line.lstrip().startswith("#"):
+        if is_remark(line):
             continue
         cells = _cells(line, dialect, f"{path}:{number}")
         if not _is_row(cells, dialect):
@@ -193,7 +207,7 @@ class KeptColumns:
         dialect, first, count = self.head.dialect, self.head.first_row, len(self.head.names)
         rows = self._pending
         for number, line in lines:
-            if number < first or not line.strip() or line.lstrip()[0] == "#":
+            if number < first or not line.strip() or is_remark(line):
                 continue
             if '"' in line or dialect.delimiter == " ":
                 cells = _cells(line, dialect, f"{self.path}:{number}")

@@ -12,7 +12,7 @@ import numpy as np
 
 from creepkit.arrays import Ints
 from creepkit.errors import HistoryError
-from creepkit.files.delimited_text import Dialect, decode_text, detect_dialect, split_line, text_lines
+from creepkit.files.delimited_text import ERROR_VALUES, Dialect, decode_text, detect_dialect, split_line, text_lines
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.column_names import split_written_name
 from creepkit.readers.text_tables import NumberRows, SourceText, TableRow, TextTable, check_columns, location_in
@@ -184,11 +184,7 @@ def grid_of_rows(path: Path, sheet: str, rows: Sequence[TableRow]) -> CellGrid:
 def is_comment(line: str) -> bool:
     """Whether a line, or the first cell of a row, is a comment."""
     text = line.lstrip(' \t"\ufeff')
-    return text.startswith(("#", "//")) and not text.startswith(_ERROR_VALUES)
-
-
-_ERROR_VALUES = ("#REF!", "#DIV/0!", "#N/A", "#VALUE!", "#NAME?", "#NUM!", "#NULL!", "#SPILL!", "#CALC!", "#####")
-"""What spreadsheets write for a value that could not be computed or shown."""
+    return text.startswith(("#", "//")) and not text.startswith(ERROR_VALUES)
 
 
 def _number_rows(

@@ -156,7 +156,8 @@ class NameTable:
         exact = split_unit(text, self.kinds)
         if text in self.texts or (exact and exact[1] in self.kinds[exact[0]].units):
             return text
-        name, unit = split_written_name(text)
+        whole = self._plain_names.get(plain_name(text))  # `Time of day` is no time in days
+        name, unit = (text, "") if whole else split_written_name(text)
         quantity = self.meaning(name)
         if quantity is None or (unit and quantity not in self.kinds):
             last = re.split(r"[\s_\-()\[\],]+", text.strip(" )]"))[-1]

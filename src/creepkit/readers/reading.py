@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import is_dataclass, replace
+from dataclasses import replace
 from glob import glob
 from pathlib import Path
 from typing import Any, cast
@@ -63,10 +63,9 @@ def reader_without(ignored: Collection[str], reader: Reader) -> Reader:
     if isinstance(ignored, str) or not all(str(name).strip() for name in ignored):
         raise HistoryError(f"ignore is {ignored!r:.60}; give a list of names of columns, such as ['load_kN', 'date']")
     vocabulary = getattr(reader, "vocabulary", None)
-    if not is_dataclass(reader) or not isinstance(vocabulary, HeaderVocabulary):
+    if not hasattr(reader, "__dataclass_fields__") or not isinstance(vocabulary, HeaderVocabulary):
         return reader
-    changes: Any = {"vocabulary": replace(vocabulary, ignored=tuple(ignored))}
-    return cast(Reader, replace(cast(Any, reader), **changes))
+    return cast(Reader, replace(cast(Any, reader), vocabulary=replace(vocabulary, ignored=tuple(ignored))))
 
 
 def _reader_named(name: str, readers: Sequence[Reader]) -> Reader:

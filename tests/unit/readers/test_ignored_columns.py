@@ -1,0 +1,94 @@
+"""Columns that nobody needs are left out where that is said, and only there; names are told as they were written."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import HistoryError
+from creepkit.records import History
+
+HEAD = "# stress_MPa: 60\n# temperature_C: 850\n"
+TABLE = "Time (h);Strain (%);load, kN;operator;Date\n0;0;3,1;Ms A;1.3.24\n1;0,112;3,1;Mr B;1.3.24\n2;0,2;3,1;;2.3.24\n"
+
+
+def read(text: str, path: Path, **options: object) -> list[History]:
+    path.write_text(text, encoding="utf-8")
+    return ck.read_histories(path, **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("key", ["ignore: load, kN; operator; Date", "Ignore: load, kN; OPERATOR; date"])
+def test_by_a_key_of_the_head(key: str, tmp_path: Path):
+    (history,) = read(f"# {key}\n{HEAD}{TABLE}", tmp_path / "x.csv")
+    np.testing.assert_allclose(history.outputs["strain"], [0, 0.00112, 0.002])
+    assert set(history.labels) == {"assumed"}
+
+
+def test_by_the_call_in_every_file_that_has_them(tmp_path: Path):
+    (tmp_path / "y.csv").write_text(f"{HEAD}time_h,strain_pct\n0,0\n1,0.1\n")
+    (tmp_path / "x.csv").write_text(HEAD + TABLE)
+    found = ck.read_histories(tmp_path, ignore=["load, kN", "operator", "Date"])
+    assert [history.name for history in found] == ["x", "y"]
+    with pytest.raises(HistoryError, match="ignore is 'Date'; give a list of names of columns"):
+        ck.read_histories(tmp_path, ignore="Date")
+
+
+def test_columns_of_a_wide_table_and_of_a_table_of_tests(tmp_path: Path):
+    wide = "Stress (MPa),60,,80\nTemperature (C),850,,850\nTime (h),A strain (%),load_kN,B strain (%)\n"
+    first, second = read("# ignore: load_kN\n" + wide + "0,0,x,0\n1,0.1,y,0.2\n", tmp_path / "x.csv")
+    assert (first.outputs["strain"][1], second.outputs["strain"][1]) == (0.001, 0.002)
+    table = "test,stress_MPa,T_C,t_r (h),stress ratio\nA,60,850,120,?\n"
+    (history,) = read(table, tmp_path / "y.csv", ignore=["stress ratio"])
+    assert "stress ratio" not in history.labels
+
+
+def test_a_large_table_of_numbers(tmp_path: Path):
+    rows = "".join(f"{k},{1e-4 * k:.4f},3.1\n" for k in range(8000))
+    (history,) = read(f"{HEAD}# ignore: load_kN\ntime_s,strain_pct,load_kN\n{rows}", tmp_path / "x.csv")
+    assert history.times.size == 8000
+
+
+@pytest.mark.parametrize(
+    ("head", "columns", "message"),
+    [
+        (
+            "",
+            "load_kN",
+            "x.csv:3: column 'load_kN' is not understood; .* leave it out: write '# ignore: load_kN' above",
+        ),
+        ("# ignore: lode_kN\n", "load_kN", "x.csv:3: ignore names 'lode_kN', which is no column; the columns are: "),
+        ("# ignor: load_kN\n", "used", "x.csv:3: unknown key 'ignor'; did you mean 'ignore'"),
+        ("# decimel: comma\n", "used", "x.csv:3: unknown key 'decimel'; did you mean 'decimal'"),
+        ("# colums: strain_pct\n", "used", "x.csv:3: unknown key 'colums'; did you mean 'columns'"),
+        ("", "pressure_MPa", "x.csv:3: .* pressure .*leave it out: write '# ignore: pressure_MPa'"),
+        ("", "Pressure (furlong)", "x.csv:3: the unit 'furlong' of 'Pressure .furlong.' is not understood"),
+        (
+            "",
+            "T1_C,T2_C",
+            "x.csv:3: 'T1_C' and 'T2_C' seem to be several sensors of the temperature; name the one that",
+        ),
+        ("# ignore: T2_C\n", "T1_C,T2_C", "x.csv:4: 'T1_C' seems to be a sensor of the temperature; name it"),
+        ("# ignore: time_s, strain_pct, used\n", "used", "x.csv:4: every column is left out by ignore"),
+    ],
+)
+def test_messages_name_what_was_written(head: str, columns: str, message: str, tmp_path: Path):
+    cells = ",1" * len(columns.split(","))
+    with pytest.raises(HistoryError, match=message) as caught:
+        read(f"{HEAD}{head}time_s,strain_pct,{columns}\n0,0{cells}\n1,0.1{cells}\n", tmp_path / "x.csv")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("Modulus [furlong]: 150", "the unit 'furlong' of 'Modulus .furlong.' is not understood"),
+        ("Youngs modulus (GPa): stiff", "'Youngs modulus .GPa.' is 'stiff'"),
+        ("Strain measure: tru", "Strain measure is 'tru'; allowed: engineering, logarithmic"),
+        ("Jump time (h): 3", "'Jump time .h.' has no meaning|'Jump time .h.' needs"),
+        ("Heet: X7", "unknown key 'Heet'; did you mean 'heat'"),
+    ],
+)
+def test_keys_are_quoted_as_they_were_written(line: str, message: str, tmp_path: Path):
+    with pytest.raises(HistoryError, match=f"x.csv:3: ({message})"):
+        read(f"{HEAD}# {line}\ntime_s,strain_pct\n0,0\n1,0.1\n", tmp_path / "x.csv")
