@@ -5,6 +5,7 @@ Exit 0 fine, 1 an error that we can explain in one line, 2 wrong usage, 130 inte
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
@@ -55,6 +56,7 @@ class CommandGroup(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an error of ours becomes one line on stderr and exit code 1."""
         try:
+            _check_files_in_environment()
             _load_plugin_files(ctx.params["plugin"])
             return super().invoke(ctx)
         except (CreepkitError, OSError) as error:
@@ -166,6 +168,13 @@ def global_options(
 
     Plugins may add laws and commands: 'creepkit plugins' lists what they bring.
     """
+
+
+def _check_files_in_environment() -> None:
+    if os.environ.get("CREEPKIT_PLUGINS"):
+        from creepkit.registry.plugin_sources import check_files_in_environment
+
+        check_files_in_environment()
 
 
 def _load_plugin_files(files: list[Path] | None) -> None:

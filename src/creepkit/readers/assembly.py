@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
@@ -95,7 +96,7 @@ def assemble_history(
         # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
     )
-    _check_operator(history, columns)
+    _check_operator(history, columns, conditions.location_of("operator"))
     return history
 
 
@@ -114,12 +115,25 @@ def _stated_fields(conditions: StatedConditions, name: str, elastic: Elastic | N
     }
 
 
-def _check_operator(history: History, location: str) -> None:
-    """HistoryError where the operator of a test does not give the outputs that its columns hold."""
+_OBSERVATION = re.compile(r"[a-z][a-z -]*\d")
+"""Beginning of an operator of observation: a form and a number."""
+
+
+def _check_operator(history: History, location: str, operator_location: str) -> None:
+    """HistoryError where the operator of a test does not give the outputs of its columns, or is who made the test."""
+    specimen, operator = specimen_of(history), history.operator
+    person = f"a person is a label: write 'label operator: {operator}'"
+    is_observation = _OBSERVATION.match(operator) is not None
+    if operator and not is_observation and getattr(specimen, "outputs_of_test", None) is None:
+        raise HistoryError(
+            f"{operator_location}: operator '{operator}' does not say how outputs were observed, as 'profile 0-7.5 mm' "
+            f"does; {person}"
+        )
     try:
-        outputs_of_test(specimen_of(history), replace(history, source=location))
+        outputs_of_test(specimen, replace(history, source=location))
     except SolveError as error:
-        raise HistoryError(str(error)) from error
+        hint = f"; {person}" if operator and not is_observation else ""
+        raise HistoryError(f"{error}{hint}") from error
 
 
 def assemble_without_frames(
@@ -162,7 +176,10 @@ def assemble_without_frames(
             **_stated_fields(conditions, name),
             labels=conditions.all_labels(),  # last: entries that nothing has used by now are refused
         )
-        return history.replace(specimen=named) if named else history
+        history = history.replace(specimen=named) if named else history
+    if history.operator:
+        _check_operator(history, location, conditions.location_of("operator"))
+    return history
 
 
 def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | None, ended: str, location: str) -> None:

@@ -294,6 +294,13 @@ def _cut_rows(grid: CellGrid, rows: Sequence[TableRow], width: int) -> Iterator[
         cells = row.cells
         if len(cells) > width and not any(cells[width:]):
             cells = cells[:width]
+        if len(cells) < width and grid.sheet:  # empty cells at the end of a sheet's row are not stored
+            cells = [*cells, *[""] * (width - len(cells))]
+        if len(cells) != width and grid.sheet:
+            raise HistoryError(
+                f"{grid.location(row.line)}: '{next(filter(None, cells[width:])):.40}' stands in a column without a "
+                "name; name it or remove it"
+            )
         if len(cells) != width:
             description = f"number of cells {len(cells)}, of columns {width}"
             advice = "" if grid.dialect.delimiter != "," else "; decimal commas need another delimiter, such as ;"

@@ -12,6 +12,7 @@ from difflib import get_close_matches
 from typing import TypeVar
 
 from creepkit.errors import CreepkitError, HistoryError, nearest
+from creepkit.readers.column_names import unit_suffix
 from creepkit.readers.text_tables import SourceText
 from creepkit.readers.vocabulary import (
     CLOSE_SPELLING,
@@ -275,7 +276,8 @@ def _specimen_dimension(stem: str, entry: SourceText, terms: Terms) -> tuple[str
 
 
 def _time_value_pair(item: str, key: str, kind: QuantityKind, entry: SourceText) -> tuple[float, float]:
-    parts, location = item.split(), entry.location
+    """Time and value of `1 h 120 MPa`; units are spelled as in names of columns, `°C` or `deg C`."""
+    location, parts = entry.location, item.split(maxsplit=3)
     if len(parts) == 3 and "" in kind.units:
         parts.append("")
     if len(parts) != 4:
@@ -284,4 +286,7 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, entry: SourceText)
             f"{location}: {key} holds '{item.strip()}'; write time and value with units, such as {example}"
         )
     time, value = (replace(entry, text=word).number(key) for word in (parts[0], parts[2]))
-    return TIME.convert(time, parts[1], location, key), kind.convert(value, parts[3], location, key)
+    time_unit, unit = (
+        part if part in one.units else unit_suffix(part) or part for part, one in ((parts[1], TIME), (parts[3], kind))
+    )
+    return TIME.convert(time, time_unit, location, key), kind.convert(value, unit, location, key)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -35,6 +36,13 @@ def entries_of_blocks(
         filled = {k: cell for k, cell in enumerate(row.cells) if cell}
         first = min(filled)
         key = filled[first] if known.is_condition(filled[first].rstrip(": ")) else ""
+        measured = {k: conditions_in(cell, known) for k, cell in filled.items() if not key}
+        if measured and all(measured.values()):
+            for result, columns in zip(results, own, strict=True):
+                k = next((k for k in range(columns[0], columns[-1] + 1) if k in measured), None)
+                for quantity, text in () if k is None else measured[k]:
+                    put_entry(result.entries, quantity, text, place, grid, known)
+            continue
         if len(set(filled.values())) == 1 and not key:
             for result in results:
                 put_entry(result.entries, f"label line {row.line}", filled[first], place, grid, known)
@@ -59,6 +67,25 @@ def entries_of_blocks(
             if values:
                 put_entry(result.entries, key or "name", values[0][1], place, grid, known)
     return results
+
+
+def conditions_in(cell: str, known: KnownNames) -> list[tuple[str, str]]:
+    """Load and temperature of a head such as `120 MPa`, or `120 MPa / 650 °C`; [] where a part of it is neither.
+
+    A load is a stress, where the file names no specimen that takes another one.
+    """
+    loads, kinds = known.terms.own_loads or ("stress",), known.terms.condition_kinds
+    found: list[tuple[str, str]] = []
+    for part in re.split(r"\s*[/;|]\s*|,\s+", cell.strip()):
+        value = _VALUE_WITH_UNIT.fullmatch(part)
+        unit = unit_suffix(value[1]) if value else None
+        names = (name for name in ("temperature", *loads) if name in kinds and unit and unit in kinds[name].units)
+        found.append((next(names, ""), part))
+    quantities = [quantity for quantity, _ in found]
+    return found if all(quantities) and len(set(quantities)) == len(quantities) else []
+
+
+_VALUE_WITH_UNIT = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?\s*([^\d\s.,;:+-][^;:]{0,10})", re.ASCII)
 
 
 def entries_above(grid: CellGrid, head: Sequence[TableRow], known: KnownNames) -> dict[str, SourceText]:

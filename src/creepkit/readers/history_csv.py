@@ -63,6 +63,17 @@ class HistoryCsvReader:
     columns: tuple[str, ...] = ()
     vocabulary: HeaderVocabulary = field(default_factory=HeaderVocabulary)
 
+    def __post_init__(self) -> None:
+        if isinstance(self.columns, str) or not all(isinstance(c, str) for c in _listed(self.columns)):
+            raise HistoryError(
+                f"reader '{self.name}': columns is a {type(self.columns).__name__}; give a tuple of names of columns as "
+                "its files write them, such as ('Time (h)', 'Strain (%)'), and vocabulary=HeaderVocabulary(...)"
+            )
+        if not isinstance(self.vocabulary, HeaderVocabulary):
+            raise HistoryError(
+                f"reader '{self.name}': vocabulary is a {type(self.vocabulary).__name__}; give a HeaderVocabulary(...)"
+            )
+
     def accepts(self, path: Path) -> bool:
         """Say whether `path` is a text table with the columns."""
         if path.suffix.lower() not in (*TABLE_SUFFIXES, *TEXT_SUFFIXES) or not path.is_file():
@@ -82,6 +93,11 @@ class HistoryCsvReader:
             return [assemble_without_frames(path.stem, head, self.vocabulary, location=str(path), source=str(path))]
         grid = read_text_grid(path)
         return histories_of_tests([(grid, test) for test in tests_in(grid, self.vocabulary)], path, self.vocabulary)
+
+
+def _listed(columns: object) -> Sequence[object]:
+    """The columns of a declaration, [None] of what is no sequence of them."""
+    return columns if isinstance(columns, Sequence) else [None]
 
 
 TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv"), (".txt", ".dat", ".asc")

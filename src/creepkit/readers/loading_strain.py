@@ -12,8 +12,8 @@ these nor `includes_elastic`, the first frames decide:
   or faster.
 
 What was decided is recorded, and what looks like loading but is neither, a jump that is not about the stress over the
-modulus or has no modulus beside it, is told by the check of data quality. A file that states
-`includes_elastic` is taken at its word.
+modulus or has no modulus beside it, is told by the check of data quality. A file that states `includes_elastic` is
+taken at its word.
 """
 
 from __future__ import annotations

@@ -238,14 +238,24 @@ class SpreadsheetReader:
         return histories_of_tests(_with_conditions(path, found, stated, aside), path, self.vocabulary)
 
 
+_TEST_NAMES = (*TEST_NAME_COLUMNS, "name", "sheet")
+"""Names, in small letters, of the column that says to which test or sheet conditions belong."""
+
+
+def _names_tests(row: TableRow) -> bool:
+    """Whether a row names columns of conditions, one of them that of the tests."""
+    cells = [words_of(cell) for cell in row.cells if cell]
+    return len(cells) > 1 and not set(cells).isdisjoint(_TEST_NAMES)
+
+
 def _conditions_by_test(grid: CellGrid, vocabulary: HeaderVocabulary) -> dict[str, dict[str, SourceText]]:
     """{test: its conditions} of a sheet with a column of tests; {} of any other sheet."""
-    names = grid.rows[0].cells
-    columns = [k for k, name in enumerate(names) if words_of(name) in (*TEST_NAME_COLUMNS, "name", "sheet")]
-    if not columns or len(grid.rows) < 2:
+    head = [k for k, row in enumerate(grid.rows[:_FILLED_ROWS]) if _names_tests(row)]
+    if not head or head[0] + 1 >= len(grid.rows):
         return {}
+    grid = replace(grid, rows=grid.rows[head[0] :])  # rows above the names are titles
     table, known = table_of(without_ignored(grid, 0, vocabulary.ignored)), KnownNames.of(vocabulary)
-    columns = [k for k, name in enumerate(table.columns) if words_of(name) in (*TEST_NAME_COLUMNS, "name", "sheet")]
+    columns = [k for k, name in enumerate(table.columns) if words_of(name) in _TEST_NAMES]
     if not columns:
         return {}
     tests: dict[str, dict[str, SourceText]] = {}

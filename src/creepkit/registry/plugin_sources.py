@@ -55,6 +55,14 @@ def plugin_files_in_environment() -> list[Path]:
     return [Path(text) for text in os.environ.get(ENVIRONMENT_VARIABLE, "").split(os.pathsep) if text.strip()]
 
 
+def check_files_in_environment() -> None:
+    """PluginError, in one sentence, where the environment variable names a file that does not exist."""
+    for path in plugin_files_in_environment():
+        if not path.is_file():
+            advice = f"separate several files with '{os.pathsep}'" if "," in str(path) else "correct or unset it"
+            raise PluginError(f"{ENVIRONMENT_VARIABLE} names the plugin file {path}, which does not exist; {advice}")
+
+
 def provenance_of_file(path: Path) -> Provenance:
     """Return the provenance of a plugin file."""
     return Provenance(str(path.resolve()), path.stem)

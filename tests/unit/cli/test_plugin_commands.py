@@ -158,3 +158,13 @@ def test_a_plugin_cannot_take_the_place_of_a_command(monkeypatch: pytest.MonkeyP
     assert f"plugin 'second' ({Path('second.py').resolve()}) adds the command 'greet', which another plugin" in greet
     assert creepkit("greet").stdout == "from a plugin\n"
     assert "norton" in creepkit("laws").stdout
+
+
+@pytest.mark.parametrize(("files", "advice"), [("none.py", "correct or unset it"), ("a.py,b.py", "separate several")])
+def test_a_file_of_the_environment_that_is_not_there_is_one_sentence(
+    files: str, advice: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CREEPKIT_PLUGINS", files)
+    result = creepkit("laws")
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert f"CREEPKIT_PLUGINS names the plugin file {files}, which does not exist; {advice}" in result.stderr
