@@ -58,8 +58,8 @@ class ReadingOptions:
 
     time, date : names of their columns. time_unit : "s", "ms", "min", "h" of times without a unit. date_order : "month
     first", "day first" or, of years of two digits, "year first". time_zone : such as "America/Chicago" or "+01:00".
-    channels : names of those that are kept; None keeps all. every : rows that are averaged to one. units : {channel: unit} of heads without one.
-    pressure_reference : "gauge" or "absolute", of pressures whose unit does not say. ambient_pressure : MPa, that turns
+    channels : names of those that are kept; None keeps all. every : rows that are averaged to one.
+    units : {channel: unit} of heads without one. pressure_reference : "gauge" or "absolute", of pressures whose unit does not say. ambient_pressure : MPa, that turns
     absolute pressures into gauge pressures. missing : texts that mean a lost reading, beside the usual ones.
     """
 
@@ -289,8 +289,8 @@ class _Layout:
         if factor > 1.0 or not EARLIEST_UNIX_TIME <= start <= time.time() + DAY:
             raise HistoryError(
                 f"{self.path}:{lines[0]}: time begins at {numbers[0]:.15g} {self.time_unit or 's'}, which is no time "
-                "since the start of a record and no unix time (s, ms, us or ns since 1970, from 1980 to today), as where "
-                "days are counted from 1900 or seconds from 1904; write dates, or times from the first row on"
+                "since the start of a record and no unix time (s, ms, us or ns since 1970, from 1980 to today), as "
+                "where days are counted from 1900 or seconds from 1904; write dates, or times from the first row on"
             )
         return ResolvedTimes((numbers - numbers[0]) * factor, start)
 

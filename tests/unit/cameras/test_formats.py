@@ -262,3 +262,46 @@ def test_arrays_of_matlab_written_in_other_ways(tmp_path: Path) -> None:
 
     with pytest.raises(HistoryError, match="cannot be read as arrays of MATLAB, it seems damaged"):
         ck.read_frames(written(tmp_path, vic_3d_mat()[:900], "c.mat"))
+
+
+def test_arrays_of_matlab_that_are_not_asked_for_are_not_unpacked(tmp_path: Path) -> None:
+    """160 MB of zeros beside a frame; and columns that are as large, which are refused before they are read."""
+    import tracemalloc
+
+    import h5py
+
+    truth = dome()
+    arrays = dict(zip("XYZUVW", (*truth.points.T, *truth.displacements.T), strict=True))
+
+    def write(name: str, large: str, count: int) -> Path:
+        with h5py.File(tmp_path / name, "w") as file:
+            for column, values in arrays.items():
+                file[column] = values
+            for column in large:
+                if column in file:
+                    del file[column]
+                file.create_dataset(column, (count,), dtype="f8", fillvalue=1.0)
+        return tmp_path / name
+
+    tracemalloc.start()
+    try:
+        assert len(ck.read_frames(write("beside.mat", "ABC", 20_000_000))[0].points) == 49
+        with pytest.raises(HistoryError, match="frame of 60000000 numbers, of at most 20000000"):
+            ck.read_frames(write("large.mat", "XYZUVW", 10_000_000))[0]
+        assert tracemalloc.get_traced_memory()[1] < 50e6
+    finally:
+        tracemalloc.stop()
+
+
+def test_arrays_of_matlab_of_other_shapes_or_of_one_name_are_refused(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    truth = dome()
+    arrays = dict(zip("XYZUVW", (*truth.points.T, *truth.displacements.T), strict=True))
+    savemat(tmp_path / "a.mat", {**arrays, "X": arrays["X"].reshape(7, 7)})
+    with pytest.raises(HistoryError, match=r"differ in their number of points \(X has 7 x 7, Y has 1 x 49"):
+        ck.read_frames(tmp_path / "a.mat")[0]
+    savemat(tmp_path / "b.mat", arrays)
+    content = (tmp_path / "b.mat").read_bytes()
+    with pytest.raises(HistoryError, match="two of its arrays are called 'X'; keep one of them"):
+        ck.read_frames(written(tmp_path, content + content[128:], "c.mat"))[0]
