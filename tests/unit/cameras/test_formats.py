@@ -305,3 +305,43 @@ def test_arrays_of_matlab_of_other_shapes_or_of_one_name_are_refused(tmp_path: P
     content = (tmp_path / "b.mat").read_bytes()
     with pytest.raises(HistoryError, match="two of its arrays are called 'X'; keep one of them"):
         ck.read_frames(written(tmp_path, content + content[128:], "c.mat"))[0]
+
+
+UNKNOWN = b"xpos_um;ypos_um;zpos_um;dx_um;dy_um;dz_um\n" + b"1;2;3;4;5;6\n" * 600
+
+
+def test_what_is_no_frame_is_found_out_from_some_of_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from creepkit.cameras import reading
+
+    for k in range(100):
+        written(tmp_path, UNKNOWN, f"frame_{k:03d}.csv")
+    looked_at: list[Path] = []
+    recognise = reading.recognise
+    monkeypatch.setattr(reading, "recognise", lambda file, *rest: (looked_at.append(file), recognise(file, *rest))[1])
+    with pytest.raises(HistoryError, match=r"000.csv:1: no camera format has its columns \(found: xpos_um.*--columns"):
+        ck.read_frames(tmp_path)
+    assert len(looked_at) == reading.MOST_LOOKED_AT
+    written(tmp_path, zeiss(), "frame_050.csv")  # damaged ones stay in the sequence of those that can be read
+    assert len(ck.read_frames(tmp_path)) == 100
+
+
+@pytest.mark.parametrize(("given", "found"), [(None, "found None"), ([1, 2], r"found \[1, 2\]"), (3, "found 3")])
+def test_what_is_no_list_of_files(given: object, found: str) -> None:
+    with pytest.raises(HistoryError, match=rf"takes a folder, a file, a pattern or a list of files, {found}"):
+        ck.read_frames(given)  # type: ignore[arg-type]
+
+
+def test_a_file_that_is_listed_twice(tmp_path: Path) -> None:
+    path = written(tmp_path, zeiss(), "a.txt")
+    with pytest.raises(HistoryError, match="a.txt: stands twice in the list of frames"):
+        ck.read_frames([path, path])
+
+
+def test_times_in_names_have_decimals(tmp_path: Path) -> None:
+    format = dataclasses.replace(ck.available("cameras")["zeiss"], time=("name", "", "s"))
+    for name in ("t_2.txt", "t_12.txt"):
+        written(tmp_path, zeiss(), name)
+    assert ck.read_frames(tmp_path, format=format).times.tolist() == [2.0, 12.0]
+    for name in ("t_2.25.txt", "t_12.5.txt"):
+        (tmp_path / f"{name[:-4].split('.')[0]}.txt").rename(tmp_path / name)
+    assert ck.read_frames(tmp_path, format=format).times.tolist() == [2.25, 12.5]
