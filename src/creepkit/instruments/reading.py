@@ -58,9 +58,10 @@ class ReadingOptions:
 
     time, date : names of their columns. time_unit : "s", "ms", "min", "h" of times without a unit. date_order : "month
     first", "day first" or, of years of two digits, "year first". time_zone : such as "America/Chicago" or "+01:00".
-    channels : names of those that are kept; None keeps all. every : rows that are averaged to one.
-    units : {channel: unit} of heads without one. pressure_reference : "gauge" or "absolute", of pressures whose unit
-    does not say. ambient_pressure : MPa, that turns absolute pressures into gauge pressures. missing : texts that mean a lost reading, beside the usual ones.
+    channels : names of those that are kept; None keeps all. every : rows that are averaged to one. units : {channel:
+    unit} of heads without one. pressure_reference : "gauge" or "absolute", of pressures whose unit does not say.
+    ambient_pressure : MPa, that turns absolute pressures into gauge pressures. missing : texts that mean a lost
+    reading, beside the usual ones.
     """
 
     time: str = ""
