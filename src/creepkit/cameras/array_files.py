@@ -1,7 +1,8 @@
 """Frames in binary files: arrays of MATLAB (versions 5 and 7.3), and packed rows without a head.
 
 Only numeric arrays are read; objects, cells, functions and text in such a file are passed over. The layout of version 5
-is that of MathWorks, MAT-File Format (2024); no more is unpacked than the arrays' own sizes say.
+is that of MathWorks, MAT-File Format (2024). Names and shapes are read first; of a frame its own columns alone are
+unpacked, and no more than their sizes say.
 """
 
 from __future__ import annotations
@@ -9,8 +10,10 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,8 +24,16 @@ from creepkit.cameras.text_files import FRAME_FILE
 from creepkit.errors import HistoryError
 from creepkit.files.reading import read_bytes
 
-LARGEST_ARRAY = 20_000_000
-"""Numbers in one array of a frame."""
+LARGEST_FRAME = 20_000_000
+"""Numbers of a frame in all its columns."""
+
+
+MOST_ELEMENTS = 10_000
+"""Arrays and other elements in one file."""
+
+
+_HEAD_BYTES = 4096
+"""In which kind, shape and name of an array stand."""
 
 
 MATLAB_5, HDF5 = b"MATLAB 5.0 MAT-file", b"\x89HDF\r\n\x1a\n"
@@ -45,25 +56,30 @@ _NUMERIC_CLASSES = range(6, 16)
 class ArrayTable:
     """Columns of one frame that are arrays in a file.
 
-    arrays : {name: (points,)}.
+    shapes : {name: shape}. load : the arrays of some names, each (points,); only what is asked for is read.
     """
 
     path: Path
-    arrays: Mapping[str, Floats]
+    shapes: Mapping[str, tuple[int, ...]]
+    load: Callable[[Sequence[str]], Mapping[str, Floats]]
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names of the arrays."""
-        return tuple(self.arrays)
+        return tuple(self.shapes)
 
     def numbers(self, positions: Sequence[int]) -> Floats:
-        """(points, positions) the numbers of some arrays; HistoryError where they differ in size."""
+        """(points, positions) the numbers of some arrays; HistoryError where they differ in shape."""
         chosen = [self.names[k] for k in positions]
-        sizes = {name: self.arrays[name].size for name in chosen}
-        if len(set(sizes.values())) > 1:
-            listed = ", ".join(f"{name} has {size}" for name, size in sizes.items())
+        shapes = {name: tuple(size for size in self.shapes[name] if size != 1) for name in chosen}
+        if len(set(shapes.values())) > 1:
+            listed = ", ".join(f"{name} has {' x '.join(map(str, self.shapes[name]))}" for name in chosen)
             raise HistoryError(f"{self.path}: its arrays differ in their number of points ({listed}); is it damaged?")
-        return np.stack([self.arrays[name] for name in chosen], axis=1)
+        count = sum(math.prod(self.shapes[name]) for name in chosen)
+        if count > LARGEST_FRAME:
+            raise HistoryError(f"{self.path}: a frame of {count} numbers, of at most {LARGEST_FRAME}; is it damaged?")
+        arrays = self.load(chosen)
+        return np.stack([arrays[name] for name in chosen], axis=1)
 
     def location(self, row: int) -> str:
         """Where a point stands."""
@@ -79,15 +95,30 @@ def matlab_table(path: Path) -> ArrayTable:
     """The numeric arrays of a MATLAB file."""
     if not read_bytes(path, FRAME_FILE, first=len(MATLAB_5)).startswith(MATLAB_5):
         return _hdf5_table(path)
-    content = read_bytes(path, FRAME_FILE)
+    content = memoryview(read_bytes(path, FRAME_FILE))
+    stored: dict[str, _Stored] = {}
+    with _damage_reported(path):
+        for array in _stored_arrays(content):
+            if array.name in stored:
+                raise HistoryError(f"{path}: two of its arrays are called '{array.name:.40}'; keep one of them")
+            stored[array.name] = array
+
+    def load(names: Sequence[str]) -> dict[str, Floats]:
+        with _damage_reported(path):
+            return {name: stored[name].numbers() for name in names}
+
+    return ArrayTable(path, {name: array.shape for name, array in stored.items()}, load)
+
+
+@contextmanager
+def _damage_reported(path: Path) -> Iterator[None]:
     try:
-        arrays = {array.name: array.numbers for array in _arrays(content)}
+        yield
     except (struct.error, zlib.error, ValueError, IndexError, OverflowError) as error:
         words = " ".join(str(error).split())
         raise HistoryError(f"{path}: cannot be read as arrays of MATLAB, it seems damaged ({words})") from None
     except MemoryError:
         raise HistoryError(f"{path}: holds more than there is memory for; is it damaged?") from None
-    return ArrayTable(path, arrays)
 
 
 def _hdf5_table(path: Path) -> ArrayTable:
@@ -96,41 +127,64 @@ def _hdf5_table(path: Path) -> ArrayTable:
 
     from creepkit.files.hdf5_files import open_hdf5
 
+    def load(names: Sequence[str]) -> dict[str, Floats]:
+        with open_hdf5(path, FRAME_FILE) as file:
+            return {name: np.asarray(file[name][()], dtype=float).T.ravel() for name in names}
+
     with open_hdf5(path, FRAME_FILE) as file:
-        arrays = {
-            name: np.asarray(item[()], dtype=float).T.ravel()
+        shapes = {
+            name: item.shape
             for name, item in file.items()
-            if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and 0 < item.size <= LARGEST_ARRAY
+            if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and 0 < item.size <= LARGEST_FRAME
         }
-    return ArrayTable(path, arrays)
-
-
-class _Array(NamedTuple):
-    name: str
-    numbers: Floats
+    return ArrayTable(path, shapes, load)
 
 
 class _Element(NamedTuple):
     kind: int
-    data: bytes
+    data: memoryview
 
 
-def _arrays(content: bytes) -> Iterator[_Array]:
-    """The real numeric arrays of more than one number in a file of version 5."""
-    order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
+class _Stored(NamedTuple):
+    """An array in a file of version 5. data : its element; unpacked only when its numbers are asked for."""
+
+    name: str
+    shape: tuple[int, ...]
+    data: memoryview
+    is_compressed: bool
+    order: str
+
+    def numbers(self) -> Floats:
+        """(points,)."""
+        count = math.prod(self.shape)
+        data = _unpacked(self.data, self.order, 8 * count + _HEAD_BYTES) if self.is_compressed else self.data
+        values = next(islice(_elements(data, self.order), 3, None), None)
+        if values is None or values.kind not in _TYPES:
+            raise ValueError("an array has no numbers")
+        numbers = np.frombuffer(values.data, dtype=np.dtype(self.order + _TYPES[values.kind]))
+        if numbers.size != count:
+            raise ValueError(f"the array {self.name:.40} has {numbers.size} numbers in the place of {count}")
+        return numbers.astype(float).reshape(self.shape, order="F").ravel()
+
+
+def _stored_arrays(content: memoryview) -> Iterator[_Stored]:
+    """The real numeric arrays in a file of version 5, of which no more than their heads is unpacked."""
+    order = {b"IM": "<", b"MI": ">"}.get(bytes(content[126:128]))
     if order is None:
         raise ValueError("its mark of the order of bytes is missing")
-    for element in _elements(content[128:], order):
-        data = element.data
-        if element.kind == _COMPRESSED:
-            data = _unpacked(data, order)
-        elif element.kind != _MATRIX:
+    for number, element in enumerate(_elements(content[128:], order)):
+        if number == MOST_ELEMENTS:
+            raise ValueError(f"more than {MOST_ELEMENTS} elements")
+        is_compressed = element.kind == _COMPRESSED
+        if not is_compressed and element.kind != _MATRIX:
             continue
-        if (array := _array_of(data, order)) is not None:
-            yield array
+        head = _unpacked(element.data, order, _HEAD_BYTES, whole=False) if is_compressed else element.data
+        described = _described(head[:_HEAD_BYTES], order)
+        if described is not None:
+            yield _Stored(*described, element.data, is_compressed, order)
 
 
-def _elements(data: bytes, order: str) -> Iterator[_Element]:
+def _elements(data: memoryview, order: str) -> Iterator[_Element]:
     """The elements that lie one behind the other in some bytes."""
     position = 0
     while position + 8 <= len(data):
@@ -149,40 +203,40 @@ def _elements(data: bytes, order: str) -> Iterator[_Element]:
         position = end if kind == _COMPRESSED else end + -size % 8
 
 
-def _unpacked(data: bytes, order: str) -> bytes:
-    """The inside of the one matrix that a compressed element holds, no longer than its head says; b"" for others."""
+def _unpacked(data: memoryview, order: str, most: int, whole: bool = True) -> memoryview:
+    """The inside of the one matrix that a compressed element holds, at most so many bytes; nothing of others.
+
+    whole : whether less than its head says is an error.
+    """
     stream = zlib.decompressobj()
     head = stream.decompress(data, 8)
     kind, size = struct.unpack(f"{order}II", head)
-    if kind != _MATRIX or size > 8 * LARGEST_ARRAY + 4096:
-        return b""
-    inside = stream.decompress(stream.unconsumed_tail, size) if size else b""
-    if len(inside) < size:
+    if kind != _MATRIX:
+        return memoryview(b"")
+    if whole and size > most:
+        raise ValueError("a compressed array is larger than its shape says")
+    inside = stream.decompress(stream.unconsumed_tail, min(size, most)) if size else b""
+    if whole and len(inside) < size:
         raise ValueError("a compressed array is cut off")
-    return inside
+    return memoryview(inside)
 
 
-def _array_of(data: bytes, order: str) -> _Array | None:
-    """The array in the inside of a matrix; None for what is no real array of numbers."""
-    parts = _elements(data, order)
-    flags, shape, name = next(parts, None), next(parts, None), next(parts, None)
+def _described(head: memoryview, order: str) -> tuple[str, tuple[int, ...]] | None:
+    """Name and shape of the array whose matrix begins so; None for what is no real array of numbers."""
+    parts = _elements(head, order)
+    try:
+        flags, shape, name = next(parts, None), next(parts, None), next(parts, None)
+    except ValueError:  # they are longer than those of any frame
+        return None
     if flags is None or shape is None or name is None or flags.kind != 6 or len(flags.data) < 4:
         return None
     (word,) = struct.unpack_from(f"{order}I", flags.data)
     if word & 0xFF not in _NUMERIC_CLASSES or word & 0x0800 or shape.kind != 5:
         return None
     sizes = struct.unpack(f"{order}{len(shape.data) // 4}i", shape.data[: len(shape.data) // 4 * 4])
-    count = math.prod(sizes)
-    if min(sizes, default=0) < 1 or not 0 < count <= LARGEST_ARRAY:
+    if not 0 < len(sizes) <= 32 or min(sizes) < 1 or math.prod(sizes) > LARGEST_FRAME:
         return None
-    values = next(parts, None)
-    if values is None or values.kind not in _TYPES:
-        raise ValueError("an array has no numbers")
-    numbers = np.frombuffer(values.data, dtype=np.dtype(order + _TYPES[values.kind]))
-    label = name.data.decode("ascii", errors="replace").rstrip("\0")
-    if numbers.size != count:
-        raise ValueError(f"the array {label:.40} has {numbers.size} numbers in the place of {count}")
-    return _Array(label, numbers.astype(float).reshape(sizes, order="F").ravel())
+    return bytes(name.data).decode("ascii", errors="replace").rstrip("\0"), sizes
 
 
 def row_table(path: Path, layout: Sequence[tuple[str, str]]) -> ArrayTable:
@@ -201,4 +255,5 @@ def row_table(path: Path, layout: Sequence[tuple[str, str]]) -> ArrayTable:
             raise HistoryError(
                 f"{path}, point {k + 1}: '{name}' is {rows[name][k]}, where 0 or 1 must be; it is of another layout"
             )
-    return ArrayTable(path, {name: rows[name].astype(float) for name, _ in layout})
+    shapes = {name: rows.shape for name, _ in layout}
+    return ArrayTable(path, shapes, lambda names: {name: rows[name].astype(float) for name in names})

@@ -16,7 +16,7 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.cameras.array_files import ArrayTable
 from creepkit.cameras.columns import FrameColumns, columns_of, frame_of, time_in
 from creepkit.cameras.recognition import Recognised, recognise
-from creepkit.cameras.sequences import in_order, missing_numbers, numbers_in, skeleton
+from creepkit.cameras.sequences import in_order, last_number, missing_numbers, skeleton
 from creepkit.cameras.text_files import (
     FRAME_FILE,
     FrameText,
@@ -31,6 +31,10 @@ from creepkit.errors import HistoryError, nearest
 from creepkit.files.reading import read_bytes
 from creepkit.records import CameraFrame, Frames
 from creepkit.records.camera_format import TIME_UNITS, CameraFormat
+
+MOST_LOOKED_AT = 10
+"""Files of one name, but for its numbers, whose heads decide whether they are frames."""
+
 
 FormatLike = CameraFormat | str | Mapping[str, Any] | None
 
@@ -80,6 +84,8 @@ def _candidates(format: FormatLike, formats: Sequence[CameraFormat]) -> tuple[Ca
     if isinstance(format, Mapping):
         return (CameraFormat("columns", "columns named by the user", format),)
     known = {one.name: one for one in formats}
+    if not isinstance(format, str):
+        raise HistoryError(f"format is {format!r:.60}; give a name, {{quantity: column}} or ck.CameraFormat(...)")
     if format not in known:
         raise HistoryError(f"no camera format is called '{format}'; {nearest(str(format), known)}")
     return (known[format],)
@@ -91,10 +97,7 @@ def _candidates(format: FormatLike, formats: Sequence[CameraFormat]) -> tuple[Ca
 def _files(path: FramePath, formats: Sequence[CameraFormat], chosen: bool) -> list[Path]:
     """The files of a sequence in order; one file may hold all of it."""
     if not isinstance(path, (str, Path)):
-        listed = [Path(one) for one in path]
-        if not listed:
-            raise HistoryError("no files are given to read frames from; name a folder, a file or a list of files")
-        return listed
+        return _listed_files(path)
     place = Path(path).expanduser()
     if place.is_dir():
         return in_order(_frames_in_folder(place, formats, chosen))
@@ -104,6 +107,22 @@ def _files(path: FramePath, formats: Sequence[CameraFormat], chosen: bool) -> li
     if not matches:
         raise HistoryError(f"{path}: no file matches this pattern; name a folder of frames or a file")
     return in_order(matches)
+
+
+def _listed_files(paths: object) -> list[Path]:
+    """The files of a list, in its order; HistoryError for what is none, and for a file that stands in it twice."""
+    given = list(paths) if isinstance(paths, Iterable) else None
+    if given is None or not all(isinstance(one, (str, Path)) for one in given):
+        raise HistoryError(f"read_frames() takes a folder, a file, a pattern or a list of files, found {paths!r:.60}")
+    if not given:
+        raise HistoryError("no files are given to read frames from; name a folder, a file or a list of files")
+    listed = [Path(one).expanduser() for one in given]
+    seen: set[Path] = set()
+    for one in listed:
+        if one.absolute() in seen:
+            raise HistoryError(f"{one}: stands twice in the list of frames; name each file once")
+        seen.add(one.absolute())
+    return listed
 
 
 def _frames_in_folder(folder: Path, formats: Sequence[CameraFormat], chosen: bool) -> list[Path]:
@@ -124,16 +143,28 @@ def _frames_in_folder(folder: Path, formats: Sequence[CameraFormat], chosen: boo
     if not files:
         wanted = ", ".join(sorted(set(patterns)))
         raise HistoryError(f"{folder}: has no files of frames; their names are {wanted}")
-    refused: dict[Path, HistoryError] = {}
+    groups: dict[str, list[Path]] = {}
     for file in files:
+        groups.setdefault(skeleton(file.name), []).append(file)
+    refused: list[HistoryError] = []
+    frames = {name for name, group in groups.items() if _has_a_frame(group, formats, chosen, refused)}
+    if not frames:
+        raise refused[0]
+    return [file for file in files if skeleton(file.name) in frames]
+
+
+def _has_a_frame(
+    group: Sequence[Path], formats: Sequence[CameraFormat], chosen: bool, refused: list[HistoryError]
+) -> bool:
+    """Whether a file of a name is a frame, of which some are looked at; errors of those that are none are appended."""
+    for file in group[:: -(-len(group) // MOST_LOOKED_AT)]:
         try:
             recognise(file, formats, chosen)
         except HistoryError as error:
-            refused[file] = error
-    kinds = {skeleton(file.name) for file in files if file not in refused}
-    if not kinds:
-        raise next(iter(refused.values()))
-    return [file for file in files if skeleton(file.name) in kinds]
+            refused.append(error)
+        else:
+            return True
+    return False
 
 
 # ---- tables of a sequence ------------------------------------------------------------------------------------------
@@ -275,7 +306,7 @@ def _time_source(format: CameraFormat, tables: _Tables, columns: FrameColumns) -
     factor = TIME_UNITS[unit]
     if source == "head":
         return lambda index: factor * _number_above(tables, index, key)
-    return lambda index: factor * next(iter(numbers_in(Path(tables.source(index)).name)[::-1]), np.nan)
+    return lambda index: factor * last_number(Path(tables.source(index)).name)
 
 
 def _time_in_column(format: CameraFormat, tables: _Tables, index: int) -> float:

@@ -133,5 +133,5 @@ def _unknown(names: Sequence[str], formats: Sequence[CameraFormat], what: str) -
     known = ", ".join(one.name for one in formats)
     return (
         f"no camera format has its {what} {found}; known are {known or 'none'}, or name the columns with "
-        "format=ck.CameraFormat(...)"
+        "format=ck.CameraFormat(...), for creepkit extract with --columns, or load a plugin with --plugin FILE.py"
     )

@@ -43,6 +43,12 @@ LEAST_COLUMNS = 4
 _LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\n|\r|\Z)")
 
 
+_BEGINS_WITH_NUMBER = re.compile(
+    rb'\s*"?[+-]?(?:(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eEdD][+-]?\d+)?|nan)"?\s*(?:[;\t,\s]|\Z)', re.IGNORECASE
+)
+"""A row of numbers, or of a lost point, which names no columns."""
+
+
 SAMPLE_ROWS = 50
 """Rows whose cells show the decimal sign."""
 
@@ -85,6 +91,8 @@ def head_bytes(path: Path) -> bytes:
 def candidate_heads(content: bytes) -> Iterator[TextHead]:
     """The lines of a file that may name columns, divided by each delimiter that they have."""
     for number, found in enumerate(islice(_LINE.finditer(content), HEAD_LINES), start=1):
+        if _BEGINS_WITH_NUMBER.match(found[1]):
+            continue
         text = _decoded(found[1])
         for delimiter in DELIMITERS:
             names = _names(text, delimiter)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime, timedelta, timezone, tzinfo
 
@@ -14,7 +14,7 @@ from creepkit.errors import HistoryError
 
 DAY = 86400.0
 EPOCH = date(1970, 1, 1).toordinal()
-DATE_ORDERS = ("month first", "day first")
+DATE_ORDERS = ("month first", "day first", "year first")
 
 
 _STAMP = re.compile(
@@ -104,7 +104,7 @@ class ResolvedTimes:
 def resolve(column: ClockColumn, path: str, lines: Ints, date_order: str, time_zone: str) -> ResolvedTimes:
     """Clock times as seconds from the first row.
 
-    lines : (rows,) line of each row in the file. date_order : "month first", "day first" or "" to decide by the dates.
+    lines : (rows,) line of each row in the file. date_order : one of DATE_ORDERS, or "" to decide by the dates.
     """
     numbers, seconds = np.concatenate(column.rows), np.concatenate(column.seconds)
     offsets = np.concatenate(column.offsets)
@@ -183,8 +183,8 @@ def _days(
     if not possible:
         raise HistoryError(f"{problem}; write dates such as 2025-08-18")
     values = list(possible.values())
-    if len(possible) == 1 or np.array_equal(values[0], values[-1]):
-        note = "" if date_order or len(possible) == 2 else f"its dates have the {next(iter(possible))}"
+    if all(np.array_equal(values[0], other) for other in values[1:]):
+        note = "" if date_order or len(possible) > 1 else f"its dates have the {next(iter(possible))}"
         return values[0], note
     gaps = [np.diff((days - days[0])[numbers] * DAY + seconds) for days in values]
     plausible = [bool((gap >= 0).all() and gap.max(initial=0.0) < 7 * DAY) for gap in gaps]
@@ -193,9 +193,13 @@ def _days(
         return values[k], f"its dates have the {list(possible)[k]}, for only so its rows follow each other"
     text = next(iter(column.dates))
     raise HistoryError(
-        f"{places[0]}: the date '{text}' may have the month or the day first, and no other row tells; state "
-        "date_order, 'month first' or 'day first'"
+        f"{places[0]}: the date '{text}' may have {_either(possible)} first, and no other row tells; state "
+        f"date_order, {' or '.join(repr(order) for order in possible)}"
     )
+
+
+def _either(orders: Iterable[str]) -> str:
+    return " or ".join(f"the {order.removesuffix(' first')}" for order in orders)
 
 
 def _ordinal(text: str, order: str) -> int | None:
@@ -205,6 +209,10 @@ def _ordinal(text: str, order: str) -> int | None:
         return None
     a, sign, b, _, c = match.groups()
     if len(a) == 4:
+        year, month, day = int(a), b, int(c)
+    elif order == "year first":  # 25-08-18; what ends with four digits, or has points, is not written so
+        if len(c) > 2 or sign == ".":
+            return None
         year, month, day = int(a), b, int(c)
     elif b.isdigit() and order == "month first" and sign != ".":
         year, month, day = int(c), a, int(b)

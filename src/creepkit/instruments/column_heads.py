@@ -85,6 +85,10 @@ TIME_UNITS = {
 """{unit: s}."""
 
 
+MINUTES_AND_SECONDS = re.compile(r"(?<![a-z:])(?:m|mm|min):(?:s|ss|sec)(?![a-z])", re.IGNORECASE)
+"""A unit of cells such as 12:30 that makes them 12.5 min, where a clock shows hours and minutes."""
+
+
 _BRACKETED = re.compile(r"(?P<name>[^()\[\]]*[^()\[\]\s])\s*[(\[](?P<unit>[^\[\]]{1,30}?)[)\]]")
 
 
@@ -143,7 +147,8 @@ def stated_unit(place: str, head: str, in_name: str, in_row: str) -> str:
         isinstance(first, ChannelUnit)
         and isinstance(second, ChannelUnit)
         and not (first.reference and second.reference)
-    ) and replace(first, reference="") == replace(second, reference=""):
+        and replace(first, reference="") == replace(second, reference="")
+    ):
         return in_row if first.reference else in_name
     raise HistoryError(f"{place}: '{head:.60}' has the unit {in_name}, the row of units says {in_row}; correct one")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -12,9 +13,10 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest
-from creepkit.files.time_stamps import DATE_ORDERS, ResolvedTimes, resolve
+from creepkit.files.time_stamps import DATE_ORDERS, DAY, ResolvedTimes, resolve
 from creepkit.instruments.column_heads import (
     KNOWN_UNITS,
+    MINUTES_AND_SECONDS,
     TIME_UNITS,
     ChannelUnit,
     channel_unit,
@@ -24,7 +26,15 @@ from creepkit.instruments.column_heads import (
     split_head,
     stated_unit,
 )
-from creepkit.instruments.record_tables import MISSING, KeptColumns, TableHead, block_means, find_head, numbered_lines
+from creepkit.instruments.record_tables import (
+    MISSING,
+    KeptColumns,
+    TableHead,
+    block_means,
+    ends_with_line_end,
+    find_head,
+    numbered_lines,
+)
 from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
 
 TIME_NAMES = (
@@ -36,6 +46,10 @@ UNIX_SCALES = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
 """Numbers above the first are unix times in units of the second, s; below 1e8 they are none."""
 
 
+EARLIEST_UNIX_TIME = 315532800.0
+"""s, the beginning of 1980; unix times from then to the next day are believed."""
+
+
 LARGEST_PRESSURE, TEMPERATURES = 1e5, (0.0, 1e4)
 """MPa and K beyond which a reading is a fault of the instrument."""
 
@@ -45,10 +59,11 @@ class ReadingOptions:
     """What a caller says about a record.
 
     time, date : names of their columns. time_unit : "s", "ms", "min", "h" of times without a unit. date_order : "month
-    first" or "day first". time_zone : such as "America/Chicago" or "+01:00". channels : names of those that are kept;
-    None keeps all. every : rows that are averaged to one. units : {channel: unit} of heads without one.
-    pressure_reference : "gauge" or "absolute", of pressures whose unit does not say. ambient_pressure : MPa, that turns
-    absolute pressures into gauge pressures. missing : texts that mean a lost reading, beside the usual ones.
+    first", "day first" or, of years of two digits, "year first". time_zone : such as "America/Chicago" or "+01:00".
+    channels : names of those that are kept; None keeps all. every : rows that are averaged to one. units : {channel:
+    unit} of heads without one. pressure_reference : "gauge" or "absolute", of pressures whose unit does not say.
+    ambient_pressure : MPa, that turns absolute pressures into gauge pressures. missing : texts that mean a lost
+    reading, beside the usual ones.
     """
 
     time: str = ""
@@ -92,7 +107,7 @@ class ReadingOptions:
         if ambient is not None and (isinstance(ambient, bool) or not isinstance(ambient, (int, float))):
             raise HistoryError(f"ambient_pressure is {ambient!r:.40}; give a number of MPa, such as 0.1013")
         if self.date_order and self.date_order not in DATE_ORDERS:
-            raise HistoryError(f"date_order is '{self.date_order:.40}'; write 'month first' or 'day first'")
+            raise HistoryError(f"date_order is '{self.date_order:.40}'; write {' or '.join(map(repr, DATE_ORDERS))}")
 
     @classmethod
     def of(cls, options: Mapping[str, Any]) -> ReadingOptions:
@@ -222,6 +237,8 @@ class _Layout:
         notes = [*resolved.notes]
         if kept.incomplete:
             notes.append(f"its last line, {kept.incomplete}, is cut off and was left out")
+        elif not ends_with_line_end(self.path):
+            notes.append(f"its last line, {lines[-1]}, has no end; it may be cut off amid a number")
         times = block_means(resolved.times, self.options.every)
         if self.options.every > 1:
             notes.append(f"each row is the mean of {self.options.every} rows of the file")
@@ -251,6 +268,7 @@ class _Layout:
         order = self.options.date_order or self.format.date_order
         zone = self.options.time_zone or self.format.time_zone
         if kept.clock is not None:
+            self._check_clock_unit()
             return resolve(kept.clock, str(self.path), lines, order, zone)
         numbers = np.concatenate(kept.numbers)
         factor = TIME_UNITS.get(self.time_unit)
@@ -268,9 +286,29 @@ class _Layout:
                 f"{self.path}:{lines[row]}: time falls from {numbers[row - 1]:g} to {numbers[row]:g}; it must never "
                 "decrease"
             )
-        if numbers[0] * factor > UNIX_SCALES[-1][0]:
-            return ResolvedTimes((numbers - numbers[0]) * factor, float(numbers[0] * factor))
-        return ResolvedTimes(numbers * factor, None)
+        if numbers[0] * factor <= UNIX_SCALES[-1][0]:
+            return ResolvedTimes(numbers * factor, None)
+        start = float(numbers[0] * factor)
+        if factor > 1.0 or not EARLIEST_UNIX_TIME <= start <= time.time() + DAY:
+            raise HistoryError(
+                f"{self.path}:{lines[0]}: time begins at {numbers[0]:.15g} {self.time_unit or 's'}, which is no time "
+                "since the start of a record and no unix time (s, ms, us or ns since 1970, from 1980 to today), as "
+                "where days are counted from 1900 or seconds from 1904; write dates, or times from the first row on"
+            )
+        return ResolvedTimes((numbers - numbers[0]) * factor, start)
+
+    def _check_clock_unit(self) -> None:
+        """HistoryError where the head gives a unit to cells that are times of a clock, hours and minutes."""
+        column = self.times[-1]
+        head = self.head.names[column]
+        unit = split_head(head)[1]
+        stated = [text for text in (unit, self.head.units[column]) if text in TIME_UNITS]
+        stated += MINUTES_AND_SECONDS.findall(f"{head[:200]} {self.head.units[column][:40]}")
+        if stated:
+            raise HistoryError(
+                f"{self.path}:{self.head.names_line}: '{head:.60}' is in {stated[0]}, and its first cell is a time of "
+                "a clock, hours:minutes; write numbers, or all times as h:mm:ss and the name without a unit"
+            )
 
     def _channel(self, name: str, written: str, numbers: Floats) -> tuple[Channel, list[str]]:
         """A channel in creepkit's unit, and what was found about it."""

@@ -19,7 +19,7 @@ from creepkit.files.delimited_text import (
     parse_numbers,
     split_line,
 )
-from creepkit.files.reading import FileKind, open_binary
+from creepkit.files.reading import FileKind, open_binary, read_range
 from creepkit.files.time_stamps import ClockColumn, is_clock_time
 from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
 
@@ -105,6 +105,12 @@ def numbered_lines(path: Path) -> Iterator[list[tuple[int, str]]]:
                 return
 
 
+def ends_with_line_end(path: Path) -> bool:
+    """Whether a line that the instrument wrote to its end is the last one."""
+    last = read_range(path, RECORD_FILE, max(path.stat().st_size - 2, 0), 2).replace(b"\0", b"")  # also in UTF-16
+    return last[-1:] in (b"\n", b"\r")
+
+
 def _last_line_end(content: bytes) -> int:
     """Bytes up to the last end of a line; one by a carriage return needs a character behind it."""
     return max(content.rfind(b"\n"), content.rfind(b"\r", 0, -1)) + 1
@@ -155,6 +161,8 @@ def find_head(path: Path, lines: Sequence[tuple[int, str]]) -> TableHead:
         units = [*units, *[""] * len(names)][: len(names)]
         remarks = tuple(text.strip() for n, text in sample if n < names_line)
         return TableHead(dialect, tuple(names), tuple(units), names_line, number, remarks)
+    for number, line in sample:
+        _check_decimal_signs(_cells(line, dialect, f"{path}:{number}"), dialect, f"{path}:{number}")
     raise HistoryError(
         f"{path}:{sample[0][0]}: no row of readings, a time and numbers, in the first {_HEAD_LINES} lines; name a table"
     )
@@ -178,6 +186,19 @@ def _is_row(cells: Sequence[str], dialect: Dialect) -> bool:
     """Whether a line holds readings: at least one number or time, and nothing else but lost readings."""
     count = sum(is_number(cell, dialect) or is_clock_time(cell) for cell in cells)
     return len(cells) > 1 and count > 0 and count + sum(cell in MISSING for cell in cells) >= 0.8 * len(cells)
+
+
+def _check_decimal_signs(cells: Sequence[str], dialect: Dialect, location: str) -> None:
+    """HistoryError for a row that would be one of readings if all its decimal signs were the same."""
+    other = Dialect(dialect.delimiter, "," if dialect.decimal == "." else ".")
+    numbers = sum(is_number(cell, dialect) or is_clock_time(cell) for cell in cells)
+    odd = [cell for cell in cells if is_number(cell, other) and not is_number(cell, dialect)]
+    if len(cells) > 1 and odd and numbers + len(odd) >= 0.8 * len(cells):
+        words = "points" if dialect.decimal == "." else "commas"
+        raise HistoryError(
+            f"{location}: '{odd[0]:.40}', where the other numbers have decimal {words}; write all numbers alike, "
+            "without separators between thousands"
+        )
 
 
 def _is_units(cells: Sequence[str]) -> bool:

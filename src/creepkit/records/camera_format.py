@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 from creepkit.errors import HistoryError, nearest
@@ -44,13 +45,19 @@ class ColumnName(NamedTuple):
     @classmethod
     def of(cls, text: str) -> ColumnName:
         """From the head of a file: `X [mm]`, `coor.X.mm`, `stereo_x_mm`, `"W (in)"`, `SIGMA`."""
-        text = " ".join(text.strip().strip('"').split())
-        if found := _UNIT_IN_BRACKETS.match(text):
-            return cls(_plain(found[1]), found[2].strip())
-        stem, mark, last = _plain(text).rpartition(" ")
-        if mark and last in (*LENGTH_UNITS, *TIME_UNITS, *PIXELS):
-            return cls(stem, last)
-        return cls(_plain(text), "")
+        return _column_name(text)
+
+
+@lru_cache(maxsize=4096)
+def _column_name(text: str) -> ColumnName:
+    """Of a text, of which all frames and all formats have the same."""
+    text = " ".join(text.strip().strip('"').split())
+    if found := _UNIT_IN_BRACKETS.match(text):
+        return ColumnName(_plain(found[1]), found[2].strip())
+    stem, mark, last = _plain(text).rpartition(" ")
+    if mark and last in (*LENGTH_UNITS, *TIME_UNITS, *PIXELS):
+        return ColumnName(stem, last)
+    return ColumnName(_plain(text), "")
 
 
 def _plain(name: str) -> str:
@@ -91,7 +98,8 @@ class CameraFormat:
     patterns : names of files, such as "*.csv". planar : columns by which a two-dimensional table of the system is
         recognised, which is refused.
     time : where the time of a frame stands unless it is a column: ("head", key, unit) for a line `key: value` above the
-        columns, ("name", "", unit) for the last number in the file's name; () for nowhere.
+        columns, ("name", "", unit) for the last number in the file's name, 12.5 of t_12.5.csv; () for
+        nowhere.
     layout : ((column, NumPy type), ...) of the packed rows of a binary file without a head.
     """
 

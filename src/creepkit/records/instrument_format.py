@@ -19,7 +19,8 @@ class InstrumentFormat:
     required : regular expressions; each matches a whole name of the line of names. Without any, every table is accepted
         that no other format wants.
     time, date : names of their columns; "" finds the usual ones. time_unit : of times that are numbers, "s", "ms",
-        "min", "h". date_order : "month first" or "day first". time_zone : such as "America/Chicago" or "+01:00".
+        "min", "h". date_order : "month first", "day first" or "year first". time_zone : such as "America/Chicago" or
+        "+01:00".
     units : {regular expression: unit} of columns whose heads state none.
     pressure_reference : "gauge" or "absolute", where the units do not say. missing : texts that mean a lost reading,
         beside the usual ones.

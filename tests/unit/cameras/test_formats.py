@@ -262,3 +262,88 @@ def test_arrays_of_matlab_written_in_other_ways(tmp_path: Path) -> None:
 
     with pytest.raises(HistoryError, match="cannot be read as arrays of MATLAB, it seems damaged"):
         ck.read_frames(written(tmp_path, vic_3d_mat()[:900], "c.mat"))
+
+
+def test_arrays_of_matlab_that_are_not_asked_for_are_not_unpacked(tmp_path: Path) -> None:
+    """160 MB of zeros beside a frame; and columns that are as large, which are refused before they are read."""
+    import tracemalloc
+
+    import h5py
+
+    truth = dome()
+    arrays = dict(zip("XYZUVW", (*truth.points.T, *truth.displacements.T), strict=True))
+
+    def write(name: str, large: str, count: int) -> Path:
+        with h5py.File(tmp_path / name, "w") as file:
+            for column, values in arrays.items():
+                file[column] = values
+            for column in large:
+                if column in file:
+                    del file[column]
+                file.create_dataset(column, (count,), dtype="f8", fillvalue=1.0)
+        return tmp_path / name
+
+    tracemalloc.start()
+    try:
+        assert len(ck.read_frames(write("beside.mat", "ABC", 20_000_000))[0].points) == 49
+        with pytest.raises(HistoryError, match="frame of 60000000 numbers, of at most 20000000"):
+            ck.read_frames(write("large.mat", "XYZUVW", 10_000_000))[0]
+        assert tracemalloc.get_traced_memory()[1] < 50e6
+    finally:
+        tracemalloc.stop()
+
+
+def test_arrays_of_matlab_of_other_shapes_or_of_one_name_are_refused(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    truth = dome()
+    arrays = dict(zip("XYZUVW", (*truth.points.T, *truth.displacements.T), strict=True))
+    savemat(tmp_path / "a.mat", {**arrays, "X": arrays["X"].reshape(7, 7)})
+    with pytest.raises(HistoryError, match=r"differ in their number of points \(X has 7 x 7, Y has 1 x 49"):
+        ck.read_frames(tmp_path / "a.mat")[0]
+    savemat(tmp_path / "b.mat", arrays)
+    content = (tmp_path / "b.mat").read_bytes()
+    with pytest.raises(HistoryError, match="two of its arrays are called 'X'; keep one of them"):
+        ck.read_frames(written(tmp_path, content + content[128:], "c.mat"))[0]
+
+
+UNKNOWN = b"xpos_um;ypos_um;zpos_um;dx_um;dy_um;dz_um\n" + b"1;2;3;4;5;6\n" * 600
+
+
+def test_what_is_no_frame_is_found_out_from_some_of_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from creepkit.cameras import reading
+
+    for k in range(100):
+        written(tmp_path, UNKNOWN, f"frame_{k:03d}.csv")
+    looked_at: list[Path] = []
+    recognise = reading.recognise
+    monkeypatch.setattr(
+        reading, "recognise", lambda file, *rest, **also: (looked_at.append(file), recognise(file, *rest, **also))[1]
+    )
+    with pytest.raises(HistoryError, match=r"000.csv:1: no camera format has its columns \(found: xpos_um.*--columns"):
+        ck.read_frames(tmp_path)
+    assert len(looked_at) == reading.MOST_LOOKED_AT
+    written(tmp_path, zeiss(), "frame_000.csv")  # damaged ones stay in the sequence of those that can be read
+    assert len(ck.read_frames(tmp_path)) == 100
+
+
+@pytest.mark.parametrize(("given", "found"), [(None, "found None"), ([1, 2], r"found \[1, 2\]"), (3, "found 3")])
+def test_what_is_no_list_of_files(given: object, found: str) -> None:
+    with pytest.raises(HistoryError, match=rf"takes a folder, a file, a pattern or a list of files, {found}"):
+        ck.read_frames(given)  # type: ignore[arg-type]
+
+
+def test_a_file_that_is_listed_twice(tmp_path: Path) -> None:
+    path = written(tmp_path, zeiss(), "a.txt")
+    with pytest.raises(HistoryError, match="a.txt: stands twice in the list of frames"):
+        ck.read_frames([path, path])
+
+
+def test_times_in_names_have_decimals(tmp_path: Path) -> None:
+    format = dataclasses.replace(ck.available("cameras")["zeiss"], time=("name", "", "s"))
+    for name in ("t_2.txt", "t_12.txt"):
+        written(tmp_path, zeiss(), name)
+    assert ck.read_frames(tmp_path, format=format).times.tolist() == [2.0, 12.0]
+    for name in ("t_2.25.txt", "t_12.5.txt"):
+        (tmp_path / f"{name[:-4].split('.')[0]}.txt").rename(tmp_path / name)
+    assert ck.read_frames(tmp_path, format=format).times.tolist() == [2.25, 12.5]

@@ -170,6 +170,14 @@ def test_files_of_several_parts_are_read_as_one(tmp_path: Path, monkeypatch: pyt
         ("time_s,p [psig]\ns,psia\n0,1\n1,2\n", {}, ":1: 'p [psig]' has the unit psig, the row of units says psia"),
         ("time_s,P abs [bar]\n0,1\n", {"pressure_reference": "gauge"}, ":1: 'P abs' is called absolute, while press"),
         ("time_s,P abs [psig]\n0,1\n", {}, ":1: 'P abs' is called absolute, while its unit psig says gauge"),
+        ("time [mm:ss],p\n00:00,1\n00:30,2\n", {}, ":1: 'time [mm:ss]' is in mm:ss, and its first cell is a time of a"),
+        ("time (min:s),p\n59:00,1\n59:10,2\n", {}, ":1: 'time (min:s)' is in min:s, and its first cell is a time"),
+        ("time_s,p\n10:00:00,1\n10:00:01,2\n", {}, ":1: 'time_s' is in s, and its first cell is a time of a clock"),
+        ("time (d),p\n45887.5,1\n45887.6,2\n", {}, ":2: time begins at 45887.5 d, which is no time since the start"),
+        ("time,p\n3838300000,1\n3838300001,2\n", {}, ":2: time begins at 3838300000 s, which is no time since the"),
+        ("time_s;p_bar;T_C\n0;1.000;800,5\n1;1.001;800,5\n", {}, ":2: '800,5', where the other numbers have decima"),
+        ('time_s,p_bar,T_C\n0,"1,000",800.5\n1,"1,001",8.5\n', {}, ":2: '1,000', where the other numbers have deci"),
+        ("time,p\n25-08-18 10:00,1\n", {}, ":2: the date '25-08-18' may have the day or the year first"),
         ("time,p\n2025-02-30 10:00,1\n", {}, ":2: '2025-02-30' is no date"),
         ("time,p\n2025-02-20 10:00,1\n", {"time_zone": "Mars"}, "time_zone is 'Mars'"),
     ],
@@ -232,6 +240,22 @@ def test_whether_a_pressure_is_absolute_stands_in_its_unit_or_its_name(
 def test_a_row_of_units_that_says_more_than_the_names(tmp_path: Path) -> None:
     record = ck.read_record(written(tmp_path, "time_s,p [bar],T (upper)\ns,barg,K\n0,1,800\n1,2,800\n"))
     assert [(c.reference, c.quantity) for c in record.channels.values()] == [("gauge", "pressure"), ("", "temperature")]
+
+
+@pytest.mark.parametrize(("order", "day"), [("year first", "2025-08-18"), ("day first", "2018-08-25")])
+def test_years_of_two_digits(tmp_path: Path, order: str, day: str) -> None:
+    content = "time,p_bar\n25-08-18 00:00,1\n25-08-18 00:01,2\n"
+    record = ck.read_record(written(tmp_path, content), date_order=order, time_zone="+00:00")
+    assert record.start == np.datetime64(day).astype("datetime64[s]").astype(float)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_a_last_line_without_an_end_is_remarked(tmp_path: Path, encoding: str) -> None:
+    content = "time_s,p_bar\n0,800\n1,800\n2,8"
+    remark = "its last line, 4, has no end; it may be cut off amid a number"
+    for text, expected in ((content, True), (f"{content}00\n", False)):
+        record = ck.read_record(written(tmp_path, text.encode(encoding)))
+        assert (remark in record.notes) is expected
 
 
 def test_units_in_heads() -> None:
