@@ -186,7 +186,7 @@ def autocorrelation(fields: Floats, places: Floats, spacing: float) -> SpatialCo
     fields : (fields, points) mm, zeros where lost. places : (points, 2) mm. spacing : mm.
     """
     if len(fields) < 2 or not np.abs(fields).max() > 0.0:
-        return SpatialCorrelation(np.eye(1, LAGS)[0], spacing * np.arange(LAGS))
+        return SpatialCorrelation(np.eye(1, LAGS)[0], np.asarray(spacing * np.arange(LAGS), dtype=float))
     chosen = np.arange(len(places))
     if chosen.size > 800:  # the middle ones, so that neighbours stay neighbours
         chosen = np.argsort(np.hypot(*(places - np.median(places, axis=0)).T))[:800]
@@ -265,7 +265,7 @@ def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: Spatia
     errors : (fields, points) mm of the clamped plate, at places (points, 2) mm.
     """
     gains, numbers = rigid_gains(places), patch_numbers(places, patch)
-    within = rho.kept_by_residuals(gains, places, numbers, np.linalg.pinv(gains), gains).within
+    within = rho.kept_by_residuals(gains, places, numbers, np.asarray(np.linalg.pinv(gains), dtype=float), gains).within
     return np.asarray(patch_covariance(gains[None], errors, numbers)[0] / np.sqrt(within[:, None] * within))
 
 

@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -64,9 +65,10 @@ class HistoryCsvReader:
     vocabulary: HeaderVocabulary = field(default_factory=HeaderVocabulary)
 
     def __post_init__(self) -> None:
-        if isinstance(self.columns, str) or not all(isinstance(c, str) for c in _listed(self.columns)):
+        columns: Any = self.columns
+        if isinstance(columns, str) or not all(isinstance(c, str) for c in _listed(columns)):
             raise HistoryError(
-                f"reader '{self.name}': columns is a {type(self.columns).__name__}; give a tuple of names of columns as "
+                f"reader '{self.name}': columns is a {type(columns).__name__}; give a tuple of names of columns as "
                 "its files write them, such as ('Time (h)', 'Strain (%)'), and vocabulary=HeaderVocabulary(...)"
             )
         if not isinstance(self.vocabulary, HeaderVocabulary):

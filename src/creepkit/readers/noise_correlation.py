@@ -16,9 +16,11 @@ KEY = "noise_correlation"
 def read_noise_correlation(conditions: StatedConditions, outputs: Collection[str]) -> dict[tuple[str, str], float]:
     """{(output, output): correlation} as the head states them; HistoryError for what cannot be one."""
     entry = conditions.take_entry(KEY)
-    location, text = (entry.location, entry.text) if entry is not None else ("", "")
     known, correlations = list(outputs), dict[tuple[str, str], float]()
-    for item in text.split(";") if entry is not None and text else ():
+    if entry is None or not entry.text:
+        return correlations
+    location, text = entry.location, entry.text
+    for item in text.split(";"):
         words = item.split()
         if len(words) != 3:
             raise HistoryError(

@@ -9,7 +9,7 @@ from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.records import PressureJump
 from creepkit.screening.alloys import Alloy, check_tests, group_by_alloy, limitations
-from creepkit.specimens.bulge.observation import profile_displacement
+from creepkit.specimens.bulge.outputs import profile_displacement
 from helpers.planted_alloys import bars, bulge
 
 BULGE = ck.specimen("bulge")

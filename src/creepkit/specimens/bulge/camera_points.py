@@ -302,7 +302,7 @@ class _Balance:
     def _even_node_terms(self) -> Floats:
         """The terms on the quadrature's nodes, but those that change sign over the disc: they have no sum."""
         even = np.concatenate([[k % 4 == 0] * (2 * count) for k, count in BALANCED_TERMS.items()])
-        return self.node_terms * even[:, None]
+        return np.asarray(self.node_terms * even[:, None])
 
 
 def _shared_by_neighbours(factors: Floats, amplitudes: Floats, trust: Floats) -> Floats:
