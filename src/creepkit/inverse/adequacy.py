@@ -28,7 +28,7 @@ from creepkit.inverse.largest_deviation import LargestDeviation, largest_deviati
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
-from creepkit.inverse.observation_vector import ObservationVector
+from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, SINGLE_VALUES, ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.scatter_of_lives import with_scatter_of_lives
@@ -39,10 +39,8 @@ from creepkit.records import History, is_logarithmic, output_unit
 SIGNIFICANCE = 0.003
 """p-value below which a law does not explain the tests: three standard deviations of a normal one."""
 
-
 IMPLAUSIBLE_CHI_SQUARE = 0.05
 """Reduced chi-square below which the noise that was stated is questioned: 4.5 times what the frames show."""
-
 
 LARGEST_SCATTER = 1.0
 """Of ln rate between tests, a factor of 2.7: more is no scatter of one alloy."""
@@ -50,6 +48,10 @@ LARGEST_SCATTER = 1.0
 
 TREND_SIGNIFICANCE, FEWEST_TREND_TESTS = 0.01, 5
 """p-value below which rates of tests bend over the stress, and the tests that it takes to see that."""
+
+
+NOTEWORTHY_EXPECTATION = 1.05
+"""Mean reduced chi-square of a right law from which on it is said beside the one that was found."""
 
 
 AdequacyVerdict = Literal["explains", "leaves a discrepancy", "cannot be judged"]
@@ -91,6 +93,8 @@ class Adequacy:
     rate_scatter : standard deviation of ln rate between tests, which was estimated from them, and rate_trend_p_value :
         of a bend of these rates over stress, by which a law shows that it misses the dependence on stress.
     implausible : nuisances that lie far from their priors, without which the law would not explain the tests.
+    expected_chi_square : what `chi_square` is in the mean if the law is right: above one where noise is estimated from
+        few frames. not_judged : the outputs, where nothing can be judged.
     """
 
     verdict: AdequacyVerdict
@@ -104,6 +108,8 @@ class Adequacy:
     rate_scatter: float = 0.0
     rate_trend_p_value: float = 1.0
     implausible: tuple[ImplausibleNuisance, ...] = ()
+    expected_chi_square: float = 1.0
+    not_judged: tuple[str, ...] = ()
 
     @property
     def explains(self) -> bool:
@@ -129,6 +135,13 @@ class Adequacy:
         """The largest discrepancy of an output, over its noise."""
         return max((o.discrepancy_in_noises for o in self.outputs), default=float("nan"))
 
+    @property
+    def _chi_square_text(self) -> str:
+        expected = ""
+        if self.expected_chi_square > NOTEWORTHY_EXPECTATION:
+            expected = f" (noise estimated from so few frames makes {self.expected_chi_square:.3g} of a right law)"
+        return f"reduced chi-square {self.chi_square:.3g}{expected}"
+
     def __getitem__(self, output: str) -> OutputAdequacy:
         for one in self.outputs:
             if one.output == output:
@@ -138,10 +151,7 @@ class Adequacy:
     def __str__(self) -> str:
         """One sentence: the verdict, with what is left and where."""
         if self.verdict == "cannot be judged":
-            return (
-                "cannot be judged: no noise is stated, and too few frames show it (state it in a column such as "
-                "strain_sd, in Python as standard_deviation)"
-            )
+            return f"cannot be judged: {_how_to_state_noise(self.not_judged)}"
         source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
         if self.explains:
             slow = np.isfinite(self.correlation)
@@ -153,7 +163,7 @@ class Adequacy:
                 scatter += " (far larger than what the frames show: check its unit)"
             return (
                 f"explains the tests to their {source} noise{self.qualification}{scatter}: "
-                f"reduced chi-square {self.chi_square:.3g}, p = {self.p_value:.2g}{correlated}"
+                f"{self._chi_square_text}, p = {self.p_value:.2g}{correlated}"
             )
         parts = [
             f"{o.discrepancy:.2g}{' ' + output_unit(o.output) if output_unit(o.output) else ''} of {o.output} "
@@ -170,9 +180,25 @@ class Adequacy:
         if self.remedies:
             where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
         return (
-            f"leaves {' and '.join(parts) or 'more than noise'} unexplained (reduced chi-square "
-            f"{self.chi_square:.3g}, {p_text}){where}"
+            f"leaves {' and '.join(parts) or 'more than noise'} unexplained ({self._chi_square_text}, {p_text}){where}"
         )
+
+
+def _how_to_state_noise(outputs: Sequence[str]) -> str:
+    """Why nothing was known of the noise of these outputs, and where to state it."""
+    frames = [name for name in outputs if name not in SINGLE_VALUES]
+    if frames or not outputs:
+        column = f"{frames[0] if frames else 'strain'}_sd"
+        return (
+            f"no noise is stated, and too few frames show it (state it in a column such as {column}, in Python as "
+            "standard_deviation)"
+        )
+    if MINIMUM_RATE_OUTPUT in outputs:
+        return (
+            "no noise of the minimum rates is stated, and scatter between tests was estimated from them (state it in a "
+            "column such as minimum_rate_sd_1/s, in Python as minimum_rate_sd)"
+        )
+    return "rupture times alone show no noise beside the scatter between tests, which was estimated from them"
 
 
 def adequacy_of(
@@ -194,7 +220,7 @@ def adequacy_of(
     known = (known or KnownNoise.of_histories(observations, histories)).where(linear.residuals.offset_sensitivity > 0)
     if not known.judged.any():
         nan = float("nan")
-        return Adequacy("cannot be judged", (), nan, 0.0, nan, nan, None)
+        return Adequacy("cannot be judged", (), nan, 0.0, nan, nan, None, not_judged=observations.outputs)
     residuals = _of_judged(linear.residuals, known)
     independent = _independent_noise(observations, known, noise_model, predictor_errors)
     judged_problem = replace(linear, residuals=residuals)
@@ -214,7 +240,7 @@ def adequacy_of(
         noise = float(np.median(known.sd[mask]))
         # In its unit from the deviations themselves: their share of chi-square is another where noise varies.
         square = float((white[mask] ** 2).mean()) / share_of_freedom * max(1.0 - 1.0 / reduced, 0.0)
-        discrepancy = float(np.sqrt(square)) if p_value < SIGNIFICANCE else 0.0
+        discrepancy = float(np.sqrt(square))
         source: Literal["stated", "estimated"] = "stated" if observations.stated[position] else "estimated"
         outputs.append(OutputAdequacy(name, int(mask.sum()), noise, source, reduced, p_value, discrepancy))
     freedom = share_of_freedom * float(known.judged.sum())
@@ -222,6 +248,10 @@ def adequacy_of(
     pooled = known.chance_of_larger(reduced, share_of_freedom, known.judged)
     p_values = [pooled, *(o.p_value for o in outputs)] if len(outputs) > 1 else [pooled]
     p_value = min(1.0, len(p_values) * min(p_values))
+    # Outputs that are each within chance may be beyond it together: all of them have then left something.
+    alone = any(o.p_value < SIGNIFICANCE for o in outputs)
+    left = [p_value < SIGNIFICANCE and (o.p_value < SIGNIFICANCE or not alone) for o in outputs]
+    outputs = [o if kept else replace(o, discrepancy=0.0) for o, kept in zip(outputs, left, strict=True)]
     scatter, trend = _scatter_of_rates(problem, linear.residuals, noise_model)
     explained = p_value >= SIGNIFICANCE and scatter <= LARGEST_SCATTER and not trend < TREND_SIGNIFICANCE
     return Adequacy(
@@ -234,6 +264,7 @@ def adequacy_of(
         largest_deviation(observations, known, white, histories),
         rate_scatter=scatter,
         rate_trend_p_value=trend,
+        expected_chi_square=known.expected(share_of_freedom, known.judged),
     )
 
 

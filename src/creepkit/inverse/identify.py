@@ -54,6 +54,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
 from creepkit.inverse.uncertainty.laplace_approximation import (
+    cut_interval_notes,
     interval_quantile,
     laplace_covariance,
     parameter_estimates,
@@ -309,9 +310,10 @@ def _result(
     adequacy = adequacy_with_remedies(
         problem, linear, noise_model, working_estimator.predictor_errors, histories, unmodelled
     )
+    estimates = parameter_estimates(law, coordinates, u, law_covariance, interval_quantile(freedom))
     return Identification(
         law=law,
-        estimates=parameter_estimates(law, coordinates, u, law_covariance, interval_quantile(freedom)),
+        estimates=estimates,
         u=u,
         covariance=law_covariance,
         reference=coordinates.reference,
@@ -335,6 +337,7 @@ def _result(
             *suspect_frames_note(histories),
             *identification_notes(best, tests, nuisance_estimates),
             *(nuisance.sentence for nuisance in implausible),
+            *cut_interval_notes(law, estimates),
             *domain_notes(prediction, histories),
             *([numerical_error.sentence] if numerical_error is not None else []),
             *unmodelled_note(unmodelled),

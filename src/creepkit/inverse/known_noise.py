@@ -73,17 +73,27 @@ class KnownNoise:
         Each test has noise of its own. One test has the distribution of F; the sum over several is taken as the scaled
         chi-square of the same mean and variance (Satterthwaite).
         """
-        groups = [
+        groups = self._groups(share_of_freedom, mask)
+        total = sum(freedom for freedom, _ in groups)
+        if len(groups) == 1:
+            return chance_of_larger(reduced, total, groups[0][1])
+        mean = total * self.expected(share_of_freedom, mask)
+        variance = sum(freedom**2 * _variance_of_f(freedom, nu) for freedom, nu in groups)
+        return float(chi2.sf(reduced * total * 2.0 * mean / variance, 2.0 * mean**2 / variance))
+
+    def expected(self, share_of_freedom: float, mask: Bools) -> float:
+        """The mean reduced chi-square of a law that is right: one where noise is stated, that of F where estimated."""
+        groups = self._groups(share_of_freedom, mask)
+        means = sum(freedom * (1.0 if np.isinf(nu) else nu / (nu - 2.0)) for freedom, nu in groups)
+        return means / max(sum(freedom for freedom, _ in groups), 1e-300)
+
+    def _groups(self, share_of_freedom: float, mask: Bools) -> list[tuple[float, float]]:
+        """(degrees of freedom of chi-square, of its noise) of observations whose noise is one estimate."""
+        return [
             (share_of_freedom * float((mask[k] & (self.freedom[k] == nu)).sum()), float(nu))
             for k in range(len(mask))
             for nu in np.unique(self.freedom[k][mask[k]])
         ]
-        total = sum(freedom for freedom, _ in groups)
-        if len(groups) == 1:
-            return chance_of_larger(reduced, total, groups[0][1])
-        mean = sum(freedom * (1.0 if np.isinf(nu) else nu / (nu - 2.0)) for freedom, nu in groups)
-        variance = sum(freedom**2 * _variance_of_f(freedom, nu) for freedom, nu in groups)
-        return float(chi2.sf(reduced * total * 2.0 * mean / variance, 2.0 * mean**2 / variance))
 
 
 def _estimated_noise(history: History, name: str, values: Floats) -> Floats:

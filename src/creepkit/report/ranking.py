@@ -38,7 +38,10 @@ def _explains(fit: Identification) -> str:
     if fit.adequacy.explains and fit.adequacy.implausible:
         kind = fit.adequacy.implausible[0].kind
         return f"only with a large {kind}"
-    return "yes" if fit.adequacy.explains else f"no: leaves {fit.adequacy.discrepancy_in_noises:.2g} noises"
+    if fit.adequacy.explains:
+        return "yes"
+    noises = fit.adequacy.discrepancy_in_noises
+    return f"no: leaves {noises:.2g} noises" if noises > 0 else "no: rates of tests are not followed"
 
 
 def _equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -152,10 +153,15 @@ def _law_colours(ranking: Ranking) -> list[Any]:
 
 
 def _columns(fit: Identification) -> list[int]:
-    """The tests from the coldest to the hottest, as they stand without histories."""
-    if not fit.histories:
-        return list(range(len(fit.tests)))
-    return [int(k) for k in np.argsort(np.round(temperatures_celsius(fit.histories)), kind="stable")]
+    """The tests from the coldest to the hottest, of one temperature (or without histories) P2 before P10."""
+    names = [_natural_order(test.name) for test in fit.tests]
+    celsius = np.round(temperatures_celsius(fit.histories)) if fit.histories else np.zeros(len(names))
+    return sorted(range(len(names)), key=lambda k: (float(celsius[k]), names[k]))
+
+
+def _natural_order(name: str) -> list[tuple[int, int, str]]:
+    """A key by which numbers within names count as numbers; other text goes before them where both begin alike."""
+    return [(1, int(part), "") if part.isdecimal() else (0, 0, part) for part in re.split(r"(\d+)", name) if part]
 
 
 def _label_tests(axes: Axes, fit: Identification, order: Sequence[int]) -> None:

@@ -254,6 +254,31 @@ def test_the_sentence_of_a_discrepancy_says_how_much_where_and_what_would_help()
         found["shape"]
 
 
+def test_what_cannot_be_judged_says_which_column_states_the_noise():
+    unknown = Adequacy("cannot be judged", (), np.nan, 0.0, np.nan, np.nan, None)
+    assert "such as amplitude_sd, in Python" in str(replace(unknown, not_judged=("amplitude", "rupture")))
+    assert "minimum_rate_sd_1/s" in str(replace(unknown, not_judged=("minimum_rate", "rupture")))
+    assert "_sd" not in str(replace(unknown, not_judged=("rupture",)))
+
+
+def test_noise_from_few_frames_says_what_chi_square_a_right_law_has():
+    """The mean of F is nu / (nu - 2), with nu a fifth of 40 frames a test."""
+    found = judged(tests := gauged(12, stated=False), *at_the_truth(tests))
+    nu = FREEDOM_PER_FRAME * 40
+    assert found.expected_chi_square == pytest.approx(nu / (nu - 2.0))
+    assert f"(noise estimated from so few frames makes {nu / (nu - 2.0):.3g} of a right law)" in str(found)
+
+
+def test_outputs_that_only_together_are_beyond_chance_have_left_something(stated):
+    """Noise of 1.17 times what is stated: two p-values of a few per mille, and one far below."""
+    tests, problem, linear = stated
+    draws = 1.19 * white_draws(problem, linear, 40, 13)
+    found = [judged(tests, problem, linear, values) for values in draws]
+    left = [a for a in found if not a.explains]
+    assert left
+    assert all(a.discrepancy_in_noises > 0 for a in left)
+
+
 def test_the_sentence_of_a_law_that_explains():
     found = Adequacy("explains", (AMPLITUDE, WIDTH), 1.04, 77.0, 0.38, float("nan"), WHERE)
     assert str(found) == "explains the tests to their stated and estimated noise: reduced chi-square 1.04, p = 0.38"

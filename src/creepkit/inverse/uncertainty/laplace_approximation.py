@@ -260,6 +260,19 @@ def parameter_estimates(
     return tuple(results)
 
 
+def cut_interval_notes(law: CreepLaw, estimates: Sequence[Estimate]) -> tuple[str, ...]:
+    """Intervals that a bound of the search cuts off, a sentence each: those of functions of the value are not cut."""
+    sentences = []
+    for (name, param), one in zip(law.table.items(), estimates, strict=True):
+        cut = [b for b, end in zip(param.bounds, (one.low, one.high), strict=True) if np.isclose(b, end, rtol=1e-9)]
+        if one.verdict == "determined" and cut:
+            sentences.append(
+                f"the interval of {name} ends at its bound, {cut[0]:.4g}, and not by the tests: intervals of rates and "
+                "of the local exponent do not know this bound and may reach beyond it"
+            )
+    return tuple(sentences)
+
+
 def _verdict(value: float, half: float, low: float, high: float) -> str:
     if 2 * half >= 0.8 * (high - low):
         return "not determined"
