@@ -40,7 +40,8 @@ class CellGrid:
     sheet : of a spreadsheet, "" of a text. header : the entries of `# key: value` lines. rows : those of them that are
     no comment and not empty. numbers : the rows below the last of `rows`, where they hold numbers alone.
     comments : line, key and entry of each `# key: value` below the first row. positions : the column of the file, from
-    0, in which each cell of a row stands, where some were left out.
+    0, in which each cell of a row stands, where some were left out. remarks : what was left aside, or read though it
+    was hidden.
     """
 
     path: Path
@@ -51,6 +52,7 @@ class CellGrid:
     numbers: NumberRows | None = None
     comments: Sequence[tuple[int, str, SourceText]] = ()
     positions: Sequence[int] = ()
+    remarks: tuple[str, ...] = ()
 
     def location(self, line: int) -> str:
         """Where a row stands."""

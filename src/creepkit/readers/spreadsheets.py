@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import re
 import warnings
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
@@ -23,6 +22,7 @@ from creepkit.readers.cell_grids import CellGrid, grid_of_rows, table_of, withou
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.number_formats import number_text
+from creepkit.readers.spreadsheet_parts import check_sheet, checked_parts
 from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
 from creepkit.readers.text_tables import SourceText, TableRow
 from creepkit.readers.vocabulary import HeaderVocabulary
@@ -31,8 +31,8 @@ from creepkit.records import History
 SPREADSHEET_FILE = FileKind("a spreadsheet of tests", HistoryError, "save the sheet as .xlsx or CSV", 100_000_000)
 
 
-MAXIMUM_UNPACKED_BYTES, MAXIMUM_CELLS = 500_000_000, 5_000_000
-"""Of all parts of a file together, and of a sheet with the empty cells in its rows."""
+MAXIMUM_CELLS = 5_000_000
+"""Of a sheet, with the empty cells in its rows."""
 
 
 _FILLED_ROWS = 60
@@ -43,10 +43,7 @@ _DAY_ZERO, _FIRST_DATE = datetime(1899, 12, 31), datetime(1902, 1, 1)
 """The day that a spreadsheet counts as 0, and the first on which a creep test may have been made."""
 
 
-_MERGED = re.compile(rb'<(?:\w+:)?mergeCell\s[^>]*?ref="([A-Z]{1,3})(\d{1,7}):([A-Z]{1,3})\d{1,7}"')
-
-
-_SHEETS = re.compile(r"xl/worksheets/[^/]+\.xml")
+_MERGED = re.compile(rb'<(?:\w+:)?mergeCell\s[^<>]*?ref="([A-Z]{1,3})(\d{1,7}):([A-Z]{1,3})\d{1,7}"')
 
 
 def read_sheets(path: Path) -> list[CellGrid]:
@@ -56,43 +53,29 @@ def read_sheets(path: Path) -> list[CellGrid]:
         from openpyxl import load_workbook
     except ImportError:
         raise HistoryError(f"{path}: to read spreadsheets, install openpyxl: pip install 'creepkit[excel]'") from None
-    parts = _checked_parts(path, content)
+    parts = checked_parts(path, content)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of what a workbook holds beside its cells
             book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
+            shown = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
+            places = {sheet.title: f"{path}, sheet '{sheet.title}'" for sheet in shown}
+            rows = {sheet.title: check_sheet(places[sheet.title], parts.get(_part_of(sheet), b"")) for sheet in shown}
             formulas = _formulas(content, load_workbook) if any(b"<f" in part for part in parts.values()) else {}
             grids = [
                 _grid(path, sheet, formulas.get(sheet.title, set()), parts.get(_part_of(sheet), b""))
-                for sheet in book.worksheets
+                for sheet in shown
             ]
+            aside = [f"hidden sheet '{sheet.title}' not read" for sheet in book.worksheets if sheet not in shown]
     except HistoryError:
         raise
     except Exception as error:  # openpyxl lets all kinds of errors through where a file is damaged
         cause = " ".join(str(error).split())[:80]
         raise HistoryError(f"{path}: is no spreadsheet that can be read ({cause}); save it anew as .xlsx") from None
-    return [grid for grid in grids if grid is not None]
-
-
-def _checked_parts(path: Path, content: bytes) -> dict[str, bytes]:
-    """{name: XML} of the sheets, once it is known that the file unpacks to a sensible size and defines no entities."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            size = sum(part.file_size for part in archive.infolist())
-            if size > MAXIMUM_UNPACKED_BYTES:
-                raise HistoryError(
-                    f"{path}: unpacks to {size / 1e6:.0f} MB, which no spreadsheet of tests does; save it as CSV"
-                )
-            for name in archive.namelist():
-                with archive.open(name) as part:
-                    start = part.read(2000).replace(b"\0", b"")
-                if name.endswith((".xml", ".rels")) and b"<!DOCTYPE" in start:
-                    raise HistoryError(f"{path}: a part of it defines XML entities; save it anew as .xlsx")
-            return {name: archive.read(name) for name in archive.namelist() if _SHEETS.fullmatch(name)}
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, OSError, EOFError, RuntimeError, ValueError, NotImplementedError):
-        raise HistoryError(f"{path}: is no spreadsheet in the format .xlsx; save it anew as .xlsx or CSV") from None
-    except Exception as error:  # zlib.error and lzma.LZMAError have no common base
-        raise HistoryError(f"{path}: its parts cannot be unpacked ({error}); save it anew as .xlsx") from None
+    found = [grid for grid in grids if grid is not None]
+    if aside and not found:
+        raise HistoryError(f"{path}: {aside[0]}, and no other holds anything; unhide the sheets that count")
+    return [replace(grid, remarks=(*rows[grid.sheet].remarks(grid.sheet), *aside)) for grid in found]
 
 
 def _part_of(sheet: Any) -> str:
@@ -295,7 +278,7 @@ def _with_conditions(
         clash = sorted(extra.keys() & test.entries.keys())
         if clash:
             raise HistoryError(f"{extra[clash[0]].location}: '{clash[0]}' was already given; keep one of them")
-        table = replace(test.table, assumptions=(*test.table.assumptions, *aside))
+        table = replace(test.table, assumptions=(*test.table.assumptions, *grid.remarks, *aside))
         results.append((grid, replace(test, entries={**test.entries, **extra}, table=table)))
     unused = sorted(stated.keys() - used)
     if unused:

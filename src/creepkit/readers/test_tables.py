@@ -137,6 +137,8 @@ class RowPerTestReader:
         written = table.entries(row).items()
         cells = {keys[table.columns.index(name)]: replace(entry, key=name) for name, entry in written}
         entries = {**table.header, **_with_end(cells, location)}
+        if table.assumptions and "label assumed" not in entries:
+            entries["label assumed"] = SourceText(", ".join(table.assumptions), location)
         name = f"{table.sheet or table.path.stem} {row.line}"
         where = f"sheet {table.sheet}, " if table.sheet else ""
         source = f"{table.path} ({where}{cells['name'].text if 'name' in cells else f'line {row.line}'})"
@@ -163,7 +165,7 @@ def _grids(path: Path) -> list[CellGrid]:
 def _tables(path: Path, ignored: Collection[str]) -> list[TextTable]:
     """The tables of tests in a file; ignored : columns that are left out."""
     grids = [grid for grid in _grids(path) if not grid.sheet or _is_test_table(grid.rows[0].cells)]
-    return [table_of(without_ignored(grid, 0, ignored)) for grid in grids]
+    return [replace(table_of(without_ignored(grid, 0, ignored)), assumptions=grid.remarks) for grid in grids]
 
 
 def columns_of_tests(path: Path, ignored: Collection[str]) -> list[tuple[Sequence[str], int]]:
