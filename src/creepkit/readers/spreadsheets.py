@@ -63,8 +63,7 @@ def read_sheets(path: Path) -> list[CellGrid]:
             rows = {sheet.title: check_sheet(places[sheet.title], parts.get(_part_of(sheet), b"")) for sheet in shown}
             formulas = _formulas(content, load_workbook) if any(b"<f" in part for part in parts.values()) else {}
             grids = [
-                _grid(path, sheet, formulas.get(sheet.title, set()), parts.get(_part_of(sheet), b""))
-                for sheet in shown
+                _grid(path, sheet, formulas.get(sheet.title, set()), parts.get(_part_of(sheet), b"")) for sheet in shown
             ]
             aside = [f"hidden sheet '{sheet.title}' not read" for sheet in book.worksheets if sheet not in shown]
     except HistoryError:
