@@ -106,8 +106,8 @@ def point_test(history: History) -> PointTest:
         )
     if history.includes_elastic and history.elastic is None:
         raise SolveError(
-            f"{where}: the strain includes the elastic part, but no elastic data are given; write modulus_GPa in the file, "
-            "or give --modulus-gpa or elastic=Elastic(E=...)"
+            f"{where}: the strain includes the elastic part, but no elastic data are given; set "
+            "elastic=Elastic(E=...), or write modulus_GPa in its file"
         )
     return integration.PointTest(
         driving=history.loading.program(),
