@@ -20,7 +20,15 @@ from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.loading_strain import without_loading
 from creepkit.readers.noise_correlation import read_noise_correlation
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
-from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, how_to_ignore, read_frames
+from creepkit.readers.text_tables import (
+    NumberRows,
+    SourceText,
+    TableFrames,
+    TextTable,
+    column_means,
+    how_to_ignore,
+    read_frames,
+)
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, outputs_of_test, specimen_of
 
@@ -210,11 +218,16 @@ def _without_readings_before_steps(
     if "time" not in quantities or not imposed:
         return table, set()
     clock, rows = quantities.index("time"), table.rows
-    before = [
-        k
-        for k, (one, next_) in enumerate(pairwise(rows))
-        if one.cells[clock] == next_.cells[clock] and any(one.cells[i] != next_.cells[i] for i in imposed)
-    ]
+    if isinstance(rows, NumberRows):
+        same_time = np.diff(rows.numbers[:, clock]) == 0.0
+        changed = np.array([np.diff(rows.numbers[:, k]) != 0.0 for k in imposed]).any(axis=0)
+        before = np.flatnonzero(same_time & changed).tolist()
+    else:
+        before = [
+            k
+            for k, (one, next_) in enumerate(pairwise(rows))
+            if one.cells[clock] == next_.cells[clock] and any(one.cells[i] != next_.cells[i] for i in imposed)
+        ]
     if not before:
         return table, set()
     dropped = set(before)

@@ -19,6 +19,10 @@ NOISE_FACTOR = 3.0
 _MEDIAN_FRAMES = 5
 
 
+_LONG_SPAN = 2000
+"""Frames above which a span is not split near its ends: else a record that swings takes a time quadratic in them."""
+
+
 def recorded_program(times: Floats, values: Floats, tolerance: float) -> Program:
     """The program of a record; its first value is taken to hold from time zero.
 
@@ -77,6 +81,9 @@ def _breakpoints(times: Floats, values: Floats, tolerance: float) -> Ints:
         distance = np.abs(values[first : last + 1] - line)
         farthest = first + int(np.argmax(distance))
         if distance[farthest - first] > tolerance:
+            length = last - first
+            if length > _LONG_SPAN and not length < 8 * (farthest - first) < 7 * length:
+                farthest = first + length // 2
             kept.add(farthest)
             spans += [(first, farthest), (farthest, last)]
     return np.array(sorted(kept))
