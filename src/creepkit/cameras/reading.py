@@ -23,6 +23,7 @@ from creepkit.cameras.text_files import (
     TextHead,
     frame_ranges,
     head_bytes,
+    is_remark,
     table_in_file,
     table_in_range,
 )
@@ -253,7 +254,7 @@ def _tables(files: Sequence[Path], first: Recognised) -> _Tables:
 
 
 def _first_row(rows: bytes) -> bytes:
-    lines = (line for line in rows.splitlines(keepends=True) if line.strip() and not line.lstrip().startswith(b"#"))
+    lines = (line for line in rows.splitlines(keepends=True) if line.strip() and not is_remark(line))
     return next(lines, b"")
 
 

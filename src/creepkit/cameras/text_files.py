@@ -15,7 +15,7 @@ import numpy as np
 from creepkit import core
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
-from creepkit.files.delimited_text import Dialect, decode_text, split_line
+from creepkit.files.delimited_text import ERROR_VALUES, Dialect, decode_text, split_line
 from creepkit.files.reading import FileKind, read_bytes, read_range
 from creepkit.records.camera_format import shown
 
@@ -69,6 +69,12 @@ class TextHead:
     def location(self, path: Path) -> str:
         """Where it stands, 'file:line'."""
         return f"{path}:{self.number}"
+
+
+def is_remark(line: bytes) -> bool:
+    """Whether a line is a remark, and no row that begins with #N/A."""
+    text = line.lstrip()
+    return text.startswith(b"#") and not text.startswith(tuple(word.encode() for word in ERROR_VALUES))
 
 
 def plain_bytes(content: bytes, path: Path) -> bytes:
@@ -162,7 +168,7 @@ class FrameText:
         """Where a row of numbers stands, 'file:line'."""
         number = self.first_line()
         for line in self.rows.splitlines():
-            if line.strip() and not line.lstrip().startswith(b"#"):
+            if line.strip() and not is_remark(line):
                 if row == 0:
                     break
                 row -= 1

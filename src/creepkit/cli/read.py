@@ -51,11 +51,15 @@ def command(
     general = {str(path) for path in files if path.is_file() and reader in (None, "csv", "xlsx")}
     sources = {history.source.partition(" (")[0] for history in found}
     tables = [table for path in sorted(general & sources) for table in summarise_tables(Path(path), ignored)]
-    quality = ck.check_data_quality([history for history in found if history.outputs])
+    framed = [history for history in found if history.outputs]
+    quality = ck.check_data_quality(framed)
     if as_json:
         print_json({**report.histories_to_json(found, tables), "quality": data_quality_to_json(quality)})
     else:
-        parts = (report.tables_text(tables), report.histories_text(found), str(quality))
+        without = len(found) - len(framed)
+        counted = f"{without} test{'' if without == 1 else 's'} without frames" if without else ""
+        checked = str(quality) if framed else ""
+        parts = (report.tables_text(tables), report.histories_text(found), counted, checked)
         typer.echo("\n".join(part for part in parts if part))
     if to is not None:
         for path in _write(found, to):

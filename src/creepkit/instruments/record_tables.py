@@ -156,6 +156,12 @@ def find_head(path: Path, lines: Sequence[tuple[int, str]]) -> TableHead:
         units: list[str] = []
         if len(fitting) > 1 and _is_units(names) and not _is_units(fitting[-2][1]):
             units, (names_line, names) = [text.strip("()[] ") for text in names], fitting[-2]
+        for n, between in above:
+            if n > names_line and any(is_number(cell, dialect) or is_clock_time(cell) for cell in between):
+                raise HistoryError(
+                    f"{path}:{n}: a row of {len(between)} cells, and the names above it are {len(names)}; write one "
+                    "cell a column, or remove the row"
+                )
         while len(names) > 1 and not names[-1]:
             names.pop()
         units = [*units, *[""] * len(names)][: len(names)]

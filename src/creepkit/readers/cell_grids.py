@@ -202,7 +202,7 @@ def _number_rows(
         return None
     body = text[sum(len(line) + 1 for line in lines[: start + 1]) :].rstrip("\n")
     body, line_numbers, comments = _without_comments(body, start + 2)
-    if not body:
+    if not body.strip():
         return None
     allowed = f"0123456789+-eE\n{dialect.delimiter}{dialect.decimal}"
     if not body.isascii() or body.encode().translate(None, allowed.encode()):

@@ -43,13 +43,18 @@ NAME_SYNONYMS: Mapping[str, str] = {
     **dict.fromkeys(
         ("timestamp", "time stamp", "datetime", "date time", "date/time", "time of day", "uhrzeit"), "time"
     ),
-    **dict.fromkeys(("temp", "test temperature", "test temp", "creep temperature", "temperatur"), "temperature"),
-    **dict.fromkeys(("applied stress", "nominal stress", "initial stress", "creep stress", "spannung"), "stress"),
+    **dict.fromkeys(("temp", "test temperature", "test temp", "creep temperature"), "temperature"),
+    **dict.fromkeys(("temperatur", "prüftemperatur", "versuchstemperatur"), "temperature"),
+    **dict.fromkeys(("applied stress", "nominal stress", "initial stress", "creep stress"), "stress"),
+    **dict.fromkeys(("spannung", "prüfspannung", "nennspannung", "anfangsspannung"), "stress"),
+    **{"druck": "pressure", "prüfdruck": "pressure"},
     **dict.fromkeys(("creep strain", "total strain", "engineering strain", "true strain"), "strain"),
     **dict.fromkeys(("logarithmic strain", "dehnung", "kriechdehnung", "gesamtdehnung"), "strain"),
-    **dict.fromkeys(("young's modulus", "youngs modulus", "elastic modulus", "e modul"), "modulus"),
+    **dict.fromkeys(
+        ("young's modulus", "youngs modulus", "elastic modulus", "e modul", "elastizitätsmodul"), "modulus"
+    ),
     **dict.fromkeys(("poisson's ratio", "poissons ratio", "poisson ratio"), "poisson"),
-    **dict.fromkeys(("rupture time", "time to rupture", "rupture life"), "rupture"),
+    **dict.fromkeys(("rupture time", "time to rupture", "rupture life", "bruchzeit", "standzeit"), "rupture"),
     **dict.fromkeys(("standard deviation of strain", "strain standard deviation"), "strain_sd"),
     **{"material": "alloy", "werkstoff": "alloy", "test name": "name", "test id": "name", "test": "name"},
 }
@@ -165,7 +170,19 @@ class NameTable:
         return f"{quantity}_{unit_suffix(unit) or unit}" if unit else quantity
 
 
-TEST_NAME_COLUMNS = ("test", "test id", "test name", "test no", "test number", "sample", "sample id", "specimen id")
+TEST_NAME_COLUMNS = (
+    "test",
+    "test id",
+    "test name",
+    "test no",
+    "test number",
+    "sample",
+    "sample id",
+    "specimen id",
+    "versuch",
+    "probe",
+    "probennummer",
+)
 """Names, in small letters, of columns and rows that tell which test it is where a table holds several."""
 
 

@@ -65,11 +65,10 @@ class HistoryCsvReader:
     vocabulary: HeaderVocabulary = field(default_factory=HeaderVocabulary)
 
     def __post_init__(self) -> None:
-        columns: Any = self.columns
-        if isinstance(columns, str) or not all(isinstance(c, str) for c in _listed(columns)):
+        if not all(isinstance(name, str) for name in _listed(self.columns)):
             raise HistoryError(
-                f"reader '{self.name}': columns is a {type(columns).__name__}; give a tuple of names of columns as "
-                "its files write them, such as ('Time (h)', 'Strain (%)'), and vocabulary=HeaderVocabulary(...)"
+                f"reader '{self.name}': columns is a {type(self.columns).__name__}; give a tuple of names of columns "
+                "as its files write them, such as ('Time (h)', 'Strain (%)'), and vocabulary=HeaderVocabulary(...)"
             )
         if not isinstance(self.vocabulary, HeaderVocabulary):
             raise HistoryError(
@@ -99,7 +98,7 @@ class HistoryCsvReader:
 
 def _listed(columns: object) -> Sequence[object]:
     """The columns of a declaration, [None] of what is no sequence of them."""
-    return columns if isinstance(columns, Sequence) else [None]
+    return columns if isinstance(columns, Sequence) and not isinstance(columns, str) else [None]
 
 
 TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv"), (".txt", ".dat", ".asc")

@@ -57,7 +57,7 @@ def tests_in(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TabulatedTest
     stated = grid.header.get("specimen")
     known = KnownNames.of(vocabulary, stated.text if stated else "")
     names_at = _row_of_names(grid, known)
-    names_line = grid.rows[names_at].line
+    names_line, conditions = grid.rows[names_at].line, grid.rows[:names_at]
     grid = without_ignored(_with_comments(grid, names_line, known), names_at, vocabulary.ignored)
     names_at = next((k for k, row in enumerate(grid.rows) if row.line == names_line), -1)
     if names_at < 0:
@@ -72,7 +72,7 @@ def tests_in(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TabulatedTest
         blocks = _columns_beside(below, head, times[0], tests_below, known)
         return _tests_of_blocks(below, head, blocks, set(range(times[0] + 1)), known)
     below, footers = _without_footers(below)
-    entries = entries_above(grid, head, known)
+    entries = entries_above(grid, conditions, known)  # they stand above columns that are left out, too
     _refuse_twice(entries, grid.header, known)
     return _rows_by_test(replace(table_of(below), assumptions=footers), {**grid.header, **entries}, known)
 

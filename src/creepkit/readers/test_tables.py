@@ -18,6 +18,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from creepkit.errors import HistoryError
+from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.readers.assembly import assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid, peek_columns, read_text_grid, table_of, without_ignored
 from creepkit.readers.column_names import NameTable, split_written_name, unit_suffix, words_of
@@ -33,9 +34,21 @@ MEASURED = ("minimum_rate", "rupture")
 QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
     "stress": (
         STRESS,
-        ("stress", "sigma", "nominal stress", "applied stress", "initial stress", "creep stress", "spannung"),
+        (
+            "stress",
+            "sigma",
+            "nominal stress",
+            "applied stress",
+            "initial stress",
+            "creep stress",
+            "spannung",
+            "prüfspannung",
+        ),
     ),
-    "temperature": (TEMPERATURE, ("temperature", "temp", "t", "test temperature", "creep temperature", "temperatur")),
+    "temperature": (
+        TEMPERATURE,
+        ("temperature", "temp", "t", "test temperature", "creep temperature", "temperatur", "prüftemperatur"),
+    ),
     "minimum_rate": (
         RATE,
         (
@@ -58,12 +71,25 @@ QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
 
 
 TEXTS: Mapping[str, tuple[str, ...]] = {
-    "name": ("name", "test", "test id", "test name", "test no", "test number", "id", "no", "sample", "specimen id"),
+    "name": (
+        "name",
+        "test",
+        "test id",
+        "test name",
+        "test no",
+        "test number",
+        "id",
+        "no",
+        "sample",
+        "specimen id",
+        "versuch",
+        "probe",
+    ),
     "ended": ("ended", "end", "end of test", "outcome", "status", "state", "result"),
     "alloy": ("alloy", "material", "werkstoff"),
     "control": ("control",),
     "specimen": ("specimen",),
-    "label heat": ("heat", "cast", "batch", "heat number", "heat no"),
+    "label heat": ("heat", "cast", "batch", "charge", "schmelze", "heat number", "heat no"),
     "label laboratory": ("laboratory", "lab"),
     "label elongation_pct": ("elongation pct", "elongation", "rupture elongation", "elongation at rupture"),
     "label reduction_of_area_pct": ("reduction of area", "area reduction", "ra", "z", "reduction in area"),
@@ -135,7 +161,7 @@ class RowPerTestReader:
     def _history(self, table: TextTable, row: TableRow, keys: Sequence[str]) -> History:
         location = table.location(row.line)
         written = table.entries(row).items()
-        cells = {keys[table.columns.index(name)]: replace(entry, key=name) for name, entry in written}
+        cells = {keys[table.columns.index(name)]: replace(_with_point(entry), key=name) for name, entry in written}
         entries = {**table.header, **_with_end(cells, location)}
         if table.assumptions and "label assumed" not in entries:
             entries["label assumed"] = SourceText(", ".join(table.assumptions), location)
@@ -143,6 +169,12 @@ class RowPerTestReader:
         where = f"sheet {table.sheet}, " if table.sheet else ""
         source = f"{table.path} ({where}{cells['name'].text if 'name' in cells else f'line {row.line}'})"
         return assemble_without_frames(name, entries, self.vocabulary, location=location, source=source)
+
+
+def _with_point(entry: SourceText) -> SourceText:
+    """A number with a decimal comma as one with a point, as labels are compared."""
+    is_comma = entry.decimal == "," and "," in entry.text and is_number(entry.text, Dialect("\t", ","))
+    return replace(entry, text=entry.text.replace(",", "."), decimal=".") if is_comma else entry
 
 
 TEST_TABLE = RowPerTestReader(

@@ -94,8 +94,9 @@ TEXT_KEYS = (
 
 
 LABEL_KEYS: Mapping[str, str] = {
-    **dict.fromkeys(("heat", "cast", "batch"), "heat"),
-    **dict.fromkeys(("laboratory", "lab"), "laboratory"),
+    **dict.fromkeys(("heat", "cast", "batch", "charge", "schmelze"), "heat"),
+    **dict.fromkeys(("laboratory", "lab", "labor"), "laboratory"),
+    **dict.fromkeys(("prüfer", "tester"), "operator"),
 }
 """{key: label} of what tests share with others: a forecast tells the scatter between heats and laboratories apart."""
 

@@ -153,8 +153,8 @@ def _methods(
             missing = [T for T in tests.isotherms if not np.isfinite(tensile(np.array([T]))[0])]
             where = f" at {', '.join(celsius(T) for T in missing)}" if missing else ""
             raise FitError(
-                f"wilshire needs the tensile strength{where}: give tensile_strength={{temperature in K: MPa}}, or a "
-                "label tensile_strength_MPa of each test"
+                f"wilshire needs the tensile strength{where}: give tensile_strength={{temperature in K: MPa}} "
+                "(--tensile), or a label tensile_strength_MPa of each test"
             )
         if name == "isothermal" and not tests.isothermal:
             raise FitError(f"isothermal is for tests of one temperature; these have {len(tests.isotherms)}: select one")

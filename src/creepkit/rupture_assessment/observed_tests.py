@@ -111,7 +111,7 @@ def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTe
     if len(alloys) > 1:
         raise HistoryError(
             f"the tests are of {len(alloys)} alloys ({', '.join(alloys[:4])}); assess one, by "
-            "select_tests(tests, alloy=...)"
+            f"--only alloy={alloys[0]} or select_tests(tests, alloy='{alloys[0]}')"
         )
     notes = []
     silent = sum(not h.end_known and h.minimum_rate is None for h in histories)

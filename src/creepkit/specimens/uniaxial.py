@@ -105,7 +105,10 @@ def point_test(history: History) -> PointTest:
             f"{where}: a uniaxial specimen is loaded by stress, found {history.loading.quantity}; use {held}"
         )
     if history.includes_elastic and history.elastic is None:
-        raise SolveError(f"{where}: the strain includes the elastic part, but no elastic data are given; set elastic=")
+        raise SolveError(
+            f"{where}: the strain includes the elastic part, but no elastic data are given; set "
+            "elastic=Elastic(E=...), or write modulus_GPa in its file"
+        )
     return integration.PointTest(
         driving=history.loading.program(),
         temperature=history.temperature_program(),
