@@ -42,12 +42,12 @@ class LogValues:
         intervals of the law alone.
         """
         posterior, locations, variances = scatter.posterior, [], []
+        parts = [scatter.joint(sd) for sd in posterior.sd]
         for k, history in enumerate(histories):
             test = scatter.new_test(history)
             row = np.zeros(scatter.joint_design.shape[1])
             row[: u.size] = self.by_parameter[k] @ coordinates.jacobian(u)
             row[[*test.known.values()]] = self.rate_effects[k] if misfit is not None else 0.0
-            parts = [scatter.joint(sd) for sd in posterior.sd]
             own = scatter.own_variance(test, posterior.sd) * self.rate_effects[k] ** 2 + (misfit or 0.0)
             locations.append([row @ mean for mean, _ in parts])
             by_law = np.array([row @ covariance @ row for _, covariance in parts])
