@@ -280,7 +280,7 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, entry: SourceText)
     location, parts = entry.location, item.split(maxsplit=3)
     if len(parts) == 3 and "" in kind.units:
         parts.append("")
-    if len(parts) != 4:
+    if len(parts) != 4 or (" " in parts[3] and unit_suffix(parts[3]) is None):
         example = f"0 s 100 {next(iter(kind.units))}" if "" not in kind.units else "0 s 0.002, or 0 s 0.2 pct"
         raise HistoryError(
             f"{location}: {key} holds '{item.strip()}'; write time and value with units, such as {example}"
