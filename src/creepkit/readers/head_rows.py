@@ -90,7 +90,9 @@ def _with_unit(key: str, unit: str, place: str) -> str:
     """A key with the unit that stands behind its value; HistoryError where the key has another one."""
     _, stated = split_written_name(key.rstrip(": "))
     if stated and unit_suffix(stated) != unit_suffix(unit):
-        raise HistoryError(f"{place}: '{key:.60}' has the unit '{unit:.20}' behind its value; keep one of the two units")
+        raise HistoryError(
+            f"{place}: '{key:.60}' has the unit '{unit:.20}' behind its value; keep one of the two units"
+        )
     return key if stated else f"{key} ({unit})"
 
 

@@ -90,7 +90,9 @@ def _check_size(path: Path, size: int, packed: int) -> None:
 
 def _is_xml(part: bytes) -> bool:
     start = part[:200]
-    return start[:2] in (b"\xff\xfe", b"\xfe\xff") or start.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<"
+    return (
+        start[:2] in (b"\xff\xfe", b"\xfe\xff") or start.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<"
+    )
 
 
 def _check_xml(path: Path, part: bytes) -> str:

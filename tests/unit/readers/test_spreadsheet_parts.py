@@ -85,7 +85,11 @@ def test_hidden_sheets_are_left_aside_and_hidden_rows_told(tmp_path: Path):
     book.active.column_dimensions["B"].hidden = True
     book.save(tmp_path / "x.xlsx")
     (history,) = SPREADSHEET.read(tmp_path / "x.xlsx")
-    for remark in ("hidden sheet 'old' not read", "hidden rows of sheet 'Sheet' read too: 5", "hidden columns of sheet"):
+    for remark in (
+        "hidden sheet 'old' not read",
+        "hidden rows of sheet 'Sheet' read too: 5",
+        "hidden columns of sheet",
+    ):
         assert remark in history.labels["assumed"]
 
 
