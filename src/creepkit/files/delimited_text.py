@@ -91,10 +91,30 @@ def decode_text(content: bytes, path: Path, error: type[CreepkitError] = History
             return _decode_western(content, path, error)
         line = _line_of(problem.object, problem.start, encoding)
         raise error(f"{path}:{line}: found bytes that are not text in {encoding.upper()}; save it in UTF-8") from None
+    if not text.isascii() or content.translate(None, _ASCII_OF_TEXT):
+        refuse_unprintable(text, lambda k: f"{path}:{text[:k].count(chr(10)) + 1}", error)
     if "\0" in text:
         line = text[: text.index("\0")].count("\n") + 1
         raise error(f"{path}:{line}: byte 0x00 is not text; save the table as text in UTF-8")
     return text
+
+
+UNPRINTABLE = re.compile("[\x01-\x08\x0b\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+"""Characters that steer a terminal, break lines or turn the direction of writing."""
+
+
+_ASCII_OF_TEXT = bytes(k for k in range(128) if not UNPRINTABLE.match(chr(k)))
+
+
+def refuse_unprintable(text: str, locate: Callable[[int], str], error: type[CreepkitError] = HistoryError) -> None:
+    """Raise an error for a text that would steer the terminal on which it is shown; locate : the place of character k.
+
+    Blanks of any width, tabs and form feeds are allowed.
+    """
+    if found := UNPRINTABLE.search(text):
+        raise error(
+            f"{locate(found.start())}: the character U+{ord(found[0]):04X} cannot be printed; remove it from the text"
+        )
 
 
 def _decode_western(content: bytes, path: Path, error: type[CreepkitError]) -> str:
@@ -102,7 +122,9 @@ def _decode_western(content: bytes, path: Path, error: type[CreepkitError]) -> s
     foreign = content.translate(None, bytes(set(range(256)) - set(_CONTROL_BYTES)))
     try:
         if not foreign:
-            return content.decode("cp1252")
+            text = content.decode("cp1252")
+            refuse_unprintable(text, lambda k: f"{path}:{text[:k].count(chr(10)) + 1}", error)
+            return text
         start = content.index(foreign[:1])
     except UnicodeDecodeError as problem:
         start = problem.start

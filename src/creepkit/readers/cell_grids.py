@@ -15,7 +15,15 @@ from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import ERROR_VALUES, Dialect, decode_text, detect_dialect, split_line, text_lines
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.column_names import split_written_name
-from creepkit.readers.text_tables import NumberRows, SourceText, TableRow, TextTable, check_columns, location_in
+from creepkit.readers.text_tables import (
+    NumberRows,
+    SourceText,
+    TableRow,
+    TextTable,
+    check_columns,
+    location_in,
+    some_of,
+)
 from creepkit.readers.vocabulary import plain_name
 
 TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
@@ -23,6 +31,10 @@ TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV 
 
 DECIMAL_SIGNS: Mapping[str, str] = {".": ".", ",": ",", "point": ".", "comma": ","}
 """What `# decimal:` may say."""
+
+
+MAXIMUM_COLUMNS, MAXIMUM_LINE, MAXIMUM_KEYS = 2000, 1_000_000, 1000
+"""Columns of a table, characters of a line, and `# key: value` lines of a head; no table of tests comes near them."""
 
 
 _LARGE_TEXT = 65_536
@@ -69,6 +81,7 @@ def read_text_grid(path: Path) -> CellGrid:
     text = decode_text(read_bytes(path, TABLE_FILE), path)
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
+    _refuse_long_lines(text, path)
     lines = text.split("\n", _HEAD_LINES) if len(text) > _LARGE_TEXT else text.split("\n")
     start = next((k for k, line in enumerate(lines[:_HEAD_LINES]) if line.strip() and not is_comment(line)), None)
     if start is not None and len(text) > _LARGE_TEXT:
@@ -76,6 +89,7 @@ def read_text_grid(path: Path) -> CellGrid:
         if numbers is not None:
             dialect, rows, comments = numbers
             names = TableRow(start + 1, split_line(lines[start], dialect, f"{path}:{start + 1}"))
+            _refuse_many(f"{path}:{start + 1}", len(names.cells), 0)
             return CellGrid(
                 path,
                 "",
@@ -86,6 +100,28 @@ def read_text_grid(path: Path) -> CellGrid:
                 _late_entries(path, comments, dialect),
             )
     return _grid_of_lines(path, text_lines(text))
+
+
+def _refuse_long_lines(text: str, path: Path) -> None:
+    """Refuse a line that no table of tests has, before it is split into cells."""
+    start = 0
+    while len(text) - start > MAXIMUM_LINE:
+        end = text.rfind("\n", start, start + MAXIMUM_LINE + 1)
+        if end < 0:
+            line = text.count("\n", 0, start) + 1
+            raise HistoryError(f"{path}:{line}: the line has more than {MAXIMUM_LINE} characters; write shorter rows")
+        start = end + 1
+
+
+def _refuse_many(location: str, columns: int, keys: int) -> None:
+    if columns > MAXIMUM_COLUMNS:
+        raise HistoryError(
+            f"{location}: number of columns {columns}, more than {MAXIMUM_COLUMNS}; write the tests to several files"
+        )
+    if keys > MAXIMUM_KEYS:
+        raise HistoryError(
+            f"{location}: number of keys {keys} above the table, more than {MAXIMUM_KEYS}; write only those that count"
+        )
 
 
 def without_ignored(grid: CellGrid, names_at: int, ignored: Collection[str]) -> CellGrid:
@@ -104,7 +140,7 @@ def without_ignored(grid: CellGrid, names_at: int, ignored: Collection[str]) -> 
             if not found:
                 raise HistoryError(
                     f"{entry.location}: ignore names '{name:.40}', which is no column; the columns are: "
-                    f"{', '.join(filter(None, cells))}"
+                    f"{some_of(list(filter(None, cells)))}"
                 )
             left_out.update(found)
     header = {name: entry for name, entry in grid.header.items() if name != key}
@@ -146,7 +182,10 @@ def _grid_of_lines(path: Path, lines: Sequence[str]) -> CellGrid:
     comments = [(k, line) for k, line in enumerate(lines[start:], start + 1) if is_comment(line)]
     late = _late_entries(path, comments, dialect)
     split = (TableRow(number, split_line(line, dialect, f"{path}:{number}")) for number, line in numbered)
-    rows = [row for row in split if any(row.cells)]
+    rows = []
+    for row in split:
+        _refuse_many(f"{path}:{row.line}", len(row.cells), 0)
+        rows += [row] if any(row.cells) else []
     if not rows:
         raise HistoryError(f"{path}:{start + 1}: no cell holds anything; write a line of columns, then rows")
     return CellGrid(path, "", dialect, _header(path, head, rows[0].cells, dialect), rows, None, late)
@@ -169,6 +208,7 @@ def grid_of_rows(path: Path, sheet: str, rows: Sequence[TableRow]) -> CellGrid:
     comments: list[tuple[int, str, SourceText]] = []
     kept: list[TableRow] = []
     for k, row in enumerate(rows):
+        _refuse_many(location_in(path, sheet, row.line), len(row.cells), 0)
         if not is_comment(row.cells[0]):
             kept.append(row)
             continue
@@ -178,6 +218,7 @@ def grid_of_rows(path: Path, sheet: str, rows: Sequence[TableRow]) -> CellGrid:
             raise HistoryError(f"{location}: '{row.cells[0]:.40}' is given twice or with several values; keep one")
         if (colon or beside) and k < start:
             header[key] = SourceText(text or "".join(beside), location)
+            _refuse_many(location, 0, len(header))
         elif colon or beside:
             comments.append((row.line, key, SourceText(text or "".join(beside), location)))
     return CellGrid(path, sheet, Dialect("\t"), header, kept, None, comments)
@@ -269,6 +310,7 @@ def _header(path: Path, lines: Sequence[str], names: Sequence[str], dialect: Dia
             first = header[key].location.rpartition(":")[2]
             raise HistoryError(f"{path}:{number}: '{key}' was already given in line {first}; keep one of them")
         header[key] = SourceText(text, f"{path}:{number}", dialect.decimal)
+        _refuse_many(f"{path}:{number}", 0, len(header))
     return header
 
 

@@ -221,8 +221,9 @@ def _unknown_key(refused: Sequence[str], unknown: Mapping[str, SourceText], sugg
     """The error about unknown keys: what the first may have meant, and which others there are."""
     key, others = unknown[refused[0]].key or refused[0], refused[1:]
     advice = f"did you mean '{suggestion}'? A label is written" if suggestion else "a label is written"
-    places = (f"'{other}' in line {unknown[other].location.rpartition(':')[2]}" for other in others)
+    places = [f"'{other:.40}' in line {unknown[other].location.rpartition(':')[2]}" for other in others[:5]]
     also = f"; unknown too: {', '.join(places)}" if others else ""
+    also += f" and {len(others) - 5} more" if len(others) > 5 else ""
     return HistoryError(f"{unknown[refused[0]].location}: unknown key '{key}'; {advice} 'label {key or 'NAME'}'{also}")
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from creepkit.errors import HistoryError, nearest
+from creepkit.files.delimited_text import refuse_unprintable
 from creepkit.hookspecs import hookimpl
 from creepkit.readers.creep_schema_json import CREEP_SCHEMA
 from creepkit.readers.history_csv import HISTORY_CSV
@@ -51,8 +52,15 @@ def read_histories(
     for path in _existing_paths(paths):
         for source in _readable_paths(path, readers):
             for history in histories_in(_reader_of(source, readers), source):
+                _check_printable(history, source)
                 read.setdefault((history.source or str(source), history.name), (source, history))
     return _with_unique_names(list(read.values()))
+
+
+def _check_printable(history: History, path: Path) -> None:
+    """Refuse texts of a test that would steer a terminal, as those of a document with escapes may."""
+    for text in (history.name, history.alloy, *history.labels, *history.labels.values(), *history.geometry):
+        refuse_unprintable(text, lambda _: str(path))
 
 
 def reader_without(ignored: Collection[str], reader: Reader) -> Reader:

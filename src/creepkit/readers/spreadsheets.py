@@ -12,11 +12,12 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from creepkit.errors import HistoryError
-from creepkit.files.delimited_text import Dialect, detect_dialect, is_number
+from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
 from creepkit.files.reading import FileKind, check_readable, read_bytes
 from creepkit.readers.cell_grids import CellGrid, grid_of_rows, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
@@ -109,6 +110,7 @@ def _grid(path: Path, sheet: Any, formulas: set[tuple[int, int]], part: bytes) -
     try:
         for number, row in enumerate(_rows(sheet), 1):
             cells = [_cell_text(cell) for cell in row]
+            refuse_unprintable("".join(cells), partial(str.format, "{}, row {}", place, number))
             if not any(cells) and not any((number, k) in formulas for k in range(1, len(row) + 1)):
                 continue
             for k, cell in enumerate(cells, 1):

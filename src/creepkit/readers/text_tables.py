@@ -48,6 +48,12 @@ _POINT_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)
 """Beside decimal commas 1.234 may be 1234."""
 
 
+def some_of(names: Sequence[str], count: int = 12) -> str:
+    """Names as messages list them: the first ones, each not longer than 40, and how many there are."""
+    shown = ", ".join(name if len(name) <= 40 else f"{name[:37]}..." for name in names[:count])
+    return shown if len(names) <= count else f"{shown} and {len(names) - count} more"
+
+
 @dataclass(frozen=True)
 class TableRow:
     """The cells of one line of a table."""
@@ -109,7 +115,7 @@ class TextTable:
     def column(self, name: str) -> int:
         """The number of a column that must be there."""
         if name not in self.columns:
-            result = ", ".join(self.columns)
+            result = some_of(self.columns)
             raise HistoryError(f"{self.location(self.columns_line)}: missing column '{name}'; found: {result}")
         return self.columns.index(name)
 
@@ -215,7 +221,7 @@ def read_frames(
                 _check_marks(table, k, values[quantity])
             found[quantity] = written
     if "time" not in values:
-        place, result = table.location(table.columns_line), ", ".join(table.written or table.columns)
+        place, result = table.location(table.columns_line), some_of(table.written or table.columns)
         raise HistoryError(f"{place}: missing column: no time among {result}; name one time_s, time_min or time_h")
     return _strictly_increasing(TableFrames(table, values, table.lines))
 
