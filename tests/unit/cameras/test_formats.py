@@ -362,7 +362,7 @@ WRONG_DECLARATIONS: dict[str, tuple[dict[str, object], str]] = {
     "no pair": ({"layout": ("X",)}, "layout holds 'X'"),
     "twice": ({"layout": (("X", "<f8"), ("X", "<f8"))}, "layout has the column 'X' twice"),
     "key": ({"time": ("head", 3, "s")}, "time is .'head', 3, 's'.; give a tuple of texts"),
-    "unit of time": ({"time": ("head", "t", [])}, "give a tuple of texts"),
+    "unit of time": ({"time": ("head", "t", [])}, "time is .*; give a tuple of texts"),
     "column": ({"columns": {**SIX, "x": 3}}, "the column of x is 3; give its name"),
     "one column": ({"columns": {**SIX, "y": "X"}}, "the column 'X' is named for x and for y"),
 }
