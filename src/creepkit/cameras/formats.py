@@ -1,10 +1,11 @@
 """The camera systems that creepkit knows, one declaration each.
 
 Names of columns are those of the systems' own exports. Axes depend on how a system was set up: VIC-3D, Zeiss and DICe
-are read as they are, as of a plane whose z was laid towards the cameras; y of MatchID points down; pyvale writes where
-points are now, in the axes of camera 0 (x to the right, y down, z away from it). Where a surface that bulges towards
-the cameras comes out negative, z points away, as it does in the plane that DICe fits to its own examples: read it with
-`dataclasses.replace(format, axes=(1, -1, -1))`.
+are read as they are, as of a plane whose z was laid towards the cameras; of MatchID it is assumed that y points down
+and z to the cameras, left-handed axes of which y alone is turned; pyvale writes where points are now, in the axes of
+camera 0 (x to the right, y down, z away from it). Where a surface that bulges towards the cameras comes out negative, z
+points away, as it does in the plane that DICe fits to its own examples: read it with `dataclasses.replace(format,
+axes=(1, -1, -1))`.
 """
 
 from __future__ import annotations

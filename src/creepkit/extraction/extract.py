@@ -113,6 +113,8 @@ class _Piece(NamedTuple):
 
 
 def _check(frames: Frames, subset: float) -> None:
+    if not isinstance(frames, Frames):
+        raise HistoryError(f"extract() takes frames, found {frames!r:.40}; read them with ck.read_frames(path)")
     if len(frames) < 2:
         raise HistoryError(f"frames '{frames.name}': one frame is no test; extraction needs the reference and others")
     if not np.isfinite(frames.times).all() or (np.diff(frames.times) <= 0.0).any():

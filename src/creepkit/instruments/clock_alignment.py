@@ -135,6 +135,7 @@ def align_clocks(
     do not bias it, see response_likelihood. HistoryError where no change of load decides, or where several lags fit
     about as well.
     """
+    search = _checked_arguments(record, channel, search, (drift, camera_start))
     times, displacements = _checked_frames(record, frame_times, displacement)
     zero = _nominal_zero(record, times, camera_start)
     task = _Task(
@@ -157,9 +158,33 @@ def align_clocks(
     return _posterior(task, lag, drift, (low, high), ClockAlignment(zero=zero, channel=channel, frames=times.size))
 
 
+def _checked_arguments(
+    record: object, channel: object, search: object, numbers: tuple[object, object]
+) -> tuple[float, float] | None:
+    """The range of the search; HistoryError where an argument is of another type."""
+    if not isinstance(record, InstrumentRecord) or not isinstance(channel, str):
+        found = f"{type(record).__name__} and {channel!r:.40}"
+        raise HistoryError(
+            f"align_clocks() takes a record and the name of a channel, found {found}; see ck.read_record(path)"
+        )
+    drift, start = numbers
+    for name, value in (("drift", drift), ("camera_start", 0.0 if start is None else start)):
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+            raise HistoryError(f"{name} is {value!r:.40}; give a number")
+    if search is None:
+        return None
+    given = tuple(search) if isinstance(search, (tuple, list, np.ndarray)) else ()
+    if len(given) != 2 or not all(isinstance(one, (int, float, np.number)) for one in given):
+        raise HistoryError(f"search is {search!r:.40}; give the least and the largest lag, s")
+    return float(given[0]), float(given[1])
+
+
 def _checked_frames(record: InstrumentRecord, frame_times: ArrayLike, displacement: ArrayLike) -> tuple[Floats, Floats]:
     """Times and displacements of the frames that hold one, without spikes of single frames."""
-    times, values = np.asarray(frame_times, dtype=float), np.asarray(displacement, dtype=float)
+    try:
+        times, values = np.asarray(frame_times, dtype=float), np.asarray(displacement, dtype=float)
+    except (TypeError, ValueError):
+        raise HistoryError("frame_times and displacement must be arrays of numbers, s and mm; give both") from None
     if times.ndim != 1 or times.shape != values.shape:
         raise HistoryError(f"frame_times and displacement have the shapes {times.shape} and {values.shape}; give both")
     seen = np.isfinite(values)

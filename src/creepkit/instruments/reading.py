@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -101,6 +100,8 @@ class ReadingOptions:
             raise HistoryError(f"units is {self.units!r:.40}; give {{channel: unit}}, such as {{'P1': 'bar'}}")
         if isinstance(self.missing, str) or not isinstance(self.missing, Sequence):
             raise HistoryError(f"missing is {self.missing!r:.40}; give a list of texts, such as ['n.a.']")
+        if not all(isinstance(text, str) for text in self.missing):
+            raise HistoryError(f"missing is {self.missing!r:.40}; give a list of texts, such as ['n.a.']")
         if self.channels is not None and not isinstance(self.channels, Sequence):
             raise HistoryError(f"channels is {self.channels!r:.40}; give a list of names")
         ambient = self.ambient_pressure
@@ -126,6 +127,8 @@ def read_record(
     given = ReadingOptions.of(options)
     if not isinstance(path, (str, Path)):
         raise HistoryError(f"read_record() takes the path of a file, found {path!r:.40}")
+    if format is not None and not isinstance(format, str):
+        raise HistoryError(f"format is {format!r:.40}; give the name of an instrument format")
     path = Path(path).expanduser()
     parts = numbered_lines(path)
     ahead = next(parts, [])
@@ -199,7 +202,7 @@ class _Layout:
             if name not in names:
                 raise HistoryError(f"{place}: units of '{name}', which is no channel; {nearest(name, names)}")
         for k in channels:
-            declared = next((u for pattern, u in chosen.units.items() if re.fullmatch(pattern, head.names[k])), "")
+            declared = chosen.unit_of(head.names[k])
             if names[k] in units and written[k] not in ("", units[names[k]]):
                 raise HistoryError(
                     f"{place}: the head of '{names[k]}' states {written[k]}, units= says {units[names[k]]}; keep one"

@@ -33,6 +33,10 @@ QUANTITIES_OF_FRAMES = (*COORDINATES, *DISPLACEMENTS, "confidence", "time", "ima
 _UNIT_IN_BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]$", re.DOTALL)
 
 
+_PACKED = re.compile(r"\?|[<>=|]?(?:[iu][1248]|f[248])", re.ASCII)
+"""Types of packed numbers, as NumPy calls them."""
+
+
 _RULE = re.compile(r"\s*(<=|>=|<|>|==)\s*([+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*", re.ASCII)
 
 
@@ -92,7 +96,9 @@ class CameraFormat:
         surface that moves in its plane.
     unit : of lengths where the head of the file states none; "" makes that an error.
     deformed : whether x y z are where the points are now, rather than where they were in the reference image.
-    axes : factors of x, y, z, each 1 or -1, that turn them into right-handed axes whose z points to the cameras.
+    axes : factors of x, y, z, each 1 or -1, that turn them into right-handed axes whose z points to the cameras. Two
+        factors of -1, or none, are a rotation; one, or three, say that the axes of the files are left-handed, as those
+        are whose y points down and whose z points to the cameras.
     lost : {column: rule} of points that the correlation lost, such as {"sigma": "< 0"}; NaN is one in all systems.
     confidence_unit : of the column confidence, where the head states none.
     patterns : names of files, such as "*.csv". planar : columns by which a two-dimensional table of the system is
@@ -119,20 +125,25 @@ class CameraFormat:
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and self.name.strip()):
             raise HistoryError(f"a camera format is called {self.name!r}; give it a short name in words")
+        for field in ("title", "unit", "confidence_unit"):
+            if not isinstance(getattr(self, field), str):
+                raise HistoryError(f"{self}: {field} is {getattr(self, field)!r:.60}; give a text")
+        if not isinstance(self.deformed, bool):
+            raise HistoryError(f"{self}: deformed is {self.deformed!r:.60}; write True or False")
         given = (self.columns,) if isinstance(self.columns, Mapping) else self.columns
         if not isinstance(given, Sequence) or not given or not all(isinstance(one, Mapping) for one in given):
             raise HistoryError(f"{self}: columns are {{quantity: column}}, or a tuple of them, found {given!r:.60}")
         object.__setattr__(self, "columns", tuple(self._checked_columns(one) for one in given))
         if self.unit and self.unit not in LENGTH_UNITS:
             raise HistoryError(f"{self}: '{self.unit}' is no unit of length; {nearest(self.unit, LENGTH_UNITS)}")
-        if len(tuple(self.axes)) != 3 or not all(axis in (1, -1) for axis in self.axes):
-            raise HistoryError(f"{self}: axes are {self.axes!r}; give three factors that are 1 or -1")
-        rules = self.lost.items() if isinstance(self.lost, Mapping) else ()
-        if isinstance(self.lost, Mapping):
-            object.__setattr__(self, "lost", tuple(self._checked_rule(*rule) for rule in rules))
-        for field in ("axes", "patterns", "planar", "time", "layout"):
-            value = getattr(self, field)
-            object.__setattr__(self, field, (value,) if isinstance(value, str) else tuple(value))
+        axes = tuple(self.axes) if isinstance(self.axes, Sequence) else ()
+        if len(axes) != 3 or not all(isinstance(axis, int) and axis in (1, -1) for axis in axes):
+            raise HistoryError(f"{self}: axes are {self.axes!r:.60}; give three factors that are 1 or -1")
+        object.__setattr__(self, "axes", axes)
+        object.__setattr__(self, "lost", self._checked_rules())
+        for field in ("patterns", "planar", "time"):
+            object.__setattr__(self, field, self._checked_texts(field))
+        self._check_layout()
         self._check_time()
 
     def __str__(self) -> str:
@@ -157,11 +168,47 @@ class CameraFormat:
         needed = [q for q in (*COORDINATES, *DISPLACEMENTS) if not (flat and q in OUT_OF_PLANE)]
         if missing := [quantity for quantity in needed if quantity not in given]:
             raise HistoryError(f"{self}: no column is given for {missing[0]}; name those of {' '.join(needed)}")
-        result = {q: (one,) if isinstance(one, str) else tuple(one) for q, one in given.items()}
-        for quantity, spellings in result.items():
+        result: dict[str, tuple[str, ...]] = {}
+        taken: dict[ColumnName, str] = {}
+        for quantity, one in given.items():
+            spellings = (one,) if isinstance(one, str) else tuple(one) if isinstance(one, Sequence) else ()
             if not spellings or not all(isinstance(word, str) and ColumnName.of(word).name for word in spellings):
-                raise HistoryError(f"{self}: the column of {quantity} is {spellings!r}; give its name")
+                raise HistoryError(f"{self}: the column of {quantity} is {one!r:.60}; give its name")
+            for name in map(ColumnName.of, spellings):
+                if taken.setdefault(name, quantity) != quantity:
+                    raise HistoryError(
+                        f"{self}: the column '{name.name}' is named for {taken[name]} and for {quantity}; give each one"
+                    )
+            result[quantity] = spellings
         return result
+
+    def _checked_texts(self, field: str) -> tuple[str, ...]:
+        value = getattr(self, field)
+        texts = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Sequence) else (None,)
+        if not all(isinstance(text, str) for text in texts):
+            raise HistoryError(f"{self}: {field} is {value!r:.60}; give a tuple of texts")
+        return texts
+
+    def _checked_rules(self) -> tuple[LostRule, ...]:
+        if isinstance(self.lost, Mapping):
+            return tuple(self._checked_rule(*rule) for rule in self.lost.items())
+        if not (isinstance(self.lost, tuple) and all(isinstance(rule, LostRule) for rule in self.lost)):
+            raise HistoryError(f"{self}: lost is {self.lost!r:.60}; write {{column: rule}}, such as {{'sigma': '< 0'}}")
+        return self.lost
+
+    def _check_layout(self) -> None:
+        pairs = tuple(self.layout) if isinstance(self.layout, Sequence) else (self.layout,)
+        names = []
+        for pair in pairs:
+            column, kind = pair if isinstance(pair, (tuple, list)) and len(pair) == 2 else ("", "")
+            if not (isinstance(column, str) and column and isinstance(kind, str) and _PACKED.fullmatch(kind)):
+                raise HistoryError(
+                    f"{self}: layout holds {pair!r:.60}; give a column and its type, such as ('stereo_x_mm', '<f8')"
+                )
+            if column in names:
+                raise HistoryError(f"{self}: layout has the column '{column:.40}' twice; give each its own name")
+            names.append(column)
+        object.__setattr__(self, "layout", tuple((column, kind) for column, kind in pairs))
 
     def _checked_rule(self, column: str, rule: str) -> LostRule:
         found = _RULE.fullmatch(rule) if isinstance(rule, str) else None

@@ -11,6 +11,14 @@ from creepkit.errors import HistoryError
 PRESSURE_REFERENCES = ("gauge", "absolute")
 
 
+LONGEST_NAME = 200
+"""Characters of a name that is matched with regular expressions."""
+
+
+_REPEATED_TWICE = re.compile(r"\([^()]*[+*][^()]*\)[+*{]")
+"""A repeated group with a repetition in it: the time of a search may grow as 2 to the power of the name's length."""
+
+
 @dataclass(frozen=True)
 class InstrumentFormat:
     """How one data logger writes its records: a table of text with a line of names and a row for each moment.
@@ -46,7 +54,29 @@ class InstrumentFormat:
                 f"instrument format {self.name!r:.40}: the name must be small letters, digits and hyphens, such as "
                 "'furnace-3'"
             )
+        for field_name in ("title", "time", "date", "time_unit", "date_order", "time_zone"):
+            if not isinstance(getattr(self, field_name), str):
+                raise HistoryError(
+                    f"instrument format '{self.name}': {field_name} is {getattr(self, field_name)!r:.40}; give a text"
+                )
+        for field_name in ("required", "missing"):
+            texts = getattr(self, field_name)
+            if not isinstance(texts, (tuple, list)) or not all(isinstance(text, str) for text in texts):
+                raise HistoryError(
+                    f"instrument format '{self.name}': {field_name} is {texts!r:.40}; give a tuple of texts"
+                )
+        for field_name in ("units", "channel_patterns"):
+            texts = getattr(self, field_name)
+            if not isinstance(texts, Mapping) or not all(isinstance(text, str) for text in texts.values()):
+                raise HistoryError(
+                    f"instrument format '{self.name}': {field_name} is {texts!r:.40}; give {{text: text}}"
+                )
         for pattern in (*self.required, *self.units):
+            if isinstance(pattern, str) and _REPEATED_TWICE.search(pattern):
+                raise HistoryError(
+                    f"instrument format '{self.name}': {pattern!r:.40} repeats what it repeats already, so that a "
+                    "search may take for ever; write it with one + or *"
+                )
             try:
                 re.compile(pattern)
             except (re.error, TypeError) as error:
@@ -67,4 +97,12 @@ class InstrumentFormat:
 
     def accepts(self, names: Sequence[str]) -> bool:
         """Whether a line of names is one of this format."""
-        return all(any(re.fullmatch(pattern, name) for name in names) for pattern in self.required)
+        return all(any(_matches(pattern, name) for name in names) for pattern in self.required)
+
+    def unit_of(self, name: str) -> str:
+        """The unit that `units` states for a column; "" for none."""
+        return next((unit for pattern, unit in self.units.items() if _matches(pattern, name)), "")
+
+
+def _matches(pattern: str, name: str) -> bool:
+    return len(name) <= LONGEST_NAME and re.fullmatch(pattern, name) is not None

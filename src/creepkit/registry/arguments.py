@@ -106,10 +106,10 @@ def read_frames(
 def read_record(path: str | Path, format: str | None = None, **options: Any) -> InstrumentRecord:
     """Read the record of an instrument: channels of pressure, temperature and others over one clock.
 
-    format : name of one of `available("instruments")`; by default the one whose columns are there. options : time, date
-    (names of their columns), time_unit, date_order ("month first", "day first", "year first"), time_zone (such as
-    "America/Chicago", "+01:00"), channels (names of those that are kept), every (rows that are averaged to one), units
-    ({channel: unit}), pressure_reference ("gauge" or "absolute"), ambient_pressure (MPa, to be taken off
+    format : name of one of `available("instruments")`; by default the one whose columns are there. options : time,
+    date (names of their columns), time_unit, date_order ("month first", "day first", "year first"), time_zone
+    ("America/Chicago", "+01:00"), channels (names of those that are kept), every (rows that are averaged to one),
+    units ({channel: unit}), pressure_reference ("gauge" or "absolute"), ambient_pressure (MPa, to be taken off
     absolute pressures), missing (texts in the place of a reading).
     """
     formats = [entry.value for entry in default_registry().instruments().values()]

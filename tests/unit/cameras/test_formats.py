@@ -347,3 +347,29 @@ def test_times_in_names_have_decimals(tmp_path: Path) -> None:
     for name in ("t_2.25.txt", "t_12.5.txt"):
         (tmp_path / f"{name[:-4].split('.')[0]}.txt").rename(tmp_path / name)
     assert ck.read_frames(tmp_path, format=format).times.tolist() == [2.25, 12.5]
+
+
+SIX = dict(zip("xyzuvw", "XYZUVW", strict=True))
+WRONG_DECLARATIONS: dict[str, tuple[dict[str, object], str]] = {
+    "title": ({"title": None}, "title is None; give a text"),
+    "unit": ({"unit": 3}, "unit is 3; give a text"),
+    "axes": ({"axes": 3}, "axes are 3; give three factors"),
+    "lost list": ({"lost": ["sigma"]}, "lost is .'sigma'.; write {column: rule}"),
+    "lost None": ({"lost": None}, "lost is None; write"),
+    "patterns": ({"patterns": (3,)}, "patterns is .3,.; give a tuple of texts"),
+    "object": ({"layout": (("X", "O"),)}, "layout holds .'X', 'O'.; give a column and its type"),
+    "type": ({"layout": (("X", "zz"),)}, "layout holds .'X', 'zz'."),
+    "no pair": ({"layout": ("X",)}, "layout holds 'X'"),
+    "twice": ({"layout": (("X", "<f8"), ("X", "<f8"))}, "layout has the column 'X' twice"),
+    "key": ({"time": ("head", 3, "s")}, "time is .'head', 3, 's'.; give a tuple of texts"),
+    "unit of time": ({"time": ("head", "t", [])}, "time is .*; give a tuple of texts"),
+    "column": ({"columns": {**SIX, "x": 3}}, "the column of x is 3; give its name"),
+    "one column": ({"columns": {**SIX, "y": "X"}}, "the column 'X' is named for x and for y"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_DECLARATIONS)
+def test_a_declaration_checks_itself(case: str) -> None:
+    changes, message = WRONG_DECLARATIONS[case]
+    with pytest.raises(HistoryError, match=f"camera format 'lab': {message}"):
+        ck.CameraFormat(**{"name": "lab", "title": "a laboratory's own", "columns": SIX, **changes})  # type: ignore[arg-type]

@@ -289,3 +289,30 @@ def test_units_that_are_nearly_known_are_not_taken_in_silence(tmp_path: Path) ->
     assert "p: taken for numbers without a unit; if 'psgi' means psi, write psi into the head" in text
     assert "V: numbers in 'rpm', which is not converted" in text
     assert not any(note.startswith(("valve", "T_set")) for note in record.notes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"title": None}, "title is None; give a text"),
+        ({"missing": [3]}, "missing is .3.; give a tuple of texts"),
+        ({"required": "P"}, "required is 'P'; give a tuple of texts"),
+        ({"units": {"P": 3}}, "units is {'P': 3}; give {text: text}"),
+        ({"required": ("(a+)+$",)}, "repeats what it repeats already"),
+    ],
+)
+def test_a_declaration_of_an_instrument_checks_itself(changes: dict[str, object], message: str) -> None:
+    with pytest.raises(HistoryError, match=f"instrument format 'lab': .*{message}"):
+        ck.InstrumentFormat(**{"name": "lab", "title": "a logger", **changes})  # type: ignore[arg-type]
+
+
+def test_long_names_are_not_matched() -> None:
+    declared = ck.InstrumentFormat("lab", "a logger", required=("a*a*b",), units={"a*": "bar"})
+    assert not declared.accepts(["a" * 100_000])
+    assert (declared.unit_of("a" * 100_000), declared.unit_of("aa")) == ("", "bar")
+
+
+@pytest.mark.parametrize("options", [{"format": []}, {"missing": [3]}])
+def test_options_of_other_types(tmp_path: Path, options: dict[str, object]) -> None:
+    with pytest.raises(HistoryError, match=r"(format|missing) is \[3?\]; give"):
+        ck.read_record(written(tmp_path, "time_s,p_bar\n0,1\n"), **options)  # type: ignore[arg-type]
