@@ -51,9 +51,9 @@ from creepkit.forecasts.simulation import (
     drawn_theta,
     followed_history,
 )
+from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
-from creepkit.inverse.observation_vector import usable_frames
 from creepkit.inverse.reference_conditions import reference_temperature
 from creepkit.quality.comparison import duplicate_tests
 from creepkit.records import History

@@ -33,8 +33,9 @@ from creepkit.forecasts.variance_shares import (
     variance_shares,
 )
 from creepkit.inverse.extrapolation import extrapolation_text
+from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, usable_frames
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
 from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, is_logarithmic, output_unit

@@ -10,10 +10,10 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import CompositePredictor, outside_class
+from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, errors_of_output
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
-from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
 from creepkit.presentation import Presentable
 from creepkit.records import History, Prediction, Predictor, Status
 

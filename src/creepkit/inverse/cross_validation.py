@@ -20,6 +20,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs, predict_to_rupture
+from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.goodness_of_fit import (
     OutputErrors,
     RateComparison,
@@ -32,7 +33,6 @@ from creepkit.inverse.identify import refit
 from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
-from creepkit.inverse.observation_vector import usable_frames
 from creepkit.inverse.rupture_prediction import compare_rupture_times
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.language import CreepLaw

@@ -11,8 +11,8 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs
+from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.noise_model import Residuals
-from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.records import History, Prediction, is_logarithmic
 

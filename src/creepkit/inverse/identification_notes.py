@@ -11,12 +11,12 @@ import numpy as np
 
 from creepkit import registry
 from creepkit.inverse.duration import followed_duration
+from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.goodness_of_fit import TestFit
 from creepkit.inverse.iterative_estimation import EstimationResult
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS
 from creepkit.inverse.nuisance_correlation import nuisance_correlation_notes
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
-from creepkit.inverse.observation_vector import usable_frames
 from creepkit.inverse.prediction_failures import tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_end_strain, reference_stresses

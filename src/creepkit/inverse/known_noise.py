@@ -9,13 +9,8 @@ import numpy as np
 from scipy.stats import chi2, f
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.observation_vector import (
-    SINGLE_VALUES,
-    SMALLEST_NOISE,
-    ObservationVector,
-    frame_noise,
-    usable_frames,
-)
+from creepkit.inverse.frame_noise import frame_noise, usable_frames
+from creepkit.inverse.observation_vector import SINGLE_VALUES, SMALLEST_NOISE, ObservationVector
 from creepkit.records import History
 
 FREEDOM_PER_FRAME = 0.2

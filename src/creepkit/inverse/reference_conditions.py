@@ -12,7 +12,7 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.duration import followed_duration
-from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
+from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, arrhenius, temperature
 from creepkit.records import ZERO_CELSIUS, History, Predictor, growing_output, is_logarithmic, specimen_of
 

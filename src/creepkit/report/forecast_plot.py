@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.observation_vector import usable_frames
+from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import is_logarithmic
 from creepkit.report.figures import empty_figure, save_figure, set_range, wrapped
 from creepkit.report.identification_plot import axis_label

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
+from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records import is_logarithmic, output_unit
 from creepkit.report.condition_colours import (

@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.observation_vector import usable_frames
+from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import growing_output, output_named, specimen_of
 from creepkit.report.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
 from creepkit.report.terminal import print_json, print_table

@@ -8,12 +8,12 @@ import pytest
 from scipy.stats import chi2, f
 
 from creepkit.inverse.adequacy import Adequacy, OutputAdequacy, adequacy_of
+from creepkit.inverse.frame_noise import frame_noise
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
-from creepkit.inverse.observation_vector import frame_noise
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE

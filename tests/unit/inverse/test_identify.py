@@ -268,7 +268,7 @@ def test_settings_and_nuisances_that_mean_nothing_are_refused():
 
 def test_noise_of_a_smooth_sparse_curve_is_small():
     """Primary creep t^0.1 without noise at 12 frames even in ln t: under 0.1 % of the end strain is taken for noise."""
-    from creepkit.inverse.observation_vector import frame_noise
+    from creepkit.inverse.frame_noise import frame_noise
     from creepkit.records import History, constant_stress
 
     times = np.geomspace(1e2, 1e6, 12)

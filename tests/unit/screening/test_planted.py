@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.observation_vector import frame_noise
+from creepkit.inverse.frame_noise import frame_noise
 from creepkit.screening.alloys import read_compositions
 from creepkit.screening.planted import BASE_ALLOYS, FIGURE_7A, mix_base_alloys, planted_plate
 

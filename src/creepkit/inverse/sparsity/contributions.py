@@ -17,7 +17,8 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.observation_vector import selected_frames, usable_frames
+from creepkit.inverse.frame_noise import usable_frames
+from creepkit.inverse.observation_vector import selected_frames
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import growth_per_strain, reference_end_strain, reference_stresses
 from creepkit.kernels import lower
