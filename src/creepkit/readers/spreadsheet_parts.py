@@ -140,8 +140,8 @@ def check_sheet(place: str, part: bytes) -> SheetRows:
         if not re.fullmatch(rb"[1-9]\d{0,6}", text) or not number < int(text) <= MAXIMUM_ROW:
             shown = text[:20].decode("ascii", "backslashreplace")
             raise HistoryError(
-                f"{place}: a row is numbered {shown} behind row {number}; rows must rise, up to {MAXIMUM_ROW}; open the "
-                "file in a spreadsheet program and save it anew"
+                f"{place}: a row is numbered {shown} behind row {number}; rows must rise, up to {MAXIMUM_ROW}; open "
+                "the file in a spreadsheet program and save it anew"
             )
         if int(text) - number > MAXIMUM_EMPTY_ROWS:
             raise HistoryError(

@@ -2,8 +2,8 @@
 
 A strain without a unit may be a fraction or in per cent. It is decided by, in this order: the key `strain_unit` (1, %),
 the head of a file that earlier versions of creepkit wrote (fractions), and its values: above 1, up to 100, they are per
-cent, for few creep tests are stretched to twice their length; below 0.001 they are fractions, for no extensometer resolves
-0.001 %. Else it is asked for. What was decided by head or values is recorded in the label "assumed".
+cent, for few creep tests are stretched to twice their length; below 0.001 they are fractions, for no extensometer
+resolves 0.001 %. Else it is asked for. What was decided by head or values is recorded in the label "assumed".
 """
 
 from __future__ import annotations

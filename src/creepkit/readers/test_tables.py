@@ -312,8 +312,8 @@ def _check_duration(entries: Mapping[str, SourceText]) -> None:
     if abs(ended - broken) > _ROUNDING * broken:
         one, other = entries[rupture], entries[end]
         raise HistoryError(
-            f"{one.location}: '{one.key or rupture}' is {one.text:.40}, and '{other.key or end}' is {other.text:.40}; a "
-            "test that ruptured lasted until then; correct one of them"
+            f"{one.location}: '{one.key or rupture}' is {one.text:.40}, and '{other.key or end}' is {other.text:.40}; "
+            "a test that ruptured lasted until then; correct one of them"
         )
 
 
