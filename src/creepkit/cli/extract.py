@@ -13,7 +13,7 @@ from creepkit.cli.options import PAPER_SPECIMEN, check_folder
 
 if TYPE_CHECKING:
     from creepkit.extraction import Extraction
-    from creepkit.records import Frames
+    from creepkit.records import Frames, History, InstrumentRecord
 
 
 def command(
@@ -34,6 +34,15 @@ def command(
     ] = None,
     time_zone: Annotated[
         str | None, typer.Option("--time-zone", metavar="ZONE", help="Of the record's times, as America/Chicago.")
+    ] = None,
+    date_order: Annotated[
+        str | None, typer.Option("--date-order", metavar="ORDER", help="Of its dates: 'month first' or 'day first'.")
+    ] = None,
+    reference: Annotated[
+        str | None, typer.Option("--pressure-reference", metavar="KIND", help="Of its pressures: gauge or absolute.")
+    ] = None,
+    channels: Annotated[
+        str | None, typer.Option(metavar="LOAD,TEMPERATURE", help="Its channels, where its format does not name them.")
     ] = None,
     names: Annotated[
         str | None, typer.Option(metavar="D1,E1", help="Names of what is found, as the record has them.")
@@ -83,6 +92,9 @@ def command(
         raise HistoryError(
             "a history needs what was imposed: give --record FILE, or --load-mpa and --temperature-c, beside --to"
         )
+    options = {"time_zone": time_zone, "date_order": date_order, "pressure_reference": reference}
+    stated = {name: value for name, value in options.items() if value is not None}
+    recorded = None if record is None else ck.read_record(record, **stated)  # before the frames, which take longer
     operator = operator_of(specimen, window, _numbers(rings, "--rings", "0,2,4") if rings else ())
     centers = _named_centers(center, names) if center else None
     sequence = _frames(frames, format, columns, _Times(interval, times))
@@ -101,8 +113,8 @@ def command(
         check_target(path, HistoryError, force=force)
     histories = []
     for one in found if to is not None else ():  # all of them, before any is written
-        if record is not None:
-            histories.append(_under_record(one, record, time_zone))
+        if recorded is not None:
+            histories.append(_under_record(one, recorded, channels))
         else:
             assert load is not None
             assert temperature is not None
@@ -118,21 +130,23 @@ def command(
         typer.echo(f"written: {path}")
 
 
-def _under_record(one: Extraction, record: Path, time_zone: str | None) -> Any:
+def _under_record(one: Extraction, recorded: InstrumentRecord, channels: str | None) -> History:
     """The history under what an instrument record says of a test piece, after the clocks were aligned."""
     import numpy as np
 
     import creepkit as ck
+    from creepkit.errors import HistoryError
     from creepkit.records import RecordedLoading
 
-    instruments: Any = ck  # the record's functions
-    recorded = instruments.read_record(record, **({} if time_zone is None else {"time_zone": time_zone}))
     signal = np.where(one.used, next(iter(one.outputs.values())), np.nan)
     times = one.times + one.first_time
-    channel = recorded.channel_patterns.get(one.load_name, "{}").replace("{}", one.name)
-    alignment = instruments.align_clocks(recorded, channel, times, signal)
+    named = tuple(name.strip() for name in channels.split(",")) if channels is not None else ()
+    if channels is not None and len(named) != 2:
+        raise HistoryError(f"--channels is '{channels}'; name two channels of the record: --channels P1,T1")
+    channel = named[0] if named else recorded.channel_patterns.get(one.load_name, "{}").replace("{}", one.name)
+    alignment = ck.align_clocks(recorded, channel, times, signal)
     typer.echo(f"  {one.name}: {alignment}")
-    imposed = instruments.imposed(recorded, one.name, times, alignment)
+    imposed = ck.imposed(recorded, (named[0], named[1]) if named else one.name, times, alignment)
     for note in imposed.notes:
         typer.echo(f"  {note}")
     return one.history_under(
