@@ -13,7 +13,7 @@ from creepkit.report.figures import empty_figure, save_figure, set_range, wrappe
 from creepkit.rupture_assessment.checks import BAND_FACTOR
 from creepkit.rupture_assessment.fitting import conditions_of
 from creepkit.rupture_assessment.methods import METHODS, THERMAL, Conditions
-from creepkit.rupture_assessment.strength import LONGEST_EXTRAPOLATION, mixed
+from creepkit.rupture_assessment.strength import LONGEST_EXTRAPOLATION, bound_curves, mixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -126,10 +126,9 @@ def _draw_isotherm(
         METHODS[m.method].needs == "tensile_strength" for m, _ in models if hasattr(m, "method")
     ) and not np.isfinite(limit):
         return
-    tail = 0.5 * (1.0 - assessment.settings.level)
+    curves = bound_curves(models, at, assessment.settings.level)
     for of, alpha in (("test", 0.13), ("mean", 0.35)):
-        distribution = mixed(models, at, of)
-        low, high = (np.clip(10.0 ** distribution.quantile(p), *_wide(hours)) for p in (tail, 1.0 - tail))
+        low, high = (np.clip(10.0**curve, *_wide(hours)) for (kind, _), curve in curves.items() if kind == of)
         axes.fill_betweenx(stress, low, high, color=colour, alpha=alpha, lw=0)
     times = 10.0 ** mixed(models, at, "mean").quantile(0.5)
     near = np.abs(tests.temperature - temperature) <= 5.0

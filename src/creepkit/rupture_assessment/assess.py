@@ -28,7 +28,12 @@ from creepkit.rupture_assessment.assessment import (
 from creepkit.rupture_assessment.checks import AssessmentCheck, effectiveness, physical_realism, repeatability, turning
 from creepkit.rupture_assessment.fitting import conditions_of, fit_method
 from creepkit.rupture_assessment.methods import METHODS, MINIMUM_RATE, MONKMAN_GRANT
-from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation, fit_relation
+from creepkit.rupture_assessment.monkman_grant import (
+    LEAST_CURVATURE,
+    MinimumRateRelation,
+    curvature_probability,
+    fit_relation,
+)
 from creepkit.rupture_assessment.observed_tests import (
     NOT_STATED,
     RuptureTests,
@@ -97,7 +102,7 @@ def rupture(
             strengths,
             relation,
             rejected,
-            (*notes, *_notes(observed, chosen)),
+            (*notes, *_notes(observed, chosen), *_relation_notes(relation, with_rate)),
             {
                 "creepkit": version("creepkit"),
                 "data": observed.fingerprint,
@@ -224,6 +229,19 @@ def _relation(
         if asked:
             raise
         return None
+
+
+def _relation_notes(relation: MinimumRateRelation | None, with_rate: RuptureTests) -> list[str]:
+    """Why strengths by Monkman-Grant's relation may be off."""
+    if relation is None:
+        return []
+    probability = curvature_probability(with_rate)
+    if probability >= LEAST_CURVATURE:
+        return ["strengths by monkman-grant take one stress exponent for all rates; checks are not made of them"]
+    return [
+        "strengths by monkman-grant are off, and their bounds do not say so: their rate law has one stress exponent, "
+        f"which these rates contradict (p = {probability:.2g})"
+    ]
 
 
 def _nothing_left(rejected: Mapping[str, str], relation: MinimumRateRelation | None) -> str:

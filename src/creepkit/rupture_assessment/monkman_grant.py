@@ -64,6 +64,26 @@ def fit_relation(tests: RuptureTests, with_rate: RuptureTests, *, level: float) 
     return MinimumRateRelation(times, rates)
 
 
+LEAST_CURVATURE = 0.01
+"""Probability below which rates say that one stress exponent does not hold for all of them."""
+
+
+def curvature_probability(with_rate: RuptureTests) -> float:
+    """Probability of so much curvature of ln rate over ln stress if there were none, by the F test; 1 of few rates."""
+    from scipy.stats import f as f_distribution
+
+    x, y = np.log(with_rate.stress), np.log(with_rate.minimum_rate)
+    line = [np.ones_like(x), x - x.mean(), *([] if with_rate.isothermal else [1.0 / with_rate.temperature])]
+    left = []
+    for columns in (line, [*line, (x - x.mean()) ** 2]):
+        A = np.stack([column / np.abs(column).max() for column in columns], axis=1)
+        if np.linalg.matrix_rank(A) < A.shape[1] or len(y) < A.shape[1] + 2:
+            return 1.0
+        left.append(float(np.sum((y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2)))
+    freedom = len(y) - len(line) - 1
+    return float(f_distribution.sf((left[0] - left[1]) * freedom / max(left[1], 1e-300), 1, freedom))
+
+
 def _conditions(tests: RuptureTests) -> Conditions:
     unknown: Floats = np.full(len(tests), np.nan)
     return Conditions(tests.stress, tests.temperature, unknown, tests.minimum_rate)

@@ -74,6 +74,22 @@ def mixed(models: WeightedModels, at: Conditions, of: str) -> MixedLogTime:
     return MixedLogTime([model.log_time(at, of) for model, _ in models], [weight for _, weight in models])
 
 
+def bound_curves(models: WeightedModels, at: Conditions, level: float) -> dict[tuple[str, float], Floats]:
+    """{(of, probability): (points,)} log10 h that bound a time: lower and upper, of each of BOUND_KINDS.
+
+    A wider kind holds the narrower ones: each has degrees of freedom of its own, by which alone it might not.
+    """
+    tail = 0.5 * (1.0 - level)
+    curves: dict[tuple[str, float], Floats] = {}
+    for of in BOUND_KINDS:
+        distribution = mixed(models, at, of)
+        for p, wider in ((tail, np.minimum), (1.0 - tail, np.maximum)):
+            curve = distribution.quantile(p)
+            inner = curves.get((BOUND_KINDS[max(BOUND_KINDS.index(of) - 1, 0)], p), curve)
+            curves[of, p] = np.asarray(wider(curve, inner))
+    return curves
+
+
 def strength_estimates(
     models: WeightedModels,
     name: str,
@@ -92,17 +108,11 @@ def strength_estimates(
     stress = np.geomspace(lowest, highest, GRID_POINTS)
     shape = stress.shape
     at = Conditions(stress, np.full(shape, temperature), np.full(shape, limit), np.full(shape, np.nan))
-    tail = 0.5 * (1.0 - level)
-    by_kind = {of: mixed(models, at, of) for of in BOUND_KINDS}
-    median = by_kind["mean"].quantile(0.5)
+    median = mixed(models, at, "mean").quantile(0.5)
     tested = (stress >= 0.99 * tests.stress.min()) & (stress <= 1.01 * tests.stress.max())
     start = int(np.argmin(np.where(tested, np.abs(median - np.median(tests.log_time)), np.inf)))
     central = _falling_branch(stress, median, start)
-    branches = {
-        (of, p): _falling_branch(stress, by_kind[of].quantile(p), start)
-        for of in BOUND_KINDS
-        for p in (tail, 1.0 - tail)
-    }
+    branches = {key: _falling_branch(stress, curve, start) for key, curve in bound_curves(models, at, level).items()}
     return [_estimate(central, branches, name, tests, time, temperature) for time in hours]
 
 
