@@ -84,6 +84,7 @@ BENCHMARKS = {
     "noise_correlation": Benchmark(4),
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "structure": Benchmark(0.1),
+    "rate_tables": Benchmark(20, needs=DATA),
     "reader_fuzz": Benchmark(40),
 }
 """{name of the program: what it costs and how it is run}."""

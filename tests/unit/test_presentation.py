@@ -18,6 +18,7 @@ from creepkit.inverse.uncertainty.model_averaging import RateBand
 from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
 from creepkit.laws.norton import NORTON
 from creepkit.presentation import PRESENTERS, Presentable, present, presenter
+from creepkit.records import constant_stress
 from creepkit.specimens.run import Run
 from helpers.log_rate_predictor import known_scatter, measured
 from helpers.source_tree import public_classes
@@ -73,7 +74,7 @@ def test_a_derived_class_uses_the_entries_of_its_base() -> None:
     class Longer(Run):
         """A run of a specimen of another package."""
 
-    run = Longer("bar", np.array([0.0, 1.0]), {"strain": np.array([0.0, 0.01])}, None, 1000.0)  # type: ignore[arg-type]
+    run = Longer("bar", np.array([0.0, 1.0]), {"strain": np.array([0.0, 0.01])}, constant_stress(50.0), 1000.0)
     assert str(run) == "bar: complete; 2 frames to 1 s, where strain 0.01"
 
 

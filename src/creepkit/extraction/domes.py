@@ -28,7 +28,10 @@ Centers = Mapping[str, tuple[float, float]] | Sequence[tuple[float, float]]
 
 
 class Found(NamedTuple):
-    """Test pieces in the field of view: the plate, turned over where they fall in it, and {name: (2,) mm in it}."""
+    """Test pieces in the field of view.
+
+    plate : turned over where they fall in it. centers : {name: (2,) mm in that plate}.
+    """
 
     plate: ReferencePlate
     centers: dict[str, Floats]

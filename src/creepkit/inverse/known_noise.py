@@ -77,7 +77,10 @@ class KnownNoise:
         return float(chi2.sf(reduced * total * 2.0 * mean / variance, 2.0 * mean**2 / variance))
 
     def expected(self, share_of_freedom: float, mask: Bools) -> float:
-        """The mean reduced chi-square of a law that is right: one where noise is stated, that of F where estimated."""
+        """The mean reduced chi-square of a law that is right: one where noise is stated, that of F where estimated.
+
+        mask : (tests, observations) which count.
+        """
         groups = self._groups(share_of_freedom, mask)
         means = sum(freedom * (1.0 if np.isinf(nu) else nu / (nu - 2.0)) for freedom, nu in groups)
         return means / max(sum(freedom for freedom, _ in groups), 1e-300)

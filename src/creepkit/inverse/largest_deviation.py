@@ -49,7 +49,10 @@ def _amount(value: float, unit: str) -> str:
 def largest_deviation(
     observations: ObservationVector, known: KnownNoise, deviation: Floats, histories: Sequence[History]
 ) -> LargestDeviation | None:
-    """Where `deviation` (tests, observations), in the output's unit, is largest over the known noise."""
+    """Where a deviation is largest over the known noise.
+
+    deviation : (tests, observations) in the output's unit.
+    """
     series = [
         (test, name, index)
         for test in range(len(histories))

@@ -44,8 +44,10 @@ class SurfaceObservation:
     operator : its text, as histories carry it. outputs : {name: (frames,)}; NaN where a frame does not show one.
     gains : (frames, outputs, points) derivatives of the outputs to the heights; zero of lost points.
     residuals : (frames, points) mm, heights less those of the operator's model; NaN outside of what it uses.
-    converged : (frames,) whether the frame was observed at all. terms : (points, terms), fitted : (terms, points) of
-    the frame of the greatest leading output: its residuals change by errors less terms @ fitted @ errors.
+    converged : (frames,) whether the frame was observed at all.
+    terms : (points, terms) and
+    fitted : (terms, points) of the frame of the greatest leading output, whose residuals change by errors less terms @
+    fitted @ errors.
     """
 
     operator: str

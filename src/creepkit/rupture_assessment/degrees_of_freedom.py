@@ -56,7 +56,10 @@ class VarianceFreedom:
         return np.asarray(np.clip(np.where(np.isfinite(freedom), freedom, self.most), 1.0, self.most))
 
     def transformed(self, jacobian: Floats) -> VarianceFreedom:
-        """The same for other location parameters, jacobian @ those of now."""
+        """The same for other location parameters, jacobian @ those of now.
+
+        jacobian : (others, parameters).
+        """
         derivatives = np.einsum("mi,kij,nj->kmn", jacobian, self.derivatives, jacobian)
         return VarianceFreedom(self.variances, self.uncertainty, frozen(derivatives), self.most)
 
