@@ -105,7 +105,7 @@ _NUMBER_AND_UNIT = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\D*)"
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 
 
-_FILE_NAME = re.compile(r"[\w.\- ]*\w\.lis\b", re.IGNORECASE)
+_FILE_NAME = re.compile(r"[\w.\- ]{0,200}\w\.lis\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True)

@@ -89,12 +89,12 @@ class QuantityKind:
         return replace(self, name=f"standard deviation of a {self.name}", units=units, low=0.0, open_interval=True)
 
     def _unit_error(self, name: str, suffix: str) -> str:
-        return f"the unit '{suffix}' of '{name}' is not understood" if suffix else f"'{name}' has no unit"
+        return f"the unit '{suffix:.40}' of '{name:.60}' is not understood" if suffix else f"'{name:.60}' has no unit"
 
     def _spellings(self, name: str, suffix: str) -> str:
         if not name.endswith(suffix):  # the unit stood apart from the name
             return ", ".join(self.units)
-        stem = name.removesuffix(suffix).rstrip("_")
+        stem = name.removesuffix(suffix).rstrip("_")[:60]
         return ", ".join(f"{stem}_{unit}" if unit else stem for unit in self.units)
 
 
