@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 namespace creepkit {
 
@@ -126,6 +127,17 @@ inline bool parse_number(const char* p, const char* end, char decimal, double& v
     return true;
 }
 
+// What spreadsheets write for a value that could not be computed; a row may begin so, a remark does not.
+inline bool begins_with_error_value(const char* p, const char* end) {
+    static const char* const words[] = {"#REF!",  "#DIV/0!", "#N/A",    "#VALUE!", "#NAME?",
+                                        "#NUM!",  "#NULL!",  "#SPILL!", "#CALC!",  "#####"};
+    for (const char* word : words) {
+        const int64_t length = int64_t(strlen(word));
+        if (end - p >= length && memcmp(p, word, size_t(length)) == 0) return true;
+    }
+    return false;
+}
+
 // A table: its bytes, how its cells are divided, the number of cells in a row, and (columns,) the place in a row of the
 // result of each column, or -1 where it is not wanted.
 struct NumberTable {
@@ -136,7 +148,7 @@ struct NumberTable {
     const int64_t* places;
 
     // Rows that were read, or a NumberTableError with where it is: (3,) first byte, one past the last, column.
-    // Blank lines and those that begin with # are left out; one empty cell too many at the end of a row is, too.
+    // Blank lines and remarks, which begin with #, are left out; one empty cell too many at the end of a row is, too.
     int64_t read(int64_t wanted, int64_t capacity, double* out, int64_t* where) const {
         const char *p = text, *const end = text + length;
         int64_t row = 0;
@@ -148,7 +160,7 @@ struct NumberTable {
                 ++p;
                 continue;
             }
-            if (*p == '#') {
+            if (*p == '#' && !begins_with_error_value(p, end)) {
                 while (p < end && *p != '\n' && *p != '\r') ++p;
                 continue;
             }

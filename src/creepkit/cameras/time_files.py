@@ -38,7 +38,10 @@ def read_frame_times(path: str | Path) -> Floats:
     if not rows:
         raise HistoryError(f"{file}: is empty; write the time of each frame, one a line")
     dialect = detect_dialect([line for _, line in rows], str(file))
-    table = [split_line(line, dialect, f"{file}:{number}") for number, line in rows]
+    if dialect.delimiter == " " and not any(len(line.split()) > 1 for _, line in rows[1:]):
+        table = [[line.strip()] for _, line in rows]  # the blanks are those of a name such as "time [ms]"
+    else:
+        table = [split_line(line, dialect, f"{file}:{number}") for number, line in rows]
     has_head = not all(is_number(cell, dialect) for cell in table[0])
     column = _column_of_times(file, rows[0][0], table[0]) if has_head else _only_column(file, table[0])
     body, places = table[has_head:], [number for number, _ in rows[has_head:]]

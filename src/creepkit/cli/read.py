@@ -30,9 +30,10 @@ def command(
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the outputs over time.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Show what measured files are understood to hold: tests, conditions, units, and what was assumed.
+    """Show what measured files are understood to hold.
 
-    A record of an instrument is shown with its channels, units, gaps and clock.
+    Tests, conditions, units, what was assumed, and what is suspect. A record of an instrument is shown with its
+    channels, units, gaps and clock.
     """
     import creepkit as ck
     from creepkit.readers.table_summary import summarise_tables

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from pathlib import Path, PurePath
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -138,7 +138,7 @@ class Extraction(Presentable):
         if not self.used.all():
             labels["suspect"] = "; ".join(f"frame {f.frames[0]} {f.kind}: {f.reason}" for f in self.flags)[:2000]
         return History(
-            name=f"{self.source} {self.name}",
+            name=f"{PurePath(self.source).name} {self.name}",
             times=self.times[kept] - zero,
             outputs={name: values[kept] for name, values in self.outputs.items()},
             loading=record,

@@ -1,9 +1,9 @@
 """Data quality: checks of measured histories, each flag stated with numbers; nothing is dropped unless asked for.
 
 Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one far from
-its replicates or from the trend of the others, a modulus off the trend, a first frame that is not elastic, a record of
-load or temperature that contradicts the stated program. Of the rig: a change of creep rate at one clock time in several
-tests, a jump of an output without a step of the load.
+its replicates or from the trend of the others, a modulus off the trend, a first frame that is not elastic, strain of
+loading that nothing states, a strain above 100 %, a record of load or temperature that contradicts the stated program.
+Of the rig: a change of creep rate at one clock time in several tests, a jump of an output without a step of the load.
 """
 
 from __future__ import annotations
@@ -59,6 +59,7 @@ def check_data_quality(
         ("replicate", replicate_deviations(histories)),
         ("temperature", temperature_trend_outliers(histories)),
         ("modulus", modulus_trend_outliers(histories)),
+        ("unit", _large_strains(histories)),
     ]
     if specimen is not None:
         test_checks.append(("first frame", first_frame_deviations(histories, specimen)))
@@ -85,6 +86,16 @@ def check_loading_strain(histories: Sequence[History]) -> list[QualityFlag]:
         for name, finding in found
         if finding is not None
     ]
+
+
+def _large_strains(histories: Sequence[History]) -> dict[int, str]:
+    """Histories whose strain exceeds one, as percent do that were read as fractions."""
+    strains = {k: np.abs(one.outputs["strain"]) for k, one in enumerate(histories) if "strain" in one.outputs}
+    return {
+        k: f"the strain reaches {100 * np.nanmax(strain):.4g} %; look whether its unit is right"
+        for k, strain in strains.items()
+        if (strain > 1.0).any()
+    }
 
 
 def check_rig(histories: Sequence[History], *, activation_energy: float = ACTIVATION_ENERGY) -> list[QualityFlag]:

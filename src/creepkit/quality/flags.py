@@ -18,6 +18,7 @@ FlagKind = Literal[
     "loading",
     "temperature",
     "modulus",
+    "unit",
     "record",
     "jump",
     "rate change",

@@ -66,8 +66,9 @@ def unstated_loading_strain(history: History) -> tuple[int, str] | None:
 
 def _end_of_jump(times: Floats, values: Floats) -> int | None:
     """The first frame behind a jump, that of the first frame after zero included, if hardly any growth follows."""
-    noise = noise_standard_deviation(times[:SEARCHED_FRAMES], values[:SEARCHED_FRAMES])
-    noise = noise if np.isfinite(noise) else 0.0
+    # Of few frames the noise may come out much too small.
+    first = noise_standard_deviation(times[:SEARCHED_FRAMES], values[:SEARCHED_FRAMES])
+    noise = float(np.nan_to_num(np.fmax(first, noise_standard_deviation(times, values))))
     smallest = max(SMALLEST_STRAIN, NOISE_FACTOR * noise)
     for k in range(min(SEARCHED_FRAMES, times.size - 3)):
         if k and values[k - 1] > JUMP_FROM * values[k]:

@@ -72,8 +72,6 @@ def assemble_history(
             conditions, frames.times, outputs["strain"], used, _elastic_strain(loading, temperature, elastic)
         )
         outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
-        if (largest := float(np.abs(record.strain).max())) > 1.0:
-            conditions.record_assumption(f"strain up to {100 * largest:.4g} % as its unit says")
     else:
         elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
     rupture_time, unruptured = _end_of_test(conditions, frames, used)

@@ -42,7 +42,8 @@ class SurfaceObservation:
     """What an observation operator makes of points.
 
     operator : its text, as histories carry it. outputs : {name: (frames,)}; NaN where a frame does not show one.
-    gains : (frames, outputs, points) derivatives of the outputs to the heights; zero of lost points.
+    gains : (frames, outputs, points) derivatives of the outputs to the heights, with the weights of the points held;
+        zero of lost points.
     residuals : (frames, points) mm, heights less those of the operator's model; NaN outside of what it uses.
     converged : (frames,) whether the frame was observed at all.
     terms : (points, terms) and

@@ -178,6 +178,12 @@ def wrapped(text: str, figure_width: float, size: float = 10.0) -> str:
     return "\n".join(line for paragraph in text.splitlines() for line in wrap(paragraph, characters))
 
 
+def shortened(name: str, most: int = 32) -> str:
+    """A name of a test on an axis; of a longer one the beginning and the end, which tells it from its neighbours."""
+    end = 2 * most // 3
+    return name if len(name) <= most else f"{name[: most - end - 1]}…{name[-end:]}"
+
+
 def place_legend_below(
     figure: Figure, axes: Axes, *, columns: int = 3, size: float = 8.0, title: str | None = None
 ) -> None:

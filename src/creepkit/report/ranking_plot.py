@@ -13,7 +13,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.goodness_of_fit import TestFit
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
 from creepkit.report.condition_colours import distinct_colours, temperatures_celsius
-from creepkit.report.figures import empty_figure, logarithmic_labels, power_of_ten, save_figure, wrapped
+from creepkit.report.figures import empty_figure, logarithmic_labels, power_of_ten, save_figure, shortened, wrapped
 from creepkit.report.identification_plot import axis_label, curve_of_test, draw_curve, set_curve_ranges
 from creepkit.report.load_programs import program_text
 from creepkit.report.prediction_bands import FittedCurves, fitted_curves
@@ -168,7 +168,7 @@ def _label_tests(axes: Axes, fit: Identification, order: Sequence[int]) -> None:
     """Names of the tests; of many, the temperature of each run of equal ones."""
     if len(order) <= MOST_TEST_NAMES or not fit.histories:
         step = -(-len(order) // MOST_TEST_NAMES)
-        names = [fit.tests[k].name for k in order[::step]]
+        names = [shortened(fit.tests[k].name) for k in order[::step]]
         axes.set_xticks(range(0, len(order), step), names, rotation=35, ha="right", rotation_mode="anchor", fontsize=8)
         return
     celsius = np.round(temperatures_celsius(fit.histories))[list(order)]

@@ -7,8 +7,11 @@ import struct
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from creepkit.cameras.text_files import FrameText
+from creepkit.errors import HistoryError
+from creepkit.files.delimited_text import ERROR_VALUES
 
 
 def read(rows: bytes, delimiter: str = ",", columns: int = 1) -> np.ndarray:
@@ -41,6 +44,12 @@ def test_numbers_are_rounded_to_the_nearest() -> None:
     assert [word for word, a, b in zip(words, found, expected, strict=True) if a != b] == []
     commas = read("\n".join(words).replace(".", ",").encode(), ";")[:, 0]
     np.testing.assert_array_equal(commas, expected)
+
+
+@pytest.mark.parametrize("word", ERROR_VALUES)
+def test_a_row_that_begins_with_an_error_of_a_spreadsheet_is_no_remark(word: str) -> None:
+    with pytest.raises(HistoryError, match="table.csv:2: "):
+        read(f"1,2\n{word},3\n# a remark\n4,5\n".encode(), ",", 2)
 
 
 def test_fortran_exponents_blank_lines_and_remarks() -> None:

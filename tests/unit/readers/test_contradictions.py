@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from creepkit.errors import HistoryError
+from creepkit.quality import check_data_quality
 from creepkit.readers.history_csv import HISTORY_CSV, write_history
 from creepkit.readers.test_tables import TEST_TABLE
 from creepkit.records import History
@@ -25,12 +26,13 @@ def test_a_strain_without_unit_above_100_is_asked_for(tmp_path: Path):
     assert history.outputs["strain"][-1] == pytest.approx(1.2e-3)
 
 
-def test_a_strain_above_one_is_told_once(tmp_path: Path):
+def test_a_strain_above_one_is_flagged(tmp_path: Path):
     (history,) = read(tmp_path / "bar.csv", HEAD + "time_h,strain_1\n0,0\n1,0.5\n2,1.2\n")
-    assert "strain up to 120 %" in history.labels["assumed"]
+    (flag,) = [one for one in check_data_quality([history]) if one.kind == "unit"]
+    assert "the strain reaches 120 %" in str(flag)
     write_history(history, tmp_path / "again.csv")
     (again,) = HISTORY_CSV.read(tmp_path / "again.csv")
-    assert again.labels["assumed"].count("strain up to 120 %") == 1
+    assert again.labels == history.labels
 
 
 def test_a_unit_behind_a_value_that_is_not_that_of_its_name(tmp_path: Path):
