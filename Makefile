@@ -36,7 +36,7 @@ test: core
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 	@for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q); done
-	$(BIN)/pytest -q -n 2 $(PYTEST_OPTIONS)
+	$(BIN)/pytest -q -n 2 --dist loadgroup $(PYTEST_OPTIONS)
 
 core: .venv/.ok
 	@$(BIN)/python src/core/compile.py >/dev/null

@@ -163,6 +163,9 @@ STEPS = {
 }
 
 
+pytestmark = pytest.mark.xdist_group("wheel")  # one worker builds and installs it, not each
+
+
 def run(*words: object, cwd: Path, stdin: str = "") -> None:
     done = subprocess.run([str(w) for w in words], cwd=cwd, input=stdin, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
