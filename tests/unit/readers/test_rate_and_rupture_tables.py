@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.readers.history_csv import write_history
-from creepkit.readers.test_tables import TEST_TABLE, key_of_column
+from creepkit.readers.rate_and_rupture_tables import TEST_TABLE, key_of_column
 from creepkit.records import UNKNOWN_DURATION, History, constant_stress
 
 TABLE = """# alloy: Alloy X
