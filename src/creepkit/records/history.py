@@ -13,7 +13,7 @@ from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError
 from creepkit.records.known_specimens import load_unit
 from creepkit.records.loading import Loading, Program, loading_text
-from creepkit.records.quantities import ZERO_CELSIUS
+from creepkit.records.units import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
