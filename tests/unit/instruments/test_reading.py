@@ -186,7 +186,7 @@ def test_what_cannot_be_read_is_said_in_one_sentence(
     tmp_path: Path, content: str, options: dict[str, object], message: str
 ) -> None:
     with pytest.raises(HistoryError) as caught:
-        ck.read_record(written(tmp_path, content), **options)  # type: ignore[arg-type]
+        ck.read_record(written(tmp_path, content), **options)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -303,7 +303,7 @@ def test_units_that_are_nearly_known_are_not_taken_in_silence(tmp_path: Path) ->
 )
 def test_a_declaration_of_an_instrument_checks_itself(changes: dict[str, object], message: str) -> None:
     with pytest.raises(HistoryError, match=f"instrument format 'lab': .*{message}"):
-        ck.InstrumentFormat(**{"name": "lab", "title": "a logger", **changes})  # type: ignore[arg-type]
+        ck.InstrumentFormat(**{"name": "lab", "title": "a logger", **changes})
 
 
 def test_long_names_are_not_matched() -> None:
@@ -315,4 +315,4 @@ def test_long_names_are_not_matched() -> None:
 @pytest.mark.parametrize("options", [{"format": []}, {"missing": [3]}])
 def test_options_of_other_types(tmp_path: Path, options: dict[str, object]) -> None:
     with pytest.raises(HistoryError, match=r"(format|missing) is \[3?\]; give"):
-        ck.read_record(written(tmp_path, "time_s,p_bar\n0,1\n"), **options)  # type: ignore[arg-type]
+        ck.read_record(written(tmp_path, "time_s,p_bar\n0,1\n"), **options)
