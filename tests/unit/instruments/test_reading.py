@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.instruments.column_heads import split_head
+from creepkit.instruments.reading_options import ReadingOptions, RecordOptions
 from helpers.instrument_samples import samples
 from helpers.paths import SHARED, needs_shared_data
 
@@ -316,3 +318,7 @@ def test_long_names_are_not_matched() -> None:
 def test_options_of_other_types(tmp_path: Path, options: dict[str, object]) -> None:
     with pytest.raises(HistoryError, match=r"(format|missing) is \[3?\]; give"):
         ck.read_record(written(tmp_path, "time_s,p_bar\n0,1\n"), **options)
+
+
+def test_keywords_are_the_options() -> None:
+    assert [*RecordOptions.__annotations__] == [one.name for one in fields(ReadingOptions)]
