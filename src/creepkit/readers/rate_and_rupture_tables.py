@@ -22,7 +22,7 @@ from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.readers.assembly import assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid, peek_columns, read_text_grid, table_of, without_ignored
 from creepkit.readers.column_names import NameTable, split_written_name, unit_suffix, words_of
-from creepkit.readers.text_tables import SourceText, TableRow, TextTable
+from creepkit.readers.text_tables import SourceText, TableRow, TextTable, unknown_text
 from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary, plain_name, split_unit
 from creepkit.records import History
 from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
@@ -163,8 +163,10 @@ class RowPerTestReader:
         written = table.entries(row).items()
         cells = {keys[table.columns.index(name)]: replace(_with_point(entry), key=name) for name, entry in written}
         entries = {**table.header, **_with_end(cells, location)}
-        if table.assumptions and "label assumed" not in entries:
-            entries["label assumed"] = SourceText(", ".join(table.assumptions), location)
+        empty = [_quantity(keys[table.columns.index(name)]) for name in table.empty_columns(row)]
+        assumptions = (*table.assumptions, *(unknown_text(one) for one in empty if _is_unknown(one, entries)))
+        if assumptions and "label assumed" not in entries:
+            entries["label assumed"] = SourceText(", ".join(assumptions), location)
         name = f"{table.sheet or table.path.stem} {row.line}"
         where = f"sheet {table.sheet}, " if table.sheet else ""
         source = f"{table.path} ({where}{cells['name'].text if 'name' in cells else f'line {row.line}'})"
@@ -325,6 +327,17 @@ def _with_end(cells: Mapping[str, SourceText], location: str) -> dict[str, Sourc
     if ended == "stopped":
         entries["ended"] = SourceText("stopped", location)
     return entries
+
+
+def _is_unknown(quantity: str, entries: Mapping[str, SourceText]) -> bool:
+    """Whether an empty cell leaves a condition unknown: a time does where the row says nothing else of the end."""
+    known = {_quantity(key) for key in entries}
+    ended = entries["ended"].text if "ended" in entries else ""
+    if quantity == "rupture":
+        return not (known & {"rupture"} or ended == "stopped")
+    if quantity == "end_time":
+        return not known & {"rupture", "end_time"}
+    return quantity not in known and quantity != "name" and not quantity.startswith("label ")
 
 
 _ROUNDING = 0.01
