@@ -164,7 +164,7 @@ class RowPerTestReader:
         cells = {keys[table.columns.index(name)]: replace(_with_point(entry), key=name) for name, entry in written}
         entries = {**table.header, **_with_end(cells, location)}
         empty = [_quantity(keys[table.columns.index(name)]) for name in table.empty_columns(row)]
-        assumptions = (*table.assumptions, *(unknown_text(one) for one in empty if _is_unknown(one, entries)))
+        assumptions = (*table.assumptions, *filter(None, (_assumed_of_empty(one, entries) for one in empty)))
         if assumptions and "label assumed" not in entries:
             entries["label assumed"] = SourceText(", ".join(assumptions), location)
         name = f"{table.sheet or table.path.stem} {row.line}"
@@ -245,11 +245,12 @@ def _keys(table: TextTable) -> list[str]:
             quantity = written if written.startswith(("label ", "geometry ")) else f"label {written}"
         first = next((k for k, key in enumerate(keys) if _quantity(key) == _quantity(quantity)), None)
         if first is not None:
-            raise HistoryError(f"{location}: '{table.columns[first]}' and '{written}' mean the same; keep one of them")
+            names = f"'{table.columns[first]:.60}' and '{written:.60}'"
+            raise HistoryError(f"{location}: {names} mean the same; keep one of them")
         key_in_header = next((key for key in table.header if _quantity(key) == _quantity(quantity)), None)
         if key_in_header is not None:
             place = table.header[key_in_header].location
-            raise HistoryError(f"{place}: '{key_in_header}' is also a column, '{written}'; keep one of them")
+            raise HistoryError(f"{place}: '{key_in_header:.60}' is also a column, '{written:.60}'; keep one of them")
         keys.append(quantity)
     return keys
 
@@ -257,9 +258,9 @@ def _keys(table: TextTable) -> list[str]:
 def _check_unit(quantity: str, unit: str, written: str, location: str) -> None:
     units = QUANTITIES[quantity][0].units
     if unit not in units:
-        found = f"the unit '{unit}', which is not understood" if unit else "no unit"
+        found = f"the unit '{unit:.40}', which is not understood" if unit else "no unit"
         raise HistoryError(
-            f"{location}: column '{written.strip()}' has {found}; allowed: {', '.join(units)}, such as "
+            f"{location}: column '{written.strip():.60}' has {found}; allowed: {', '.join(units)}, such as "
             f"'{quantity} ({next(iter(units))})'"
         )
 
@@ -277,8 +278,8 @@ def _refuse_misspelt(written: str, location: str) -> None:
     near = get_close_matches(name, [one for one in known if len(one) > 3], 1, cutoff=0.8)
     if near:
         raise HistoryError(
-            f"{location}: column '{written}' is not understood; did you mean '{near[0]}'? A label is written "
-            f"'label {written}'"
+            f"{location}: column '{written:.60}' is not understood; did you mean '{near[0]}'? A label is written "
+            f"'label {written:.60}'"
         )
 
 
@@ -329,15 +330,16 @@ def _with_end(cells: Mapping[str, SourceText], location: str) -> dict[str, Sourc
     return entries
 
 
-def _is_unknown(quantity: str, entries: Mapping[str, SourceText]) -> bool:
-    """Whether an empty cell leaves a condition unknown: a time does where the row says nothing else of the end."""
+def _assumed_of_empty(quantity: str, entries: Mapping[str, SourceText]) -> str:
+    """What an empty cell leaves unknown; "" where the rest of the row says it, or where it would be a label."""
     known = {_quantity(key) for key in entries}
-    ended = entries["ended"].text if "ended" in entries else ""
-    if quantity == "rupture":
-        return not (known & {"rupture"} or ended == "stopped")
-    if quantity == "end_time":
-        return not known & {"rupture", "end_time"}
-    return quantity not in known and quantity != "name" and not quantity.startswith("label ")
+    if quantity == "ended" and "rupture" in known:
+        return "ended ruptured (empty cell)"
+    is_stopped = "ended" in entries and entries["ended"].text == "stopped"
+    said = {"rupture": is_stopped, "end_time": "rupture" in known}.get(quantity, False)
+    if quantity in known or said or quantity == "name" or quantity.startswith("label "):
+        return ""
+    return unknown_text(quantity)
 
 
 _ROUNDING = 0.01
