@@ -52,7 +52,7 @@ SMALL_CHANGES = (
     "Without a primary stage (m = 0) this law fits the curves best where phi is at its bound and damage hardly speeds "
     "creep up: most tests then break by their loss of section alone, as with Norton's law, and those few that damage "
     "breaks leave B, chi and Q_B badly determined. Least squares, in which a rupture time weighs as much as a curve, "
-    "and the likelihood, by which the best round is chosen, then differ, the rounds end before they agree ('converged'), "
+    "and the likelihood, by which the best round is chosen, then differ; the rounds end before they agree, "
     "and which of these solutions comes out, long lives right or too short, is decided by trifles. The band of a "
     "single test knows of it (its half width above), the median does not: a law whose fit has not converged, and whose "
     "damage is not determined, is no basis of an extrapolation."
