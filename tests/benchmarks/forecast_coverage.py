@@ -88,7 +88,7 @@ class Row:
 
 
 def _hardening(tests: int, rate: float, **further: object) -> Row:
-    return Row(f"strain hardening, {tests} tests, {rate:g}", bars.HARDENING, tests, rate, **further)  # type: ignore[arg-type]
+    return Row(f"strain hardening, {tests} tests, {rate:g}", bars.HARDENING, tests, rate, **further)
 
 
 def _heats(known: bool) -> Row:
@@ -102,11 +102,11 @@ def _rupture(law: str, tests: int, rate: float, damage: float, **further: object
     name = "Kachanov-Rabotnov" if law == bars.KACHANOV else "MPC Omega"
     by_likelihood = ", by likelihood" if further.get("weights") == "likelihood" else ""
     title = f"{name}, {tests} tests, {rate:g} and {damage:g}{by_likelihood}"
-    return Row(title, law, tests, rate, damage, **further)  # type: ignore[arg-type]
+    return Row(title, law, tests, rate, damage, **further)
 
 
 def _dimples(title: str, tests: int, **further: object) -> Row:
-    return Row(f"{tests} dimples{title}", "", tests, **further)  # type: ignore[arg-type]
+    return Row(f"{tests} dimples{title}", "", tests, **further)
 
 
 ROWS = {

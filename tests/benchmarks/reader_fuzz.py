@@ -1,6 +1,7 @@
 """Mutated files for every reader: no traceback, no hang, no wrong acceptance.
 
-    python tests/benchmarks/reader_fuzz.py [--samples NAME ...] [--count 12000] [--jobs 2] [--only SEED] [--write]
+    python tests/benchmarks/reader_fuzz.py [--samples NAME ...] [--count 12000] [--first 0] [--jobs 2] [--only SEED]
+                                            [--write]
 
 Samples of each reader (tests/helpers/samples_*.py) are mutated `count` times in all, by seed, and read in a process
 without privileges. Counted are tracebacks (anything but an error of creepkit in one sentence that names the file),
@@ -132,6 +133,7 @@ def main() -> int:
     parser = arguments(__doc__)
     parser.add_argument("--samples", nargs="*", help="names of samples, all by default")
     parser.add_argument("--count", type=int, default=12000, help="mutations for each reader, shared by its samples")
+    parser.add_argument("--first", type=int, default=0, help="the first seed; others than those looked at before")
     parser.add_argument("--jobs", type=int, default=1, help="samples at a time")
     parser.add_argument("--only", type=int, help="one seed alone")
     options = parser.parse_args()
@@ -139,7 +141,7 @@ def main() -> int:
     page.table("reader", "sample", "mutations", *OUTCOMES)
     faults: list[str] = []
     kinds: dict[str, Counter[str]] = {}
-    first = 0 if options.only is None else options.only
+    first = options.first if options.only is None else options.only
     samples = all_samples()
     readers = {name: sample.reader or name for name, sample in samples.items()}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from helpers.reader_samples import ReaderSample
@@ -134,20 +134,23 @@ def _decimal_sign(sample: ReaderSample, draw: random.Random) -> Mutation | None:
 
 def _without_unit(sample: ReaderSample, draw: random.Random) -> Mutation | None:
     """The name of a column or key without its unit."""
-    if not sample.without_unit:
-        return None
-    before, after = draw.choice(sample.without_unit)
-    content = sample.files[sample.mutated].decode().replace(before, after, 1)
-    return Mutation("unit removed", content.encode(), changed=True)
+    return _written_otherwise("unit removed", sample, sample.without_unit, draw)
 
 
 def _misspelt(sample: ReaderSample, draw: random.Random) -> Mutation | None:
     """A key or the name of a column with a letter missing."""
-    if not sample.misspelt:
+    return _written_otherwise("name misspelt", sample, sample.misspelt, draw)
+
+
+def _written_otherwise(
+    kind: str, sample: ReaderSample, choices: Sequence[tuple[str, str]], draw: random.Random
+) -> Mutation | None:
+    """One of the texts replaced where it stands first; None where there is none to choose."""
+    if not choices:
         return None
-    before, after = draw.choice(sample.misspelt)
+    before, after = draw.choice(choices)
     content = sample.files[sample.mutated].decode().replace(before, after, 1)
-    return Mutation("name misspelt", content.encode(), changed=True)
+    return Mutation(kind, content.encode(), changed=True)
 
 
 def _no_number(sample: ReaderSample, draw: random.Random) -> Mutation | None:

@@ -15,9 +15,11 @@ from creepkit.records.camera_format import (
     COORDINATES,
     DISPLACEMENTS,
     LENGTH_UNITS,
+    LENGTHS_ALLOWED,
     OUT_OF_PLANE,
     PIXELS,
     TIME_UNITS,
+    TIMES_ALLOWED,
     CameraFormat,
     ColumnName,
     shown,
@@ -226,8 +228,9 @@ def _missing(format: CameraFormat, names: Sequence[str], quantity: str, spelling
 
 def _factor(format: CameraFormat, quantity: str, unit: str, name: str, location: str) -> float:
     """What brings a column into mm, or into s."""
-    units, wanted = (TIME_UNITS, "s") if quantity == "time" else (LENGTH_UNITS, "mm")
-    unit = unit or (format.unit if quantity != "time" else "")
+    is_time = quantity == "time"
+    units, wanted = (TIME_UNITS, "s") if is_time else (LENGTH_UNITS, "mm")
+    unit = unit or ("" if is_time else format.unit)
     known = {one.casefold(): factor for one, factor in units.items()}
     if unit.casefold() in known:
         return known[unit.casefold()]
@@ -238,4 +241,5 @@ def _factor(format: CameraFormat, quantity: str, unit: str, name: str, location:
             f"{location}: the unit of '{name}' is not stated; write '{name} [{wanted}]', or say it by "
             f"format=dataclasses.replace(format, unit='mm')"
         )
-    raise HistoryError(f"{location}: '{name}' has the unit '{shown(unit)}'; allowed are {', '.join(units)}")
+    allowed = TIMES_ALLOWED if is_time else LENGTHS_ALLOWED
+    raise HistoryError(f"{location}: '{name}' has the unit '{shown(unit)}'; allowed are {allowed}")

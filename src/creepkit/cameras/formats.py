@@ -10,6 +10,8 @@ axes=(1, -1, -1))`.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from creepkit.hookspecs import hookimpl
 from creepkit.records.camera_format import CameraFormat
 
@@ -91,21 +93,18 @@ ZEISS = CameraFormat(
 )
 
 
-_PYVALE_COLUMNS = {
-    "x": "stereo_x",
-    "y": "stereo_y",
-    "z": "stereo_z",
-    "u": "stereo_disp_u",
-    "v": "stereo_disp_v",
-    "w": "stereo_disp_w",
-    "confidence": "stereo_cost_zncc",
-}
-
-
 PYVALE = CameraFormat(
     "pyvale",
     "pyvale, CSV of a stereo correlation",
-    _PYVALE_COLUMNS,
+    {
+        "x": "stereo_x",
+        "y": "stereo_y",
+        "z": "stereo_z",
+        "u": "stereo_disp_u",
+        "v": "stereo_disp_v",
+        "w": "stereo_disp_w",
+        "confidence": "stereo_cost_zncc",
+    },
     deformed=True,
     axes=(1, -1, -1),
     lost={"converged": "== 0", "stereo_converged": "== 0"},
@@ -114,14 +113,10 @@ PYVALE = CameraFormat(
 )
 
 
-PYVALE_BINARY = CameraFormat(
-    "pyvale-binary",
-    "pyvale, binary *.dic3d of a stereo correlation",
-    _PYVALE_COLUMNS,
-    deformed=True,
-    axes=(1, -1, -1),
-    lost={"converged": "== 0", "stereo_converged": "== 0"},
-    confidence_unit="ZNCC",
+PYVALE_BINARY = replace(
+    PYVALE,
+    name="pyvale-binary",
+    title="pyvale, binary *.dic3d of a stereo correlation",
     patterns=("*.dic3d",),
     layout=(
         ("subset_x", "<i4"),

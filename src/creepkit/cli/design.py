@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from creepkit.cli.options import parsed_number
 from creepkit.report.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def parse_goal(text: str | None) -> Goal | None:
         return "law"
     kind, *numbers = text.split(":")
     try:
-        values = [float(number) for number in numbers]
+        values = [parsed_number(number) for number in numbers]
     except ValueError:
         values = []
     quantities = {"rate": rate_at, "exponent": exponent_at}
@@ -170,7 +171,7 @@ def _numbers(text: str, separator: str, option: str, example: str, count: int | 
     from creepkit.errors import FitError
 
     try:
-        values = [float(part) for part in text.split(separator)]
+        values = [parsed_number(part) for part in text.split(separator)]
     except ValueError:
         values = []
     if not values or (count is not None and len(values) != count):

@@ -22,7 +22,7 @@ from creepkit.cli.identification_options import (
     setting_changes,
     surrogate_named,
 )
-from creepkit.cli.options import NUISANCE_SYNTAX, check_folder, parse_nuisances
+from creepkit.cli.options import NUISANCE_SYNTAX, check_folder, parse_nuisances, parsed_number
 from creepkit.report.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ def parse_prior_odds(texts: Sequence[str] | None) -> dict[str, dict[str, float]]
         target, _, odds = text.partition("=")
         name, _, form = target.partition(":")
         try:
-            number = float(odds)
+            number = parsed_number(odds)
         except ValueError:
             raise FitError(f"--prior {text} is not known; write A:arrhenius=10") from None
         if not (name.strip() and form.strip() and 0.0 < number < float("inf")):

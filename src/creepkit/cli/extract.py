@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from creepkit.cli.options import PAPER_SPECIMEN, check_folder
+from creepkit.cli.options import PAPER_SPECIMEN, check_folder, parsed_number
 
 if TYPE_CHECKING:
     from creepkit.extraction import Extraction
@@ -92,9 +92,11 @@ def command(
         raise HistoryError(
             "a history needs what was imposed: give --record FILE, or --load-mpa and --temperature-c, beside --to"
         )
-    options = {"time_zone": time_zone, "date_order": date_order, "pressure_reference": reference}
-    stated = {name: value for name, value in options.items() if value is not None}
-    recorded = None if record is None else ck.read_record(record, **stated)  # before the frames, which take longer
+    recorded = None
+    if record is not None:  # before the frames, which take longer
+        recorded = ck.read_record(
+            record, time_zone=time_zone or "", date_order=date_order or "", pressure_reference=reference or ""
+        )
     operator = operator_of(specimen, window, _numbers(rings, "--rings", "0,2,4") if rings else ())
     centers = _named_centers(center, names) if center else None
     sequence = _frames(frames, format, columns, _Times(interval, times))
@@ -209,7 +211,7 @@ def _numbers(text: str, option: str, example: str) -> tuple[float, ...]:
     from creepkit.errors import HistoryError
 
     try:
-        return tuple(float(word) for word in text.split(","))
+        return tuple(parsed_number(word) for word in text.split(","))
     except ValueError:
         raise HistoryError(
             f"{option} {text}: write numbers with commas between them, as in {option} {example}"
@@ -244,7 +246,7 @@ def _frame_range(text: str | None) -> slice | None:
     if text is None:
         return None
     first, _, last = text.partition("-")
-    if not (first.isdecimal() and last.isdecimal() and int(first) <= int(last) < 10**9):
+    if not ((first + last).isascii() and first.isdecimal() and last.isdecimal() and int(first) <= int(last) < 10**9):
         raise HistoryError(
             f"--rest {text}: write the first and the last frame at rest, counted from 0, as in --rest 0-39"
         )

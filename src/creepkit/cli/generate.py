@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.options import PAPER_SPECIMEN
+from creepkit.cli.options import PAPER_SPECIMEN, parsed_number
 from creepkit.report.terminal import ProgressBar
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def parse_range(text: str) -> tuple[str, tuple[float, float]]:
 
     name, _, limits = text.partition("=")
     try:
-        low, high = (float(end) for end in (limits if ":" in limits else f"{limits}:{limits}").split(":"))
+        low, high = (parsed_number(end) for end in (limits if ":" in limits else f"{limits}:{limits}").split(":"))
     except ValueError:
         raise DatasetError(f"--range {text}: write NAME=LOW:HIGH or NAME=NUMBER, such as P1=5:20") from None
     return name.strip(), (low, high)
@@ -131,6 +131,6 @@ def parse_part(text: str | None) -> tuple[int, int] | None:
     if text is None:
         return None
     k, _, n = text.partition("/")
-    if not (k.isdecimal() and n.isdecimal() and 1 <= int(k) <= int(n)):
+    if not ((k + n).isascii() and k.isdecimal() and n.isdecimal() and 1 <= int(k) <= int(n)):
         raise DatasetError(f"--part {text} is not K/N with K from 1 to N, such as 3/16")
     return int(k), int(n)

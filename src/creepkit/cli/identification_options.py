@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from creepkit.cli.options import parse_weights
+from creepkit.cli.options import parse_weights, parsed_number
 
 if TYPE_CHECKING:
     from creepkit.api.identification import SettingChanges
@@ -179,7 +179,7 @@ def _parse_named(option: str, texts: Sequence[str] | None, parse: Callable[[str]
 
 
 def _parse_number(text: str) -> float:
-    number = float(text)
+    number = parsed_number(text)
     if not math.isfinite(number):
         raise ValueError(text)
     return number

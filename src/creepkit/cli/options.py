@@ -28,6 +28,20 @@ PAPER_SPECIMEN, DEFAULT_SPECIMEN = "bulge", "uniaxial"
 SEARCHES = ("multi-start", "swarm", "cma-es")
 
 
+def parsed_number(text: str) -> float:
+    """The number that a text is; ValueError for digits of other scripts and for 1_000, which Python would take."""
+    if not text.isascii() or "_" in text:
+        raise ValueError(text)
+    return float(text)
+
+
+def parsed_integer(text: str) -> int:
+    """The whole number that a text is; ValueError as parsed_number()."""
+    if not text.isascii() or "_" in text:
+        raise ValueError(text)
+    return int(text)
+
+
 def search_named(name: str) -> GlobalSearch | None:
     """The search of this name; None for the default."""
     from creepkit.errors import FitError
@@ -62,7 +76,7 @@ def parse_steps(texts: Sequence[str], option: str) -> list[tuple[float, float]]:
     for text in texts:
         start, _, value = text.rpartition(":")
         try:
-            pairs.append((float(start or 0.0), float(value)))
+            pairs.append((parsed_number(start or "0"), parsed_number(value)))
         except ValueError:
             raise SolveError(f"{option} {text}: write a number, or SECONDS:NUMBER for a later step") from None
     return pairs
@@ -79,7 +93,7 @@ def parse_numbers(texts: Sequence[str], option: str, example: str) -> dict[str, 
         if name in values:
             raise SolveError(f"{option} {text}: {name} is given twice; keep one of them")
         try:
-            values[name] = float(number)
+            values[name] = parsed_number(number)
         except ValueError:
             raise SolveError(f"{option} {text}: write NAME=NUMBER, such as {example}") from None
     return values
@@ -116,7 +130,7 @@ def parse_weights(text: str) -> Any:
         return text
     pairs = [part.partition("=") for part in text.split(",")]
     try:
-        return {name.strip(): float(value) for name, _, value in pairs}
+        return {name.strip(): parsed_number(value) for name, _, value in pairs}
     except ValueError:
         words = f"{', '.join(WEIGHTINGS)} or amplitude=0.99,width=0.005"
         raise FitError(f"--weights {text} is not known; write {words}") from None
@@ -150,7 +164,7 @@ def _nuisance(text: str) -> Nuisance:
     kind, _, numbers_text = definition.partition("=")
     mean, _, sd = numbers_text.partition(":")
     try:
-        numbers = float(mean or 0.0), float(sd) if sd else None, float(start or 0.0)
+        numbers = parsed_number(mean or "0"), parsed_number(sd) if sd else None, parsed_number(start or "0")
     except ValueError:
         raise FitError(f"--nuisance {text}: write {NUISANCE_SYNTAX}, such as thickness=0.4935:0.027") from None
     if not all(math.isfinite(number) for number in numbers if number is not None):

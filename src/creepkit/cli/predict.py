@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from creepkit.cli.described_test import further_options
-from creepkit.cli.options import parse_numbers
+from creepkit.cli.options import parse_numbers, parsed_number
 from creepkit.cli.planned_test import (
     ControlOption,
     GeometryOption,
@@ -143,7 +143,7 @@ def _targets(texts: list[str] | None) -> dict[str, list[float]] | None:
     for text in texts:
         name, _, values = text.partition("=")
         try:
-            targets.setdefault(name.strip(), []).extend(float(value) for value in values.split(","))
+            targets.setdefault(name.strip(), []).extend(parsed_number(value) for value in values.split(","))
         except ValueError:
             raise FitError(f"--target {text}: write OUTPUT=NUMBER, such as strain=0.01,0.05") from None
     return targets

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from creepkit.cli.identification_options import OnlyOption, select_by_label
-from creepkit.cli.options import check_file
+from creepkit.cli.options import check_file, parsed_integer, parsed_number
 from creepkit.report.terminal import print_json
 
 HOURS_BY_SUFFIX = {"h": 1.0, "d": 24.0, "s": 1.0 / 3600.0, "": 1.0}
@@ -93,7 +93,7 @@ def _hours(text: str) -> float:
     word = text.strip()
     suffix = word[-1:] if word[-1:].isalpha() else ""
     try:
-        return float(word.removesuffix(suffix)) * HOURS_BY_SUFFIX[suffix]
+        return parsed_number(word.removesuffix(suffix)) * HOURS_BY_SUFFIX[suffix]
     except (KeyError, ValueError):
         raise FitError(f"--times {text}: write numbers with h, d or s, such as 1e3h,1e5h") from None
 
@@ -102,7 +102,7 @@ def _number(text: str, option: str, example: str) -> float:
     from creepkit.errors import FitError
 
     try:
-        return float(text)
+        return parsed_number(text)
     except ValueError:
         raise FitError(f"{option} {text.strip()}: write {example}") from None
 
@@ -123,7 +123,7 @@ def _degree(text: str) -> int:
     from creepkit.errors import FitError
 
     try:
-        return int(text)
+        return parsed_integer(text)
     except ValueError:
         raise FitError(f"--degrees {text.strip()}: write whole numbers, such as 1,2,3") from None
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from creepkit.cli.options import parsed_integer
 from creepkit.report.terminal import ProgressBar, print_json, print_table
 
 
@@ -71,7 +72,7 @@ def parse_whole_numbers(text: str, option: str) -> tuple[int, ...]:
     from creepkit.errors import SurrogateError
 
     try:
-        numbers = tuple(int(part) for part in text.split(","))
+        numbers = tuple(parsed_integer(part) for part in text.split(","))
     except ValueError:
         numbers = ()
     if not numbers or min(numbers) < 1:

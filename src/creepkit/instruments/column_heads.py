@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
 from creepkit.errors import HistoryError
-
-PSI = 6.894757293168361e-3
-"""MPa."""
+from creepkit.records.units import UNITS, spelled_factors, spellings
 
 
 @dataclass(frozen=True)
@@ -22,19 +20,10 @@ class ChannelUnit:
     reference: str = ""
 
 
-_PRESSURES = {
-    "psi": PSI,
-    "ksi": 1e3 * PSI,
-    "bar": 0.1,
-    "mbar": 1e-4,
-    "Pa": 1e-6,
-    "hPa": 1e-4,
-    "kPa": 1e-3,
-    "MPa": 1.0,
-    "atm": 0.101325,
-    "Torr": 0.101325 / 760.0,
-    "mmHg": 0.101325 / 760.0,
-}
+_PRESSURES = spellings("psi", "ksi", "bar", "mbar", "Pa", "hPa", "kPa", "MPa", "atm", "Torr")
+
+
+_OTHERS = spellings("K", "C", "F", "mm", "m", "cm", "um", "in", "N", "kN", "lbf")
 
 
 _REFERENCES = {
@@ -47,25 +36,19 @@ _REFERENCES = {
 _REFERENCE_IN_NAME = re.compile(r"(?<![a-z])p?(?:(abs(?:olute)?)|(gauge|gage))(?![a-z])")
 
 
+def _channel(symbol: str, reference: str = "") -> ChannelUnit:
+    unit = UNITS[symbol]
+    quantity = "pressure" if unit.quantity == "stress" else unit.quantity
+    return ChannelUnit(quantity, unit.conversion.factor, unit.conversion.offset, reference)
+
+
 _UNITS: dict[str, ChannelUnit] = {
     **{
-        f"{unit}{suffix}": ChannelUnit("pressure", factor, reference=reference)
-        for unit, factor in _PRESSURES.items()
+        f"{unit}{suffix}": _channel(symbol, reference)
+        for unit, symbol in _PRESSURES.items()
         for suffix, reference in _REFERENCES.items()
     },
-    **{unit: ChannelUnit("temperature") for unit in ("K", "Kelvin", "degK")},
-    **{
-        unit: ChannelUnit("temperature", 1.0, 273.15)
-        for unit in ("C", "°C", "degC", "deg C", "deg. C", "Celsius", "oC", "℃")
-    },
-    **{
-        unit: ChannelUnit("temperature", 5.0 / 9.0, 459.67 * 5.0 / 9.0)
-        for unit in ("F", "°F", "degF", "deg F", "deg. F", "Fahrenheit", "oF")
-    },
-    **{"mm": ChannelUnit("length"), "m": ChannelUnit("length", 1e3), "cm": ChannelUnit("length", 10.0)},
-    **{unit: ChannelUnit("length", 1e-3) for unit in ("um", "µm", "μm", "micron")},
-    **{unit: ChannelUnit("length", 25.4) for unit in ("in", "inch")},
-    **{"N": ChannelUnit("force"), "kN": ChannelUnit("force", 1e3), "lbf": ChannelUnit("force", 4.4482216152605)},
+    **{unit: _channel(symbol) for unit, symbol in _OTHERS.items()},
 }
 
 
@@ -74,13 +57,10 @@ _ANY_CASE = {unit.lower(): found for unit, found in _UNITS.items() if len(unit) 
 
 
 TIME_UNITS = {
-    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "S", "Sec"), 1.0),
-    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
-    **dict.fromkeys(("us", "µs", "μs", "microseconds"), 1e-6),
-    **dict.fromkeys(("ns", "nanoseconds"), 1e-9),
-    **dict.fromkeys(("min", "mins", "minute", "minutes"), 60.0),
-    **dict.fromkeys(("h", "hr", "hrs", "hour", "hours", "Std"), 3600.0),
-    **dict.fromkeys(("d", "day", "days"), 86400.0),
+    **spelled_factors("s", "ms", "us", "ns", "min", "h", "d"),
+    # In tables of tests Std is a standard deviation, and S none of time.
+    **dict.fromkeys(("S", "Sec"), 1.0),
+    "Std": 3600.0,
 }
 """{unit: s}."""
 

@@ -4,11 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, TypedDict
 
 from creepkit.errors import HistoryError, nearest
 from creepkit.files.time_stamps import DATE_ORDERS
 from creepkit.instruments.column_heads import TIME_UNITS
+
+
+class RecordOptions(TypedDict, total=False):
+    """Keywords of read_record(), which are the fields of ReadingOptions."""
+
+    time: str
+    date: str
+    time_unit: str
+    date_order: str
+    time_zone: str
+    channels: Sequence[str] | None
+    every: int
+    units: Mapping[str, str]
+    pressure_reference: str
+    ambient_pressure: float | None
+    missing: Sequence[str]
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from creepkit.inverse.output_transforms import (
     RateTransform,
 )
 from creepkit.records import History, Prediction, Predictor, is_logarithmic
+from creepkit.records.noise_correlations import correlation_matrix
 
 RUPTURE_OUTPUT = "rupture"
 """The output of tests that were followed to rupture: the rupture time, s. It has no frames of its own."""
@@ -331,12 +332,8 @@ class ObservationVector:
 
 def _correlation_matrix(history: History, outputs: Sequence[str]) -> Floats:
     """(outputs, outputs) correlation of the noise of a frame."""
-    matrix = np.eye(len(outputs))
-    for pair, correlation in history.noise_correlation.items():
-        if set(pair) <= set(outputs):
-            first, second = (outputs.index(name) for name in pair)
-            matrix[first, second] = matrix[second, first] = correlation
-    return matrix
+    fitted = {pair: rho for pair, rho in history.noise_correlation.items() if set(pair) <= set(outputs)}
+    return correlation_matrix(fitted, outputs)
 
 
 def _states_noise(histories: Sequence[History], name: str) -> bool:

@@ -8,32 +8,31 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 from creepkit.readers.vocabulary import LABEL_KEYS, HeaderVocabulary, Terms, plain_name, split_unit
-from creepkit.records.quantities import LENGTH, TIME, QuantityKind
+from creepkit.records.quantities import (
+    ANGLE,
+    FORCE,
+    LENGTH,
+    MODULUS,
+    MOMENT,
+    STRAIN,
+    STRESS,
+    TEMPERATURE,
+    TIME,
+    QuantityKind,
+)
+from creepkit.records.units import CAPITALS_THAT_MATTER, UNITS, spellings
 
-UNIT_SPELLINGS: Mapping[str, str] = {
-    **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), "s"),
-    **dict.fromkeys(("min", "mins", "minute", "minutes"), "min"),
-    **dict.fromkeys(("h", "hr", "hrs", "hour", "hours"), "h"),
-    **dict.fromkeys(("d", "day", "days"), "d"),
-    **dict.fromkeys(("%", "pct", "percent", "per cent"), "pct"),
-    **dict.fromkeys(("1", "-", "mm/mm", "m/m", "in/in", "fraction"), "1"),
-    **dict.fromkeys(("microstrain", "µstrain", "μstrain", "ustrain", "µm/m", "μm/m", "um/m"), "microstrain"),
-    **dict.fromkeys(("k", "kelvin"), "K"),
-    **dict.fromkeys(("c", "°c", "ºc", "℃", "degc", "deg c", "deg. c", "celsius"), "C"),
-    **dict.fromkeys(("f", "°f", "ºf", "℉", "degf", "deg f", "deg. f", "fahrenheit"), "F"),
-    **dict.fromkeys(("mpa", "n/mm2", "n/mm²", "n/mm^2", "mn/m2"), "MPa"),
-    **{"pa": "Pa", "kpa": "kPa", "gpa": "GPa", "bar": "bar", "psi": "psi", "ksi": "ksi", "msi": "Msi"},
-    **dict.fromkeys(("mm", "millimetre", "millimeter"), "mm"),
-    **dict.fromkeys(("um", "µm", "μm", "micron", "microns"), "um"),
-    **dict.fromkeys(("in", "inch", "inches"), "in"),
-    **{"m": "m", "n": "N", "kn": "kN", "lbf": "lbf", "nmm": "Nmm", "nm": "Nm"},
-    **{"rad": "rad", "deg": "deg", "°": "deg"},
-}
+_READ = dict.fromkeys(
+    suffix
+    for kind in (TIME, STRAIN, TEMPERATURE, STRESS, MODULUS, LENGTH, FORCE, MOMENT, ANGLE)
+    for suffix in kind.units
+    if suffix in UNITS
+)
+"""Units that some column or condition may be in."""
+
+
+UNIT_SPELLINGS: Mapping[str, str] = {spelling.lower(): symbol for spelling, symbol in spellings(*_READ).items()}
 """{spelling in small letters: creepkit's suffix}. Capitals do not matter but where they tell units apart."""
-
-
-_CAPITALS_THAT_MATTER = frozenset(("mPa", "M", "nm", "mN", "Mn"))
-"""Spellings that in other capitals mean another unit, millipascal or nanometre: they are not understood."""
 
 
 NAME_SYNONYMS: Mapping[str, str] = {
@@ -87,7 +86,7 @@ _RATE_UNIT = re.compile(r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:(/|per )\s*)?([a-z
 def unit_suffix(text: str) -> str | None:
     """creepkit's suffix of a unit as it is written, None where it is no unit that is known."""
     text = text.strip().strip("()[]").strip()
-    if text in _CAPITALS_THAT_MATTER:
+    if text in CAPITALS_THAT_MATTER:
         return None
     plain = text.lower()
     rate = _RATE_UNIT.fullmatch(plain)
@@ -166,7 +165,7 @@ class NameTable:
         quantity = self.meaning(name)
         if quantity is None or (unit and quantity not in self.kinds):
             last = re.split(r"[\s_\-()\[\],]+", text.strip(" )]"))[-1]
-            return text if last in ("1", *_CAPITALS_THAT_MATTER) else self._plain_keys.get(plain_name(text), text)
+            return text if last in ("1", *CAPITALS_THAT_MATTER) else self._plain_keys.get(plain_name(text), text)
         return f"{quantity}_{unit_suffix(unit) or unit}" if unit else quantity
 
 

@@ -13,7 +13,8 @@ from pathlib import Path
 from creepkit.errors import HistoryError
 from creepkit.readers.assembly import assemble_history
 from creepkit.readers.cell_grids import peek_columns, read_table
-from creepkit.readers.text_tables import SourceText, TableRow, TextTable
+from creepkit.readers.column_names import KnownNames
+from creepkit.readers.text_tables import SourceText, TableRow, TextTable, unknown_text
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 
@@ -117,6 +118,10 @@ class IndexedFolderReader:
         entries = {name: entry for name, entry in index.entries(row).items() if name != self.key_column}
         location = index.location(row.line)
         entries.setdefault("alloy", SourceText(frames.path.absolute().parent.name, location))
+        known = KnownNames.of(self.vocabulary)
+        unknown = [name for name in index.empty_columns(row) if known.is_condition(name) and name not in entries]
+        if unknown and "label assumed" not in entries:
+            entries["label assumed"] = SourceText(", ".join(map(unknown_text, unknown)), location)
         source = f"{frames.path} ({key})" if self._has_common_frames_file else str(frames.path)
         return assemble_history(
             key,

@@ -25,6 +25,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError
 from creepkit.readers.conditions import StatedConditions
+from creepkit.records.recorded_programs import noise_of_readings
 
 ELASTIC_RANGE = (0.9, 1.15)
 """Ratios of a strain at time zero to the stress over the modulus at which it is elastic, and not plastic too."""
@@ -113,7 +114,7 @@ def _decided(
     frames = np.flatnonzero(used)
     if frames.size > 2 and times[frames[0]] == 0.0:
         first = float(strain[frames[0]])
-        if first > max(SMALLEST_STRAIN, NOISE_FACTOR * _noise(strain[frames[:SEARCHED_FRAMES]])):
+        if first > max(SMALLEST_STRAIN, NOISE_FACTOR * noise_of_readings(strain[frames[:SEARCHED_FRAMES]])):
             ratio = f"{first / elastic_strain:.2f} of stress over modulus" if elastic_strain else ""
             if elastic_strain and _is_elastic(first, elastic_strain, ELASTIC_RANGE):
                 conditions.record_assumption(f"includes_elastic yes (the strain at time 0 is {ratio})")
@@ -136,7 +137,7 @@ def _decided(
 
 def _end_of_loading(times: Floats, strain: Floats, elastic_strain: float) -> int | None:
     """The first frame of a plateau of about the elastic strain, None where the strain shows none."""
-    noise = _noise(strain[:SEARCHED_FRAMES])
+    noise = noise_of_readings(strain[:SEARCHED_FRAMES])
     for k in range(1, min(SEARCHED_FRAMES, times.size - 2)):
         if not _is_elastic(float(strain[k]), elastic_strain, PLATEAU_RANGE):
             continue
@@ -151,9 +152,3 @@ def _end_of_loading(times: Floats, strain: Floats, elastic_strain: float) -> int
 
 def _is_elastic(strain: float, elastic_strain: float, ratios: tuple[float, float]) -> bool:
     return ratios[0] * elastic_strain <= strain <= ratios[1] * elastic_strain
-
-
-def _noise(strain: Floats) -> float:
-    """Standard deviation of white noise by the median of second differences; 0 of fewer than three values."""
-    differences = np.abs(np.diff(strain, 2))
-    return float(1.4826 * np.median(differences) / 6**0.5) if differences.size else 0.0

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from creepkit.errors import HistoryError, nearest
 from creepkit.readers.conditions import StatedConditions
+from creepkit.records.noise_correlations import can_hold_together
 
 KEY = "noise_correlation"
 
@@ -39,7 +38,7 @@ def read_noise_correlation(conditions: StatedConditions, outputs: Collection[str
         if not -1.0 < value < 1.0:
             raise HistoryError(f"{location}: {KEY} of {first} {second} is {value:g}; allowed is between -1 and 1")
         correlations[pair] = value
-    if correlations and (np.linalg.eigvalsh(_matrix(correlations)) <= 0.0).any():
+    if not can_hold_together(correlations):
         raise HistoryError(
             f"{location}: the correlations '{text}' cannot all hold: their matrix is not positive definite; correct one"
         )
@@ -49,12 +48,3 @@ def read_noise_correlation(conditions: StatedConditions, outputs: Collection[str
 def noise_correlation_text(correlations: Mapping[tuple[str, str], float]) -> str:
     """The text of the key, from which the same numbers are read."""
     return "; ".join(f"{first} {second} {float(value)!r}" for (first, second), value in correlations.items())
-
-
-def _matrix(correlations: Mapping[tuple[str, str], float]) -> np.ndarray:
-    names = list(dict.fromkeys(name for pair in correlations for name in pair))
-    matrix = np.eye(len(names))
-    for (first, second), value in correlations.items():
-        i, j = names.index(first), names.index(second)
-        matrix[i, j] = matrix[j, i] = value
-    return matrix

@@ -143,6 +143,10 @@ class TextTable:
         place, decimal = self.location(row.line), self.dialect.decimal
         return {n: SourceText(cell, place, decimal) for n, cell in zip(self.columns, row.cells, strict=True) if cell}
 
+    def empty_columns(self, row: TableRow) -> list[str]:
+        """The columns whose cell in one row is empty: what they would say of it is unknown."""
+        return [name for name, cell in zip(self.columns, row.cells, strict=True) if not cell]
+
     def with_rows(self, rows: Sequence[TableRow]) -> TextTable:
         """The same table with other rows."""
         return replace(self, rows=tuple(rows))
@@ -232,6 +236,11 @@ def column_means(table: TextTable, vocabulary: HeaderVocabulary) -> dict[str, st
         label: f"{np.mean([table.numbers(name) for name in names]):.2f}"
         for label, names in vocabulary.averaged_columns.items()
     }
+
+
+def unknown_text(quantity: str) -> str:
+    """What is assumed of a condition whose cell is empty."""
+    return f"{quantity} unknown (empty cell)"
 
 
 def how_to_ignore(column: str) -> str:

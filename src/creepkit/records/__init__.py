@@ -81,10 +81,11 @@ from creepkit.records.prediction_assembly import (
     unpredicted,
 )
 from creepkit.records.prediction_checks import checked_prediction
-from creepkit.records.quantities import QUANTITIES, ZERO_CELSIUS, QuantityKind, unit_of
+from creepkit.records.quantities import QUANTITIES, QuantityKind, unit_of
 from creepkit.records.specimen_record import Dimension, Load, Output
 from creepkit.records.surface_observation import SurfaceObservation, SurfacePoints, SurfaceRegion
 from creepkit.records.typical_history import typical_history
+from creepkit.records.units import ZERO_CELSIUS
 
 __all__ = [
     "COVARIANCE_NUISANCES",

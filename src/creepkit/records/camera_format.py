@@ -9,13 +9,18 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from creepkit.errors import HistoryError, nearest
+from creepkit.records.units import spelled_factors
 
-LENGTH_UNITS = {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "in": 25.4, "inch": 25.4}
-"""{unit: mm}."""
+LENGTH_UNITS = spelled_factors("mm", "m", "cm", "um", "in")
+"""{spelling of a unit: mm}."""
 
 
-TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
-"""{unit: s}."""
+TIME_UNITS = spelled_factors("s", "ms", "us", "min", "h")
+"""{spelling of a unit: s}."""
+
+
+LENGTHS_ALLOWED, TIMES_ALLOWED = "mm, m, cm, um, in", "s, ms, us, min, h"
+"""In messages."""
 
 
 PIXELS = ("px", "pixel", "pixels", "pix")
@@ -222,5 +227,5 @@ class CameraFormat:
         if len(self.time) != 3 or self.time[0] not in ("head", "name") or self.time[2] not in TIME_UNITS:
             raise HistoryError(
                 f"{self}: time is {self.time!r}; write ('head', key, unit) or ('name', '', unit) with one of the units "
-                f"{', '.join(TIME_UNITS)}"
+                f"{TIMES_ALLOWED}"
             )

@@ -13,7 +13,8 @@ from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError
 from creepkit.records.known_specimens import load_unit
 from creepkit.records.loading import Loading, Program, loading_text
-from creepkit.records.quantities import ZERO_CELSIUS
+from creepkit.records.noise_correlations import can_hold_together
+from creepkit.records.units import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -146,14 +147,7 @@ class History:
                 )
             first, second = sorted(pair, key=order.index) if order else pair
             correlations[first, second] = float(value)
-        if not correlations:
-            return correlations
-        order = order or list(dict.fromkeys(name for pair in correlations for name in pair))
-        matrix = np.eye(len(order))
-        for (first, second), value in correlations.items():
-            i, j = order.index(first), order.index(second)
-            matrix[i, j] = matrix[j, i] = value
-        if not (np.isfinite(matrix).all() and (np.linalg.eigvalsh(matrix) > 0).all()):
+        if not can_hold_together(correlations):
             stated = ", ".join(f"{a} {b} {value:g}" for (a, b), value in correlations.items())
             raise HistoryError(f"{origin}: the noise correlations {stated} cannot all hold; give numbers within +-1")
         return correlations

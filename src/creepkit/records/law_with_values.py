@@ -8,17 +8,18 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import ExportError, LawError, nearest
+from creepkit.records.units import factors
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
     from creepkit.language.law import CreepLaw
 
 
-STRESS_UNITS = {"MPa": 1.0, "Pa": 1e-6, "kPa": 1e-3, "GPa": 1e3, "psi": 0.006894757293168361, "ksi": 6.894757293168361}
+STRESS_UNITS = factors("MPa", "Pa", "kPa", "GPa", "psi", "ksi")
 """MPa in one unit of stress; 1 psi is 1 lbf/in^2 = 4.4482216152605 N/(25.4 mm)^2."""
 
 
-TIME_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "day": 86400.0, "year": 31557600.0}
+TIME_UNITS = {**factors("s", "min", "h"), "day": factors("d")["d"], **factors("year")}
 """Seconds in one unit of time; a year is a Julian year."""
 
 

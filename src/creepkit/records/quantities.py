@@ -11,16 +11,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
-
-ZERO_CELSIUS = 273.15
-
-
-@dataclass(frozen=True)
-class UnitConversion:
-    """How a number in some unit becomes creepkit's own: factor * number + offset."""
-
-    factor: float
-    offset: float = 0.0
+from creepkit.records.units import UnitConversion, conversions
 
 
 @dataclass(frozen=True)
@@ -98,36 +89,28 @@ class QuantityKind:
         return ", ".join(f"{stem}_{unit}" if unit else stem for unit in self.units)
 
 
-TIME = QuantityKind(
-    "time",
-    {"s": UnitConversion(1.0), "min": UnitConversion(60.0), "h": UnitConversion(3600.0), "d": UnitConversion(86400.0)},
-    low=0.0,
-)
+TIME = QuantityKind("time", conversions("s", "min", "h", "d"), low=0.0)
 
 
-LENGTH = QuantityKind(
-    "length",
-    {"mm": UnitConversion(1.0), "um": UnitConversion(1e-3), "m": UnitConversion(1e3), "in": UnitConversion(25.4)},
-)
+LENGTH = QuantityKind("length", conversions("mm", "um", "m", "in"))
+
+
+_NO_UNIT = {"": UnitConversion(1.0)}
+
+
+_PERCENT = conversions("pct")["pct"]
 
 
 STRAIN = QuantityKind(
-    "strain",
-    {
-        "": UnitConversion(1.0),
-        "1": UnitConversion(1.0),
-        "pct": UnitConversion(1e-2),
-        "percent": UnitConversion(1e-2),
-        "microstrain": UnitConversion(1e-6),
-    },
+    "strain", {**_NO_UNIT, **conversions("1", "pct"), "percent": _PERCENT, **conversions("microstrain")}
 )
 
 
 RATE = QuantityKind(
     "creep rate",
     {
-        f"{prefix}/{unit}": UnitConversion(factor / time.factor)
-        for prefix, factor in (("1", 1.0), ("pct", 1e-2), ("%", 1e-2))
+        f"{prefix}/{unit}": UnitConversion(strain.factor / time.factor)
+        for prefix, strain in {**conversions("1", "pct"), "%": _PERCENT}.items()
         for unit, time in TIME.units.items()
     },
     low=0.0,
@@ -136,56 +119,22 @@ RATE = QuantityKind(
 )
 
 
-NUMBER = QuantityKind("number", {"": UnitConversion(1.0)})
+NUMBER = QuantityKind("number", _NO_UNIT)
 
 
-STRESS = QuantityKind(
-    "stress",
-    {
-        "MPa": UnitConversion(1.0),
-        "kPa": UnitConversion(1e-3),
-        "GPa": UnitConversion(1e3),
-        "Pa": UnitConversion(1e-6),
-        "bar": UnitConversion(0.1),
-        "ksi": UnitConversion(6.894757293168361),
-        "psi": UnitConversion(6.894757293168361e-3),
-    },
-    low=0.0,
-    high=1e5,
-)
+STRESS = QuantityKind("stress", conversions("MPa", "kPa", "GPa", "Pa", "bar", "ksi", "psi"), low=0.0, high=1e5)
 
 
 SIGNED_STRESS = replace(STRESS, low=-1e5)
 
 
-MODULUS = QuantityKind(
-    "modulus",
-    {
-        "MPa": UnitConversion(1.0),
-        "GPa": UnitConversion(1e3),
-        "ksi": UnitConversion(6.894757293168361),
-        "Msi": UnitConversion(6.894757293168361e3),
-    },
-    0.0,
-    1e8,
-    open_interval=True,
-)
+MODULUS = QuantityKind("modulus", conversions("MPa", "GPa", "ksi", "Msi"), 0.0, 1e8, open_interval=True)
 
 
 POISSON = QuantityKind("Poisson's ratio", NUMBER.units, low=-1.0, high=0.5, open_interval=True)
 
 
-TEMPERATURE = QuantityKind(
-    "temperature",
-    {
-        "K": UnitConversion(1.0),
-        "C": UnitConversion(1.0, ZERO_CELSIUS),
-        "F": UnitConversion(1.0 / 1.8, ZERO_CELSIUS - 32.0 / 1.8),
-    },
-    low=0.0,
-    high=1e4,
-    open_interval=True,
-)
+TEMPERATURE = QuantityKind("temperature", conversions("K", "C", "F"), low=0.0, high=1e4, open_interval=True)
 
 
 FLAG = QuantityKind("flag", NUMBER.units, low=0.0, high=1.0)
@@ -194,15 +143,13 @@ FLAG = QuantityKind("flag", NUMBER.units, low=0.0, high=1.0)
 COUNT = QuantityKind("number from 1 on", NUMBER.units, low=1.0, high=1e6)
 
 
-FORCE = QuantityKind(
-    "force", {"N": UnitConversion(1.0), "kN": UnitConversion(1e3), "lbf": UnitConversion(4.4482216152605)}
-)
+FORCE = QuantityKind("force", conversions("N", "kN", "lbf"))
 
 
-MOMENT = QuantityKind("moment", {"Nmm": UnitConversion(1.0), "Nm": UnitConversion(1e3)})
+MOMENT = QuantityKind("moment", conversions("Nmm", "Nm"))
 
 
-ANGLE = QuantityKind("angle", {"rad": UnitConversion(1.0), "deg": UnitConversion(math.pi / 180.0)})
+ANGLE = QuantityKind("angle", conversions("rad", "deg"))
 
 
 QUANTITIES: Mapping[str, QuantityKind] = MappingProxyType(

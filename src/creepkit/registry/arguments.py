@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
 from creepkit.arrays import ArrayLike
 from creepkit.cameras import reading as camera_reading
 from creepkit.errors import FitError, LawError, SolveError
 from creepkit.instruments import reading as instrument_files
+from creepkit.instruments.reading_options import RecordOptions
 from creepkit.readers import reading
 from creepkit.records import Frames, History, InstrumentRecord, Predictor, Specimen, known_specimens, remember_specimen
 from creepkit.registry.plugin_registry import default_registry
@@ -103,14 +104,16 @@ def read_frames(
     return camera_reading.read_frames(path, formats, format, times)
 
 
-def read_record(path: str | Path, format: str | None = None, **options: Any) -> InstrumentRecord:
+def read_record(path: str | Path, format: str | None = None, **options: Unpack[RecordOptions]) -> InstrumentRecord:
     """Read the record of an instrument: channels of pressure, temperature and others over one clock.
 
-    format : name of one of `available("instruments")`; by default the one whose columns are there. options : time,
-    date (names of their columns), time_unit, date_order ("month first", "day first", "year first"), time_zone
-    ("America/Chicago", "+01:00"), channels (names of those that are kept), every (rows that are averaged to one),
-    units ({channel: unit}), pressure_reference ("gauge" or "absolute"), ambient_pressure (MPa, to be taken off
-    absolute pressures), missing (texts in the place of a reading).
+    format : name of one of `available("instruments")`; by default the one whose columns are there.
+    time="", date="" : names of their columns, where they are not called so. time_unit="" : "s", "ms", "min", "h", of
+    times without a unit. date_order="" : "month first", "day first" or "year first". time_zone="" : such as
+    "America/Chicago" or "+01:00". channels=None : names of those that are kept; all by default. every=1 : rows that are
+    averaged to one. units={} : {channel: unit} of heads without one. pressure_reference="" : "gauge" or "absolute", of
+    pressures whose unit does not say. ambient_pressure=None : MPa, to be taken off absolute pressures. missing=() :
+    texts in the place of a reading, beside the usual ones.
     """
     formats = [entry.value for entry in default_registry().instruments().values()]
     return instrument_files.read_record(path, formats, format, options)

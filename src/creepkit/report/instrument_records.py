@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.instruments.clock_alignment import UNIX_TIME
-from creepkit.records.quantities import ZERO_CELSIUS
+from creepkit.records.units import ZERO_CELSIUS
 from creepkit.report.figures import empty_figure, save_figure
 
 if TYPE_CHECKING:

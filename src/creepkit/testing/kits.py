@@ -170,12 +170,11 @@ def check_reader(reader: Reader, path: str | Path | None = None) -> ConformanceR
         raise HistoryError(f"check_reader() takes a reader, found {reader!r}; it needs accepts() and read()")
     case = ReaderCase(reader, None if path is None else Path(path))
     checks = {
-        "name and title": lambda case: specimen_checks.check_record_name(case.reader, "reader"),
         "foreign files": reader_checks.check_foreign_files,
         "files of write_history()": reader_checks.check_own_files,
         "example file": reader_checks.check_example,
     }
-    return ConformanceReport(reader, tuple(_all_findings(checks, case)), "reader")
+    return _report(reader, "reader", checks, case)
 
 
 def check_camera_format(format: CameraFormat, path: str | Path | None = None) -> ConformanceReport:
@@ -187,12 +186,11 @@ def check_camera_format(format: CameraFormat, path: str | Path | None = None) ->
         raise HistoryError(f"check_camera_format() takes a ck.CameraFormat, found {format!r:.40}")
     case = CameraFormatCase(format, None if path is None else Path(path))
     checks = {
-        "name and title": lambda case: specimen_checks.check_record_name(case.format, "camera format"),
         "its own tables": camera_checks.check_own_tables,
         "foreign files": camera_checks.check_foreign_files,
         "example": camera_checks.check_example,
     }
-    return ConformanceReport(format, tuple(_all_findings(checks, case)), "camera format")
+    return _report(format, "camera format", checks, case)
 
 
 def check_exporter(exporter: Exporter) -> ConformanceReport:
@@ -201,24 +199,20 @@ def check_exporter(exporter: Exporter) -> ConformanceReport:
         raise ExportError(f"check_exporter() takes an exporter, found {exporter!r}; it needs a method text()")
     case = ExporterCase(exporter)
     checks = {
-        "name and title": lambda case: specimen_checks.check_record_name(case.exporter, "exporter"),
         "suffix": exporter_checks.check_interface,
         "text or a reason for every law": exporter_checks.check_every_law,
         "deterministic": exporter_checks.check_determinism,
         "notes and names": exporter_checks.check_hostile_texts,
     }
-    return ConformanceReport(exporter, tuple(_all_findings(checks, case)), "exporter")
+    return _report(exporter, "exporter", checks, case)
 
 
 def check_instrument_format(format: InstrumentFormat) -> ConformanceReport:
     """Run every check on an instrument format: its name, the units of its channels, the order of its dates."""
     if not isinstance(format, InstrumentFormat):
         raise HistoryError(f"check_instrument_format() takes a ck.InstrumentFormat, found {format!r:.40}")
-    checks = {
-        "name and title": lambda one: specimen_checks.check_record_name(one, "instrument format"),
-        "declaration": instrument_checks.check_declaration,
-    }
-    return ConformanceReport(format, tuple(_all_findings(checks, format)), "instrument format")
+    checks = {"declaration": instrument_checks.check_declaration}
+    return _report(format, "instrument format", checks, format)
 
 
 def check_temperature_form(name: str, form: Callable[..., Any]) -> ConformanceReport:
@@ -272,6 +266,14 @@ def check_named(name: str) -> list[ConformanceReport]:
     if name in forms:
         reports.append(check_temperature_form(name, forms[name].value))
     return reports or [check_law(registry.law(name))]
+
+
+def _report(
+    subject: Any, kind: str, checks: Mapping[str, Callable[[Any], Iterable[ConformanceCheck]]], case: Any
+) -> ConformanceReport:
+    """Name and title of what was offered, then the checks of its kind."""
+    named = findings("name and title", lambda: specimen_checks.check_record_name(subject, kind))
+    return ConformanceReport(subject, (*named, *_all_findings(checks, case)), kind)
 
 
 def _all_findings(checks: Mapping[str, Callable[[Any], Iterable[ConformanceCheck]]], case: Any) -> list[Any]:

@@ -7,17 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
+from creepkit.records.units import factors, spelled_factors
+
 PRESSURE, SECOND, KELVIN, LENGTH, AMOUNT = "MPa", "s", "K", "mm", "mol"
 """Base units; an energy is MPa mm^3, which is N mm."""
 
 
-_LEVEL = {"MPa": 1.0, "Pa": 1e-6, "kPa": 1e-3, "GPa": 1e3, "psi": 0.006894757293168361, "ksi": 6.894757293168361}
+_LEVEL = factors("MPa", "Pa", "kPa", "GPa", "psi", "ksi")
 
 
-_TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0, "hr": 3600.0, "d": 86400.0, "day": 86400.0, "year": 31557600.0}
+_TIMES = spelled_factors("s", "min", "h", "d", "year")
 
 
-_LENGTHS = {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "nm": 1e-6}
+_LENGTHS = factors("mm", "m", "cm", "um", "nm")
 
 
 _ENERGIES = {"J": 1e3, "kJ": 1e6, "MJ": 1e9, "eV": 1.602176634e-16, "cal": 4184.0, "kcal": 4.184e6}

@@ -330,7 +330,7 @@ def test_what_is_no_frame_is_found_out_from_some_of_its_files(tmp_path: Path, mo
 @pytest.mark.parametrize(("given", "found"), [(None, "found None"), ([1, 2], r"found \[1, 2\]"), (3, "found 3")])
 def test_what_is_no_list_of_files(given: object, found: str) -> None:
     with pytest.raises(HistoryError, match=rf"takes a folder, a file, a pattern or a list of files, {found}"):
-        ck.read_frames(given)  # type: ignore[arg-type]
+        ck.read_frames(given)
 
 
 def test_a_file_that_is_listed_twice(tmp_path: Path) -> None:
@@ -372,4 +372,4 @@ WRONG_DECLARATIONS: dict[str, tuple[dict[str, object], str]] = {
 def test_a_declaration_checks_itself(case: str) -> None:
     changes, message = WRONG_DECLARATIONS[case]
     with pytest.raises(HistoryError, match=f"camera format 'lab': {message}"):
-        ck.CameraFormat(**{"name": "lab", "title": "a laboratory's own", "columns": SIX, **changes})  # type: ignore[arg-type]
+        ck.CameraFormat(**{"name": "lab", "title": "a laboratory's own", "columns": SIX, **changes})

@@ -8,6 +8,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.cli.app import COMMANDS
+from creepkit.cli.options import parsed_integer, parsed_number
 from helpers.command_line import creepkit, one_line
 
 FALLING = """
@@ -388,3 +389,12 @@ def test_a_file_that_cannot_be_written_is_said_before_the_simulation(
     monkeypatch.setattr(ck, "simulate", simulate)
     Path("folder.png").mkdir()
     assert message in one_line(creepkit(*DIMPLE, "--pressure", "8", *target))
+
+
+@pytest.mark.parametrize("text", ["٣", "1_0", "２"])
+def test_digits_of_other_scripts_are_no_numbers(text: str):
+    assert parsed_number(" 1e3 ") == 1000.0
+    assert parsed_integer("-3") == -3
+    for parsed in (parsed_number, parsed_integer):
+        with pytest.raises(ValueError, match=text):
+            parsed(text)

@@ -117,4 +117,4 @@ def test_arguments_of_other_types(changes: dict[str, object], message: str) -> N
     record = ck.InstrumentRecord("r", times, {"p": ck.Channel("p", "pressure", times, "gauge", "MPa")})
     given = {"record": record, "channel": "p", "frame_times": times, "displacement": times**2} | changes
     with pytest.raises(HistoryError, match=message):
-        ck.align_clocks(**given)  # type: ignore[arg-type]
+        ck.align_clocks(**given)

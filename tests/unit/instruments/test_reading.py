@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.instruments.column_heads import split_head
+from creepkit.instruments.reading_options import ReadingOptions, RecordOptions
 from helpers.instrument_samples import samples
 from helpers.paths import SHARED, needs_shared_data
 
@@ -186,7 +188,7 @@ def test_what_cannot_be_read_is_said_in_one_sentence(
     tmp_path: Path, content: str, options: dict[str, object], message: str
 ) -> None:
     with pytest.raises(HistoryError) as caught:
-        ck.read_record(written(tmp_path, content), **options)  # type: ignore[arg-type]
+        ck.read_record(written(tmp_path, content), **options)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -303,7 +305,7 @@ def test_units_that_are_nearly_known_are_not_taken_in_silence(tmp_path: Path) ->
 )
 def test_a_declaration_of_an_instrument_checks_itself(changes: dict[str, object], message: str) -> None:
     with pytest.raises(HistoryError, match=f"instrument format 'lab': .*{message}"):
-        ck.InstrumentFormat(**{"name": "lab", "title": "a logger", **changes})  # type: ignore[arg-type]
+        ck.InstrumentFormat(**{"name": "lab", "title": "a logger", **changes})
 
 
 def test_long_names_are_not_matched() -> None:
@@ -315,4 +317,8 @@ def test_long_names_are_not_matched() -> None:
 @pytest.mark.parametrize("options", [{"format": []}, {"missing": [3]}])
 def test_options_of_other_types(tmp_path: Path, options: dict[str, object]) -> None:
     with pytest.raises(HistoryError, match=r"(format|missing) is \[3?\]; give"):
-        ck.read_record(written(tmp_path, "time_s,p_bar\n0,1\n"), **options)  # type: ignore[arg-type]
+        ck.read_record(written(tmp_path, "time_s,p_bar\n0,1\n"), **options)
+
+
+def test_keywords_are_the_options() -> None:
+    assert [*RecordOptions.__annotations__] == [one.name for one in fields(ReadingOptions)]

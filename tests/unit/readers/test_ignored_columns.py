@@ -15,7 +15,7 @@ TABLE = "Time (h);Strain (%);load, kN;operator;Date\n0;0;3,1;Ms A;1.3.24\n1;0,11
 
 def read(text: str, path: Path, **options: object) -> list[History]:
     path.write_text(text, encoding="utf-8")
-    return ck.read_histories(path, **options)  # type: ignore[arg-type]
+    return ck.read_histories(path, **options)
 
 
 @pytest.mark.parametrize("key", ["ignore: load, kN; operator; Date", "Ignore: load, kN; OPERATOR; date"])

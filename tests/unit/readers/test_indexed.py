@@ -137,3 +137,11 @@ def test_missing_thermocouple(tmp_path):
     frames = "time_h,creep_extension_pct,T_top_C,T_mid_C\n0,0,980,981\n2,0.5,980,981\n"
     with pytest.raises(HistoryError, match=r"B_creep.csv:1: missing column 'T_bot_C'; found: time_h, creep_ext"):
         INDEXED_FILES.read(folder(tmp_path, files(frames=frames)))
+
+
+def test_what_an_empty_cell_of_the_index_leaves_unknown_is_said(tmp_path):
+    index = "key,temperature_C,stress_MPa,youngs_MPa,state,product\na/1,900,25,,Ruptured,\na/2,950,20,144000,,Base\n"
+    first, second = INDEXED_TABLE.read(folder(tmp_path, {"index.csv": index, "curves.csv": CURVES}))
+    assert "youngs_MPa unknown (empty cell)" in first.labels["assumed"].split(", ")
+    assert "state unknown (empty cell)" in second.labels["assumed"].split(", ")
+    assert "product" not in first.labels["assumed"]

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from creepkit.errors import HistoryError
+from creepkit.readers.rate_and_rupture_tables import TEST_TABLE
 from creepkit.readers.spreadsheets import SPREADSHEET
-from creepkit.readers.test_tables import TEST_TABLE
 
 openpyxl = pytest.importorskip("openpyxl")
 

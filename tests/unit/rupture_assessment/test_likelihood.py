@@ -90,7 +90,10 @@ def test_effects_of_run_outs_are_integrated(distribution):
 
     expected = 0.0
     for members in ((0, 1, 2, 3), (4, 5)):
-        product = lambda b, members=members: norm.pdf(b, 0, tau) * np.prod([density(b, k) for k in members])  # noqa: E731
+
+        def product(b, members=members):
+            return norm.pdf(b, 0, tau) * np.prod([density(b, k) for k in members])
+
         expected += np.log(quad(product, -2.0, 2.0, epsabs=1e-14, limit=200)[0])
     value = times.log_likelihood(mean[None], np.array([s]), np.array([[tau]]))[0]
     assert value == pytest.approx(expected, abs=2e-4)

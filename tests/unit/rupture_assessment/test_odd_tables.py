@@ -67,12 +67,12 @@ def test_times_beyond_a_double_are_infinite() -> None:
     found = ck.rupture(TESTS, "larson-miller")
     assert found.rupture_time(1e-3, 20.0) == (np.inf, np.inf, np.inf)
     with pytest.raises(FitError, match="give MPa above zero"):
-        found.rupture_time("abc", 900.0)  # type: ignore[arg-type]
+        found.rupture_time("abc", 900.0)
 
 
 def test_a_load_is_a_record() -> None:
     with pytest.raises(HistoryError, match=r"loading is 100; give what was imposed, such as ck.constant_stress"):
-        ck.History("a", [3600.0], {}, 100, 873.15, rupture_time=3600.0)  # type: ignore[arg-type]
+        ck.History("a", [3600.0], {}, 100, 873.15, rupture_time=3600.0)
 
 
 def test_pairs_of_levels_that_share_tests() -> None:

@@ -22,7 +22,7 @@ from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.readers.assembly import assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid, peek_columns, read_text_grid, table_of, without_ignored
 from creepkit.readers.column_names import NameTable, split_written_name, unit_suffix, words_of
-from creepkit.readers.text_tables import SourceText, TableRow, TextTable
+from creepkit.readers.text_tables import SourceText, TableRow, TextTable, unknown_text
 from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary, plain_name, split_unit
 from creepkit.records import History
 from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
@@ -163,8 +163,10 @@ class RowPerTestReader:
         written = table.entries(row).items()
         cells = {keys[table.columns.index(name)]: replace(_with_point(entry), key=name) for name, entry in written}
         entries = {**table.header, **_with_end(cells, location)}
-        if table.assumptions and "label assumed" not in entries:
-            entries["label assumed"] = SourceText(", ".join(table.assumptions), location)
+        empty = [_quantity(keys[table.columns.index(name)]) for name in table.empty_columns(row)]
+        assumptions = (*table.assumptions, *filter(None, (_assumed_of_empty(one, entries) for one in empty)))
+        if assumptions and "label assumed" not in entries:
+            entries["label assumed"] = SourceText(", ".join(assumptions), location)
         name = f"{table.sheet or table.path.stem} {row.line}"
         where = f"sheet {table.sheet}, " if table.sheet else ""
         source = f"{table.path} ({where}{cells['name'].text if 'name' in cells else f'line {row.line}'})"
@@ -243,11 +245,12 @@ def _keys(table: TextTable) -> list[str]:
             quantity = written if written.startswith(("label ", "geometry ")) else f"label {written}"
         first = next((k for k, key in enumerate(keys) if _quantity(key) == _quantity(quantity)), None)
         if first is not None:
-            raise HistoryError(f"{location}: '{table.columns[first]}' and '{written}' mean the same; keep one of them")
+            names = f"'{table.columns[first]:.60}' and '{written:.60}'"
+            raise HistoryError(f"{location}: {names} mean the same; keep one of them")
         key_in_header = next((key for key in table.header if _quantity(key) == _quantity(quantity)), None)
         if key_in_header is not None:
             place = table.header[key_in_header].location
-            raise HistoryError(f"{place}: '{key_in_header}' is also a column, '{written}'; keep one of them")
+            raise HistoryError(f"{place}: '{key_in_header:.60}' is also a column, '{written:.60}'; keep one of them")
         keys.append(quantity)
     return keys
 
@@ -255,9 +258,9 @@ def _keys(table: TextTable) -> list[str]:
 def _check_unit(quantity: str, unit: str, written: str, location: str) -> None:
     units = QUANTITIES[quantity][0].units
     if unit not in units:
-        found = f"the unit '{unit}', which is not understood" if unit else "no unit"
+        found = f"the unit '{unit:.40}', which is not understood" if unit else "no unit"
         raise HistoryError(
-            f"{location}: column '{written.strip()}' has {found}; allowed: {', '.join(units)}, such as "
+            f"{location}: column '{written.strip():.60}' has {found}; allowed: {', '.join(units)}, such as "
             f"'{quantity} ({next(iter(units))})'"
         )
 
@@ -275,8 +278,8 @@ def _refuse_misspelt(written: str, location: str) -> None:
     near = get_close_matches(name, [one for one in known if len(one) > 3], 1, cutoff=0.8)
     if near:
         raise HistoryError(
-            f"{location}: column '{written}' is not understood; did you mean '{near[0]}'? A label is written "
-            f"'label {written}'"
+            f"{location}: column '{written:.60}' is not understood; did you mean '{near[0]}'? A label is written "
+            f"'label {written:.60}'"
         )
 
 
@@ -325,6 +328,18 @@ def _with_end(cells: Mapping[str, SourceText], location: str) -> dict[str, Sourc
     if ended == "stopped":
         entries["ended"] = SourceText("stopped", location)
     return entries
+
+
+def _assumed_of_empty(quantity: str, entries: Mapping[str, SourceText]) -> str:
+    """What an empty cell leaves unknown; "" where the rest of the row says it, or where it would be a label."""
+    known = {_quantity(key) for key in entries}
+    if quantity == "ended" and "rupture" in known:
+        return "ended ruptured (empty cell)"
+    is_stopped = "ended" in entries and entries["ended"].text == "stopped"
+    said = {"rupture": is_stopped, "end_time": "rupture" in known}.get(quantity, False)
+    if quantity in known or said or quantity == "name" or quantity.startswith("label "):
+        return ""
+    return unknown_text(quantity)
 
 
 _ROUNDING = 0.01

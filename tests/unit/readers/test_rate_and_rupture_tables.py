@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.readers.history_csv import write_history
-from creepkit.readers.test_tables import TEST_TABLE, key_of_column
+from creepkit.readers.rate_and_rupture_tables import TEST_TABLE, key_of_column
 from creepkit.records import UNKNOWN_DURATION, History, constant_stress
 
 TABLE = """# alloy: Alloy X
@@ -194,3 +194,19 @@ def test_mutated_tables_give_tests_or_one_sentence(tmp_path, changes, delimiter)
     for history in found:
         assert history.minimum_rate is not None or history.end_known
         assert history.minimum_rate is None or history.minimum_rate > 0
+
+
+@pytest.mark.parametrize(
+    ("row", "unknown"),
+    [
+        ("A,120,750,,900,", ["minimum_rate unknown (empty cell)", "ended ruptured (empty cell)"]),
+        ("A,120,750,2e-6,,", ["rupture unknown (empty cell)", "ended unknown (empty cell)"]),
+        ("A,120,750,2e-6,>900,", []),
+        ("A,120,750,,>900,stopped", ["minimum_rate unknown (empty cell)"]),
+        ("A,120,750,2e-6,900,ruptured", []),
+    ],
+)
+def test_what_an_empty_cell_leaves_unknown_is_said(row, unknown, tmp_path):
+    (history,) = read(tmp_path, f"test,stress_MPa,temperature_C,min creep rate (1/h),t_r (h),ended\n{row}\n")
+    assumed = history.labels["assumed"].split(", ")
+    assert [text for text in assumed if "cell" in text] == unknown

@@ -1,0 +1,114 @@
+"""Units as files spell them: of which quantity each is, and how a number in it becomes one in MPa, mm, s, K, N or rad.
+
+Who reads files names the units that make sense there; spellings, factors and offsets stand here only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+ZERO_CELSIUS = 273.15
+"""K."""
+
+
+PSI = 6.894757293168361e-3
+"""MPa."""
+
+
+@dataclass(frozen=True)
+class UnitConversion:
+    """How a number in some unit becomes creepkit's own: factor * number + offset."""
+
+    factor: float
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: its quantity, its conversion, and how else than by its symbol it is spelled, in small letters."""
+
+    quantity: str
+    conversion: UnitConversion
+    spellings: tuple[str, ...] = ()
+
+
+def _unit(quantity: str, factor: float, *spellings: str, offset: float = 0.0) -> Unit:
+    return Unit(quantity, UnitConversion(factor, offset), spellings)
+
+
+UNITS: Mapping[str, Unit] = MappingProxyType(
+    {
+        "s": _unit("time", 1.0, "sec", "secs", "second", "seconds"),
+        "ms": _unit("time", 1e-3, "msec", "millisecond", "milliseconds"),
+        "us": _unit("time", 1e-6, "µs", "μs", "microsecond", "microseconds"),
+        "ns": _unit("time", 1e-9, "nanosecond", "nanoseconds"),
+        "min": _unit("time", 60.0, "mins", "minute", "minutes"),
+        "h": _unit("time", 3600.0, "hr", "hrs", "hour", "hours"),
+        "d": _unit("time", 86400.0, "day", "days"),
+        "year": _unit("time", 31557600.0, "years"),
+        "mm": _unit("length", 1.0, "millimetre", "millimeter"),
+        "cm": _unit("length", 10.0, "centimetre", "centimeter"),
+        "m": _unit("length", 1e3, "metre", "meter"),
+        "um": _unit("length", 1e-3, "µm", "μm", "micron", "microns"),
+        "nm": _unit("length", 1e-6),
+        "in": _unit("length", 25.4, "inch", "inches"),
+        "MPa": _unit("stress", 1.0, "n/mm2", "n/mm²", "n/mm^2", "mn/m2"),
+        "GPa": _unit("stress", 1e3),
+        "kPa": _unit("stress", 1e-3),
+        "hPa": _unit("stress", 1e-4),
+        "Pa": _unit("stress", 1e-6),
+        "bar": _unit("stress", 0.1),
+        "mbar": _unit("stress", 1e-4),
+        "atm": _unit("stress", 0.101325),
+        "Torr": _unit("stress", 0.101325 / 760.0, "mmhg"),
+        "psi": _unit("stress", PSI),
+        "ksi": _unit("stress", 1e3 * PSI),
+        "Msi": _unit("stress", 1e6 * PSI),
+        "K": _unit("temperature", 1.0, "kelvin", "degk"),
+        "C": _unit(
+            *("temperature", 1.0, "°c", "ºc", "℃", "degc", "deg c", "deg. c", "celsius", "oc"), offset=ZERO_CELSIUS
+        ),
+        "F": _unit(
+            *("temperature", 1.0 / 1.8, "°f", "ºf", "℉", "degf", "deg f", "deg. f", "fahrenheit", "of"),
+            offset=ZERO_CELSIUS - 32.0 / 1.8,
+        ),
+        "1": _unit("strain", 1.0, "-", "mm/mm", "m/m", "in/in", "fraction"),
+        "pct": _unit("strain", 1e-2, "%", "percent", "per cent"),
+        "microstrain": _unit("strain", 1e-6, "µstrain", "μstrain", "ustrain", "µm/m", "μm/m", "um/m"),
+        "N": _unit("force", 1.0),
+        "kN": _unit("force", 1e3),
+        "lbf": _unit("force", 4.4482216152605),
+        "Nmm": _unit("moment", 1.0),
+        "Nm": _unit("moment", 1e3),
+        "rad": _unit("angle", 1.0),
+        "deg": _unit("angle", math.pi / 180.0, "°"),
+    }
+)
+"""{symbol: unit}; capitals of a symbol matter."""
+
+
+CAPITALS_THAT_MATTER = frozenset(("mPa", "M", "nm", "mN", "Mn", "Mbar"))
+"""Spellings that in other capitals mean another unit: millipascal is no megapascal, nanometre no newton metre."""
+
+
+def conversions(*symbols: str) -> dict[str, UnitConversion]:
+    """{symbol: conversion} of some units."""
+    return {symbol: UNITS[symbol].conversion for symbol in symbols}
+
+
+def factors(*symbols: str) -> dict[str, float]:
+    """{symbol: factor} of some units, for quantities whose units have no offset."""
+    return {symbol: UNITS[symbol].conversion.factor for symbol in symbols}
+
+
+def spellings(*symbols: str) -> dict[str, str]:
+    """{spelling: symbol} of some units; each symbol is a spelling too."""
+    return {spelling: symbol for symbol in symbols for spelling in (symbol, *UNITS[symbol].spellings)}
+
+
+def spelled_factors(*symbols: str) -> dict[str, float]:
+    """{spelling: factor} of some units, for quantities whose units have no offset."""
+    return {spelling: UNITS[symbol].conversion.factor for spelling, symbol in spellings(*symbols).items()}

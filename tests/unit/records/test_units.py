@@ -1,0 +1,67 @@
+"""Units as files spell them: factors by their definitions, and no spelling of two units."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from creepkit.cameras.reading import TIME_UNITS
+from creepkit.instruments.column_heads import channel_unit
+from creepkit.readers.column_names import unit_suffix
+from creepkit.records.camera_format import LENGTH_UNITS
+from creepkit.records.quantities import LENGTH, STRESS, TEMPERATURE, TIME
+from creepkit.records.units import UNITS
+
+POUND_FORCE, INCH = 0.45359237 * 9.80665, 25.4
+"""N and mm, by their definitions."""
+
+
+@pytest.mark.parametrize(
+    ("symbol", "factor"),
+    [
+        ("psi", POUND_FORCE / INCH**2),
+        ("ksi", 1e3 * POUND_FORCE / INCH**2),
+        ("lbf", POUND_FORCE),
+        ("atm", 101325e-6),
+        ("Torr", 101325e-6 / 760),
+        ("year", 365.25 * 24 * 3600),
+    ],
+)
+def test_factors_are_those_of_the_definitions(symbol: str, factor: float):
+    assert UNITS[symbol].conversion.factor == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("number", "unit", "kelvin"), [(212.0, "F", 373.15), (-40.0, "F", 233.15), (-40.0, "C", 233.15)]
+)
+def test_temperatures_have_their_offsets(number: float, unit: str, kelvin: float):
+    conversion = UNITS[unit].conversion
+    assert conversion.factor * number + conversion.offset == pytest.approx(kelvin, abs=1e-9)
+
+
+def test_no_spelling_means_two_units():
+    written = Counter(text for symbol, unit in UNITS.items() for text in (symbol, *unit.spellings))
+    assert [text for text, count in written.items() if count > 1] == []
+
+
+@pytest.mark.parametrize("symbol", [s for s, unit in UNITS.items() if unit.quantity in ("time", "length")])
+def test_readers_cameras_and_instruments_agree(symbol: str):
+    unit = UNITS[symbol]
+    for text in (symbol, *unit.spellings):
+        factor = unit.conversion.factor
+        for known in (LENGTH_UNITS, TIME_UNITS):
+            assert known.get(text, factor) == factor
+        channel, suffix = channel_unit(text), unit_suffix(text)
+        assert channel is None or channel.factor == factor
+        for kind in (LENGTH, TIME):
+            assert suffix not in kind.units or kind.units[suffix].factor == factor
+
+
+@pytest.mark.parametrize("text", ["n/mm2", "N/mm²", "MPA", "psi", "Kelvin", "°C", "deg F", "Fahrenheit"])
+def test_instruments_and_tables_take_the_same_spellings(text: str):
+    channel, suffix = channel_unit(text), unit_suffix(text)
+    assert channel is not None
+    assert suffix is not None
+    conversion = (STRESS if suffix in STRESS.units else TEMPERATURE).units[suffix]
+    assert (channel.factor, channel.offset) == (conversion.factor, conversion.offset)
