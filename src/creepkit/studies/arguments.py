@@ -15,6 +15,7 @@ from creepkit.records import (
     Program,
     Specimen,
     dimensions_of,
+    is_length_nuisance,
     loads_of,
     outputs_of,
 )
@@ -23,9 +24,9 @@ from creepkit.studies.model import ForecastPart, NuisancePart, Step
 from creepkit.studies.study_file import StudyFile
 
 if TYPE_CHECKING:
+    from creepkit.experiments.design_task import Goal
     from creepkit.experiments.rig import Rig
     from creepkit.inverse.settings import IdentificationSettings
-    from creepkit.inverse.uncertainty.quantities import DerivedQuantity
     from creepkit.language import CreepLaw
 
 HOUR = 3600.0
@@ -123,7 +124,8 @@ def nuisances_of(file: StudyFile) -> tuple[Nuisance, ...] | None:
 def _nuisance(file: StudyFile, number: int, part: NuisancePart) -> Nuisance:
     place = ("identification", "nuisances", number)
     with file.at(*place, "kind"):
-        unit = _unit_of_nuisance(Nuisance(part.kind, start=1.0 if part.kind.endswith("step") else 0.0))
+        Nuisance(part.kind, start=1.0 if part.kind.endswith("step") else 0.0)
+    unit = _unit_of_kind(part.kind)
     values: dict[str, Any] = {}
     for name in ("mean", "sd"):
         for suffix in ("", "_mm", "_K"):
@@ -144,8 +146,8 @@ def _nuisance(file: StudyFile, number: int, part: NuisancePart) -> Nuisance:
         )
 
 
-def _unit_of_nuisance(nuisance: Nuisance) -> str:
-    return "mm" if nuisance.is_length else "K" if nuisance.kind.startswith("temperature") else ""
+def _unit_of_kind(kind: str) -> str:
+    return "mm" if is_length_nuisance(kind) else "K" if kind.startswith("temperature") else ""
 
 
 def settings_of(file: StudyFile) -> IdentificationSettings:
@@ -275,13 +277,13 @@ def numbers_by_output(file: StudyFile, key: tuple[str | int, ...], given: Mappin
     return values
 
 
-def goal_of(file: StudyFile) -> str | DerivedQuantity | None:
+def goal_of(file: StudyFile) -> Goal | None:
     """The goal of a design, as ck.design takes it."""
     import creepkit as ck
 
     part = file.model.design
     assert part is not None
-    if part.goal not in ("rate", "exponent"):
+    if part.goal is None or part.goal == "law" or part.goal == "parameters":
         if part.at_stress_MPa is not None or part.at_temperature_C is not None:
             name = "at_stress_MPa" if part.at_stress_MPa is not None else "at_temperature_C"
             raise file.error(("design", name), 'belongs to the goals "rate" and "exponent"; leave it out')
@@ -330,3 +332,18 @@ def rigs_of_study(file: StudyFile, rigs: Sequence[Rig], predictor: object) -> li
         raise file.error(("design",), f"the tests are of {' and '.join(names)}: say by specimen whose rig is described")
     with file.at("design"):
         return [rig.replace(**changes) if rig.specimen == chosen else rig for rig in rigs]
+
+
+def tolerances_of(file: StudyFile, number: int) -> dict[str, float]:
+    """{kind: standard deviation} of a forecast, in the unit of the nuisance parameter of that kind."""
+    from creepkit.records.known_specimens import all_dimensions
+    from creepkit.records.prediction import GENERAL_NUISANCES
+
+    known = [*GENERAL_NUISANCES, *all_dimensions()]
+    spelt = {f"{kind}_{unit}" if (unit := _unit_of_kind(kind)) else kind: kind for kind in known}
+    tolerances: dict[str, float] = {}
+    for key, value in file.model.forecast[number].tolerances.items():
+        if key not in spelt:
+            raise file.error(("forecast", number, "tolerances", key), f"is not known; {nearest(key, spelt)}")
+        tolerances[spelt[key]] = value
+    return tolerances

@@ -1,4 +1,4 @@
-"""Results of stages as files of a folder, each with the hash of all that it was made from, and what reads them again."""
+"""Results of stages as files of a folder, each with the hash of all that it was made from; and how they are read."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def planned_from_json(data: Any) -> History:
     """The planned test that `planned_to_json` wrote; RecordError or another error of creepkit for other data."""
     names = (*HISTORY_FIELDS, "loading", "temperature", "elastic")
     problem = "it is no object" if not isinstance(data, dict) else check_keys(data, names, "test")
-    kind = LOADINGS.get(data["loading"].get("kind")) if not problem and isinstance(data["loading"], dict) else None
+    kind = LOADINGS.get(str(data["loading"].get("kind"))) if not problem and isinstance(data["loading"], dict) else None
     if problem or kind is None:
         raise RecordError(f"a planned test cannot be read: {problem or 'its loading is not known'}")
     fields = {name: PLAIN.from_json(hint, data[name], name) for name, hint in HISTORY_FIELDS.items()}
