@@ -180,6 +180,12 @@ class ResultFolder:
         """The file of a stage."""
         return self.folder / f"{file_name(stage)}.json"
 
+    def clear(self) -> None:
+        """Remove all results and identifications, those half written among them."""
+        for folder in (self.folder, self.fits):
+            for path in (*folder.glob("*.json"), *folder.glob(".*.part")):
+                path.unlink(missing_ok=True)
+
     def load(self, stage: str, key: str) -> Any:
         """The data of a stage; None where there are none, or of another key."""
         try:

@@ -155,7 +155,9 @@ class Execution:
 
         def tick(task: str, done: int, total: int) -> None:
             elapsed = time.monotonic() - begun.setdefault(task, start if not begun else time.monotonic())
-            left = f", {duration_text(elapsed / done * (total - done))} left" if elapsed > 0 and 0 < done < total else ""
+            left = (
+                f", {duration_text(elapsed / done * (total - done))} left" if elapsed > 0 and 0 < done < total else ""
+            )
             self._report(stage, min(done, total), total, f"{task}{left}")
 
         try:

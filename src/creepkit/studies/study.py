@@ -119,6 +119,8 @@ class Study:
         kept = ResultFolder(folder / f"{self.path.stem}.results")
         lock_path = folder / f"{self.path.stem}.lock"
         with running_alone(kept.folder):
+            if force:
+                kept.clear()
             return self._run(folder, kept, lock_path, kinds, force, locked, progress)
 
     def _run(

@@ -57,7 +57,11 @@ class StudyFile:
 
 def read_study_file(path: Path) -> StudyFile:
     """Read and check the layout of a study file; StudyError, in one sentence with the line, says what is wrong."""
-    text = read_text(path, STUDY_FILE)
+    return parse_study(path, read_text(path, STUDY_FILE))
+
+
+def parse_study(path: Path, text: str) -> StudyFile:
+    """The study file of a text; path : its name, for messages."""
     try:
         data = tomllib.loads(text)
         lines = key_lines(text)
