@@ -6,6 +6,7 @@ import json
 import os.path
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,10 @@ TERTIARY_LAWS = ("norton", "mpc-omega", "kachanov-rabotnov")
 
 TERTIARY_RATIO = 2.0
 """Rate at the end of a test over its smallest, from which on it is called tertiary creep."""
+
+
+TERTIARY_SHARE = 0.3
+"""Of the tests with curves, from which on laws with tertiary creep are the candidates."""
 
 
 STRESS_RATIO = 1.5
@@ -55,7 +60,8 @@ class StudyProposal:
 class DataSummary:
     """What tests hold that decides which stages make sense.
 
-    loads : levels above zero that are held, of all tests. temperatures : K, of distinct levels. alloys, heats : that are named.
+    loads : levels above zero that are held, of all tests. temperatures : K, of distinct levels. alloys, heats : that
+    are named. ruptured, tertiary : tests that ended by rupture, and those with tertiary creep.
     """
 
     tests: tuple[History, ...]
@@ -100,8 +106,9 @@ class DataSummary:
             loads += (
                 f", {self.loads[0]:g} to {self.loads[-1]:g} {unit}" if len(self.loads) > 1 else f", {self.loads[0]:g}"
             )
+        count = f"{len(self.tests)} test{'s' if len(self.tests) > 1 else ''}"
         return [
-            f"{len(self.tests)} test{'s' if len(self.tests) > 1 else ''} ({kinds}), {self.framed} with curves or rates; {loads}; {at}",
+            f"{count} ({kinds}), {self.framed} with curves or rates; {loads}; {at}",
             f"ended by rupture: {self.ruptured}; with tertiary creep: {self.tertiary}",
         ]
 
@@ -110,7 +117,7 @@ def _held_levels(history: History) -> list[float]:
     """Levels of the load above zero that last: those of a ramp are passed."""
     program = history.loading.program()
     values = program.values
-    held = [float(v) for v, later in zip(values[:-1], values[1:], strict=True) if v == later and v > 0]
+    held = [float(v) for v, later in pairwise((*values, values[-1])) if v == later and v > 0]
     return held or [float(values.max())]
 
 
@@ -190,7 +197,7 @@ def candidate_laws(summary: DataSummary) -> list[str]:
     import creepkit as ck
 
     installed = ck.available("laws")
-    names = TERTIARY_LAWS if summary.tertiary and summary.tertiary >= summary.ruptured / 2 else SECONDARY_LAWS
+    names = TERTIARY_LAWS if summary.tertiary > TERTIARY_SHARE * summary.framed else SECONDARY_LAWS
     chosen = [name for name in names if name in installed]
     several = len(summary.loads) > 2 and summary.loads[-1] > STRESS_RATIO * summary.loads[0]
     if several and names is SECONDARY_LAWS and SEVERAL_STRESSES_LAW in installed:
