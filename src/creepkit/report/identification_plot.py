@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -177,7 +177,7 @@ def _few_tests(fit: Identification, curves: FittedCurves) -> Figure:
                 cell = grid[i, j].subgridspec(len(names), 1, hspace=0.05)
                 panels = [figure.add_subplot(cell[k]) for k in range(len(names))]
                 for axes, name in zip(panels, names, strict=True):
-                    _draw_residuals(axes, fit, curves, name, leading[output], colours)
+                    draw_residuals(axes, fit, curves, name, leading[output], colours)
                 for axes in panels[:-1]:
                     axes.set_xlabel("")
                     axes.tick_params(labelbottom=False)
@@ -247,7 +247,7 @@ def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
     by_panel = list(zip(panels.flat, bottom, strict=False))
     for axes, (kind, output) in by_panel:
         if kind == "residuals":
-            _draw_residuals(axes, fit, curves, output, leading[output], by_condition.colours)
+            draw_residuals(axes, fit, curves, output, leading[output], by_condition.colours)
         elif kind == "rates":
             draw_rates(axes, fit, rates_of_tests(fit, curves.prediction))
         else:
@@ -332,8 +332,13 @@ RESIDUAL_QUANTILES = (0.005, 0.995)
 """The axis shows the residuals between these: the first frames of a test may lie far beyond."""
 
 
-def _draw_residuals(
-    axes: Axes, fit: Identification, curves: FittedCurves, output: str, tests: Sequence[int], colours: Sequence[Any]
+def draw_residuals(
+    axes: Axes,
+    fit: Identification,
+    curves: FittedCurves,
+    output: str,
+    tests: Sequence[int],
+    colours: Sequence[Any] | Mapping[int, Any],
 ) -> None:
     """Measured less identified over time, in noises or per cent, and twice the standard deviation of the noise."""
     hours, values, noises = [], [], []

@@ -7,6 +7,7 @@ C their covariance, its standard deviation is sqrt(dy/dx C dy/dx'). One predicti
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -39,8 +40,18 @@ class FittedCurves:
         return self.prediction.of(test)[:, position], self.half_width[test, :length, position]
 
 
+_KNOWN_CURVES: WeakKeyDictionary[Identification, FittedCurves] = WeakKeyDictionary()
+"""Of identifications that are in use: the figures of one report draw the same curves."""
+
+
 def fitted_curves(fit: Identification) -> FittedCurves:
-    """The curves of the fitted tests with their bands: one prediction with sensitivities."""
+    """The curves of the fitted tests with their bands: one prediction with sensitivities, made once."""
+    if fit not in _KNOWN_CURVES:
+        _KNOWN_CURVES[fit] = _fitted_curves(fit)
+    return _KNOWN_CURVES[fit]
+
+
+def _fitted_curves(fit: Identification) -> FittedCurves:
     if fit.predictor is None or not fit.histories:
         raise FitError(
             "this identification was loaded without its histories: attach them with "

@@ -23,15 +23,15 @@ def ranking_text(ranking: Ranking) -> str:
     width = max(len(r.fit.law.name) for r in ranking.laws)
     header = f"{'law':{width}}   weight  {_CRITERION_NAMES[ranking.criterion]} - best  chi-square  explains the tests"
     rows = [
-        f"{r.fit.law.name:{width}}   {r.weight:6.3f}  {r.excess:10.1f}  {r.chi_square:10.1f}  {_explains(r.fit)}"
+        f"{r.fit.law.name:{width}}   {r.weight:6.3f}  {r.excess:10.1f}  {r.chi_square:10.1f}  {explanation(r.fit)}"
         for r in ranking.laws
     ]
     failed = [f"{name}: {reason}" for name, reason in ranking.failed.items()]
-    equivalent = [] if ranking.decisive else [f"- {pair}" for pair in _equivalents_among_remaining(ranking)]
+    equivalent = [] if ranking.decisive else [f"- {pair}" for pair in equivalents_among_remaining(ranking)]
     return "\n".join([ranking.verdict, *equivalent, "", header, *rows, *failed])
 
 
-def _explains(fit: Identification) -> str:
+def explanation(fit: Identification) -> str:
     """Whether a law explains the tests to their noise, and what it leaves, in noises."""
     if fit.adequacy is None or fit.adequacy.verdict == "cannot be judged":
         return "?"
@@ -44,7 +44,7 @@ def _explains(fit: Identification) -> str:
     return f"no: leaves {noises:.2g} noises" if noises > 0 else "no: rates of tests are not followed"
 
 
-def _equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
+def equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
     names = {r.fit.law.name for r in ranking.credible}
     if any(r.fit.predictor is None or not r.fit.histories for r in ranking.laws):
         return []
@@ -57,16 +57,16 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
         (
             entry.fit.law.name,
             str(len(entry.fit.law.params)),
-            *_misfit_cells(entry.fit),
+            *misfit_cells(entry.fit),
             f"{entry.excess:.1f}",
             f"{entry.weight:.3f}",
-            _explains(entry.fit),
+            explanation(entry.fit),
         )
         for entry in ranking.laws
     ]
-    columns = ("law", "parameters", *_misfit_columns(ranking.best), "BIC - best", "weight", "explains the tests")
+    columns = ("law", "parameters", *misfit_columns(ranking.best), "BIC - best", "weight", "explains the tests")
     print_table(f"{test_count} tests", columns, rows)
-    equivalent = [] if ranking.decisive else [f"- {pair}" for pair in _equivalents_among_remaining(ranking)]
+    equivalent = [] if ranking.decisive else [f"- {pair}" for pair in equivalents_among_remaining(ranking)]
     print("\n".join([ranking.verdict, *equivalent]) + f"\n\n{ranking.best}\n")
     for path in written:
         print(f"wrote {path}")
@@ -78,14 +78,14 @@ def _is_logarithmic(output: str) -> bool:
     return is_logarithmic(output)
 
 
-def _misfit_columns(fit: Identification) -> tuple[str, ...]:
+def misfit_columns(fit: Identification) -> tuple[str, ...]:
     if not fit.errors:
         return _single_value_misfit(fit)[0], "test to test"
     output = next(iter(fit.errors))
     return (f"rms ln {output}" if _is_logarithmic(output) else f"error of {output}", "test to test")
 
 
-def _misfit_cells(fit: Identification) -> tuple[str, ...]:
+def misfit_cells(fit: Identification) -> tuple[str, ...]:
     if not fit.errors:
         return _single_value_misfit(fit)[1], f"{100 * fit.noise_model.rate:.0f} %"
     output = next(iter(fit.errors))
