@@ -40,13 +40,15 @@ def fitted_test_figure(fit: Identification, curves: FittedCurves, test: int) -> 
         set_curve_ranges([row[0]], [curve], one.output)
         row[0].set(xlabel="time, h", ylabel=axis_label(one.output))
         draw_residuals(row[1], fit, curves, one.output, [test], colours)
-        row[1].set_title(f"reduced chi-square {one.errors.chi_square:.3g}", fontsize=9)
+        chi_square = one.errors.chi_square
+        row[1].set_title(f"reduced chi-square {chi_square:.3g}" if np.isfinite(chi_square) else "", fontsize=9)
         for axes in row:
             axes.xaxis.label.set_fontsize(9)
             axes.yaxis.label.set_fontsize(9)
-            axes.tick_params(labelsize=8, labelbottom=row is panels[-1])
+            axes.tick_params(labelsize=8)
     for axes in panels[:-1].flat:
         axes.set_xlabel("")
+        axes.tick_params(labelbottom=False)
     figure.suptitle(f"{history.name}: {program_text(history)}", fontsize=10)
     return save_figure(figure, None)
 

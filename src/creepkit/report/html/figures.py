@@ -20,7 +20,11 @@ class PageFigures:
         self.count = 0
 
     def picture(self, figure: Figure, title: str, description: str, caption: str) -> Picture:
-        """A figure with its alternative text (title and description) and a caption, which gets its number."""
+        """A figure with its alternative text (title and description) and a caption, which gets its number.
+
+        Its own heading is left out: the page says the same above it.
+        """
         self.count += 1
+        figure.suptitle("")
         svg = svg_text(figure, f"f{self.count}", title, description)
         return Picture(Markup(svg), f"Figure {self.count}. {caption}")  # noqa: S704

@@ -39,6 +39,10 @@ if TYPE_CHECKING:
     from creepkit.report.contents import ReportGroup
 
 
+LARGEST_PER_CENT = 0.4
+"""Of a logarithm, from which its change is given as a factor."""
+
+
 @dataclass(frozen=True)
 class GroupFindings:
     """What was found of one material, whatever it was found by.
@@ -104,13 +108,20 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     else:
         blocks.append(Paragraph("The tests determine every parameter of the law."))
     unmodelled = [
-        sentence(f"{effect.description} in a test, which changes its rate by {100 * np.expm1(effect.rate_change):.2g} %")
+        sentence(f"{effect.description} in a test, which changes its rate by {_change(effect.rate_change)}")
         for effect in fit.unmodelled
     ]
     if unmodelled:
         blocks += [Paragraph("The intervals do not include:"), Items(unmodelled)]
     remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *fit.notes])))
     return [*blocks, Paragraph("Remarks:"), Items(remarks)] if remarks else blocks
+
+
+def _change(log_factor: float) -> str:
+    """A change of a logarithm in words."""
+    if abs(log_factor) < LARGEST_PER_CENT:
+        return f"{number(100 * float(np.expm1(log_factor)), 2)} %"
+    return f"a factor of {number(float(np.exp(log_factor)), 2)}"
 
 
 def _undetermined(fit: Identification) -> list[str]:
@@ -323,8 +334,8 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
     ]
     blocks: list[Block] = [
         Paragraph(
-            f"The creep rates of single tests scatter by {100 * fit.noise_model.rate:.2g} % (one standard deviation) "
-            "about the law."
+            f"The creep rates of single tests scatter by {number(100 * fit.noise_model.rate, 3)} % (one standard deviation "
+            "of their logarithm) about the law."
         )
     ]
     if noise:

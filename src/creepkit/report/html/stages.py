@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -67,7 +68,7 @@ def _table_of_histories(histories: Sequence[History]) -> Table:
             str(h.times.size),
             number(float(h.times[-1]) / 3600.0),
             _ending(h),
-            printable(h.source or "–", 160),
+            printable(re.split(r"[/\\]", h.source)[-1] or "–", 160),
         )
         for h in histories[:MOST_LISTED]
     ]
