@@ -1,5 +1,0 @@
-"""A report as one HTML page without scripts: findings first, then tests, ranking, data, methods and provenance."""
-
-from creepkit.report.html.page import report_html
-
-__all__ = ["report_html"]
