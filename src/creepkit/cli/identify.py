@@ -24,8 +24,8 @@ from creepkit.cli.identification_options import (
     surrogate_named,
 )
 from creepkit.cli.options import NUISANCE_SYNTAX, check_folder, parse_nuisances, penalty_named, search_named
-from creepkit.report.ranking import print_ranking, ranking_to_json
-from creepkit.report.terminal import ProgressBar, print_json
+from creepkit.reports.ranking import print_ranking, ranking_to_json
+from creepkit.reports.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -187,7 +187,7 @@ def _truncate_at_strain(histories: list[History], limit: float) -> list[History]
 
 def _tell_assumptions(histories: list[History]) -> None:
     """What readers assumed of the tests, for a fit rests on it."""
-    from creepkit.report.histories import assumptions_text
+    from creepkit.reports.histories import assumptions_text
 
     for line in assumptions_text(histories).splitlines():
         typer.echo(f"note: {line}", err=True)

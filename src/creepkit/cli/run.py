@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.report.terminal import ProgressBar, print_json, print_table
+from creepkit.reports.terminal import ProgressBar, print_json, print_table
 
 if TYPE_CHECKING:
     from creepkit.studies.result import StudyResult

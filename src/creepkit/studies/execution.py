@@ -15,7 +15,7 @@ from creepkit.files.record_codec import RecordError
 from creepkit.inverse.kept_fits import COMPUTING, keep_fits
 from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text
 from creepkit.records import History
-from creepkit.report.contents import StageFailure
+from creepkit.reports.contents import StageFailure
 from creepkit.studies.documents import ResultCodec, ResultFolder, key_of
 from creepkit.studies.stages import Stage
 

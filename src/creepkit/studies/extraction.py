@@ -7,7 +7,7 @@ from pathlib import Path
 from creepkit.errors import StudyError
 from creepkit.files.reading import read_bytes
 from creepkit.files.writing import write_bytes
-from creepkit.report.attachments import read_attachments
+from creepkit.reports.attachments import read_attachments
 from creepkit.studies.inputs import DATA_FILE
 from creepkit.studies.page import CARRIED_FOLDER
 from creepkit.studies.study import Study

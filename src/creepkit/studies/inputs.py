@@ -17,7 +17,7 @@ from creepkit.files.reading import FileKind, open_binary
 from creepkit.inverse.history_checks import SUSPECT_LABEL, truncated_at_strain
 from creepkit.records import ZERO_CELSIUS, History
 from creepkit.records.history_selection import select_tests
-from creepkit.report.contents import Exclusion
+from creepkit.reports.contents import Exclusion
 from creepkit.studies.arguments import HOUR
 from creepkit.studies.study_file import StudyFile
 

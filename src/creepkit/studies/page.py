@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.files.reading import read_bytes
 from creepkit.files.writing import write_text
-from creepkit.report.contents import Attachment, Provenance, ReportContents, ReportGroup
+from creepkit.reports.contents import Attachment, Provenance, ReportContents, ReportGroup
 from creepkit.studies.execution import StageRecord
 from creepkit.studies.inputs import DATA_FILE
 from creepkit.studies.lock import versions_of
@@ -33,10 +33,10 @@ def write_page(
     if progress is not None:
         progress("report", 0, 1, "")
     try:
-        from creepkit.report.html import report_html
+        from creepkit.reports.html import report_html
 
         write_text(report_html(contents_of(file, result, lock_path)), path, StudyError)
-    except (CreepkitError, ImportError) as error:
+    except CreepkitError as error:
         record = StageRecord("report", "report", "", "failed", "", " ".join(str(error).split()))
         return replace(result, stages=(*result.stages, record))
     if progress is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from creepkit.report.contents import Exclusion, ExportedFile, StageFailure
+from creepkit.reports.contents import Exclusion, ExportedFile, StageFailure
 from creepkit.studies.execution import StageRecord
 from creepkit.studies.inputs import InputFile, TestGroup
 

@@ -12,7 +12,7 @@ from creepkit.inverse.kept_fits import history_digest
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, with_arrhenius
 from creepkit.quality import DataQuality
 from creepkit.records import ZERO_CELSIUS, History, Predictor
-from creepkit.report.contents import ExportedFile
+from creepkit.reports.contents import ExportedFile
 from creepkit.studies import arguments
 from creepkit.studies.inputs import StudyInputs, TestGroup, resolve_paths
 from creepkit.studies.study_file import StudyFile
