@@ -10,8 +10,8 @@ from creepkit.records import dimensions_of, outputs_of
 from creepkit.registry import default_registry
 from helpers import source_tree
 
-PACKAGES = ("readers", "quality", "extraction", "inverse", "report", "cli", "experiments", "forecasts")
-PACKAGES += ("screening", "discovery")
+PACKAGES = ("readers", "quality", "extraction", "inverse", "reports", "cli", "experiments", "forecasts")
+PACKAGES += ("screening", "discovery", "studies")
 """No string, attribute or keyword of theirs is such a name; sentences may give one as an example."""
 
 
