@@ -33,6 +33,7 @@ from creepkit.cli import (
     predict,
     read,
     reduced_model,
+    report,
     rupture,
     screen,
     simulate,
@@ -133,6 +134,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "design": design.command,
     "rupture": rupture.command,
     "export": export.command,
+    "report": report.command,
     "demo": demo.command,
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from creepkit.discovery.discover import TemperatureStudy
@@ -124,6 +124,14 @@ class ReportContents:
 
     def __post_init__(self) -> None:
         _freeze(self, "temperature", "forecasts", "design", "rupture", "extractions")
+
+
+class ReportSource(Protocol):
+    """What has a report of its own, such as a study that was run."""
+
+    def report_contents(self) -> ReportContents:
+        """Everything that its report shows."""
+        ...
 
 
 def _freeze(record: object, *names: str) -> None:

@@ -1,4 +1,4 @@
-"""The sections on the other stages of a study: data, exclusions, extraction, temperature, rupture, forecasts, design."""
+"""The sections on the other stages of a study: data, extraction, temperature, rupture, forecasts, further tests."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def _extraction_blocks(name: str, extraction: Extraction, figures: PageFigures) 
     used = int(extraction.used.sum())
     outputs = ", ".join(output.replace("_", " ") for output in extraction.outputs)
     picture = figures.picture(
-        extraction_figure(extraction),
+        lambda: extraction_figure(extraction),
         f"Extraction{_of(name)}",
         f"Maps of height of some frames, and over time {outputs}, rigid motion and residuals; {used} of "
         f"{extraction.times.size} frames were used, {plural(len(extraction.flags), 'flag')}.",
@@ -168,17 +168,23 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
             )
         )
         rows = [
-            (e.name, number(e.value, 5), f"{number(e.low)} to {number(e.high)}", "" if e.unit == "1" else e.unit, e.verdict)
+            (
+                e.name,
+                number(e.value, 5),
+                f"{number(e.low)} to {number(e.high)}",
+                "" if e.unit == "1" else e.unit,
+                e.verdict,
+            )
             for e in law.estimates
         ]
         columns = ("parameter", "value", "95 % interval", "unit", "by these tests")
         blocks.append(Table("Values of the temperature law", columns, rows, numeric=(1, 2)))
         blocks.append(
             figures.picture(
-                plot_temperature_law(law),
+                lambda: plot_temperature_law(law),
                 f"Parameters over temperature{_of(name)}",
-                f"Isothermal estimates with 95 % intervals at {law.isothermal_estimates.temperatures.size} temperatures "
-                f"from {low:.0f} to {high:.0f} K, and the curves of the forms that remain. Best forms: {forms}.",
+                f"Isothermal estimates with 95 % intervals at {law.isothermal_estimates.temperatures.size} "
+                f"temperatures from {low:.0f} to {high:.0f} K, and the curves of the forms that remain. Best forms: {forms}.",
                 "Parameters at each temperature with 95 % intervals, and the forms that remain with their weights.",
             )
         )
@@ -188,7 +194,7 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
 
 def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigures) -> list[Block]:
     picture = figures.picture(
-        rupture_figure(assessment),
+        lambda: rupture_figure(assessment),
         f"Rupture assessment{_of(name)}",
         f"Isotherms of stress over rupture time with tests and bounds, the master curve, and predicted over measured "
         f"times of {plural(len(assessment.tests), 'test')}. {sentence(assessment.verdict)}",
@@ -212,9 +218,10 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> lis
         ends = " ".join(f"{printable(row[0], 80)}: {printable(row[2], 200)}." for row in forecast_rows(forecast)[:12])
         blocks.append(
             figures.picture(
-                forecast_figure(forecast),
+                lambda: forecast_figure(forecast),
                 f"Forecasts{_of(name)}",
-                f"Forecast curves over time with pointwise and simultaneous bands, and what the variance is made of. {ends}",
+                "Forecast curves over time with pointwise and simultaneous bands, and what the variance is made of. "
+                f"{ends}",
                 f"Forecast with bands of {100 * forecast.level:g} %, and below it what the variance is made of.",
             )
         )
@@ -239,11 +246,11 @@ def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Bloc
         blocks.append(Table(caption, columns, rows, numeric=(1, 2, 3)))
         blocks.append(
             figures.picture(
-                design_figure(design),
+                lambda: design_figure(design),
                 f"What further tests tell{_of(name)}",
                 "Map of the expected information for an hour of the oven over the first load and the duration, left of "
                 f"constant loads, right of loads that change. {sentence(design.sentence)}",
-                "Expected information for an hour of the oven, over the first load and the duration; the plan is marked.",
+                "Expected information for an hour of the oven over the first load and the duration; the plan is marked.",
             )
         )
     lines = [line.strip() for line in direction_lines(design) if line.strip()]
