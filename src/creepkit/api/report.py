@@ -1,4 +1,4 @@
-"""A page that a colleague can read, from results as they are: identifications, rankings, plates, forecasts and others."""
+"""A page that a colleague can read, from results as they are: identifications, rankings, plates, forecasts, designs."""
 
 from __future__ import annotations
 

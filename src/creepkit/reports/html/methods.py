@@ -130,8 +130,8 @@ def _stages(contents: ReportContents, references: References) -> list[list[str]]
         tests = {one.test for one in contents.exclusions}
         paragraphs.append(
             [
-                f"Frames of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons that the report "
-                "lists."
+                f"Frames of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons that the "
+                "report lists."
             ]
         )
     if contents.temperature:

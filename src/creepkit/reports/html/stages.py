@@ -184,7 +184,8 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
                 lambda: plot_temperature_law(law),
                 f"Parameters over temperature{_of(name)}",
                 f"Isothermal estimates with 95 % intervals at {law.isothermal_estimates.temperatures.size} "
-                f"temperatures from {low:.0f} to {high:.0f} K, and the curves of the forms that remain. Best forms: {forms}.",
+                f"temperatures from {low:.0f} to {high:.0f} K, and the curves of the forms that remain. "
+                f"Best forms: {forms}.",
                 "Parameters at each temperature with 95 % intervals, and the forms that remain with their weights.",
             )
         )
@@ -250,7 +251,7 @@ def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Bloc
                 f"What further tests tell{_of(name)}",
                 "Map of the expected information for an hour of the oven over the first load and the duration, left of "
                 f"constant loads, right of loads that change. {sentence(design.sentence)}",
-                "Expected information for an hour of the oven over the first load and the duration; the plan is marked.",
+                "Expected information for an hour of the oven over first load and duration; the plan is marked.",
             )
         )
     lines = [line.strip() for line in direction_lines(design) if line.strip()]
