@@ -73,7 +73,8 @@ class Provenance:
     """What is needed to repeat the work.
 
     versions : {package: version}. seed : of all draws, None where nothing was drawn. settings : {name: value}, values
-    that JSON can hold. inputs : {file: sha256 of its content}. commands : of a shell, in their order, that repeat it.
+    that JSON can hold. inputs : {file: sha256 of its content}. commands : lines, of a shell or of Python, that repeat
+    it.
     """
 
     versions: Mapping[str, str] = field(default_factory=dict)

@@ -108,7 +108,7 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     else:
         blocks.append(Paragraph("The tests determine every parameter of the law."))
     unmodelled = [
-        sentence(f"{effect.description} in a test, which changes its rate by {_change(effect.rate_change)}")
+        sentence(f"{effect.description}, which changes the rate by {_change(effect.rate_change)}")
         for effect in fit.unmodelled
     ]
     if unmodelled:

@@ -72,10 +72,7 @@ def _identification(found: Sequence[GroupFindings], references: References) -> l
     if ranking is not None:
         sentences.append(
             "The laws were compared under a common covariance by the "
-            + {
-                "bic": f"Bayesian information criterion{references.cite('bic')} over independent frames",
-                "aicc": f"corrected information criterion of Akaike{references.cite('aicc')} over independent frames",
-            }.get(ranking.criterion, "error of tests that were held out")
+            + _criterion(ranking.criterion, references)
             + "; weights are exp(-difference / 2) over their sum."
         )
     sentences.append(
@@ -83,6 +80,14 @@ def _identification(found: Sequence[GroupFindings], references: References) -> l
         "frames and not from its own misfit, has a probability of at least 0.3 %."
     )
     return [sentences]
+
+
+def _criterion(name: str, references: References) -> str:
+    if name == "bic":
+        return f"Bayesian information criterion{references.cite('bic')} over independent frames"
+    if name == "aicc":
+        return f"corrected information criterion of Akaike{references.cite('aicc')} over independent frames"
+    return "error of tests that were held out"
 
 
 def _fits(found: GroupFindings) -> list[Identification]:

@@ -213,10 +213,10 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> lis
             f"By {laws}: bands and intervals hold a measured value of a single test with a probability of "
             f"{100 * forecast.level:g} %."
         ),
-        Table("Forecasts", FORECAST_COLUMNS, [tuple(map(printable, row)) for row in forecast_rows(forecast)]),
+        Table("Forecasts of single tests", FORECAST_COLUMNS, _forecast_cells(forecast)),
     ]
     if any(test.outputs for test in forecast.tests):
-        ends = " ".join(f"{printable(row[0], 80)}: {printable(row[2], 200)}." for row in forecast_rows(forecast)[:12])
+        ends = " ".join(f"{printable(row[0], 80)}: {printable(row[2], 200)}." for row in _forecast_cells(forecast)[:12])
         blocks.append(
             figures.picture(
                 lambda: forecast_figure(forecast),
@@ -226,8 +226,21 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> lis
                 f"Forecast with bands of {100 * forecast.level:g} %, and below it what the variance is made of.",
             )
         )
-    remarks = [sentence(f"{test.name}: {note}") for test in forecast.tests for note in test.notes]
-    return [*blocks, Items(remarks)] if remarks else blocks
+    remarks: dict[str, list[str]] = {}
+    for test in forecast.tests:
+        for note in test.notes:
+            remarks.setdefault(note, []).append(printable(test.name, 80))
+    listed = [sentence(f"{note} ({', '.join(tests)})") for note, tests in remarks.items()]
+    return [*blocks, Items(listed)] if listed else blocks
+
+
+def _forecast_cells(forecast: Forecast) -> list[tuple[str, ...]]:
+    """Rows of the table; what stands on lines of its own in a terminal is parted by semicolons."""
+    rows = []
+    for test, condition, end, *cells in forecast_rows(forecast):
+        parted = ["; ".join(cell.splitlines()) for cell in cells]
+        rows.append(tuple(map(printable, (test, condition, end, *parted))))
+    return rows
 
 
 def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Block]:
