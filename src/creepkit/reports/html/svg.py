@@ -6,7 +6,7 @@ The ground of a figure is transparent; its colours are those of a figure on whit
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from creepkit.reports.figures import POWER_OF_TEN, save_figure
@@ -21,7 +21,12 @@ LONGEST_LABEL = 160
 """Characters of one line of text in a figure."""
 
 
-_SETTINGS = {"svg.fonttype": "none", "svg.hashsalt": "creepkit", "path.simplify": False, "svg.image_inline": True}
+_SETTINGS: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "creepkit",
+    "path.simplify": False,
+    "svg.image_inline": True,
+}
 _FONTS = "system-ui, 'DejaVu Sans', Verdana, sans-serif"
 
 
@@ -45,7 +50,8 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
     thin_figure(figure)
     buffer = io.StringIO()
     with matplotlib.rc_context(_SETTINGS):
-        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+        canvas: Any = FigureCanvasSVG(figure)
+        canvas.print_svg(buffer, metadata={"Date": None})
     root = ElementTree.fromstring(buffer.getvalue())
     width = float(str(root.get("viewBox")).split()[2])
     compact(root, identifier)
@@ -73,10 +79,10 @@ def _shorten_texts(figure: Figure) -> None:
     from matplotlib.ticker import FixedFormatter
 
     for text in figure.findobj(Text):
-        content: str = text.get_text()  # type: ignore[attr-defined]
+        content: str = text.get_text()
         if content and not POWER_OF_TEN.fullmatch(content):
             lines = [printable(line, LONGEST_LABEL) for line in content.split("\n")]
-            text.set_text("\n".join(lines))  # type: ignore[attr-defined]
+            text.set_text("\n".join(lines))
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             formatter = axis.get_major_formatter()
