@@ -1,0 +1,275 @@
+"""The contents of a page as one JSON document, which its scripts read: laws, specimens and tests in plain numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.app.contents import RATE_STRAIN, RATE_TIME, USUAL_STRESS, PageContents, PageLaw, usual_end
+from creepkit.app.directions import likely_directions
+from creepkit.errors import CreepkitError
+from creepkit.exporters.latex import latex_unit
+from creepkit.exporters.mathml import MathmlExporter, MathmlPrinter
+from creepkit.language import temperature as temperature_symbol
+from creepkit.language.printing import LatexLawPrinter, latex_equations
+from creepkit.records import (
+    History,
+    LawWithValues,
+    Load,
+    Specimen,
+    dimensions_of,
+    loads_of,
+    outputs_of,
+    outputs_of_test,
+    typical_history,
+)
+from creepkit.records.interfaces import SupportsReducedOrderModel
+from creepkit.specimens.run import Runnable
+
+if TYPE_CHECKING:
+    from creepkit.arrays import Floats
+    from creepkit.inverse.identification import Identification
+
+
+MOST_FRAMES = 300
+"""Frames of a test that a page draws and compares; of a longer one, as many evenly spread over its frames."""
+
+
+def contents_document(contents: PageContents) -> dict[str, Any]:
+    """All that the scripts of a page read, but for what answers them."""
+    specimens = [specimen_document(one) for one in contents.specimens]
+    stress = specimens[0]["loads"][0]["stress"]
+    return {
+        "title": contents.title,
+        "laws": [law_document(one, usual_end(one, stress, contents.temperature)) for one in contents.laws],
+        "specimens": specimens,
+        "tests": [test_document(one, contents) for one in contents.histories],
+        "temperature": contents.temperature,
+    }
+
+
+# ---- laws ----------------------------------------------------------------------------------------------------------
+
+
+def law_document(page_law: PageLaw, end: float) -> dict[str, Any]:
+    """A law: equation, parameters, where its sliders start, and what is known of its values.
+
+    end : s, of a first curve.
+    """
+    law, printer, latex = page_law.law, MathmlPrinter(), LatexLawPrinter(page_law.law)
+    parameters = [
+        {
+            "name": symbol.name,
+            "symbol": f'<math xmlns="http://www.w3.org/1998/Math/MathML">{printer.doprint(symbol)}</math>',
+            "latex": latex.doprint(symbol),
+            "latex_unit": latex_unit("" if param.unit == "1" else param.unit),
+            "meaning": param.meaning,
+            "unit": "" if param.unit == "1" else param.unit,
+            "low": param.bounds[0],
+            "high": param.bounds[1],
+            "log": param.scale == "log",
+            "off": param.off,
+            "value": float(page_law.values[symbol.name]),
+        }
+        for symbol, param in law.params.items()
+    ]
+    return {
+        "name": law.name,
+        "title": law.title or law.name,
+        "equations": _equations(page_law),
+        "latex": [f"{left} = {' '.join(right)}" for left, right in latex_equations(law, latex)],
+        "parameters": parameters,
+        "states": [{"name": symbol.name, "meaning": state.meaning} for symbol, state in law.states.items()],
+        "temperature": law.uses(temperature_symbol),
+        "weight": page_law.weight,
+        "end": end,
+        "rate_point": rate_point(page_law.fit),
+        "fit": None if page_law.fit is None else fit_document(page_law.fit),
+    }
+
+
+def _equations(page_law: PageLaw) -> list[str]:
+    """The equations, each a <math> element."""
+    page = MathmlExporter().text(LawWithValues(page_law.law, page_law.values))
+    found = re.findall(r'<math [^>]*display="block">.*?</math>', page, flags=re.DOTALL)
+    # columns are aligned by the style of the page, for the policy of the server allows no other
+    return [re.sub(r' style="[^"]*"', "", equation) for equation in found]
+
+
+def rate_point(fit: Identification | None) -> dict[str, Any]:
+    """At which strain and time (s) the creep rate is shown, and over which stresses, MPa."""
+    if fit is None:
+        return {"strain": RATE_STRAIN, "time": RATE_TIME, "stress": [0.1 * USUAL_STRESS, 5.0 * USUAL_STRESS]}
+    low, high = fit.ranges["stress"]
+    reference = fit.reference
+    return {"strain": reference.strain, "time": reference.time, "stress": [low / 2.0, high * 2.0]}
+
+
+def fit_document(fit: Identification) -> dict[str, Any]:
+    """The optimum: intervals, and the covariance of the internal values, from which likely directions follow."""
+    to_theta = fit.coordinates.jacobian(fit.u)
+    covariance = np.asarray(to_theta @ fit.covariance @ to_theta.T)
+    return {
+        "estimates": {
+            e.name: {"value": e.value, "low": finite(e.low), "high": finite(e.high), "verdict": e.verdict}
+            for e in fit.estimates
+        },
+        "covariance": covariance.tolist() if np.isfinite(covariance).all() else None,
+        "directions": likely_directions(fit.law.names, covariance, np.ptp(fit.law.internal_bounds, axis=0)),
+        "undetermined": list(_undetermined(fit)),
+        "adequacy": "" if fit.adequacy is None else str(fit.adequacy),
+    }
+
+
+def _undetermined(fit: Identification) -> Sequence[str]:
+    try:
+        return fit.undetermined()
+    except (CreepkitError, np.linalg.LinAlgError, ValueError):
+        return ()
+
+
+# ---- specimens -----------------------------------------------------------------------------------------------------
+
+
+def specimen_document(specimen: Specimen) -> dict[str, Any]:
+    """A specimen by its record: outputs, loads, lengths, and whether it needs a modulus or has a section to draw."""
+    conditions: Mapping[str, tuple[float, float]] = getattr(specimen, "conditions", None) or {}
+    elastic = typical_history(specimen).elastic
+    low, high = conditions.get("modulus", (50e3, 300e3))
+    return {
+        "name": specimen.name,
+        "title": specimen.title,
+        "outputs": [
+            {
+                "name": str(output),
+                "title": output.long_name,
+                "unit": output.unit,
+                "logarithmic": output.logarithmic,
+                "grows": output.grows,
+                "noise": output.noise,
+            }
+            for output in outputs_of(specimen)
+            if output in specimen.outputs
+        ],
+        "loads": [_load_document(specimen, load, conditions) for load in loads_of(specimen)],
+        "dimensions": [
+            {"name": d.name, "title": d.long_name, "value": d.default, "low": d.bounds[0], "high": d.bounds[1]}
+            for d in dimensions_of(specimen)
+            if d.of_piece
+        ],
+        "modulus": {
+            "needed": "modulus" in conditions,
+            "low": low,
+            "high": high,
+            "value": float(f"{getattr(elastic, 'E', 150e3):.2g}"),
+        },
+        "reduced": isinstance(specimen, SupportsReducedOrderModel),
+        "runs": isinstance(specimen, Runnable),
+    }
+
+
+def _load_document(specimen: Specimen, load: Load, conditions: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+    plan = typical_history(specimen, load.name)
+    value = float(f"{np.max(plan.loading.program().values):.2g}")
+    low, high = conditions.get(load.name, (0.1 * value, 10.0 * value))
+    return {
+        "name": load.name,
+        "title": load.long_name,
+        "unit": load.unit,
+        "low": low,
+        "high": high,
+        "value": value,
+        "ramp": load.ramp,
+        "control": load.name == "stress",
+        "stress": _reference_stress(specimen, plan),
+    }
+
+
+def _reference_stress(specimen: Any, plan: History) -> float:
+    """MPa, that stands for a plan."""
+    try:
+        stress = float(np.max(specimen.reference_stress(plan)))
+    except (CreepkitError, AttributeError, ValueError):
+        return USUAL_STRESS
+    return stress if 0.0 < stress < math.inf else USUAL_STRESS
+
+
+# ---- measured tests ------------------------------------------------------------------------------------------------
+
+
+def compared_frames(history: History) -> Any:
+    """(frames,) indices of the used frames that a page shows."""
+    used = np.flatnonzero(history.used)
+    if used.size > MOST_FRAMES:
+        used = used[np.unique(np.linspace(0, used.size - 1, MOST_FRAMES).round().astype(int))]
+    return used
+
+
+def test_document(history: History, contents: PageContents) -> dict[str, Any]:
+    """A measured test: its frames, the noise of each output, and how it was made."""
+    frames = compared_frames(history)
+    program, temperature = history.loading.program(), history.temperature_program()
+    specimen: Any = contents.specimen(history.specimen)
+    stated = set(outputs_of_test(specimen, history)) if history.outputs else set()
+    return {
+        "name": history.name,
+        "condition": history.condition,
+        "specimen": history.specimen,
+        "times": numbers(history.times[frames]),
+        "outputs": {str(n): numbers(v[frames]) for n, v in history.outputs.items() if n in stated},
+        "noise": {n: v for n in history.outputs if (v := _noise(history, n, contents)) is not None},
+        "offset": _offsets(history, contents),
+        "load": history.loading.quantity,
+        "control": getattr(history.loading, "control", "load"),
+        "program": [numbers(program.times), numbers(program.values)],
+        "temperature": float(np.mean(temperature.values)),
+        "isothermal": bool(np.ptp(temperature.values) < 0.5),
+        "modulus": finite(getattr(history.elastic, "E", None)),
+        "lengths": {name: float(value) for name, value in history.geometry.items()},
+        "minimum_rate": history.minimum_rate,
+        "rupture_time": history.rupture_time,
+        "includes_elastic": history.includes_elastic,
+        "measure": history.strain_measure,
+    }
+
+
+def _noise(history: History, output: str, contents: PageContents) -> float | None:
+    """Standard deviation of a frame in the unit of the output: stated, else estimated by the fit, else the record's."""
+    stated = history.standard_deviation.get(output)
+    if stated is not None and np.isfinite(stated).any() and float(np.nanmedian(stated)) > 0.0:
+        return float(np.nanmedian(stated))
+    for one in _test_fits(history, contents):
+        for fitted in one.outputs:
+            if fitted.output == output and 0.0 < fitted.noise < math.inf:
+                return float(fitted.noise)
+    for known in outputs_of(contents.specimen(history.specimen)):
+        if known == output:
+            return known.noise
+    return None
+
+
+def _offsets(history: History, contents: PageContents) -> dict[str, float]:
+    """{output: what was added to it before creep began, as loading strain is}, of the first law's identification."""
+    return {o.output: float(o.offset) for one in _test_fits(history, contents) for o in one.outputs if o.offset}
+
+
+def _test_fits(history: History, contents: PageContents) -> list[Any]:
+    fit = contents.laws[0].fit
+    return [] if fit is None else [one for one in fit.tests if one.name == history.name]
+
+
+# ---- numbers -------------------------------------------------------------------------------------------------------
+
+
+def numbers(values: Floats) -> list[float | None]:
+    """Numbers to six digits, which is finer than a screen; None in the place of those that are not finite."""
+    return [float(f"{v:.6g}") if math.isfinite(v) else None for v in np.asarray(values, float).ravel().tolist()]
+
+
+def finite(value: Any) -> float | None:
+    """The number, or None where it is none or not finite."""
+    return float(value) if isinstance(value, int | float | np.floating) and math.isfinite(value) else None

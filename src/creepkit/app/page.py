@@ -1,0 +1,96 @@
+"""The text of an interactive page: its markup, its style, its scripts and its data, in one document.
+
+The scripts are plain ones, joined in the order of SCRIPTS; they share the one name `creepkitPage`. Data stand in
+elements that browsers do not run, and whatever of them is shown is shown as text.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from creepkit.app.contents import PageContents
+from creepkit.app.documents import contents_document
+
+FOLDER = Path(__file__).parent / "page"
+
+
+SCRIPTS = ("numbers", "elements", "chart", "section", "controls", "law_controls", "test_controls")
+SCRIPTS += ("test_list", "copies", "misfit", "engine", "page")
+"""Files of the folder, without their ending, each of which may use those before it."""
+
+
+LARGEST_PAGE = 1_000_000
+"""Bytes of a page that stands alone."""
+
+
+def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") -> str:
+    """A whole page. nonce : of the policy of a server. endpoint : where it asks for predictions."""
+    policy = "" if endpoint else _POLICY_OF_A_FILE
+    mark = f' nonce="{nonce}"' if nonce else ""
+    replacements = {
+        "policy": policy,
+        "title": escaped(contents.title),
+        "style": f"<style{mark}>\n{_part('style.css')}</style>",
+        "fragment": _fragment(contents_document(contents), {"endpoint": endpoint}),
+        "scripts": f"<script{mark}>\n{page_scripts()}</script>",
+    }
+    text = _part("page.html")
+    for name, value in replacements.items():
+        text = text.replace(f"<!--{name}-->", value, 1)
+    return text
+
+
+_POLICY_OF_A_FILE = (
+    '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; script-src \'unsafe-inline\'; '
+    "style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'\">"
+)
+"""A page that is a file loads nothing and sends nothing."""
+
+
+def page_style() -> str:
+    """The style of pages and fragments; every rule begins with .creepkit-page."""
+    return _part("style.css")
+
+
+@cache
+def page_scripts() -> str:
+    """The scripts of pages and fragments; they start every fragment of the document that they stand in."""
+    return "\n".join(_part(f"{name}.js") for name in SCRIPTS)
+
+
+def page_fragment(contents: PageContents, *, style: bool = True, scripts: bool = True) -> str:
+    """The page as part of another document of HTML.
+
+    style, scripts : whether it brings its own; of several fragments in one document, the first has to.
+    """
+    parts = [f"<style>\n{page_style()}</style>"] if style else []
+    parts.append(_fragment(contents_document(contents), {"endpoint": ""}))
+    parts += [f"<script>\n{page_scripts()}</script>"] if scripts else []
+    return "\n".join(parts)
+
+
+def _fragment(document: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
+    data = json.dumps({**document, **settings}, allow_nan=False, separators=(",", ":"), ensure_ascii=True)
+    # no text of the data can end the element that it stands in
+    data = data.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    note = "This part of the page needs scripts: it computes creep curves while its sliders are moved."
+    return (
+        f'<div class="creepkit-page"><noscript><p>{note}</p></noscript>'
+        f'<script type="application/json" class="creepkit-page-data">{data}</script></div>'
+    )
+
+
+@cache
+def _part(name: str) -> str:
+    return (FOLDER / name).read_text(encoding="utf-8")
+
+
+def escaped(text: str) -> str:
+    """Text as HTML shows it."""
+    for character, name in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;"), ("'", "&#39;")):
+        text = text.replace(character, name)
+    return text
