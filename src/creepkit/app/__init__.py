@@ -1,14 +1,15 @@
 """The interactive page: data packed for it, and the runtime that computes in it without a server.
 
-The runtime is plain scripts (`runtime_files()`, in the order in which a page or a program must load them) that put their
-functions into one object, `globalThis.creepkit`. A law comes to it as the JavaScript that `exporters.javascript` writes:
-in a page as an expression (`model_data.law_data(...)["source"]`), in node as the module itself. Units: MPa, mm, s, K.
+The runtime is plain scripts (`runtime_files.runtime_script()`, or one by one in the order of RUNTIME_FILES) that put
+their functions into one object, `globalThis.creepkit`. A law comes to it as the JavaScript that `exporters.javascript`
+writes: in a page as an expression (`model_data.law_data(...)["source"]`), in node as the module itself. Units: MPa, mm,
+s, K.
 
     const law = <source>;                       // {law, rate, terms, stateRates, kernel}
     creepkit.simulateCreep(law, {n: 5}, {       // parameters by name; those left out keep the values of the source
       stress: 100,                              // a number, or pairs [[time, MPa], ...] joined by straight lines, two
-                                                // pairs of one time being a jump; creepkit.steps([[0, 80], [3600, 100]],
-                                                // ramp) makes such pairs from steps
+                                                // pairs of one time being a jump; such pairs from steps:
+                                                // creepkit.steps([[0, 80], [3600, 100]], ramp)
       times: [...],                             // s, at which results are wanted
       temperature: 1073,                        // K, a number or pairs; needed where law.law.variables has it
       control: "load" | "stress",               // constant load (default) or constant true stress

@@ -60,7 +60,10 @@ function erf(value) {
   const size = Math.abs(value);
   let result = 0.0;
   if (size < 3.0) {
-    for (let k = 0, term = size; term > 1e-17 * result; k += 1, term *= (2.0 * size * size) / (2.0 * k + 1.0)) result += term;
+    for (let k = 1, term = size; term > 1e-17 * result; k += 1) {
+      result += term;
+      term *= (2.0 * size * size) / (2.0 * k + 1.0);
+    }
     result *= (2.0 / Math.sqrt(Math.PI)) * Math.exp(-size * size);
   } else if (size < 6.0) {
     let fraction = size;

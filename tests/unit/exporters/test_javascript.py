@@ -73,7 +73,9 @@ def test_every_law_agrees_with_50_digits(tmp_path):
     bad = []
     for name, found in zip(LAWS, results, strict=True):
         judged = case(name)
-        rates, terms, update = (np.array([each[part] for each in found], float) for part in ("rates", "terms", "update"))
+        rates, terms, update = (
+            np.array([each[part] for each in found], float) for part in ("rates", "terms", "update")
+        )
         samples, size, width = len(rates), rates.shape[1], judged.drawn.points.shape[1]
         slopes = update[:, size:].reshape(samples, size, width)
         with np.errstate(over="ignore", invalid="ignore"):  # a rate that no double holds is judged by its logarithm

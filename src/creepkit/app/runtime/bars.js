@@ -32,11 +32,11 @@
     return low[1] + share * (high[1] - low[1]);
   }
 
-  /** Rates of creep and of states at the frames of a history. */
+  /** Rates of creep at the frames; NaN where the rate of virgin material has no limit, as at time zero. */
   function ratesAlong(law, times, temperature, stress, strain, states) {
     const point = new Float64Array(6 + law.states), out = new Float64Array(1 + law.states);
     return Float64Array.from(times, (time, k) => {
-      if (Number.isNaN(strain[k])) return NaN;
+      if (Number.isNaN(strain[k]) || (strain[k] === 0.0 && law.beta < 1.0)) return NaN;
       point.set([stress[k], strain[k], time, creepkit.valueAt(temperature, time), stress[k], stress[k] / 3.0]);
       states.forEach((values, i) => (point[6 + i] = values[k]));
       law.rates(point, out);
