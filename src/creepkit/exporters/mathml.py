@@ -61,7 +61,7 @@ class MathmlExporter:
             f'<head><meta charset="utf-8"/><title>{title}</title><style>{_STYLE}</style></head>',
             "<body>",
             f"<h1>{title}</h1>",
-            *_equations(law, printer),
+            *law_equations(law),
             "<table>",
             "<tr><th>Symbol</th><th>Meaning</th><th>Value</th><th>Unit</th></tr>",
             *(_html_row(row, printer) for row in parameter_rows(source, converted_values)),
@@ -148,11 +148,17 @@ def _character_reference(match: re.Match[str]) -> str:
 # ---- the page ------------------------------------------------------------------------------------------------------
 
 
-def _equations(law: CreepLaw, printer: MathmlPrinter) -> Iterator[str]:
-    """A display for the rate of strain, a summand a row, and one for each internal variable."""
+def law_equations(law: CreepLaw) -> Iterator[str]:
+    """A <math> display for the rate of strain, a summand a row, and one for each internal variable."""
+    printer = MathmlPrinter()
     yield _equation_block(_with_dot(printer.doprint(strain)), [printer.doprint(term) for term in law.terms.values()])
     for symbol, state in law.states.items():
         yield _equation_block(_with_dot(printer.doprint(symbol)), [printer.doprint(state.rate)])
+
+
+def expression_mathml(expression: sympy.Basic) -> str:
+    """An expression as a <math> element."""
+    return _math_element(f"<mrow>{MathmlPrinter().doprint(expression)}</mrow>")
 
 
 def _with_dot(name: str) -> str:
