@@ -178,7 +178,10 @@ def usual_end(page_law: PageLaw, stress: float, temperature: float) -> float:
     if not reached.size:
         return USUAL_TIME
     end = min(float(times[min(reached[-1] + 1, times.size - 1)]), float(prediction.end_times[0, 0]) * 1.02)
-    return float(f"{end:.2g}") if math.isfinite(end) and end > 0.0 else USUAL_TIME
+    if not (math.isfinite(end) and end > 0.0):
+        return USUAL_TIME
+    hours = float(f"{end / 3600.0:.2g}")
+    return 3600.0 * hours
 
 
 def _held_stress(stress: float) -> Any:

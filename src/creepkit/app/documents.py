@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.app.contents import RATE_STRAIN, RATE_TIME, USUAL_STRESS, PageContents, PageLaw, usual_end
-from creepkit.app.directions import likely_directions
+from creepkit.app.model_data import law_data
 from creepkit.errors import CreepkitError
 from creepkit.exporters.latex import latex_unit
-from creepkit.exporters.mathml import MathmlExporter, MathmlPrinter
-from creepkit.language import temperature as temperature_symbol
 from creepkit.language.printing import LatexLawPrinter, latex_equations
 from creepkit.records import (
     History,
@@ -28,7 +25,9 @@ from creepkit.records import (
     typical_history,
 )
 from creepkit.records.interfaces import SupportsReducedOrderModel
+from creepkit.specimens.relaxation import Relaxation
 from creepkit.specimens.run import Runnable
+from creepkit.specimens.uniaxial import Uniaxial
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
@@ -60,44 +59,25 @@ def law_document(page_law: PageLaw, end: float) -> dict[str, Any]:
 
     end : s, of a first curve.
     """
-    law, printer, latex = page_law.law, MathmlPrinter(), LatexLawPrinter(page_law.law)
-    parameters = [
-        {
-            "name": symbol.name,
-            "symbol": f'<math xmlns="http://www.w3.org/1998/Math/MathML">{printer.doprint(symbol)}</math>',
-            "latex": latex.doprint(symbol),
-            "latex_unit": latex_unit("" if param.unit == "1" else param.unit),
-            "meaning": param.meaning,
-            "unit": "" if param.unit == "1" else param.unit,
-            "low": param.bounds[0],
-            "high": param.bounds[1],
-            "log": param.scale == "log",
-            "off": param.off,
-            "value": float(page_law.values[symbol.name]),
-        }
-        for symbol, param in law.params.items()
-    ]
+    law, latex = page_law.law, LatexLawPrinter(page_law.law)
+    known = law_data(LawWithValues(law, page_law.values) if page_law.fit is None else page_law.fit)
+    for symbol, row in zip(law.params, known["parameters"], strict=True):
+        row |= {"latex": latex.doprint(symbol), "latex_unit": latex_unit(row["unit"]).strip("$")}
     return {
-        "name": law.name,
-        "title": law.title or law.name,
-        "equations": _equations(page_law),
+        **{name: value for name, value in known.items() if name != "source"},
+        "code": law_code_name(page_law),
         "latex": [f"{left} = {' '.join(right)}" for left, right in latex_equations(law, latex)],
-        "parameters": parameters,
-        "states": [{"name": symbol.name, "meaning": state.meaning} for symbol, state in law.states.items()],
-        "temperature": law.uses(temperature_symbol),
         "weight": page_law.weight,
         "end": end,
         "rate_point": rate_point(page_law.fit),
-        "fit": None if page_law.fit is None else fit_document(page_law.fit),
+        "covariance": None if page_law.fit is None else _covariance(page_law.fit),
+        "undetermined": [] if page_law.fit is None else list(_undetermined(page_law.fit)),
     }
 
 
-def _equations(page_law: PageLaw) -> list[str]:
-    """The equations, each a <math> element."""
-    page = MathmlExporter().text(LawWithValues(page_law.law, page_law.values))
-    found = re.findall(r'<math [^>]*display="block">.*?</math>', page, flags=re.DOTALL)
-    # columns are aligned by the style of the page, for the policy of the server allows no other
-    return [re.sub(r' style="[^"]*"', "", equation) for equation in found]
+def law_code_name(page_law: PageLaw) -> str:
+    """The name under which the scripts of a page find the law as JavaScript."""
+    return page_law.law.fingerprint
 
 
 def rate_point(fit: Identification | None) -> dict[str, Any]:
@@ -109,20 +89,11 @@ def rate_point(fit: Identification | None) -> dict[str, Any]:
     return {"strain": reference.strain, "time": reference.time, "stress": [low / 2.0, high * 2.0]}
 
 
-def fit_document(fit: Identification) -> dict[str, Any]:
-    """The optimum: intervals, and the covariance of the internal values, from which likely directions follow."""
+def _covariance(fit: Identification) -> list[list[float]] | None:
+    """Of the internal values, from which follows what the others are likely to be when one is moved."""
     to_theta = fit.coordinates.jacobian(fit.u)
     covariance = np.asarray(to_theta @ fit.covariance @ to_theta.T)
-    return {
-        "estimates": {
-            e.name: {"value": e.value, "low": finite(e.low), "high": finite(e.high), "verdict": e.verdict}
-            for e in fit.estimates
-        },
-        "covariance": covariance.tolist() if np.isfinite(covariance).all() else None,
-        "directions": likely_directions(fit.law.names, covariance, np.ptp(fit.law.internal_bounds, axis=0)),
-        "undetermined": list(_undetermined(fit)),
-        "adequacy": "" if fit.adequacy is None else str(fit.adequacy),
-    }
+    return covariance.tolist() if np.isfinite(covariance).all() else None
 
 
 def _undetermined(fit: Identification) -> Sequence[str]:
@@ -167,9 +138,15 @@ def specimen_document(specimen: Specimen) -> dict[str, Any]:
             "high": high,
             "value": float(f"{getattr(elastic, 'E', 150e3):.2g}"),
         },
+        "runtime": runtime_of(specimen),
         "reduced": isinstance(specimen, SupportsReducedOrderModel),
         "runs": isinstance(specimen, Runnable),
     }
+
+
+def runtime_of(specimen: Specimen) -> str | None:
+    """Which function of the runtime predicts a specimen in a page that stands alone; None where none does."""
+    return {Uniaxial: "creep", Relaxation: "relaxation"}.get(type(specimen))
 
 
 def _load_document(specimen: Specimen, load: Load, conditions: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
@@ -227,7 +204,7 @@ def test_document(history: History, contents: PageContents) -> dict[str, Any]:
         "control": getattr(history.loading, "control", "load"),
         "program": [numbers(program.times), numbers(program.values)],
         "temperature": float(np.mean(temperature.values)),
-        "isothermal": bool(np.ptp(temperature.values) < 0.5),
+        "temperature_program": [numbers(temperature.times), numbers(temperature.values)],
         "modulus": finite(getattr(history.elastic, "E", None)),
         "lengths": {name: float(value) for name, value in history.geometry.items()},
         "minimum_rate": history.minimum_rate,

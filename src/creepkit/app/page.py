@@ -13,13 +13,17 @@ from pathlib import Path
 from typing import Any
 
 from creepkit.app.contents import PageContents
-from creepkit.app.documents import contents_document
+from creepkit.app.documents import contents_document, law_code_name
+from creepkit.app.model_data import embedded_json
+from creepkit.app.runtime_files import runtime_script
+from creepkit.exporters.javascript import law_expression
+from creepkit.records import LawWithValues
 
 FOLDER = Path(__file__).parent / "page"
 
 
 SCRIPTS = ("numbers", "elements", "chart", "section", "controls", "law_controls", "test_controls")
-SCRIPTS += ("test_list", "copies", "misfit", "engine", "page")
+SCRIPTS += ("test_list", "copies", "misfit", "own_predictions", "engine", "page")
 """Files of the folder, without their ending, each of which may use those before it."""
 
 
@@ -36,7 +40,8 @@ def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") ->
         "title": escaped(contents.title),
         "style": f"<style{mark}>\n{_part('style.css')}</style>",
         "fragment": _fragment(contents_document(contents), {"endpoint": endpoint}),
-        "scripts": f"<script{mark}>\n{page_scripts()}</script>",
+        "scripts": "" if endpoint else f"<script>\n{runtime_script()}\n</script>\n<script>\n{law_scripts(contents)}</script>",
+        "page_scripts": f"<script{mark}>\n{page_scripts()}</script>",
     }
     text = _part("page.html")
     for name, value in replacements.items():
@@ -62,21 +67,30 @@ def page_scripts() -> str:
     return "\n".join(_part(f"{name}.js") for name in SCRIPTS)
 
 
+def law_scripts(contents: PageContents) -> str:
+    """The laws as JavaScript, by the names that the data of the page give them."""
+    codes = {
+        law_code_name(one): law_expression(LawWithValues(one.law, one.values)) for one in contents.laws
+    }
+    lines = [f"globalThis.creepkitLaws[{json.dumps(name)}] = {code};" for name, code in codes.items()]
+    return "\n".join(["globalThis.creepkitLaws ??= {};", *lines])
+
+
 def page_fragment(contents: PageContents, *, style: bool = True, scripts: bool = True) -> str:
     """The page as part of another document of HTML.
 
     style, scripts : whether it brings its own; of several fragments in one document, the first has to.
     """
     parts = [f"<style>\n{page_style()}</style>"] if style else []
+    parts += [f"<script>\n{runtime_script()}\n</script>"] if scripts else []
+    parts.append(f"<script>\n{law_scripts(contents)}</script>")
     parts.append(_fragment(contents_document(contents), {"endpoint": ""}))
     parts += [f"<script>\n{page_scripts()}</script>"] if scripts else []
     return "\n".join(parts)
 
 
 def _fragment(document: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
-    data = json.dumps({**document, **settings}, allow_nan=False, separators=(",", ":"), ensure_ascii=True)
-    # no text of the data can end the element that it stands in
-    data = data.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    data = embedded_json({**document, **settings})
     note = "This part of the page needs scripts: it computes creep curves while its sliders are moved."
     return (
         f'<div class="creepkit-page"><noscript><p>{note}</p></noscript>'

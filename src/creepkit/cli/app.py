@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from creepkit.cli import (
+    app_page,
     check,
     confirm,
     data,
@@ -133,6 +134,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "design": design.command,
     "rupture": rupture.command,
     "export": export.command,
+    "app": app_page.command,
     "demo": demo.command,
 }
 

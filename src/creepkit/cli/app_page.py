@@ -39,7 +39,8 @@ def _resolved(words: list[str]) -> tuple[PageSource, list[object]]:
     """The source of the page, and the measured tests; a word that is no file is a law."""
     import creepkit as ck
     from creepkit.errors import FitError
-    from creepkit.inverse.ranking_document import read_fit_or_ranking
+    from creepkit.exporters.law_files import read_law_file
+    from creepkit.inverse.ranking_document import RANKING, read_ranking
 
     laws = ck.available("laws")
     sources: list[PageSource] = []
@@ -48,8 +49,8 @@ def _resolved(words: list[str]) -> tuple[PageSource, list[object]]:
         named = word in laws or ("+" in word and not Path(word).exists())
         if named or not (Path(word).exists() or any(c in word for c in "*?[./\\")):
             sources.append(ck.law(word))
-        elif Path(word).suffix.lower() == ".json" and _is_result(Path(word)):
-            sources.append(read_fit_or_ranking(word))
+        elif Path(word).suffix.lower() == ".json" and _format(Path(word)) is not None:
+            sources.append(read_ranking(word) if _format(Path(word)) == RANKING.name else read_law_file(Path(word)))
         else:
             tests.append(word)
     if len(sources) > 1:
@@ -62,14 +63,16 @@ DEFAULT_LAW = "norton"
 """Where only tests are named, or nothing."""
 
 
-def _is_result(path: Path) -> bool:
-    """Whether a file of JSON is an identification or a ranking, not a file of tests."""
+def _format(path: Path) -> str | None:
+    """The format of a law, an identification or a ranking in JSON; None for a file of tests."""
+    from creepkit.exporters.law_files import VALUED_LAW
     from creepkit.files.json_documents import read_json
     from creepkit.inverse.identification_document import IDENTIFICATION
     from creepkit.inverse.ranking_document import RANKING
 
-    data = read_json(path, IDENTIFICATION.kind)
-    return isinstance(data, dict) and data.get("format") in (IDENTIFICATION.name, RANKING.name)
+    data = read_json(path, VALUED_LAW.kind)
+    name = data.get("format") if isinstance(data, dict) else None
+    return name if name in (VALUED_LAW.name, IDENTIFICATION.name, RANKING.name) else None
 
 
 def _serve(contents: PageContents, port: int, browser: bool) -> None:
@@ -84,7 +87,7 @@ def _serve(contents: PageContents, port: int, browser: bool) -> None:
     except OSError as error:
         raise FitError(f"--port {port} cannot be used: {error.strerror}; choose another, or 0 for any") from None
     with server:
-        threading.Thread(target=server.prepare, daemon=True).start()
+        threading.Thread(target=server.answers.prepare, daemon=True).start()
         typer.echo(f"the page: {server.url}")
         typer.echo("Ctrl-C ends it", err=True)
         if browser:

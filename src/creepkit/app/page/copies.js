@@ -13,7 +13,7 @@
   }
 
   function asLatex(state, law) {
-    const unit = (parameter) => (parameter.latex_unit ? "\\," + parameter.latex_unit.replaceAll("$", "") : "");
+    const unit = (parameter) => (parameter.latex_unit ? "\\," + parameter.latex_unit : "");
     const values = law.parameters.map((p) => `${p.latex} &= ${latexNumber(state.values[p.name])}${unit(p)}`);
     return ["\\begin{align}", [...law.latex.map((row) => row.replace(" = ", " &= ")), ...values].join(" \\\\\n"), "\\end{align}"].join("\n");
   }
@@ -29,7 +29,7 @@
     if (state.load.control) words.push("--control", state.control);
     else if (state.ramp !== state.load.ramp) words.push("--ramp", page.plain(state.ramp));
     words.push("--end-h", page.plain(state.end / 3600));
-    if (law.temperature) words.push("--temperature-c", page.plain(state.temperature - 273.15, 8));
+    if (law.variables.includes("temperature")) words.push("--temperature-c", page.plain(state.temperature - 273.15, 8));
     if (state.specimen.modulus.needed) words.push("--modulus-gpa", page.plain(state.modulus / 1e3));
     for (const [name, value] of Object.entries(state.lengths)) words.push("--geometry", `${name}=${page.plain(value)}`);
     return words.map(quoted).join(" ");

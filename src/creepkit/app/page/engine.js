@@ -42,7 +42,7 @@
       send({ ...question, exact: true }, ++number, exact.signal).catch(failed);
     }
 
-    return { quick, precise, has: () => true, words: "finite elements" };
+    return { quick, precise, has: () => true };
   };
 
   // Answers within the page.
@@ -54,6 +54,6 @@
         onProblem(String(error.message ?? error));
       }
     }
-    return { quick, precise: quick, has: (specimen) => page.predicts?.(data, specimen.name) ?? false };
+    return { quick, precise: quick, has: (specimen) => page.predicts(data, specimen) };
   };
 })((globalThis.creepkitPage ??= {}));

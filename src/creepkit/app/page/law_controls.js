@@ -4,8 +4,17 @@
   const { element } = page;
   const DECADES = 3; // to either side, of a slider that does not span all bounds
 
-  const internal = (p, value) => (p.log ? Math.log(value) : value);
-  const external = (p, value) => (p.log ? Math.exp(value) : value);
+  const isLog = (p) => p.scale === "log";
+  const internal = (p, value) => (isLog(p) ? Math.log(value) : value);
+  const external = (p, value) => (isLog(p) ? Math.exp(value) : value);
+
+  const MOST_DIRECTIONS = 2;
+
+  // A direction in words: which parameters rise and which fall along it.
+  function words(direction) {
+    const order = Object.entries(direction).sort((a, b) => Math.abs(b[1]) - Math.abs(a[1]));
+    return order.slice(0, 4).filter(([, by]) => by !== 0).map(([name, by]) => `${name} ${by > 0 ? "up" : "down"}`).join(", ");
+  }
 
   // handlers: onInput(event), onRelease(), onLaw(position)
   page.lawControls = function (data, state, handlers) {
@@ -32,33 +41,34 @@
       state.values = Object.fromEntries(law.parameters.map((p) => [p.name, p.value]));
       sliders = law.parameters.map((p, k) =>
         page.slider({
-          label: element("span", {}, page.math(p.symbol)), name: p.name, help: p.meaning, unit: p.unit, low: p.low, high: p.high, value: p.value, log: p.log,
-          accepts: (value) => !p.log || value > 0 || value === p.off,
+          label: element("span", {}, page.math(p.symbol)), name: p.name, help: p.title, unit: p.unit, low: p.low, high: p.high, value: p.value, log: isLog(p),
+          accepts: (value) => !isLog(p) || value > 0 || value === p.off,
           onInput: (value, event) => moved(k, value, event), onRelease: handlers.onRelease,
         }));
       list.replaceChildren(...sliders.map((slider) => slider.row));
-      reset.textContent = law.fit === null ? "Back to the first values" : "Back to the optimum";
-      followRow.hidden = !law.fit?.covariance;
-      known.replaceChildren(...(law.fit?.undetermined ?? []).map((sentence) => element("p", {}, sentence + ".")));
+      reset.textContent = law.parameters[0]?.interval === null ? "Back to the first values" : "Back to the optimum";
+      followRow.hidden = law.covariance === null;
+      known.replaceChildren(...law.undetermined.map((sentence) => element("p", {}, sentence + ".")));
       law.parameters.forEach((p, k) => {
-        const e = law.fit?.estimates[p.name];
-        if (e === undefined) return;
-        sliders[k].mark({ optimum: e.value, interval: e.low === null || e.high === null ? undefined : [e.low, e.high] });
-        sliders[k].row.append(element("div", { class: "estimate" }, `${page.format(e.value)}, 95 % from ${page.format(e.low, 3)} to ${page.format(e.high, 3)}` + (e.verdict === "determined" ? "" : `: ${e.verdict}`)));
+        if (p.interval === null) return;
+        const [low, high] = p.interval;
+        sliders[k].mark({ optimum: p.value, interval: low === null || high === null ? undefined : p.interval });
+        sliders[k].row.append(element("div", { class: "estimate" }, `${page.format(p.value)}, 95 % from ${page.format(low, 3)} to ${page.format(high, 3)}` + (p.verdict === "determined" ? "" : `: ${p.verdict}`)));
       });
-      shifts = (law.fit?.directions ?? []).map(() => 0);
-      directions.replaceChildren(...(law.fit?.directions ?? []).map(directionSlider));
+      const shown = law.parameters.length > 1 ? law.directions.slice(0, MOST_DIRECTIONS) : [];
+      shifts = shown.map(() => 0);
+      directions.replaceChildren(...shown.map(directionSlider));
       windows();
     }
 
     const directionSliders = [];
     function directionSlider(direction, d) {
       const slider = page.slider({
-        name: `likely direction ${d + 1}`, help: direction.words, unit: "sd", low: -3, high: 3, value: 0,
+        name: `likely direction ${d + 1}`, help: words(direction), unit: "sd", low: -3, high: 3, value: 0,
         onInput: (value, event) => {
           shifts[d] = value;
           law.parameters.forEach((p, k) => {
-            const shift = law.fit.directions.reduce((sum, one, j) => sum + shifts[j] * one.step[k], 0);
+            const shift = shifts.reduce((sum, by, j) => sum + by * law.directions[j][p.name], 0);
             put(k, Math.min(Math.max(external(p, internal(p, p.value) + shift), p.low), p.high));
           });
           handlers.onInput(event);
@@ -76,13 +86,13 @@
 
     // One slider was moved: the likely values of the others, given it, are marked, and taken where that is wanted.
     function moved(k, value, event) {
-      const { parameters, fit } = law;
+      const { parameters, covariance } = law;
       state.values[parameters[k].name] = value;
-      if (fit?.covariance && fit.covariance[k][k] > 0 && (value > 0 || !parameters[k].log)) {
+      if (covariance !== null && covariance[k][k] > 0 && (value > 0 || !isLog(parameters[k]))) {
         const shift = internal(parameters[k], value) - internal(parameters[k], parameters[k].value);
         parameters.forEach((p, j) => {
-          if (j === k || !(p.value > 0 || !p.log)) return;
-          const likely = external(p, internal(p, p.value) + (fit.covariance[j][k] / fit.covariance[k][k]) * shift);
+          if (j === k || !(p.value > 0 || !isLog(p))) return;
+          const likely = external(p, internal(p, p.value) + (covariance[j][k] / covariance[k][k]) * shift);
           if (follow.checked) put(j, Math.min(Math.max(likely, p.low), p.high));
           sliders[j].mark({ likely });
         });
@@ -94,12 +104,12 @@
     function windows() {
       law.parameters.forEach((p, k) => {
         let [low, high] = [p.low, p.high];
-        if (!whole.checked && (p.value > 0 || !p.log)) {
-          const e = law.fit?.estimates[p.name];
+        if (!whole.checked && (p.value > 0 || !isLog(p))) {
+          const [from, to] = p.interval ?? [null, null];
           const center = internal(p, p.value);
-          let reach = p.log ? DECADES * Math.LN10 : Infinity;
-          if (e && e.low !== null && e.high !== null && e.high > e.low && (e.low > 0 || !p.log)) {
-            reach = 2.5 * Math.max(internal(p, e.high) - center, center - internal(p, e.low));
+          let reach = isLog(p) ? DECADES * Math.LN10 : Infinity;
+          if (from !== null && to !== null && to > from && (from > 0 || !isLog(p))) {
+            reach = 2.5 * Math.max(internal(p, to) - center, center - internal(p, from));
           }
           [low, high] = [external(p, Math.max(internal(p, low), center - reach)), external(p, Math.min(internal(p, high), center + reach))];
           if (!(high > low)) [low, high] = [p.low, p.high];

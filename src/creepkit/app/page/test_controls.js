@@ -52,7 +52,7 @@
         parts.push(page.slider({ name: "ramp", help: "in which each level is reached", unit: "s", low: 0, high: Math.max(60, 4 * load.ramp), value: state.ramp, accepts: (v) => v >= 0, ...changed, onInput: (v, event) => { state.ramp = v; handlers.onInput(event); } }).row);
       }
       const law = data.laws[state.law];
-      if (law.temperature) {
+      if (law.variables.includes("temperature")) {
         const span = temperatureSpan();
         parts.push(page.slider({ name: "temperature", unit: "\u00b0C", low: span[0] - ZERO_CELSIUS, high: span[1] - ZERO_CELSIUS, value: state.temperature - ZERO_CELSIUS, accepts: (v) => v > -ZERO_CELSIUS && v < 9700, ...changed, onInput: (v, event) => { state.temperature = v + ZERO_CELSIUS; handlers.onInput(event); } }).row);
       }
