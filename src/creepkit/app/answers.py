@@ -142,11 +142,12 @@ class PageAnswers:
         assert request.program is not None
         specimen = self.contents.specimen(request.program.specimen)
         plan = planned_history(request.program, specimen)
-        if request.exact and isinstance(specimen, Runnable):
-            run = specimen.run(page_law.law, values, plan)
+        predictor = self._predictor(specimen.name, request.exact)
+        if isinstance(predictor, Runnable):
+            run = predictor.run(page_law.law, values, plan)
             if isinstance(run, FiniteElementRun):
                 return {**_run_document(run), "section": section_document(run)}
-        prediction = predict(self._predictor(specimen.name, request.exact), page_law.law, theta, [plan])
+        prediction = predict(predictor, page_law.law, theta, [plan])
         return _prediction_document(prediction, plan)
 
     def _test_document(self, page_law: PageLaw, theta: Floats, k: int, exact: bool) -> dict[str, Any]:

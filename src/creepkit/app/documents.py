@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -65,6 +66,8 @@ def law_document(page_law: PageLaw, end: float) -> dict[str, Any]:
         row |= {"latex": latex.doprint(symbol), "latex_unit": latex_unit(row["unit"]).strip("$")}
     return {
         **{name: value for name, value in known.items() if name != "source"},
+        # the page's style aligns their columns, for the policy of the server allows no other
+        "equations": [re.sub(r' style="[^"]*"', "", equation) for equation in known["equations"]],
         "code": law_code_name(page_law),
         "latex": [f"{left} = {' '.join(right)}" for left, right in latex_equations(law, latex)],
         "weight": page_law.weight,

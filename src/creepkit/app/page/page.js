@@ -13,7 +13,7 @@
     const status = element("p", { class: "status", role: "status" });
     const problem = element("p", { class: "problem", role: "alert", hidden: true });
     const panels = element("div", { class: "panels" });
-    let inputAt = null, charts = new Map(), rates = null, section = null, last = null, timer = null;
+    let inputAt = null, charts = new Map(), rates = null, section = null, last = null, timer = null, before = null, settled = true;
 
     const engine = data.endpoint ? page.serverEngine(data.endpoint, draw, complain) : page.ownEngine(data, draw, complain);
     data.specimens = data.specimens.filter((specimen) => engine.has(specimen));
@@ -48,6 +48,7 @@
     }
 
     function onSpecimen() {
+      before = null;
       makePanels();
       changed(null);
       released();
@@ -65,12 +66,15 @@
       changed(event);
     }
 
+    // The curves as they were before a slider began to move stay, in grey, until the next one does.
     function changed(event) {
+      if (settled && event !== null) { before = last; settled = false; }
       inputAt = event === null ? null : performance.now();
       engine.quick(question());
     }
 
     function released() {
+      settled = true;
       clearTimeout(timer);
       timer = setTimeout(() => engine.precise(question()), 120);
     }
@@ -91,7 +95,7 @@
       const label = (output) => (output.unit ? `${output.title}, ${output.unit}` : output.title);
       charts = new Map([...outputs].map(([name, output]) => [name, page.chart({ title: capital(output.title), x: { label: "time", logarithmic: false, choice: true }, y: { label: label(output), logarithmic: false, choice: true } })]));
       const point = data.laws[state.law].rate_point;
-      rates = page.chart({ title: "Creep rate against stress", x: { label: "stress, MPa", logarithmic: true }, y: { label: "creep rate, 1/s", logarithmic: true } });
+      rates = page.chart({ title: "Creep rate against stress", whole: true, x: { label: "stress, MPa", logarithmic: true }, y: { label: "creep rate, 1/s", logarithmic: true } });
       rates.heading.append(element("span", { class: "help" }, ` at a strain of ${page.format(point.strain, 2)} and ${page.duration(point.time)}`));
       section = page.section();
       section.panel.hidden = true;
@@ -109,9 +113,10 @@
         const series = [];
         for (const one of shown) {
           const test = data.tests[one.test], colour = page.colour(one.test), offset = test.offset[name] ?? 0, x = inUnit(test.times);
-          if (test.outputs[name]) series.push({ kind: "points", x, y: test.outputs[name], colour });
+          if (test.outputs[name]) series.push({ kind: "points", name: one.test, x, y: test.outputs[name], colour });
           if (one.outputs[name]) series.push({ kind: "line", x, y: one.outputs[name].map((v) => (v === null ? null : v + offset)), colour });
         }
+        if (before?.program?.outputs[name] && answer.program) series.push({ kind: "line", style: "before", x: inUnit(before.program.times), y: before.program.outputs[name], colour: "var(--soft)" });
         if (answer.program?.outputs[name]) series.push({ kind: "line", style: "plan", x: inUnit(answer.program.times), y: answer.program.outputs[name], colour: page.colour(null) });
         const planned = answer.program?.outputs[name]?.filter((v) => v !== null).at(-1);
         chart.draw({ series, xLabel: `time, ${unit.name}`, summary: planned === undefined ? `${shown.length} measured tests.` : `The planned test ends at ${page.format(planned)}.` });
@@ -137,9 +142,10 @@
     function drawRates(rate) {
       if (!rate) return;
       const colour = page.colour(null);
-      const series = [{ kind: "line", style: "plan", x: rate.stress, y: rate.log_rate.map((v) => (v === null ? null : 10 ** v)), colour }];
+      const drawn = (rate, style, colour) => ({ kind: "line", style, x: rate.stress, y: rate.log_rate.map((v) => (v === null ? null : 10 ** v)), colour });
+      const series = [...(before?.rate ? [drawn(before.rate, "before", "var(--soft)")] : []), drawn(rate, "plan", colour)];
       data.tests.forEach((test, k) => {
-        if (state.tests[k] && test.minimum_rate !== null && test.load === "stress") series.push({ kind: "points", large: true, x: [test.program[1].at(-1)], y: [test.minimum_rate], colour: page.colour(k) });
+        if (state.tests[k] && test.minimum_rate !== null && test.load === "stress") series.push({ kind: "points", name: k, large: true, x: [test.program[1].at(-1)], y: [test.minimum_rate], colour: page.colour(k) });
       });
       rates.draw({ series, summary: rate.problem ?? "" });
     }

@@ -16,7 +16,7 @@
     const words = element("output", { class: "readout" });
     const legend = element("div", { class: "legend" });
     const panel = element("figure", { class: "panel" }, element("figcaption", {}, element("h3", {}, "Deformed section")), drawing, legend, element("label", { class: "row" }, "time ", moment, words));
-    let shown = null;
+    let shown = null, colours = null;
 
     function outlinePath(data, place) {
       // sides that belong to one element alone
@@ -35,7 +35,9 @@
       shown = data;
       moment.max = data.times.length - 1;
       const k = Math.min(Number(moment.value), data.times.length - 1);
-      const moves = data.displacements[k], stress = data.stress[k];
+      // a reduced-order model says nothing of stresses: the colours stay as they were
+      if (data.stress !== null) colours = data.stress;
+      const moves = data.displacements[k], stress = colours?.[k]?.length === data.elements.length ? colours[k] : data.elements.map(() => 0);
       const width = Math.max(260, panel.clientWidth - 20 || 520);
       let reach = 0, top = -Infinity, bottom = Infinity;
       for (let n = 0; n < data.nodes.length / 2; n++) {
@@ -61,7 +63,8 @@
       drawing.setAttribute("width", width);
       drawing.setAttribute("height", height.toFixed(0));
       drawing.setAttribute("viewBox", `0 0 ${width} ${height.toFixed(0)}`);
-      drawing.setAttribute("aria-label", `Deformed section at ${page.duration(data.times[k])}, von Mises stress ${page.format(low, 3)} to ${page.format(high, 3)} MPa`);
+      drawing.setAttribute("aria-label", `Deformed section at ${page.duration(data.times[k])}` + (data.stress === null ? "" : `, von Mises stress ${page.format(low, 3)} to ${page.format(high, 3)} MPa`));
+      legend.classList.toggle("waiting", data.stress === null);
       legend.replaceChildren(`${page.format(low, 3)}`, element("span", { class: "colours", "aria-hidden": "true" }), `${page.format(high, 3)} MPa, von Mises; dashed: at rest; true to scale`);
       words.textContent = page.duration(data.times[k]);
     }

@@ -34,9 +34,9 @@
     function show(misfits) {
       data.tests.forEach((test, k) => {
         const entries = Object.entries(misfits.get(k) ?? {});
-        const text = (write) => (state.tests[k] ? entries.map(write).join("; ") : "");
-        rows[k].rms.textContent = text(([name, one]) => `${entries.length > 1 ? (units[name]?.title ?? name) + " " : ""}${page.format(one.rms, 2)} ${units[name]?.unit ?? ""}`.trim());
-        rows[k].ratio.textContent = text(([, one]) => (one.ratio === null ? "\u2013" : page.format(one.ratio, 2)));
+        const lines = (write) => (state.tests[k] ? entries.map((entry) => element("div", {}, write(entry))) : []);
+        rows[k].rms.replaceChildren(...lines(([name, one]) => `${entries.length > 1 ? (units[name]?.title ?? name) + " " : ""}${page.format(one.rms, 2)} ${units[name]?.unit ?? ""}`.trim()));
+        rows[k].ratio.replaceChildren(...lines(([, one]) => (one.ratio === null ? "\u2013" : page.format(one.ratio, 2))));
       });
       const shown = [...misfits].filter(([k]) => state.tests[k]).map(([, misfit]) => misfit);
       const weighted = page.weighted(shown);
