@@ -45,6 +45,7 @@ def write_page(contents: PageContents, path: Path, *, force: bool = True) -> Pat
     size = len(text.encode("utf-8"))
     if size > LARGEST_PAGE:
         raise ExportError(
-            f"{path}: the page would have {size / 1e6:.1f} MB, allowed is {LARGEST_PAGE / 1e6:g} MB; give fewer tests or laws"
+            f"{path}: the page would have {size / 1e6:.1f} MB, allowed is {LARGEST_PAGE / 1e6:g} MB; "
+            "give fewer tests or laws"
         )
     return write_text(text, path, ExportError)

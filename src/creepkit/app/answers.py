@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,7 +27,7 @@ from creepkit.records import (
     SupportsReducedOrderModel,
     SupportsSearchTolerance,
     SupportsTraining,
-    check_geometry,
+    dimensions_of,
     load_steps,
     loads_of,
 )
@@ -47,7 +47,7 @@ MOST_CLIENTS = 64
 """Pages whose latest request is remembered."""
 
 
-class Superseded(Exception):  # noqa: N818 - no error: the page asked for something newer
+class Superseded(Exception):
     """A newer request of the same page has come."""
 
 
@@ -168,7 +168,7 @@ def planned_history(program: ProgramRequest, specimen: Any) -> History:
     starts = np.array([start for start, _ in program.steps if 0.0 < start < end])
     times = np.union1d(np.geomspace(1e-4 * end, end, half), np.linspace(end / half, end, half))
     times = np.union1d(times, np.concatenate([starts, starts + max(program.ramp, 1e-6 * end)]))
-    check_geometry(specimen, program.lengths, "the planned test")
+    _check_lengths(program, specimen)
     return History(
         name="planned test",
         times=times[(times > 0.0) & (times <= end)],
@@ -179,6 +179,14 @@ def planned_history(program: ProgramRequest, specimen: Any) -> History:
         elastic=None if program.modulus is None else Elastic(program.modulus),
         geometry=program.lengths,
     )
+
+
+def _check_lengths(program: ProgramRequest, specimen: Any) -> None:
+    known = [d.name for d in dimensions_of(specimen)]
+    for name in program.lengths:
+        if name not in known:
+            has = ", ".join(known) or "none"
+            raise RequestError(f"specimen '{specimen.name}' has no length '{name:.60}'; it has {has}")
 
 
 def _loading(program: ProgramRequest, specimen: Any) -> Loading:
@@ -219,7 +227,8 @@ def _run_document(run: FiniteElementRun) -> dict[str, Any]:
 def rate_document(page_law: PageLaw, values: dict[str, float], temperature: float) -> dict[str, Any]:
     """The creep rate over stress, at the strain and the time that stand for the tests; log10 of 1/s."""
     point = rate_point(page_law.fit)
-    stresses = np.geomspace(*point["stress"], RATE_STRESSES)
+    low, high = point["stress"]
+    stresses = np.geomspace(low, high, RATE_STRESSES)
     kernel = kernels.lower(page_law.law, "numpy")
     try:
         with np.errstate(all="ignore"):
@@ -230,6 +239,3 @@ def rate_document(page_law: PageLaw, values: dict[str, float], temperature: floa
         return {"stress": [], "log_rate": [], "problem": str(error)}
     logs = np.broadcast_to(np.asarray(logs, float), stresses.shape) / np.log(10.0)
     return {"stress": numbers(stresses), "log_rate": numbers(np.where(logs < -1e3, np.nan, logs))}
-
-
-__all__: Sequence[str] = ("PageAnswers", "Superseded", "planned_history", "rate_document")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.language import CreepLaw
 
-    PageSource = CreepLaw | Identification | Ranking | ModelAverage | LawWithValues | str
+
+PageSource: TypeAlias = "CreepLaw | Identification | Ranking | ModelAverage | LawWithValues | str"
 
 
 MOST_LAWS = 12
@@ -108,9 +109,9 @@ def page_contents(
 
 def _page_laws(source: PageSource) -> tuple[PageLaw, ...]:
     """The laws of a source, those of a ranking by falling weight."""
-    if isinstance(source, LawWithValues):
-        return (PageLaw(source.law, dict(source.values)),)
     given: Any = source
+    if isinstance(given, LawWithValues):
+        return (PageLaw(given.law, dict(given.values)),)
     if hasattr(given, "fits"):  # the laws of a ranking, from its file
         pairs = sorted(zip(given.fits, given.weights, strict=True), key=lambda pair: -pair[1])
         return tuple(PageLaw(fit.law, fit.values, fit, float(weight)) for fit, weight in pairs[:MOST_LAWS])
@@ -149,7 +150,10 @@ def _specimens(histories: Sequence[History], first: str | None) -> tuple[Specime
 
 def _bar_first(known: Mapping[str, Any]) -> Any:
     """Sort specimens by how much is asked of a user before a first curve is seen: those without lengths first."""
-    return lambda name: ("modulus" in getattr(known[name], "conditions", {}), len(getattr(known[name], "dimensions", ())))
+    return lambda name: (
+        "modulus" in getattr(known[name], "conditions", {}),
+        len(getattr(known[name], "dimensions", ())),
+    )
 
 
 def _has_plain_load(specimen: Any) -> bool:
@@ -165,9 +169,7 @@ def _first_temperature(histories: Sequence[History], fit: Identification | None)
 def usual_end(page_law: PageLaw, stress: float, temperature: float) -> float:
     """s, when a bar under `stress` (MPa) has crept by USUAL_STRAIN, or ruptures; what a first curve is to show."""
     times = np.geomspace(1e-6, 1e22, 561)
-    plan = History(
-        name="first curve", times=times, outputs={}, loading=_held_stress(stress), temperature=temperature
-    )
+    plan = History(name="first curve", times=times, outputs={}, loading=_held_stress(stress), temperature=temperature)
     law = page_law.law
     try:
         prediction = predict_with(known_specimens()[plan.specimen], law, law.to_internal(dict(page_law.values)), [plan])

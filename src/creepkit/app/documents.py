@@ -149,7 +149,8 @@ def specimen_document(specimen: Specimen) -> dict[str, Any]:
 
 def runtime_of(specimen: Specimen) -> str | None:
     """Which function of the runtime predicts a specimen in a page that stands alone; None where none does."""
-    return {Uniaxial: "creep", Relaxation: "relaxation"}.get(type(specimen))
+    kinds: dict[type[object], str] = {Uniaxial: "creep", Relaxation: "relaxation"}
+    return kinds.get(type(specimen))
 
 
 def _load_document(specimen: Specimen, load: Load, conditions: Mapping[str, tuple[float, float]]) -> dict[str, Any]:

@@ -22,8 +22,10 @@ from creepkit.records import LawWithValues
 FOLDER = Path(__file__).parent / "page"
 
 
-SCRIPTS = ("numbers", "elements", "chart", "section", "controls", "law_controls", "test_controls")
-SCRIPTS += ("test_list", "copies", "misfit", "own_predictions", "engine", "page")
+SCRIPTS = (
+    *("numbers", "elements", "chart", "section", "controls", "law_controls", "test_controls", "test_list"),
+    *("copies", "misfit", "own_predictions", "engine", "page"),
+)
 """Files of the folder, without their ending, each of which may use those before it."""
 
 
@@ -40,7 +42,9 @@ def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") ->
         "title": escaped(contents.title),
         "style": f"<style{mark}>\n{_part('style.css')}</style>",
         "fragment": _fragment(contents_document(contents), {"endpoint": endpoint}),
-        "scripts": "" if endpoint else f"<script>\n{runtime_script()}\n</script>\n<script>\n{law_scripts(contents)}</script>",
+        "scripts": ""
+        if endpoint
+        else f"<script>\n{runtime_script()}\n</script>\n<script>\n{law_scripts(contents)}</script>",
         "page_scripts": f"<script{mark}>\n{page_scripts()}</script>",
     }
     text = _part("page.html")
@@ -50,7 +54,7 @@ def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") ->
 
 
 _POLICY_OF_A_FILE = (
-    '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; script-src \'unsafe-inline\'; '
+    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; "
     "style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'\">"
 )
 """A page that is a file loads nothing and sends nothing."""
@@ -69,9 +73,7 @@ def page_scripts() -> str:
 
 def law_scripts(contents: PageContents) -> str:
     """The laws as JavaScript, by the names that the data of the page give them."""
-    codes = {
-        law_code_name(one): law_expression(LawWithValues(one.law, one.values)) for one in contents.laws
-    }
+    codes = {law_code_name(one): law_expression(LawWithValues(one.law, one.values)) for one in contents.laws}
     lines = [f"globalThis.creepkitLaws[{json.dumps(name)}] = {code};" for name, code in codes.items()]
     return "\n".join(["globalThis.creepkitLaws ??= {};", *lines])
 

@@ -9,7 +9,7 @@ import numpy as np
 from creepkit.app.documents import numbers
 from creepkit.specimens.finite_element_run import FiniteElementRun
 
-SECTION_TIMES = 13
+SECTION_TIMES = 9
 """At which a section is sent, the last at the end of the run."""
 
 

@@ -2,7 +2,7 @@
 
 It is bound to 127.0.0.1 and answers under a random token alone. A page of another site cannot read it (the name of the
 host must be that of this machine, which keeps out names that were rebound to it) nor send to it (an origin must be this
-server's, and a body must be JSON, which browsers do not send across origins unasked). Nothing of a request names a file.
+server's, and a body must be JSON, which browsers do not send across origins unasked). No request names a file.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class PageHandler(BaseHTTPRequestHandler):
     wbufsize = -1  # head and body leave together
     disable_nagle_algorithm = True
 
-    def do_GET(self) -> None:  # noqa: N802 - the name that http.server looks for
+    def do_GET(self) -> None:
         """The page."""
         if not self._allowed():
             return
@@ -90,7 +90,7 @@ class PageHandler(BaseHTTPRequestHandler):
         else:
             self._refuse(HTTPStatus.NOT_FOUND, "there is nothing here but the page and its endpoint")
 
-    def do_POST(self) -> None:  # noqa: N802
+    def do_POST(self) -> None:
         """A prediction."""
         if not self._allowed():
             return
@@ -133,9 +133,9 @@ class PageHandler(BaseHTTPRequestHandler):
         origin, site = self.headers.get("Origin"), self.headers.get("Sec-Fetch-Site", "none")
         if self.headers.get_all("Host", []) not in [[host] for host in hosts]:
             self._refuse(HTTPStatus.FORBIDDEN, "this server answers to its own address alone")
-        elif origin is not None and origin not in {f"http://{host}" for host in hosts}:
-            self._refuse(HTTPStatus.FORBIDDEN, "this server answers its own page alone")
-        elif site not in ("none", "same-origin") and not (site == "cross-site" and self._is_navigation()):
+        elif (origin is not None and origin not in {f"http://{host}" for host in hosts}) or (
+            site not in ("none", "same-origin") and not self._is_navigation()
+        ):
             self._refuse(HTTPStatus.FORBIDDEN, "this server answers its own page alone")
         elif not self._token_is_right():
             self._refuse(HTTPStatus.FORBIDDEN, "the token of this address is wrong; use the one that was printed")

@@ -9,6 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from creepkit.app.contents import PageContents, PageSource
+    from creepkit.records import History
 
 
 def command(
@@ -28,14 +29,15 @@ def command(
     from creepkit.api.pages import write_page
     from creepkit.app.contents import page_contents
 
-    contents = page_contents(*_resolved(sources or []), specimen=specimen)
+    source, tests = _resolved(sources or [])
+    contents = page_contents(source, tests, specimen=specimen)
     if to is not None:
         typer.echo(f"wrote {write_page(contents, to)}")
         return
     _serve(contents, port, browser)
 
 
-def _resolved(words: list[str]) -> tuple[PageSource, list[object]]:
+def _resolved(words: list[str]) -> tuple[PageSource, list[History]]:
     """The source of the page, and the measured tests; a word that is no file is a law."""
     import creepkit as ck
     from creepkit.errors import FitError

@@ -2,6 +2,7 @@
 // The page: controls at one side, panels at the other; every input asks the engine, every answer is drawn.
 (function (page) {
   const { element } = page;
+  const LONGEST_LABEL = 22; // letters beside an axis
   const MOST_SHOWN = 12; // tests that are shown at first
   page.latencies = []; // ms from an input to the frame after its curves were drawn
 
@@ -92,7 +93,8 @@
       const names = new Set(data.tests.filter((_, k) => state.tests[k]).map((test) => test.specimen));
       if (state.planned || names.size === 0) names.add(state.specimen.name);
       const outputs = new Map(data.specimens.filter((one) => names.has(one.name)).flatMap((one) => one.outputs.map((output) => [output.name, output])));
-      const label = (output) => (output.unit ? `${output.title}, ${output.unit}` : output.title);
+      // the title names it in full
+      const label = (output) => (output.title.length > LONGEST_LABEL ? output.unit : output.unit ? `${output.title}, ${output.unit}` : output.title);
       charts = new Map([...outputs].map(([name, output]) => [name, page.chart({ title: capital(output.title), x: { label: "time", logarithmic: false, choice: true }, y: { label: label(output), logarithmic: false, choice: true } })]));
       const point = data.laws[state.law].rate_point;
       rates = page.chart({ title: "Creep rate against stress", whole: true, x: { label: "stress, MPa", logarithmic: true }, y: { label: "creep rate, 1/s", logarithmic: true } });

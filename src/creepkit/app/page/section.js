@@ -12,14 +12,14 @@
 
   page.section = function () {
     const drawing = svg("svg", { role: "img", class: "section" });
-    const moment = element("input", { type: "range", min: 0, max: 12, step: 1, value: 12, "aria-label": "time of the section" });
+    const moment = element("input", { type: "range", min: 0, max: 7, step: 1, value: 7, "aria-label": "time of the section" });
     const words = element("output", { class: "readout" });
     const legend = element("div", { class: "legend" });
     const panel = element("figure", { class: "panel" }, element("figcaption", {}, element("h3", {}, "Deformed section")), drawing, legend, element("label", { class: "row" }, "time ", moment, words));
     let shown = null, colours = null;
 
     function outlinePath(data, place) {
-      // sides that belong to one element alone
+      // sides that belong to one element alone, but for the axis
       const count = new Map();
       for (const sides of data.elements) {
         for (let k = 0; k < 8; k += 2) {
@@ -28,7 +28,7 @@
           count.set(key, count.has(key) ? null : [a, m, b]);
         }
       }
-      return [...count.values()].filter((side) => side !== null).map((side) => "M" + side.map((n) => place(n).join(" ")).join("L")).join("");
+      return [...count.values()].filter((side) => side !== null && !side.every((n) => Math.abs(data.nodes[2 * n]) < 1e-9)).map((side) => "M" + side.map((n) => place(n).join(" ")).join("L")).join("");
     }
 
     function draw(data) {

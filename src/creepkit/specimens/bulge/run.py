@@ -124,9 +124,7 @@ def run_bulge(
     theta = law.to_internal(law.values(values))[0]
     model = test_setup.model if reduced is None else reduced.model_of(test_setup)
     settings = solver_settings(specimen) if reduced is None else reduced.settings
-    simulation = simulate(
-        kernel, theta, model, test_setup.load_history, settings=settings, keep_points=reduced is None
-    )
+    simulation = simulate(kernel, theta, model, test_setup.load_history, settings=settings, keep_points=reduced is None)
     rows = simulation.at(
         test_setup.observation.observe(test_setup.radii, simulation.displacements[:, test_setup.model.top, 1]),
         plan.times,
