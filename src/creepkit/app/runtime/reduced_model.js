@@ -74,19 +74,28 @@
       this.P = new Float64Array(5);
       this.A = new Float64Array(25);
       this.products = new Float64Array(5 * model.modes);
+      this.across = new Float64Array(model.modes);
+      this.along = new Float64Array(model.modes);
       this.tangent = new Float64Array(model.modes * model.modes);
       this.residual = new Float64Array(model.modes);
     }
 
     deform(k, q) {
       const { F, model } = this, { modes, gradients } = model;
-      let start = 5 * k * modes;
-      for (let s = 0; s < 5; s += 1) {
-        let total = s === 1 || s === 2 ? 0.0 : 1.0;
-        for (let i = 0; i < modes; i += 1) total += q[i] * gradients[start + i];
-        F[s] = total;
-        start += modes;
+      let f11 = 1.0, f12 = 0.0, f21 = 0.0, f22 = 1.0, f33 = 1.0;
+      for (let i = 0, g = 5 * k * modes; i < modes; i += 1, g += 1) {
+        const factor = q[i];
+        f11 += factor * gradients[g];
+        f12 += factor * gradients[g + modes];
+        f21 += factor * gradients[g + 2 * modes];
+        f22 += factor * gradients[g + 3 * modes];
+        f33 += factor * gradients[g + 4 * modes];
       }
+      F[0] = f11;
+      F[1] = f12;
+      F[2] = f21;
+      F[3] = f22;
+      F[4] = f33;
     }
 
     /** Out-of-balance forces and, if `stiff`, the tangent's lower triangle; false where a point fails. */
@@ -109,11 +118,10 @@
 
     addForces(k, weight) {
       const { P, residual, model } = this, { modes, gradients } = model;
-      let start = 5 * k * modes;
-      for (let s = 0; s < 5; s += 1) {
-        const force = weight * P[s];
-        for (let i = 0; i < modes; i += 1) residual[i] += force * gradients[start + i];
-        start += modes;
+      const p0 = weight * P[0], p1 = weight * P[1], p2 = weight * P[2], p3 = weight * P[3], p4 = weight * P[4];
+      for (let i = 0, g = 5 * k * modes; i < modes; i += 1, g += 1) {
+        residual[i] += p0 * gradients[g] + p1 * gradients[g + modes] + p2 * gradients[g + 2 * modes] +
+          p3 * gradients[g + 3 * modes] + p4 * gradients[g + 4 * modes];
       }
     }
 
@@ -128,12 +136,19 @@
             a3 * gradients[g + 3 * modes] + a4 * gradients[g + 4 * modes];
         }
       }
-      for (let i = 0; i < modes; i += 1) {
-        const g0 = gradients[start + i], g1 = gradients[start + modes + i], g2 = gradients[start + 2 * modes + i];
-        const g3 = gradients[start + 3 * modes + i], g4 = gradients[start + 4 * modes + i], row = i * modes;
-        for (let j = 0; j <= i; j += 1) {
-          tangent[row + j] += g0 * products[j] + g1 * products[modes + j] + g2 * products[2 * modes + j] +
-            g3 * products[3 * modes + j] + g4 * products[4 * modes + j];
+      // two rows at a time: what is read of the products serves both
+      for (let i = 0; i < modes; i += 2) {
+        const two = i + 1 < modes, g = start + i, h = two ? g + 1 : g, row = i * modes, next = row + modes;
+        const g0 = gradients[g], g1 = gradients[g + modes], g2 = gradients[g + 2 * modes];
+        const g3 = gradients[g + 3 * modes], g4 = gradients[g + 4 * modes];
+        const h0 = gradients[h], h1 = gradients[h + modes], h2 = gradients[h + 2 * modes];
+        const h3 = gradients[h + 3 * modes], h4 = gradients[h + 4 * modes];
+        const last = two ? i + 1 : i;
+        for (let j = 0; j <= last; j += 1) {
+          const p0 = products[j], p1 = products[modes + j], p2 = products[2 * modes + j];
+          const p3 = products[3 * modes + j], p4 = products[4 * modes + j];
+          tangent[row + j] += g0 * p0 + g1 * p1 + g2 * p2 + g3 * p3 + g4 * p4;
+          if (two) tangent[next + j] += h0 * p0 + h1 * p1 + h2 * p2 + h3 * p3 + h4 * p4;
         }
       }
     }
@@ -152,13 +167,14 @@
         }
         for (let i = 0; i < modes; i += 1) residual[i] += weight * radius * (dz * byRadius[i] - dr * byHeight[i]);
         if (!stiff) continue;
+        const { across, along } = this;
         for (let i = 0; i < modes; i += 1) {
-          const acrossI = dz * byRadius[i] + radius * byDz[i], alongI = dr * byRadius[i] + radius * byDr[i];
-          for (let j = 0; j <= i; j += 1) {
-            const acrossJ = dz * byRadius[j] + radius * byDz[j], alongJ = dr * byRadius[j] + radius * byDr[j];
-            tangent[i * modes + j] += 0.5 * weight *
-              (byRadius[i] * acrossJ - byHeight[i] * alongJ + acrossI * byRadius[j] - alongI * byHeight[j]);
-          }
+          across[i] = 0.5 * weight * (dz * byRadius[i] + radius * byDz[i]);
+          along[i] = 0.5 * weight * (dr * byRadius[i] + radius * byDr[i]);
+        }
+        for (let i = 0; i < modes; i += 1) {
+          const a = across[i], b = along[i], r = byRadius[i], z = byHeight[i], row = i * modes;
+          for (let j = 0; j <= i; j += 1) tangent[row + j] += r * across[j] - z * along[j] + a * byRadius[j] - b * byHeight[j];
         }
       }
     }
