@@ -23,7 +23,14 @@ s, K.
         -> {times, stress, creepStrain, rate, states, status, endTime, ruptureTime, reason, steps}
     creepkit.rateCurve(law, {}, {stresses: [...], strain, time, temperature, states: {}})
         -> {stresses, rate, terms: {name: array}}
+    creepkit.simulateDimple(law, {}, rom, {     // rom : JSON.parse of reduced_model_data.rom_data(predictor), kept
+      pressure: [[0, 0], [5, 8], [14400, 8], [14405, 10]],          // MPa, a program as above
+      elastic: {modulus: 150e3, poisson: 0.3}, temperature: 1073, times: [...],
+      fast: true,                               // 16 modes and longer steps, as in a global search: while dragging
+    }) -> {times, outputs: {amplitude, width: mm, shape}, radii: mm, profileAt(time): u_z mm of the top at those radii,
+           placesAt(time): [[r, z], ...] mm of the nodes, edges: [[first, middle, last node], ...] of the outline,
+           status, endTime, ruptureTime, reason, steps}
 
 Mistakes in what is given are RangeErrors of one sentence. Programs, stresses and ends are those of the specimens
-`uniaxial` and `relaxation`, and the integrator is that of the core, step by step.
+`uniaxial`, `relaxation` and `bulge`, and the integrators are those of the core, step by step.
 """

@@ -12,6 +12,13 @@ RUNTIME_FILES = (
     "stage_solver.js",
     "point_integration.js",
     "bars.js",
+    "kinematics.js",
+    "body_points.js",
+    "reduced_model.js",
+    "body_integration.js",
+    "time_interpolation.js",
+    "profile_fit.js",
+    "dimple.js",
 )
 """Each needs those before it."""
 

@@ -115,5 +115,5 @@
     return { stresses, rate, terms: Object.fromEntries(law.law.terms.map((name, i) => [name, terms[i]])) };
   }
 
-  Object.assign(creepkit, { simulateCreep, simulateRelaxation, rateCurve, modulusAt });
+  Object.assign(creepkit, { simulateCreep, simulateRelaxation, rateCurve, modulusAt, temperatureOf });
 })(globalThis.creepkit);
