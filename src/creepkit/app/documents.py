@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.app.contents import RATE_STRAIN, RATE_TIME, USUAL_STRESS, PageContents, PageLaw, usual_end
 from creepkit.app.model_data import law_data
+from creepkit.app.page_models import model_of
 from creepkit.errors import CreepkitError
 from creepkit.exporters.latex import latex_unit
 from creepkit.language.printing import LatexLawPrinter, latex_equations
@@ -26,6 +27,7 @@ from creepkit.records import (
     typical_history,
 )
 from creepkit.records.interfaces import SupportsReducedOrderModel
+from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.relaxation import Relaxation
 from creepkit.specimens.run import Runnable
 from creepkit.specimens.uniaxial import Uniaxial
@@ -39,15 +41,25 @@ MOST_FRAMES = 300
 """Frames of a test that a page draws and compares; of a longer one, as many evenly spread over its frames."""
 
 
-def contents_document(contents: PageContents) -> dict[str, Any]:
-    """All that the scripts of a page read, but for what answers them."""
-    specimens = [specimen_document(one) for one in contents.specimens]
+def contents_document(contents: PageContents, models: Collection[str] = ()) -> dict[str, Any]:
+    """All that the scripts of a page read, but for what answers them.
+
+    models : names of the reduced-order models that the page brings along, of one that no server answers.
+    """
+
+    def with_model(document: dict[str, Any], specimen: Specimen, history: History | None = None) -> dict[str, Any]:
+        own = [name for name in (model_of(specimen, history) if models else ()) if name in models]
+        return {**document, "model": own[0] if own else None}
+
+    specimens = [with_model(specimen_document(one), one) for one in contents.specimens]
     stress = specimens[0]["loads"][0]["stress"]
     return {
         "title": contents.title,
         "laws": [law_document(one, usual_end(one, stress, contents.temperature)) for one in contents.laws],
         "specimens": specimens,
-        "tests": [test_document(one, contents) for one in contents.histories],
+        "tests": [
+            with_model(test_document(one, contents), contents.specimen(one.specimen), one) for one in contents.histories
+        ],
         "temperature": contents.temperature,
     }
 
@@ -149,7 +161,7 @@ def specimen_document(specimen: Specimen) -> dict[str, Any]:
 
 def runtime_of(specimen: Specimen) -> str | None:
     """Which function of the runtime predicts a specimen in a page that stands alone; None where none does."""
-    kinds: dict[type[object], str] = {Uniaxial: "creep", Relaxation: "relaxation"}
+    kinds: dict[type[object], str] = {Uniaxial: "creep", Relaxation: "relaxation", Bulge: "dimple"}
     return kinds.get(type(specimen))
 
 

@@ -15,6 +15,7 @@ from typing import Any
 from creepkit.app.contents import PageContents
 from creepkit.app.documents import contents_document, law_code_name
 from creepkit.app.model_data import embedded_json
+from creepkit.app.page_models import page_models
 from creepkit.app.runtime_files import runtime_script
 from creepkit.exporters.javascript import law_expression
 from creepkit.records import LawWithValues
@@ -35,16 +36,17 @@ LARGEST_PAGE = 1_000_000
 
 def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") -> str:
     """A whole page. nonce : of the policy of a server. endpoint : where it asks for predictions."""
+    models = {} if endpoint else page_models(contents)
     policy = "" if endpoint else _POLICY_OF_A_FILE
     mark = f' nonce="{nonce}"' if nonce else ""
     replacements = {
         "policy": policy,
         "title": escaped(contents.title),
         "style": f"<style{mark}>\n{_part('style.css')}</style>",
-        "fragment": _fragment(contents_document(contents), {"endpoint": endpoint}),
+        "fragment": _fragment(contents_document(contents, models), {"endpoint": endpoint}),
         "scripts": ""
         if endpoint
-        else f"<script>\n{runtime_script()}\n</script>\n<script>\n{law_scripts(contents)}</script>",
+        else f"<script>\n{runtime_script()}\n</script>\n<script>\n{law_scripts(contents)}\n{model_scripts(models)}</script>",
         "page_scripts": f"<script{mark}>\n{page_scripts()}</script>",
     }
     text = _part("page.html")
@@ -78,17 +80,30 @@ def law_scripts(contents: PageContents) -> str:
     return "\n".join(["globalThis.creepkitLaws ??= {};", *lines])
 
 
+def model_scripts(models: Mapping[str, str]) -> str:
+    """Reduced-order models by the names that the data of the page give them."""
+    lines = [f"globalThis.creepkitModels[{json.dumps(name)}] = {text};" for name, text in models.items()]
+    return "\n".join(["globalThis.creepkitModels ??= {};", *lines])
+
+
 def page_fragment(contents: PageContents, *, style: bool = True, scripts: bool = True) -> str:
     """The page as part of another document of HTML.
 
-    style, scripts : whether it brings its own; of several fragments in one document, the first has to.
+    style, scripts : whether it brings its own style, and its own scripts and reduced-order models; of several fragments
+    in one document the first has to. shared_scripts() are the scripts of all of them.
     """
+    models = page_models(contents)
     parts = [f"<style>\n{page_style()}</style>"] if style else []
-    parts += [f"<script>\n{runtime_script()}\n</script>"] if scripts else []
+    parts += [f"<script>\n{runtime_script()}\n{model_scripts(models)}</script>"] if scripts else []
     parts.append(f"<script>\n{law_scripts(contents)}</script>")
-    parts.append(_fragment(contents_document(contents), {"endpoint": ""}))
+    parts.append(_fragment(contents_document(contents, models), {"endpoint": ""}))
     parts += [f"<script>\n{page_scripts()}</script>"] if scripts else []
     return "\n".join(parts)
+
+
+def shared_scripts(contents: PageContents) -> str:
+    """What page_fragment(scripts=False) leaves out, as one script that is loaded after the fragments."""
+    return "\n".join([runtime_script(), model_scripts(page_models(contents)), page_scripts()])
 
 
 def _fragment(document: Mapping[str, Any], settings: Mapping[str, Any]) -> str:

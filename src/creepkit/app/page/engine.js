@@ -47,13 +47,14 @@
 
   // Answers within the page.
   page.ownEngine = function (data, onAnswer, onProblem) {
-    function quick(question) {
+    function answer(question, exact) {
       try {
-        onAnswer({ exact: false, ...page.predict(data, question) });
+        onAnswer({ exact, ...page.predict(data, { ...question, exact }) });
       } catch (error) {
         onProblem(String(error.message ?? error));
       }
     }
-    return { quick, precise: quick, has: (specimen) => page.predicts(data, specimen) };
+    const quick = (question) => answer(question, false), precise = (question) => answer(question, true);
+    return { quick, precise, has: (specimen) => page.predicts(data, specimen) };
   };
 })((globalThis.creepkitPage ??= {}));

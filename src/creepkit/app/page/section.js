@@ -54,7 +54,7 @@
         const moved = (n) => [(middle + side * size * (data.nodes[2 * n] + moves[2 * n])).toFixed(1), (6 + size * (top - data.nodes[2 * n + 1] - moves[2 * n + 1])).toFixed(1)];
         data.elements.forEach((sides, e) => {
           const piece = svg("path", { d: "M" + sides.map((n) => moved(n).join(" ")).join("L") + "Z" });
-          piece.style.fill = piece.style.stroke = colourOf((stress[e] - low) / (high - low || 1));
+          piece.style.fill = piece.style.stroke = colours === null ? "var(--band)" : colourOf((stress[e] - low) / (high - low || 1));
           parts.push(piece);
         });
         parts.push(svg("path", { class: "rest", d: outlinePath(data, rest) }), svg("path", { class: "moved", d: outlinePath(data, moved) }));
@@ -64,8 +64,9 @@
       drawing.setAttribute("height", height.toFixed(0));
       drawing.setAttribute("viewBox", `0 0 ${width} ${height.toFixed(0)}`);
       drawing.setAttribute("aria-label", `Deformed section at ${page.duration(data.times[k])}` + (data.stress === null ? "" : `, von Mises stress ${page.format(low, 3)} to ${page.format(high, 3)} MPa`));
-      legend.classList.toggle("waiting", data.stress === null);
-      legend.replaceChildren(`${page.format(low, 3)}`, element("span", { class: "colours", "aria-hidden": "true" }), `${page.format(high, 3)} MPa, von Mises; dashed: at rest; true to scale`);
+      legend.classList.toggle("waiting", data.stress === null && colours !== null);
+      if (colours === null) legend.replaceChildren("dashed: at rest; true to scale");
+      else legend.replaceChildren(`${page.format(low, 3)}`, element("span", { class: "colours", "aria-hidden": "true" }), `${page.format(high, 3)} MPa, von Mises; dashed: at rest; true to scale`);
       words.textContent = page.duration(data.times[k]);
     }
 
