@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-COMPILERS = ("gfortran", "gcc", "g++")
+COMPILERS = ("gfortran", "gcc", "g++", "node")
 NOT_INSTALLED = "{} is not installed"
 
 

@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from creepkit.cli import (
+    app_page,
     check,
     confirm,
     data,
@@ -139,6 +140,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "rupture": rupture.command,
     "export": export.command,
     "report": report.command,
+    "app": app_page.command,
     "demo": demo.command,
 }
 

@@ -5,6 +5,7 @@ from creepkit.exporters.ansys import AnsysCards
 from creepkit.exporters.c import CExporter
 from creepkit.exporters.code_aster import CodeAsterMaterial
 from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine
+from creepkit.exporters.javascript import JavaScriptExporter
 from creepkit.exporters.latex import LatexExporter, MarkdownExporter
 from creepkit.exporters.law_files import JsonExporter
 from creepkit.exporters.mathml import MathmlExporter
@@ -26,6 +27,7 @@ def creepkit_exporters() -> list[Exporter]:
         CalculixCreepSubroutine(),
         NumpyExporter(),
         CExporter(),
+        JavaScriptExporter(),
         MfrontExporter(),
         MarkdownExporter(),
         MathmlExporter(),

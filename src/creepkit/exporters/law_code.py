@@ -18,6 +18,7 @@ import sympy
 from creepkit.errors import ExportError, LawError
 from creepkit.kernels.log_form import leading_exponents
 from creepkit.kernels.symbolic_kernel import KernelFunction, SymbolicKernel, symbolic_kernel
+from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import LawWithValues
 
@@ -105,10 +106,18 @@ class LawCode:
     """
 
     def __init__(
-        self, source: LawWithValues, identifiers: Identifiers, target_names: Mapping[str, str] | None = None
+        self,
+        source: LawWithValues,
+        identifiers: Identifiers,
+        target_names: Mapping[str, str] | None = None,
+        *,
+        keeps_inactive: bool = False,
     ) -> None:
-        """target_names : {name of a variable of the point or of a state: its name in the target's code}."""
-        self.source = source.without_inactive_terms()
+        """target_names : {name of a variable of the point or of a state: its name in the target's code}.
+
+        keeps_inactive : whether what is switched off stays in the code, where other values can switch it on.
+        """
+        self.source = source if keeps_inactive else source.without_inactive_terms()
         self.law, self.identifiers = self.source.law, identifiers
         try:
             self._lowered: SymbolicKernel = _kernel_entries(self.law)
@@ -136,7 +145,7 @@ class LawCode:
         self._parameter_of_exp = {sympy.exp(ln): symbol for ln, symbol in self.logarithms.items()}
 
     def function(self, entry_name: str) -> CodeFunction:
-        """Return an entry of the kernel: rate, log_rate or update."""
+        """Return an entry of the kernel: rate, terms, log_rate or update."""
         entry: KernelFunction = getattr(self._lowered, entry_name)
         return self._in_target_names((*entry.constants, *entry.steps), entry.outputs)
 
@@ -145,8 +154,7 @@ class LawCode:
 
         Taken at 100 MPa and 1000 K where it varies with the point, as integrators do.
         """
-        point_values = dict(zip(POINT_VARIABLES, (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0), strict=True))
-        point_values |= {s: state.initial for s, state in self.law.states.items()}
+        point_values = _reference_point(self.law)
         values = {s: self.source.values[s.name] for s in self.law.params}
         logs = {ln: sympy.log(values[s]) for s, ln in self._lowered.form.logs.items()}
         exponents_found = []
@@ -156,6 +164,24 @@ class LawCode:
             )
             exponents_found.append((1.0 + time_exponent) / (1.0 - strain_exponent))
         return min(exponents_found)
+
+    def leading_exponents(self) -> list[tuple[tuple[sympy.Expr, sympy.Expr], tuple[sympy.Symbol, ...]]]:
+        """For each term the exponents of time and of strain at t -> 0+, and its coefficients: zero switches it off.
+
+        The exponents are functions of the parameters and their logarithms, at 100 MPa and 1000 K where they vary with
+        the point, as integrators take them.
+        """
+        form = self._lowered.form
+        symbols = [*self.parameters]
+        of_logs = {symbol: ln for ln, symbol in self.logarithms.items()}
+        renamed: dict[sympy.Basic, sympy.Basic] = {
+            theta: of_logs.get(symbol, symbol) for theta, symbol in zip(form.theta, symbols, strict=True)
+        }
+        renamed |= {s: sympy.Float(value) for s, value in _reference_point(self.law).items()}
+        return [
+            ((time.xreplace(renamed), strain.xreplace(renamed)), tuple(symbols[k] for k in coefficients))
+            for (time, strain), coefficients in zip(leading_exponents(form), form.coefficients, strict=True)
+        ]
 
     def _new_symbol(self, symbol: sympy.Symbol, requested: str) -> sympy.Symbol:
         self._symbols[symbol] = sympy.Symbol(self.identifiers.unique(requested), real=True)
@@ -190,3 +216,9 @@ class LawCode:
         """One line for each name of the author's that the target could not keep."""
         original_names = {*self.law.names, *(s.name for s in (*POINT_VARIABLES, *self.law.states))}
         return self.identifiers.renaming_notes(original_names)
+
+
+def _reference_point(law: CreepLaw) -> dict[sympy.Symbol, float]:
+    """Where exponents that vary with the point are taken: virgin material at 100 MPa and 1000 K."""
+    values = dict(zip(POINT_VARIABLES, (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0), strict=True))
+    return values | {symbol: state.initial for symbol, state in law.states.items()}

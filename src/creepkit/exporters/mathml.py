@@ -156,6 +156,11 @@ def law_equations(law: CreepLaw) -> Iterator[str]:
         yield _equation_block(_with_dot(printer.doprint(symbol)), [printer.doprint(state.rate)])
 
 
+def expression_mathml(expression: sympy.Basic) -> str:
+    """An expression as a <math> element."""
+    return _math_element(f"<mrow>{MathmlPrinter().doprint(expression)}</mrow>")
+
+
 def _with_dot(name: str) -> str:
     """The name of a rate: a dot over the letter, not over its index."""
     if name.startswith("<msub><mi>"):

@@ -141,6 +141,11 @@ class SymbolicKernel:
         return _kernel_function("rate", self.names, self._terms, self._rates)
 
     @cached_property
+    def terms(self) -> KernelFunction:
+        """The rate of each term of the law."""
+        return _kernel_function("terms", self.names, self._terms, [*self._terms])
+
+    @cached_property
     def log_rate(self) -> KernelFunction:
         """ln of the rate of creep, then rates of states."""
         return _kernel_function("log_rate", self.names, self._scaled_terms, self._log_rates)

@@ -83,7 +83,8 @@ class FiniteElementRun(Run):
 
     def _field_at_steps(self, name: str) -> Floats:
         """Values of a field at the accepted steps, (steps, points)."""
-        assert self.simulation.values is not None
+        if self.simulation.values is None:
+            raise SolveError(f"run '{self.name}' is of a reduced-order model, which keeps displacements and no fields")
         if name == STRESS_FIELD:
             return self.simulation.mises
         known = (CREEP_STRAIN_FIELD, *self.states)

@@ -146,7 +146,7 @@ class Observation:
         else of the last one: at t = 0 they stand for the limit of what follows. A frame without a fit worth the name is
         NaN.
         """
-        sampling = self._sampling(radii)
+        sampling = self.sampling(radii)
         return sampling.fit.observe(_frames(profiles, sampling), derivatives=False)[0]
 
     def observe_at_times(
@@ -156,7 +156,7 @@ class Observation:
 
         radii : (nodes,) mm at rest. profiles : (steps, nodes) mm. times : (times,) s.
         """
-        sampling = self._sampling(radii)
+        sampling = self.sampling(radii)
         asked = np.atleast_1d(np.asarray(times, dtype=float))
         return sampling.fit.observe_at_times(_frames(profiles, sampling), steps, asked)[0]
 
@@ -168,7 +168,7 @@ class Observation:
         At rest D has the derivatives of the frame that lent its shape (those of D do not change with the size of a
         profile), S and p have none and are given zeros.
         """
-        sampling = self._sampling(radii)
+        sampling = self.sampling(radii)
         outputs, derivatives = sampling.fit.observe(_frames(profiles, sampling), derivatives=True)
         return outputs, derivatives @ sampling.nodes.values
 
@@ -179,7 +179,7 @@ class Observation:
         """
         if self.form == "rings":
             return np.zeros((len(np.asarray(profiles)), len(self.radii)))
-        sampling = self._sampling(radii)
+        sampling = self.sampling(radii)
         frames = _frames(profiles, sampling)
         outputs, derivatives = sampling.fit.observe(frames, derivatives=True)
         slopes = _chain(derivatives, frames @ sampling.nodes.slopes.T * sampling.shares)
@@ -192,13 +192,14 @@ class Observation:
         radii : (nodes,) mm at rest. profiles : (frames, nodes) mm.
         shift : (nodes,) mm for each unit of what moves them, such as the apex thickness of a mesh that follows it.
         """
-        sampling = self._sampling(radii)
+        sampling = self.sampling(radii)
         frames = _frames(profiles, sampling)
         _, derivatives = sampling.fit.observe(frames, derivatives=True)
         moved = sampling.nodes.values @ np.asarray(shift, dtype=float)
         return _chain(derivatives, -(frames @ sampling.nodes.slopes.T) * moved)
 
-    def _sampling(self, radii: ArrayLike) -> ProfileSampling:
+    def sampling(self, radii: ArrayLike) -> ProfileSampling:
+        """Where the operator observes a surface whose nodes have these radii at rest, (nodes,) mm."""
         return _sampling_of(self, np.asarray(radii, dtype=float).tobytes())
 
 

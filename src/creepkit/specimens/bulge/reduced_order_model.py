@@ -6,7 +6,7 @@ it was trained for, and the derivatives to a thickness are exact; another basis 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar
@@ -39,6 +39,7 @@ from creepkit.specimens.reduced_order_training import MODES, RAMP, power_law_run
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
+    from creepkit.specimens.bulge.run import BulgeRun
 
 
 THICKNESS_RANGE = 1.25
@@ -110,6 +111,16 @@ class BulgeReducedOrderModel:
             self.specimen, law, theta, histories, nuisances or {}, sensitivities, self.reduced_model_of,
             self._settings(sensitivities),
         )  # fmt: skip
+
+    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
+        """Run one test, keeping displacements of the whole dimple; stresses are known at some points only, see fields.
+
+        A field of the run is a SolveError.
+        """
+        from creepkit.specimens.bulge.run import ReducedSimulation, run_bulge
+
+        reduced = ReducedSimulation(self.reduced_model_of, self._settings(False))
+        return run_bulge(self.specimen, law, values, plan, reduced)
 
     def for_search(self) -> BulgeReducedOrderModel:
         """The same model in longer steps."""

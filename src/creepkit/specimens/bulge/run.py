@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -23,12 +23,10 @@ from creepkit.specimens.finite_element_run import STRESS_FIELD, FiniteElementRun
 from creepkit.specimens.run import run_from_outputs
 
 if TYPE_CHECKING:
-    pass
-
-
-if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from creepkit.fem.reduced_order_model import ReducedOrderModel
+    from creepkit.fem.solver import SolverSettings
     from creepkit.language import CreepLaw
     from creepkit.specimens.bulge.settings import BulgeSettings
 
@@ -106,21 +104,36 @@ class BulgeRun(FiniteElementRun):
         return np.asarray(self.simulation.displacements[:, self.setup.model.top, 1])
 
 
-def run_bulge(specimen: BulgeSettings, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
-    """Simulate one test and keep all of it."""
+class ReducedSimulation(NamedTuple):
+    """How a reduced-order model simulates: the model of a test that is set up, and the settings of the solver."""
+
+    model_of: Callable[[BulgeSetup], ReducedOrderModel]
+    settings: SolverSettings
+
+
+def run_bulge(
+    specimen: BulgeSettings,
+    law: CreepLaw,
+    values: Mapping[str, float],
+    plan: History,
+    reduced: ReducedSimulation | None = None,
+) -> BulgeRun:
+    """Simulate one test and keep all of it; by a reduced-order model, displacements alone."""
     test_setup = set_up_test(specimen, plan, {})
     kernel = kernels.lower(law, "compiled")
     theta = law.to_internal(law.values(values))[0]
-    simulation = simulate(
-        kernel, theta, test_setup.model, test_setup.load_history, settings=solver_settings(specimen), keep_points=True
-    )
+    model = test_setup.model if reduced is None else reduced.model_of(test_setup)
+    settings = solver_settings(specimen) if reduced is None else reduced.settings
+    simulation = simulate(kernel, theta, model, test_setup.load_history, settings=settings, keep_points=reduced is None)
     rows = simulation.at(
         test_setup.observation.observe(test_setup.radii, simulation.displacements[:, test_setup.model.top, 1]),
         plan.times,
     )
     status, end_time, reason = simulation.status, simulation.end_time, simulation.reason
     largest = float(np.max(specimen.reference_stress(plan), initial=1.0))
-    rate_failure = rate_failure_of(kernel, theta, simulation, test_setup.load_history.temperature, largest)
+    rate_failure = None
+    if reduced is None:
+        rate_failure = rate_failure_of(kernel, theta, simulation, test_setup.load_history.temperature, largest)
     if rate_failure is not None:
         status, end_time, reason = Status.NOT_CONVERGED, *rate_failure
     plan_with_setup = plan.replace(

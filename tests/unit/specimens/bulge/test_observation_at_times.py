@@ -40,7 +40,7 @@ def test_every_width_of_vectors_gives_the_same(monkeypatch, lanes):
 
 def test_derivatives_against_differences():
     operator = Observation()
-    fit = operator._sampling(NODES).fit
+    fit = operator.sampling(NODES).fit
     directions = [dict(growth=1.0), dict(width=3.6)]
     base = [1.0, 3.6]
 

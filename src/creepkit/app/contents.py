@@ -1,0 +1,192 @@
+"""What an interactive page shows: laws with values, specimens by their records, and measured tests, as plain data.
+
+The page is drawn by scripts, which get all of this as one JSON document; nothing in it names a specimen, an output or a
+load, so that those of plugins are shown with their own titles, units and lengths.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from creepkit.errors import CreepkitError, FitError
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.reference_conditions import ReferencePoint
+from creepkit.records import History, LawWithValues, Specimen, known_specimens, predict_with
+from creepkit.registry.arguments import check_histories, resolve_law
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+    from creepkit.language import CreepLaw
+
+
+PageSource: TypeAlias = "CreepLaw | Identification | Ranking | ModelAverage | LawWithValues | str"
+
+
+MOST_LAWS = 12
+"""Laws of a ranking on one page, those of largest weight."""
+
+
+MOST_TESTS = 100
+"""Measured tests on one page."""
+
+
+USUAL_TEMPERATURE = 1073.15
+"""K, where nothing says at which temperature a law is wanted."""
+
+
+USUAL_STRAIN, USUAL_TIME, USUAL_STRESS = 0.02, 36000.0, 100.0
+"""Creep strain that a first curve reaches; s and MPa where a law says nothing of time or a specimen of stress."""
+
+
+USUAL_RATE = 1e-7
+"""1/s, of each term of a law without values at USUAL_STRESS, so that creep takes days."""
+
+
+RATE_STRAIN, RATE_TIME = 0.01, 3600.0
+"""Where the creep rate is shown of a law that was not identified; s."""
+
+
+@dataclass(frozen=True)
+class PageLaw:
+    """A law with the values that its sliders start at; fit : where they come from, weight : in a ranking."""
+
+    law: CreepLaw
+    values: Mapping[str, float]
+    fit: Identification | None = None
+    weight: float | None = None
+
+
+@dataclass(frozen=True)
+class PageContents:
+    """Laws, specimens and measured tests of a page; the first law and the first specimen are shown first.
+
+    title : of the page. temperature : K, where the sliders start.
+    """
+
+    title: str
+    laws: tuple[PageLaw, ...]
+    specimens: tuple[Specimen, ...]
+    histories: tuple[History, ...]
+    temperature: float = USUAL_TEMPERATURE
+
+    def specimen(self, name: str) -> Specimen:
+        """The specimen of this name; FitError where the page has none."""
+        for one in self.specimens:
+            if one.name == name:
+                return one
+        raise FitError(f"this page has no specimen '{name:.60}'; it has {', '.join(s.name for s in self.specimens)}")
+
+
+def page_contents(
+    source: PageSource, tests: Sequence[History] = (), *, specimen: str | None = None, title: str = ""
+) -> PageContents:
+    """Resolve what a page is to show.
+
+    source : a law or its name, a law with values, an identification or a ranking. tests : measured ones that are laid
+    over; by default those that an identification holds. specimen : which is shown first; by default that of the tests.
+    """
+    laws = _page_laws(source)
+    fit = laws[0].fit
+    histories = tuple(check_histories(tests)) or (() if fit is None else fit.histories)
+    if len(histories) > MOST_TESTS:
+        raise FitError(f"a page shows at most {MOST_TESTS} tests, found {len(histories)}; give fewer files")
+    law = laws[0].law
+    return PageContents(
+        title or law.title or law.name,
+        laws,
+        _specimens(histories, specimen),
+        histories,
+        _first_temperature(histories, fit),
+    )
+
+
+def _page_laws(source: PageSource) -> tuple[PageLaw, ...]:
+    """The laws of a source, those of a ranking by falling weight."""
+    given: Any = source
+    if isinstance(given, LawWithValues):
+        return (PageLaw(given.law, dict(given.values)),)
+    if hasattr(given, "fits"):  # the laws of a ranking, from its file
+        pairs = sorted(zip(given.fits, given.weights, strict=True), key=lambda pair: -pair[1])
+        return tuple(PageLaw(fit.law, fit.values, fit, float(weight)) for fit, weight in pairs[:MOST_LAWS])
+    if hasattr(given, "laws"):
+        return tuple(PageLaw(one.fit.law, one.fit.values, one.fit, one.weight) for one in given.laws[:MOST_LAWS])
+    if hasattr(given, "estimates"):
+        return (PageLaw(given.law, given.values, given),)
+    law = resolve_law(given)
+    return (PageLaw(law, _example_values(law)),)
+
+
+def _example_values(law: CreepLaw) -> dict[str, float]:
+    """The middle of the bounds, but for rate coefficients: with them each term has USUAL_RATE where creep is usual.
+
+    The bounds of coefficients span so many powers of ten that their middle is no material's.
+    """
+    coordinates = Coordinates(law, ReferencePoint(USUAL_STRESS, RATE_STRAIN, RATE_TIME, USUAL_TEMPERATURE))
+    with np.errstate(all="ignore"):
+        u = coordinates.u(law.to_internal(law.center())[0])
+        u[list(coordinates.coefficients)] = math.log(USUAL_RATE)
+        theta = coordinates.theta(u)
+    low, high = law.internal_bounds
+    inside = np.where(np.isfinite(theta), np.clip(theta, low, high), law.internal_bounds.mean(axis=0))
+    return {name: float(value) for name, value in law.from_internal(inside).items()}
+
+
+def _specimens(histories: Sequence[History], first: str | None) -> tuple[Specimen, ...]:
+    """All registered specimens whose load is one number over time: that of the tests first."""
+    known = {name: one for name, one in known_specimens().items() if _has_plain_load(one)}
+    wanted = [*([first] if first else []), *(history.specimen for history in histories)]
+    for name in wanted:
+        if name not in known:
+            raise FitError(f"specimen '{name}' cannot be shown on a page; those that can are {', '.join(known)}")
+    return tuple(known[name] for name in dict.fromkeys([*wanted, *sorted(known, key=_bar_first(known))]))
+
+
+def _bar_first(known: Mapping[str, Any]) -> Any:
+    """Sort specimens by how much is asked of a user before a first curve is seen: those without lengths first."""
+    return lambda name: (
+        "modulus" in getattr(known[name], "conditions", {}),
+        len(getattr(known[name], "dimensions", ())),
+    )
+
+
+def _has_plain_load(specimen: Any) -> bool:
+    return any(load.name != "components" for load in getattr(specimen, "loads", ()))
+
+
+def _first_temperature(histories: Sequence[History], fit: Identification | None) -> float:
+    if histories:
+        return float(np.median([history.mean_temperature for history in histories]))
+    return USUAL_TEMPERATURE if fit is None else float(fit.reference.temperature)
+
+
+def usual_end(page_law: PageLaw, stress: float, temperature: float) -> float:
+    """s, when a bar under `stress` (MPa) has crept by USUAL_STRAIN, or ruptures; what a first curve is to show."""
+    times = np.geomspace(1e-6, 1e22, 561)
+    plan = History(name="first curve", times=times, outputs={}, loading=_held_stress(stress), temperature=temperature)
+    law = page_law.law
+    try:
+        prediction = predict_with(known_specimens()[plan.specimen], law, law.to_internal(dict(page_law.values)), [plan])
+    except CreepkitError:
+        return USUAL_TIME
+    strain = prediction.values[0, 0, :, 0]
+    reached = np.flatnonzero(np.isfinite(strain) & (strain > 0.0) & (strain < USUAL_STRAIN))
+    if not reached.size:
+        return USUAL_TIME
+    end = min(float(times[min(reached[-1] + 1, times.size - 1)]), float(prediction.end_times[0, 0]) * 1.02)
+    if not (math.isfinite(end) and end > 0.0):
+        return USUAL_TIME
+    hours = float(f"{end / 3600.0:.2g}")
+    return 3600.0 * hours
+
+
+def _held_stress(stress: float) -> Any:
+    from creepkit.records import constant_stress
+
+    return constant_stress(stress)

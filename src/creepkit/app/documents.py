@@ -1,0 +1,268 @@
+"""The contents of a page as one JSON document, which its scripts read: laws, specimens and tests in plain numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.app.contents import RATE_STRAIN, RATE_TIME, USUAL_STRESS, PageContents, PageLaw, usual_end
+from creepkit.app.model_data import law_data
+from creepkit.app.page_models import model_of
+from creepkit.errors import CreepkitError
+from creepkit.exporters.latex import latex_unit
+from creepkit.language.printing import LatexLawPrinter, latex_equations
+from creepkit.records import (
+    History,
+    LawWithValues,
+    Load,
+    Specimen,
+    dimensions_of,
+    loads_of,
+    outputs_of,
+    outputs_of_test,
+    typical_history,
+)
+from creepkit.records.interfaces import SupportsReducedOrderModel
+from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.specimens.relaxation import Relaxation
+from creepkit.specimens.run import Runnable
+from creepkit.specimens.uniaxial import Uniaxial
+
+if TYPE_CHECKING:
+    from creepkit.arrays import Floats
+    from creepkit.inverse.identification import Identification
+
+
+MOST_FRAMES = 300
+"""Frames of a test that a page draws and compares; of a longer one, as many evenly spread over its frames."""
+
+
+def contents_document(contents: PageContents, models: Collection[str] = ()) -> dict[str, Any]:
+    """All that the scripts of a page read, but for what answers them.
+
+    models : names of the reduced-order models that the page brings along, of one that no server answers.
+    """
+
+    def with_model(document: dict[str, Any], specimen: Specimen, history: History | None = None) -> dict[str, Any]:
+        own = [name for name in (model_of(specimen, history) if models else ()) if name in models]
+        return {**document, "model": own[0] if own else None}
+
+    specimens = [with_model(specimen_document(one), one) for one in contents.specimens]
+    stress = specimens[0]["loads"][0]["stress"]
+    return {
+        "title": contents.title,
+        "laws": [law_document(one, usual_end(one, stress, contents.temperature)) for one in contents.laws],
+        "specimens": specimens,
+        "tests": [
+            with_model(test_document(one, contents), contents.specimen(one.specimen), one) for one in contents.histories
+        ],
+        "temperature": contents.temperature,
+    }
+
+
+# ---- laws ----------------------------------------------------------------------------------------------------------
+
+
+def law_document(page_law: PageLaw, end: float) -> dict[str, Any]:
+    """A law: equation, parameters, where its sliders start, and what is known of its values.
+
+    end : s, of a first curve.
+    """
+    law, latex = page_law.law, LatexLawPrinter(page_law.law)
+    known = law_data(LawWithValues(law, page_law.values) if page_law.fit is None else page_law.fit)
+    for symbol, row in zip(law.params, known["parameters"], strict=True):
+        row |= {"latex": latex.doprint(symbol), "latex_unit": latex_unit(row["unit"]).strip("$")}
+    return {
+        **{name: value for name, value in known.items() if name != "source"},
+        # the page's style aligns their columns, for the policy of the server allows no other
+        "equations": [re.sub(r' style="[^"]*"', "", equation) for equation in known["equations"]],
+        "code": law_code_name(page_law),
+        "latex": [f"{left} = {' '.join(right)}" for left, right in latex_equations(law, latex)],
+        "weight": page_law.weight,
+        "end": end,
+        "rate_point": rate_point(page_law.fit),
+        "covariance": None if page_law.fit is None else _covariance(page_law.fit),
+        "undetermined": [] if page_law.fit is None else list(_undetermined(page_law.fit)),
+    }
+
+
+def law_code_name(page_law: PageLaw) -> str:
+    """The name under which the scripts of a page find the law as JavaScript."""
+    return page_law.law.fingerprint
+
+
+def rate_point(fit: Identification | None) -> dict[str, Any]:
+    """At which strain and time (s) the creep rate is shown, and over which stresses, MPa."""
+    if fit is None:
+        return {"strain": RATE_STRAIN, "time": RATE_TIME, "stress": [0.1 * USUAL_STRESS, 5.0 * USUAL_STRESS]}
+    low, high = fit.ranges["stress"]
+    reference = fit.reference
+    return {"strain": reference.strain, "time": reference.time, "stress": [low / 2.0, high * 2.0]}
+
+
+def _covariance(fit: Identification) -> list[list[float]] | None:
+    """Of the internal values, from which follows what the others are likely to be when one is moved."""
+    to_theta = fit.coordinates.jacobian(fit.u)
+    covariance = np.asarray(to_theta @ fit.covariance @ to_theta.T)
+    return covariance.tolist() if np.isfinite(covariance).all() else None
+
+
+def _undetermined(fit: Identification) -> Sequence[str]:
+    try:
+        return fit.undetermined()
+    except (CreepkitError, np.linalg.LinAlgError, ValueError):
+        return ()
+
+
+# ---- specimens -----------------------------------------------------------------------------------------------------
+
+
+def specimen_document(specimen: Specimen) -> dict[str, Any]:
+    """A specimen by its record: outputs, loads, lengths, and whether it needs a modulus or has a section to draw."""
+    conditions: Mapping[str, tuple[float, float]] = getattr(specimen, "conditions", None) or {}
+    elastic = typical_history(specimen).elastic
+    low, high = conditions.get("modulus", (50e3, 300e3))
+    return {
+        "name": specimen.name,
+        "title": specimen.title,
+        "outputs": [
+            {
+                "name": str(output),
+                "title": output.long_name,
+                "unit": output.unit,
+                "logarithmic": output.logarithmic,
+                "grows": output.grows,
+                "noise": output.noise,
+            }
+            for output in outputs_of(specimen)
+            if output in specimen.outputs
+        ],
+        "loads": [_load_document(specimen, load, conditions) for load in loads_of(specimen)],
+        "dimensions": [
+            {"name": d.name, "title": d.long_name, "value": d.default, "low": d.bounds[0], "high": d.bounds[1]}
+            for d in dimensions_of(specimen)
+            if d.of_piece
+        ],
+        "modulus": {
+            "needed": "modulus" in conditions,
+            "low": low,
+            "high": high,
+            "value": float(f"{getattr(elastic, 'E', 150e3):.2g}"),
+        },
+        "runtime": runtime_of(specimen),
+        "reduced": isinstance(specimen, SupportsReducedOrderModel),
+        "runs": isinstance(specimen, Runnable),
+    }
+
+
+def runtime_of(specimen: Specimen) -> str | None:
+    """Which function of the runtime predicts a specimen in a page that stands alone; None where none does."""
+    kinds: dict[type[object], str] = {Uniaxial: "creep", Relaxation: "relaxation", Bulge: "dimple"}
+    return kinds.get(type(specimen))
+
+
+def _load_document(specimen: Specimen, load: Load, conditions: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+    plan = typical_history(specimen, load.name)
+    value = float(f"{np.max(plan.loading.program().values):.2g}")
+    low, high = conditions.get(load.name, (0.1 * value, 10.0 * value))
+    return {
+        "name": load.name,
+        "title": load.long_name,
+        "unit": load.unit,
+        "low": low,
+        "high": high,
+        "value": value,
+        "ramp": load.ramp,
+        "control": load.name == "stress",
+        "stress": _reference_stress(specimen, plan),
+    }
+
+
+def _reference_stress(specimen: Any, plan: History) -> float:
+    """MPa, that stands for a plan."""
+    try:
+        stress = float(np.max(specimen.reference_stress(plan)))
+    except (CreepkitError, AttributeError, ValueError):
+        return USUAL_STRESS
+    return stress if 0.0 < stress < math.inf else USUAL_STRESS
+
+
+# ---- measured tests ------------------------------------------------------------------------------------------------
+
+
+def compared_frames(history: History) -> Any:
+    """(frames,) indices of the used frames that a page shows."""
+    used = np.flatnonzero(history.used)
+    if used.size > MOST_FRAMES:
+        used = used[np.unique(np.linspace(0, used.size - 1, MOST_FRAMES).round().astype(int))]
+    return used
+
+
+def test_document(history: History, contents: PageContents) -> dict[str, Any]:
+    """A measured test: its frames, the noise of each output, and how it was made."""
+    frames = compared_frames(history)
+    program, temperature = history.loading.program(), history.temperature_program()
+    specimen: Any = contents.specimen(history.specimen)
+    stated = set(outputs_of_test(specimen, history)) if history.outputs else set()
+    return {
+        "name": history.name,
+        "condition": history.condition,
+        "specimen": history.specimen,
+        "times": numbers(history.times[frames]),
+        "outputs": {str(n): numbers(v[frames]) for n, v in history.outputs.items() if n in stated},
+        "noise": {n: v for n in history.outputs if (v := _noise(history, n, contents)) is not None},
+        "offset": _offsets(history, contents),
+        "load": history.loading.quantity,
+        "control": getattr(history.loading, "control", "load"),
+        "program": [numbers(program.times), numbers(program.values)],
+        "temperature": float(np.mean(temperature.values)),
+        "temperature_program": [numbers(temperature.times), numbers(temperature.values)],
+        "modulus": finite(getattr(history.elastic, "E", None)),
+        "lengths": {name: float(value) for name, value in history.geometry.items()},
+        "minimum_rate": history.minimum_rate,
+        "rupture_time": history.rupture_time,
+        "includes_elastic": history.includes_elastic,
+        "measure": history.strain_measure,
+    }
+
+
+def _noise(history: History, output: str, contents: PageContents) -> float | None:
+    """Standard deviation of a frame in the unit of the output: stated, else estimated by the fit, else the record's."""
+    stated = history.standard_deviation.get(output)
+    if stated is not None and np.isfinite(stated).any() and float(np.nanmedian(stated)) > 0.0:
+        return float(np.nanmedian(stated))
+    for one in _test_fits(history, contents):
+        for fitted in one.outputs:
+            if fitted.output == output and 0.0 < fitted.noise < math.inf:
+                return float(fitted.noise)
+    for known in outputs_of(contents.specimen(history.specimen)):
+        if known == output:
+            return known.noise
+    return None
+
+
+def _offsets(history: History, contents: PageContents) -> dict[str, float]:
+    """{output: what was added to it before creep began, as loading strain is}, of the first law's identification."""
+    return {o.output: float(o.offset) for one in _test_fits(history, contents) for o in one.outputs if o.offset}
+
+
+def _test_fits(history: History, contents: PageContents) -> list[Any]:
+    fit = contents.laws[0].fit
+    return [] if fit is None else [one for one in fit.tests if one.name == history.name]
+
+
+# ---- numbers -------------------------------------------------------------------------------------------------------
+
+
+def numbers(values: Floats) -> list[float | None]:
+    """Numbers to six digits, which is finer than a screen; None in the place of those that are not finite."""
+    return [float(f"{v:.6g}") if math.isfinite(v) else None for v in np.asarray(values, float).ravel().tolist()]
+
+
+def finite(value: Any) -> float | None:
+    """The number, or None where it is none or not finite."""
+    return float(value) if isinstance(value, int | float | np.floating) and math.isfinite(value) else None

@@ -1,0 +1,36 @@
+"use strict";
+// How far predictions lie from measured tests: root mean square, and its ratio to the noise.
+(function (page) {
+  // {output: {rms, ratio, frames, squares}} of one test; predicted: {output: values at its frames}
+  page.misfit = function (test, predicted) {
+    const result = {};
+    for (const [name, measured] of Object.entries(test.outputs)) {
+      const values = predicted[name];
+      if (values === undefined) continue;
+      const offset = test.offset[name] ?? 0, noise = test.noise[name] ?? null;
+      let sum = 0, frames = 0, lost = 0;
+      measured.forEach((value, k) => {
+        if (value === null) return;
+        if (values[k] === null || values[k] === undefined) { lost++; return; }
+        sum += (values[k] + offset - value) ** 2;
+        frames++;
+      });
+      const rms = frames ? Math.sqrt(sum / frames) : null;
+      result[name] = { rms, frames, lost, ratio: rms === null || !noise ? null : rms / noise, squares: noise ? sum / noise ** 2 : null };
+    }
+    return result;
+  };
+
+  // The rms of residuals over their noise, of all outputs of all tests; null where no noise is known.
+  page.weighted = function (misfits) {
+    let squares = 0, frames = 0;
+    for (const misfit of misfits) {
+      for (const one of Object.values(misfit)) {
+        if (one.squares === null) continue;
+        squares += one.squares;
+        frames += one.frames;
+      }
+    }
+    return frames ? Math.sqrt(squares / frames) : null;
+  };
+})((globalThis.creepkitPage ??= {}));

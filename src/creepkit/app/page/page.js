@@ -1,0 +1,179 @@
+"use strict";
+// The page: controls at one side, panels at the other; every input asks the engine, every answer is drawn.
+(function (page) {
+  const { element } = page;
+  const LONGEST_LABEL = 22; // letters beside an axis
+  const MOST_SHOWN = 12; // tests that are shown at first
+  page.latencies = []; // ms from an input to the frame after its curves were drawn
+
+  const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+  page.start = function (root) {
+    const data = JSON.parse(root.querySelector(".creepkit-page-data").textContent);
+    const state = { law: 0, temperature: data.temperature, end: data.laws[0].end, tests: data.tests.map((_, k) => k < MOST_SHOWN), planned: data.tests.length === 0 };
+    const status = element("p", { class: "status", role: "status" });
+    const problem = element("p", { class: "problem", role: "alert", hidden: true });
+    const panels = element("div", { class: "panels" });
+    let inputAt = null, charts = new Map(), rates = null, section = null, last = null, timer = null, before = null, settled = true;
+
+    const engine = data.endpoint ? page.serverEngine(data.endpoint, draw, complain) : page.ownEngine(data, draw, complain);
+    data.specimens = data.specimens.filter((specimen) => engine.has(specimen));
+
+    const laws = page.lawControls(data, state, { onInput: changed, onRelease: released, onLaw });
+    const planned = page.testControls(data, state, { onInput: plannedChanged, onRelease: released, onSpecimen });
+    const tests = page.testList(data, state, { onInput: () => changed(null), onRelease: released, onRepeat });
+    const show = element("input", { type: "checkbox", id: page.identifier("planned"), onchange: () => { state.planned = show.checked; onSpecimen(); } });
+    show.checked = state.planned;
+    const showRow = element("div", { class: "check" }, show, element("label", { for: show.id }, "show the planned test"));
+    if (data.tests.length) planned.group.insertBefore(showRow, planned.group.children[1]);
+
+    root.replaceChildren(
+      element("header", {}, element("h2", {}, data.title), status),
+      problem,
+      element("div", { class: "columns" },
+        element("form", { class: "controls", onsubmit: (event) => event.preventDefault() }, laws.group, data.tests.length ? tests.group : null, planned.group, page.copies(() => ({ state, law: data.laws[state.law] }))),
+        panels),
+    );
+    laws.use(0);
+    planned.use(0);
+    onSpecimen();
+
+    // ---- what a person does ------------------------------------------------------------------------------------
+
+    function onLaw(position) {
+      state.law = position;
+      laws.use(position);
+      planned.build();
+      changed(null);
+      released();
+    }
+
+    function onSpecimen() {
+      before = null;
+      makePanels();
+      changed(null);
+      released();
+    }
+
+    function onRepeat(k) {
+      const test = data.tests[k];
+      planned.use(data.specimens.findIndex((one) => one.name === test.specimen), page.programOf(test));
+      state.planned = show.checked = true;
+      onSpecimen();
+    }
+
+    function plannedChanged(event) {
+      if (!state.planned) { state.planned = show.checked = true; makePanels(); }
+      changed(event);
+    }
+
+    // The curves as they were before a slider began to move stay, in grey, until the next one does.
+    function changed(event) {
+      if (settled && event !== null) { before = last; settled = false; }
+      inputAt = event === null ? null : performance.now();
+      engine.quick(question());
+    }
+
+    function released() {
+      settled = true;
+      clearTimeout(timer);
+      timer = setTimeout(() => engine.precise(question()), 120);
+    }
+
+    function question() {
+      const { specimen, load, steps, ramp, control, end, temperature, modulus, lengths } = state;
+      const program = { specimen: specimen.name, load: load.name, steps, control, ramp: load.control ? 0 : ramp, end, temperature, modulus: specimen.modulus.needed ? modulus : null, lengths };
+      const shown = data.tests.map((_, k) => k).filter((k) => state.tests[k]);
+      return { law: state.law, values: state.values, program: state.planned ? program : null, tests: shown, rate_temperature: temperature };
+    }
+
+    // ---- panels ------------------------------------------------------------------------------------------------
+
+    function makePanels() {
+      const names = new Set(data.tests.filter((_, k) => state.tests[k]).map((test) => test.specimen));
+      if (state.planned || names.size === 0) names.add(state.specimen.name);
+      const outputs = new Map(data.specimens.filter((one) => names.has(one.name)).flatMap((one) => one.outputs.map((output) => [output.name, output])));
+      // the title names it in full
+      const label = (output) => (output.title.length > LONGEST_LABEL ? output.unit : output.unit ? `${output.title}, ${output.unit}` : output.title);
+      charts = new Map([...outputs].map(([name, output]) => [name, page.chart({ title: capital(output.title), x: { label: "time", logarithmic: false, choice: true }, y: { label: label(output), logarithmic: false, choice: true } })]));
+      const point = data.laws[state.law].rate_point;
+      rates = page.chart({ title: "Creep rate against stress", whole: true, x: { label: "stress, MPa", logarithmic: true }, y: { label: "creep rate, 1/s", logarithmic: true } });
+      rates.heading.append(element("span", { class: "help" }, ` at a strain of ${page.format(point.strain, 2)} and ${page.duration(point.time)}`));
+      section = page.section();
+      section.panel.hidden = true;
+      panels.replaceChildren(...[...charts.values()].map((chart) => chart.panel), section.panel, rates.panel);
+    }
+
+    function draw(answer) {
+      const started = inputAt;
+      problem.hidden = true;
+      const shown = (answer.tests ?? []).filter((one) => state.tests[one.test]);
+      const ends = [...shown.map((one) => data.tests[one.test].times.at(-1)), ...(answer.program ? [state.end] : [])];
+      const unit = page.timeUnit(Math.max(...ends, 1e-30));
+      const inUnit = (times) => times.map((t) => (t === null ? null : t / unit.size));
+      for (const [name, chart] of charts) {
+        const series = [];
+        for (const one of shown) {
+          const test = data.tests[one.test], colour = page.colour(one.test), offset = test.offset[name] ?? 0, x = inUnit(test.times);
+          if (test.outputs[name]) series.push({ kind: "points", name: one.test, x, y: test.outputs[name], colour });
+          if (one.outputs[name]) series.push({ kind: "line", x, y: one.outputs[name].map((v) => (v === null ? null : v + offset)), colour });
+        }
+        if (before?.program?.outputs[name] && answer.program) series.push({ kind: "line", style: "before", x: inUnit(before.program.times), y: before.program.outputs[name], colour: "var(--soft)" });
+        if (answer.program?.outputs[name]) series.push({ kind: "line", style: "plan", x: inUnit(answer.program.times), y: answer.program.outputs[name], colour: page.colour(null) });
+        const planned = answer.program?.outputs[name]?.filter((v) => v !== null).at(-1);
+        chart.draw({ series, xLabel: `time, ${unit.name}`, summary: planned === undefined ? `${shown.length} measured tests.` : `The planned test ends at ${page.format(planned)}.` });
+      }
+      drawRates(answer.rate);
+      if (answer.program?.section) {
+        section.panel.hidden = false;
+        section.draw(answer.program.section);
+      }
+      const misfits = new Map(shown.map((one) => [one.test, page.misfit(data.tests[one.test], one.outputs)]));
+      if (data.tests.length) tests.show(misfits);
+      say(answer);
+      last = answer;
+      if (started !== null) {
+        inputAt = null;
+        requestAnimationFrame(() => requestAnimationFrame(() => {
+          page.latencies.push(performance.now() - started);
+          if (page.latencies.length > 5000) page.latencies.shift();
+        }));
+      }
+    }
+
+    function drawRates(rate) {
+      if (!rate) return;
+      const colour = page.colour(null);
+      const drawn = (rate, style, colour) => ({ kind: "line", style, x: rate.stress, y: rate.log_rate.map((v) => (v === null ? null : 10 ** v)), colour });
+      const series = [...(before?.rate ? [drawn(before.rate, "before", "var(--soft)")] : []), drawn(rate, "plan", colour)];
+      data.tests.forEach((test, k) => {
+        if (state.tests[k] && test.minimum_rate !== null && test.load === "stress") series.push({ kind: "points", name: k, large: true, x: [test.program[1].at(-1)], y: [test.minimum_rate], colour: page.colour(k) });
+      });
+      rates.draw({ series, summary: rate.problem ?? "" });
+    }
+
+    function say(answer) {
+      const how = answer.exact ? "" : state.specimen.reduced && state.planned ? (data.endpoint ? "Reduced-order model; finite elements when you let go. " : "Reduced-order model in few modes; all modes when you let go. ") : "";
+      const ended = answer.program?.ended ? `The planned test ended after ${page.duration(answer.program.end)}: ${answer.program.ended}.` : "";
+      status.textContent = how + ended;
+      root.dataset.exact = String(answer.exact);
+      root.dataset.number = String(answer.number ?? 0);
+    }
+
+    function complain(sentence) {
+      problem.textContent = sentence;
+      problem.hidden = false;
+    }
+
+    return { data, state, redraw: () => last && draw(last) };
+  };
+
+  function startAll() {
+    for (const root of document.querySelectorAll(".creepkit-page:not([data-started])")) {
+      root.dataset.started = "";
+      page.start(root);
+    }
+  }
+  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", startAll);
+  else startAll();
+})((globalThis.creepkitPage ??= {}));

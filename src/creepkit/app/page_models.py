@@ -1,0 +1,49 @@
+"""Reduced-order models that a page brings along: of the first piece of each specimen, and of the pieces of its tests."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import lru_cache
+from typing import Any
+
+from creepkit.app.contents import PageContents
+from creepkit.app.reduced_model_data import rom_data
+from creepkit.errors import CreepkitError
+from creepkit.records import History, Specimen
+from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
+from creepkit.specimens.bulge.specimen import Bulge
+
+MOST_MODELS = 4
+"""Of one page, some 150 kB each; tests of further pieces are shown without a curve."""
+
+
+def page_models(contents: PageContents) -> dict[str, str]:
+    """{name: data as JSON} of the models of a page that stands alone."""
+    models: dict[str, str] = {}
+    for specimen in contents.specimens:
+        models |= model_of(specimen)
+    for history in contents.histories:
+        found = model_of(contents.specimen(history.specimen), history)
+        if len(models) < MOST_MODELS:
+            models |= found
+    return models
+
+
+def model_of(specimen: Specimen, history: History | None = None) -> dict[str, str]:
+    """{name: data} of the model of a specimen, or of the piece and the observation of a test; {} where there is none."""
+    if not isinstance(specimen, Bulge):
+        return {}
+    if history is not None:
+        lengths = {name: history.geometry[name] for name in specimen.geometry.lengths if name in history.geometry}
+        specimen = specimen.replace(**lengths, observation=specimen.observation_of(history))
+    try:
+        return dict([_packed(specimen)])
+    except CreepkitError:  # of rings, say, which the runtime does not know
+        return {}
+
+
+@lru_cache(maxsize=16)
+def _packed(specimen: Bulge) -> tuple[str, str]:
+    text = json.dumps(rom_data(BulgeReducedOrderModel(specimen)), allow_nan=False, separators=(",", ":"))
+    return f"dimple-{hashlib.sha256(text.encode()).hexdigest()[:12]}", text

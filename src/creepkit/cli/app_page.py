@@ -1,0 +1,100 @@
+"""`creepkit app`: an interactive page of a law, an identification or a ranking, served on this machine alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from creepkit.app.contents import PageContents, PageSource
+    from creepkit.records import History
+
+
+def command(
+    sources: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[LAW|FIT.json|TESTS]...", help="A law, an identification or a ranking, and tests."),
+    ] = None,
+    specimen: Annotated[str | None, typer.Option(help="Which is shown first; by default that of the tests.")] = None,
+    to: Annotated[Path | None, typer.Option(help="Write the page as one file, and serve nothing.")] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the server; 0 takes any that is free.")] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Whether to open a browser.")] = True,
+) -> None:
+    """Explore a law by sliders in a browser page.
+
+    Measured tests are laid over. The page is served on this machine alone until Ctrl-C, or written as one file.
+    """
+    from creepkit.api.pages import write_page
+    from creepkit.app.contents import page_contents
+
+    source, tests = _resolved(sources or [])
+    contents = page_contents(source, tests, specimen=specimen)
+    if to is not None:
+        typer.echo(f"wrote {write_page(contents, to)}")
+        return
+    _serve(contents, port, browser)
+
+
+def _resolved(words: list[str]) -> tuple[PageSource, list[History]]:
+    """The source of the page, and the measured tests; a word that is no file is a law."""
+    import creepkit as ck
+    from creepkit.errors import FitError
+    from creepkit.exporters.law_files import read_law_file
+    from creepkit.inverse.ranking_document import RANKING, read_ranking
+
+    laws = ck.available("laws")
+    sources: list[PageSource] = []
+    tests: list[str] = []
+    for word in words:
+        named = word in laws or ("+" in word and not Path(word).exists())
+        if named or not (Path(word).exists() or any(c in word for c in "*?[./\\")):
+            sources.append(ck.law(word))
+        elif Path(word).suffix.lower() == ".json" and _format(Path(word)) is not None:
+            sources.append(read_ranking(word) if _format(Path(word)) == RANKING.name else read_law_file(Path(word)))
+        else:
+            tests.append(word)
+    if len(sources) > 1:
+        raise FitError(f"{len(sources)} laws or results are named; name one, and tests beside it")
+    histories = ck.read_histories(tests) if tests else []
+    return sources[0] if sources else DEFAULT_LAW, list(histories)
+
+
+DEFAULT_LAW = "norton"
+"""Where only tests are named, or nothing."""
+
+
+def _format(path: Path) -> str | None:
+    """The format of a law, an identification or a ranking in JSON; None for a file of tests."""
+    from creepkit.exporters.law_files import VALUED_LAW
+    from creepkit.files.json_documents import read_json
+    from creepkit.inverse.identification_document import IDENTIFICATION
+    from creepkit.inverse.ranking_document import RANKING
+
+    data = read_json(path, VALUED_LAW.kind)
+    name = data.get("format") if isinstance(data, dict) else None
+    return name if name in (VALUED_LAW.name, IDENTIFICATION.name, RANKING.name) else None
+
+
+def _serve(contents: PageContents, port: int, browser: bool) -> None:
+    import threading
+    import webbrowser
+
+    from creepkit.app.server import PageServer
+    from creepkit.errors import FitError
+
+    try:
+        server = PageServer(contents, port)
+    except OSError as error:
+        raise FitError(f"--port {port} cannot be used: {error.strerror}; choose another, or 0 for any") from None
+    with server:
+        threading.Thread(target=server.answers.prepare, daemon=True).start()
+        typer.echo(f"the page: {server.url}")
+        typer.echo("Ctrl-C ends it", err=True)
+        if browser:
+            webbrowser.open(server.url)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            typer.echo("ended", err=True)
