@@ -121,6 +121,8 @@ from .specimens.per_test import OneTest as OneTest
 from .specimens.per_test import PerTest as PerTest
 from .specimens.test_piece import TestPiece as TestPiece
 from .specimens.test_piece import dimension as dimension
+from .studies.result import StudyResult as StudyResult
+from .studies.study import Study as Study
 from .surrogates.parameter_gru import ParameterGru as ParameterGru
 from .surrogates.recipe import Training as Training
 from .testing import check_camera_format as check_camera_format

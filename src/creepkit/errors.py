@@ -50,6 +50,14 @@ class ExportError(CreepkitError):
     """A law cannot be written in the language that was asked for."""
 
 
+class ReportError(CreepkitError):
+    """A report cannot be written, or the files that it carries cannot be trusted."""
+
+
+class StudyError(CreepkitError):
+    """A study file, or what it asks for, is not well formed; or its results cannot be kept."""
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return `` Did you mean 'x'?`` when a known word lies near, else the list of what is known."""
     known = sorted(known)

@@ -10,7 +10,7 @@ from creepkit.records import dimensions_of, outputs_of
 from creepkit.registry import default_registry
 from helpers import source_tree
 
-PACKAGES = ("readers", "quality", "extraction", "inverse", "report", "cli", "experiments", "forecasts")
+PACKAGES = ("readers", "quality", "extraction", "inverse", "reports", "cli", "experiments", "forecasts")
 PACKAGES += ("screening", "discovery")
 """No string, attribute or keyword of theirs is such a name; sentences may give one as an example."""
 

@@ -290,7 +290,7 @@ def law_with_values(
 
     resolved: Any = getattr(source, "valued", source)  # a temperature law has one
     if isinstance(resolved, Identification):
-        from creepkit.report.identification_text import identification_comments
+        from creepkit.reports.identification_text import identification_comments
 
         resolved = LawWithValues(
             resolved.law, resolved.values, tuple(identification_comments(resolved)), ranges=resolved.ranges

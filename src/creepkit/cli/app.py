@@ -24,6 +24,7 @@ from creepkit.cli import (
     extract,
     generate,
     identify,
+    init,
     laws,
     new_exporter,
     new_law,
@@ -33,6 +34,7 @@ from creepkit.cli import (
     predict,
     read,
     reduced_model,
+    run,
     rupture,
     screen,
     simulate,
@@ -109,6 +111,8 @@ app = typer.Typer(
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
+    "init": init.command,
+    "run": run.command,
     "laws": laws.command,
     "specimens": specimens.command,
     "plugins": plugins.command,

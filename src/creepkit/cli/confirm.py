@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.report.terminal import print_json, print_table
+from creepkit.reports.terminal import print_json, print_table
 
 
 def command(
@@ -22,7 +22,7 @@ def command(
     from dataclasses import replace
 
     import creepkit as ck
-    from creepkit.report.identification_text import CONFIRMATION_COLUMNS, confirmation_rows, confirmation_to_json
+    from creepkit.reports.identification_text import CONFIRMATION_COLUMNS, confirmation_rows, confirmation_to_json
 
     identification, histories = ck.load(fit), ck.read_histories(tests)
     if surrogate is not None:

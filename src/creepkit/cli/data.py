@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.report.terminal import print_json
+from creepkit.reports.terminal import print_json
 
 DATA_SET_SUFFIXES = (".h5", ".hdf5")
 """Endings of data sets; everything else is read as measured tests."""
@@ -53,7 +53,7 @@ def _describe_data_set(file: Path, as_json: bool, plots: Path | None, seed: int)
     else:
         typer.echo(str(data))
     if plots is not None:
-        from creepkit.report.dataset import write_dataset_figures
+        from creepkit.reports.dataset import write_dataset_figures
 
         for path in write_dataset_figures(data, plots, seed):
             typer.echo(f"wrote {path}", err=as_json)
@@ -61,8 +61,8 @@ def _describe_data_set(file: Path, as_json: bool, plots: Path | None, seed: int)
 
 def _check_measured_tests(file: Path, as_json: bool, reader: str | None, activation_energy: float | None) -> None:
     import creepkit as ck
-    from creepkit.report.data_quality import data_quality_to_json
-    from creepkit.report.histories import assumptions_text
+    from creepkit.reports.data_quality import data_quality_to_json
+    from creepkit.reports.histories import assumptions_text
 
     histories = ck.read_histories(file, reader=reader)
     quality = ck.check_data_quality(histories, activation_energy=activation_energy)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from creepkit.cli.identify import file_stem, write_ranking
-from creepkit.report.terminal import ProgressBar
+from creepkit.reports.terminal import ProgressBar
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification

@@ -7,7 +7,6 @@ the specimen or a plugin brings it; `creepkit specimens NAME` lists them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -189,28 +188,16 @@ def _load(
     load: Load | None, name: str, texts: Sequence[str], control: str | None, ramp: float | None, end: float
 ) -> Loading:
     """One load by steps; its ramp is the load's own where none is given."""
+    from creepkit.api.planned_tests import stepped_load
     from creepkit.errors import SolveError
-    from creepkit.records import StressSteps, TwoLevels, loading_of
 
     option = f"--{name.replace('_', '-')}"
     steps = parse_steps(texts, option)
-    if name == "stress":
-        if control not in (None, "load", "stress"):
-            raise SolveError(f"--control {control} is not known; allowed are load and stress")
-        return StressSteps(tuple(steps), "stress" if control == "stress" else "load")
-    given = ramp if ramp is not None else 0.0 if load is None else load.ramp
-    starts, values = [start for start, _ in steps], [value for _, value in steps]
-    early = any(later - earlier < given for earlier, later in pairwise(starts))
-    negative = load is not None and load.kind.low >= 0.0 and min(values) < 0.0
-    if starts[0] != 0.0 or early or negative:
-        raise SolveError(
-            f"{option} {' '.join(texts)}: the first {name} starts at 0 s, none is negative, and each comes {given:g} s "
-            "or more after the one before, for the ramp takes that long"
-        )
-    if given and len(steps) <= 2 and min(values) > 0.0 and (len(steps) == 1 or starts[1] > given):
-        time = starts[1] if len(steps) == 2 else max(end, 2 * given)
-        return loading_of(name, TwoLevels(values[0], values[-1], time), ramp=given, end=end)
-    return loading_of(name, steps, ramp=given, end=end)
+    try:
+        return stepped_load(name, load, steps, control=control, ramp=ramp, end=end)
+    except SolveError as error:
+        given = "--" if str(error).startswith("control") else f"{option} {' '.join(texts)}: "
+        raise SolveError(f"{given}{error}") from None
 
 
 def _component_loading(specimen: Specimen, loads: LoadTexts) -> Loading:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.report.terminal import ProgressBar, print_json
+from creepkit.reports.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from creepkit.experiments.design_task import Goal
@@ -68,8 +68,8 @@ def command(
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.ranking_document import read_fit_or_ranking
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-    from creepkit.report.design import design_to_json, print_design
-    from creepkit.report.figures import check_figure_target
+    from creepkit.reports.design import design_to_json, print_design
+    from creepkit.reports.figures import check_figure_target
 
     if plot is not None:
         check_figure_target(plot)

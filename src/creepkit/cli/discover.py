@@ -23,7 +23,7 @@ from creepkit.cli.identification_options import (
     surrogate_named,
 )
 from creepkit.cli.options import NUISANCE_SYNTAX, check_folder, parse_nuisances
-from creepkit.report.terminal import ProgressBar, print_json
+from creepkit.reports.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -111,7 +111,7 @@ def command(
         temperature_law = _temperature_law_of(study)
     written = write_temperature_law(temperature_law, to)
     if as_json:
-        from creepkit.report.temperature_law import temperature_law_to_json
+        from creepkit.reports.temperature_law import temperature_law_to_json
 
         print_json(temperature_law_to_json(temperature_law, written))
         return

@@ -79,8 +79,8 @@ def command(
     from creepkit.errors import HistoryError
     from creepkit.files.writing import check_target
     from creepkit.records import ZERO_CELSIUS
-    from creepkit.report.figures import check_figure_target
-    from creepkit.report.terminal import ProgressBar
+    from creepkit.reports.figures import check_figure_target
+    from creepkit.reports.terminal import ProgressBar
 
     if to is not None:
         check_folder(to)

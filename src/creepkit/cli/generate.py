@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from creepkit.cli.options import PAPER_SPECIMEN
-from creepkit.report.terminal import ProgressBar
+from creepkit.reports.terminal import ProgressBar
 
 if TYPE_CHECKING:
     from creepkit.records import Specimen
@@ -62,7 +62,7 @@ def command(
         law, specimen_record, domain, design_changes(ranges or [], end_h, domain, unscreened), interval
     )
     if dry_run:
-        from creepkit.report.sampling import print_acceptance
+        from creepkit.reports.sampling import print_acceptance
 
         print_acceptance(design, seed, to, as_json)
         return
@@ -79,7 +79,7 @@ def command(
             execution=ck.ParallelExecution(workers, cluster, parse_part(part)),
             progress=progress.tick,
         )
-    from creepkit.report.dataset import print_dataset
+    from creepkit.reports.dataset import print_dataset
 
     print_dataset(data, to, part, as_json)
 

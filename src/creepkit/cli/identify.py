@@ -24,8 +24,8 @@ from creepkit.cli.identification_options import (
     surrogate_named,
 )
 from creepkit.cli.options import NUISANCE_SYNTAX, check_folder, parse_nuisances, penalty_named, search_named
-from creepkit.report.ranking import print_ranking, ranking_to_json
-from creepkit.report.terminal import ProgressBar, print_json
+from creepkit.reports.ranking import print_ranking, ranking_to_json
+from creepkit.reports.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -171,28 +171,23 @@ def command(
 
 
 def _truncate_at_strain(histories: list[History], limit: float) -> list[History]:
-    """Frames up to a strain; a curve that has fewer than two of them is left out, and said; one without any stays.
+    """Frames up to a strain; a curve that has fewer than two of them is left out, and said."""
+    from creepkit.errors import FitError
+    from creepkit.inverse.history_checks import truncated_at_strain
 
-    How a test ended is forgotten, also of those that never came so far: all are compared over the same part of life.
-    """
-    truncated = [
-        h.up_to("strain", limit).replace(rupture_time=None, unruptured=False) if "strain" in h.outputs else h
-        for h in histories
-    ]
-    retained = [h for h in truncated if not h.outputs or int((h.used & (h.times > 0)).sum()) >= 2]
-    for history in truncated:
-        if history not in retained:
+    retained = truncated_at_strain(histories, limit)
+    names = {history.name for history in retained}
+    for history in histories:
+        if history.name not in names:
             typer.echo(f"left out: {history.name} has no two frames below a strain of {limit:g}", err=True)
     if not retained:
-        from creepkit.errors import FitError
-
         raise FitError(f"no test has two frames below a strain of {limit:g}; raise --up-to")
     return retained
 
 
 def _tell_assumptions(histories: list[History]) -> None:
     """What readers assumed of the tests, for a fit rests on it."""
-    from creepkit.report.histories import assumptions_text
+    from creepkit.reports.histories import assumptions_text
 
     for line in assumptions_text(histories).splitlines():
         typer.echo(f"note: {line}", err=True)

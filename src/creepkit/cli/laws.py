@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.report.catalogue import print_law, print_laws
+from creepkit.reports.catalogue import print_law, print_laws
 
 
 def command(

@@ -56,10 +56,6 @@ ControlOption = Annotated[str | None, typer.Option(help="Of a bar: load (held in
 RampOption = Annotated[float | None, typer.Option(min=0, help="s in which each level of a load is reached.")]
 
 
-PLANNED_FRAMES = 100
-"""Of a planned test, half spread over time and half over its logarithm."""
-
-
 LONGEST_TEST = 1e9
 """h."""
 
@@ -140,21 +136,16 @@ def described_test(options: TestOptions) -> DescribedTest:
 
 def planned_test(options: TestOptions, temperature: float | Program) -> History:
     """The history of a test that is described by options, without outputs; temperature : K."""
-    import numpy as np
-
+    from creepkit.api.planned_tests import planned_history
     from creepkit.language import Elastic
-    from creepkit.records import History
 
     test = described_test(options)
-    end, half = 3600.0 * options.end_h, PLANNED_FRAMES // 2
-    times = np.union1d(np.geomspace(1e-3 * end, end, half), np.linspace(end / half, end, half))
-    return History(
-        name="planned test",
-        times=times,
-        outputs={},
-        loading=test.loading,
+    elastic = None if options.modulus_gpa is None else Elastic(1e3 * options.modulus_gpa)
+    return planned_history(
+        test.specimen,
+        test.loading,
+        3600.0 * options.end_h,
         temperature=temperature,
-        specimen=test.specimen.name,
-        elastic=None if options.modulus_gpa is None else Elastic(1e3 * options.modulus_gpa),
-        geometry=test.lengths,
+        elastic=elastic,
+        lengths=test.lengths,
     )

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.report.catalogue import print_plugins
+from creepkit.reports.catalogue import print_plugins
 
 
 def command(as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False) -> None:

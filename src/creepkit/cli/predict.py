@@ -21,7 +21,7 @@ from creepkit.cli.planned_test import (
     parse_temperature,
     planned_test,
 )
-from creepkit.report.terminal import ProgressBar, print_json
+from creepkit.reports.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -72,8 +72,8 @@ def command(
     import creepkit as ck
     from creepkit.errors import FitError
     from creepkit.inverse.ranking_document import read_fit_or_ranking
-    from creepkit.report.figures import check_figure_target
-    from creepkit.report.forecast import forecast_to_json
+    from creepkit.reports.figures import check_figure_target
+    from creepkit.reports.forecast import forecast_to_json
 
     if plot is not None:
         check_figure_target(plot)

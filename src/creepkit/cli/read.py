@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.report.terminal import print_json
+from creepkit.reports.terminal import print_json
 
 if TYPE_CHECKING:
     from creepkit.records import History, InstrumentRecord
@@ -37,9 +37,9 @@ def command(
     """
     import creepkit as ck
     from creepkit.readers.table_summary import summarise_tables
-    from creepkit.report import histories as report
-    from creepkit.report.data_quality import data_quality_to_json
-    from creepkit.report.figures import check_figure_target
+    from creepkit.reports import histories as report
+    from creepkit.reports.data_quality import data_quality_to_json
+    from creepkit.reports.figures import check_figure_target
 
     records = _records(files, reader)
     if records:
@@ -74,7 +74,7 @@ def _write(histories: list[History], folder: Path) -> list[Path]:
     """Write each history; what cannot stand in the name of a file becomes a line."""
     import creepkit as ck
     from creepkit.readers.history_csv import history_text
-    from creepkit.report.figures import make_folder
+    from creepkit.reports.figures import make_folder
 
     names = [re.sub(r"[^\w.+-]+", "_", history.name).strip(".") or "test" for history in histories]
     if len(set(names)) < len(names):
@@ -118,8 +118,8 @@ def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:
 def _show_records(records: list[InstrumentRecord], to: Path | None, plot: Path | None, as_json: bool) -> None:
     """Print records, and draw the one there is."""
     from creepkit.errors import HistoryError
-    from creepkit.report.figures import check_figure_target
-    from creepkit.report.instrument_records import record_to_json
+    from creepkit.reports.figures import check_figure_target
+    from creepkit.reports.instrument_records import record_to_json
 
     if to is not None:
         raise HistoryError(f"--to writes tests, and {records[0].origin} is an instrument's record; leave --to away")

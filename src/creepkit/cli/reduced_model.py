@@ -29,7 +29,7 @@ def command(
     import creepkit as ck
     from creepkit.errors import SolveError
     from creepkit.records import outputs_of
-    from creepkit.report.simulation import cubature_figure
+    from creepkit.reports.simulation import cubature_figure
 
     predictor = trainable_model(ck.specimen(specimen), geometry or [])
     typer.echo(predictor.train())

@@ -9,7 +9,7 @@ import typer
 
 from creepkit.cli.identification_options import OnlyOption, select_by_label
 from creepkit.cli.options import check_file
-from creepkit.report.terminal import print_json
+from creepkit.reports.terminal import print_json
 
 HOURS_BY_SUFFIX = {"h": 1.0, "d": 24.0, "s": 1.0 / 3600.0, "": 1.0}
 
@@ -51,8 +51,8 @@ def command(
     mean, of a new heat and of one test of it; what lies beyond three times the longest test is flagged.
     """
     import creepkit as ck
-    from creepkit.report.figures import check_figure_target
-    from creepkit.report.rupture import rupture_to_json
+    from creepkit.reports.figures import check_figure_target
+    from creepkit.reports.rupture import rupture_to_json
 
     if plot is not None:
         check_figure_target(plot)

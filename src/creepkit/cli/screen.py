@@ -22,7 +22,7 @@ from creepkit.cli.identification_options import (
     surrogate_named,
 )
 from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, penalty_named
-from creepkit.report.terminal import ProgressBar
+from creepkit.reports.terminal import ProgressBar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -111,7 +111,7 @@ def command(
     written = [plate.to_csv(to / "plate.csv"), plate.to_hdf5(to / "plate.h5")]
     if plate.identified:
         written += [to / "fits", *plate.plot(to / "pictures")]
-    from creepkit.report.screening import print_screening
+    from creepkit.reports.screening import print_screening
 
     print_screening(plate, written, as_json)
 

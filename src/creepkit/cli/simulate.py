@@ -78,7 +78,7 @@ def command(
     if picture is not None and not hasattr(test.specimen, "draws_section"):
         raise SolveError(f"--picture: specimen '{test.specimen.name}' has no section to draw; leave it out")
     if picture is not None:
-        from creepkit.report.figures import check_figure_target
+        from creepkit.reports.figures import check_figure_target
 
         check_figure_target(picture, SolveError)
     if to is not None:

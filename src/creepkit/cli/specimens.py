@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.report.catalogue import print_specimen, print_specimens
+from creepkit.reports.catalogue import print_specimen, print_specimens
 
 
 def command(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.report.terminal import ProgressBar, print_json, print_table
+from creepkit.reports.terminal import ProgressBar, print_json, print_table
 
 
 def command(
@@ -36,7 +36,7 @@ def command(
 
     from creepkit.cli.train import recipe_with
     from creepkit.dataset.storage import read_dataset
-    from creepkit.report.surrogate import size_study_figure, size_study_rows
+    from creepkit.reports.surrogate import size_study_figure, size_study_rows
     from creepkit.surrogates.training import NetworkSizes, size_study
 
     if threads is not None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.report.terminal import ProgressBar, print_json
+from creepkit.reports.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from creepkit.surrogates.parameter_gru import ParameterGru
@@ -47,7 +47,7 @@ def command(
 
     import creepkit as ck
     from creepkit.dataset.storage import read_dataset
-    from creepkit.report.surrogate import write_surrogate_figures
+    from creepkit.reports.surrogate import write_surrogate_figures
 
     if threads is not None:
         torch.set_num_threads(threads)

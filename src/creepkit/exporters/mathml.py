@@ -61,7 +61,7 @@ class MathmlExporter:
             f'<head><meta charset="utf-8"/><title>{title}</title><style>{_STYLE}</style></head>',
             "<body>",
             f"<h1>{title}</h1>",
-            *_equations(law, printer),
+            *law_equations(law),
             "<table>",
             "<tr><th>Symbol</th><th>Meaning</th><th>Value</th><th>Unit</th></tr>",
             *(_html_row(row, printer) for row in parameter_rows(source, converted_values)),
@@ -148,8 +148,9 @@ def _character_reference(match: re.Match[str]) -> str:
 # ---- the page ------------------------------------------------------------------------------------------------------
 
 
-def _equations(law: CreepLaw, printer: MathmlPrinter) -> Iterator[str]:
-    """A display for the rate of strain, a summand a row, and one for each internal variable."""
+def law_equations(law: CreepLaw) -> Iterator[str]:
+    """A display for the rate of strain, a summand a row, and one for each internal variable: <math> elements."""
+    printer = MathmlPrinter()
     yield _equation_block(_with_dot(printer.doprint(strain)), [printer.doprint(term) for term in law.terms.values()])
     for symbol, state in law.states.items():
         yield _equation_block(_with_dot(printer.doprint(symbol)), [printer.doprint(state.rate)])
@@ -172,6 +173,11 @@ def _equation_block(left: str, summands: Sequence[str]) -> str:
         for name, sign, summand in zip(names, signs, summands, strict=True)
     ]
     return _math_element(f'<mtable displaystyle="true">{"".join(rows)}</mtable>', ' display="block"')
+
+
+def symbol_element(symbol: sympy.Basic) -> str:
+    """A symbol within a line of text, as a <math> element."""
+    return _math_element(f"<mrow>{MathmlPrinter().doprint(symbol)}</mrow>")
 
 
 def _math_element(content: str, attributes: str = "") -> str:

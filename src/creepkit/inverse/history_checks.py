@@ -31,6 +31,19 @@ def without_suspect_frames(histories: Sequence[History], settings: Identificatio
     return [h if SUSPECT_LABEL in h.labels else exclude_suspect_frames([h])[0] for h in histories]
 
 
+def truncated_at_strain(histories: Sequence[History], limit: float) -> list[History]:
+    """The histories with frames up to a strain alone; without curves that have fewer than two of them.
+
+    How a test ended is forgotten, also of those that never came so far: all are compared over the same part of life.
+    One without any frames stays.
+    """
+    truncated = [
+        h.up_to("strain", limit).replace(rupture_time=None, unruptured=False) if "strain" in h.outputs else h
+        for h in histories
+    ]
+    return [h for h in truncated if not h.outputs or int((h.used & (h.times > 0)).sum()) >= 2]
+
+
 def suspect_frames_note(histories: Sequence[History]) -> tuple[str, ...]:
     """The tests of which suspect frames were left out, how many and why, in one sentence."""
     described = [

@@ -40,6 +40,7 @@ from creepkit.inverse.iterative_estimation import (
     linearised,
     starting_point,
 )
+from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS, NoiseModel, initial_noise_model
@@ -76,6 +77,7 @@ REFIT_ROUNDS = 2
 """Rounds of an estimate that begins near its end."""
 
 
+@kept_where_asked
 def identify(
     law: CreepLaw,
     histories: Sequence[History],
@@ -103,6 +105,7 @@ def identify(
         return with_samples(fit, through_for_law(through, law)) if needs_samples(fit) else fit
 
 
+@kept_where_asked
 def identify_values(
     law: CreepLaw,
     histories: Sequence[History],

@@ -6,23 +6,19 @@ asked for or in doubt.
 
 from __future__ import annotations
 
-import hashlib
-import pickle
 import re
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
-import numpy as np
-
-from creepkit.errors import CreepkitError, DatasetError
-from creepkit.files.json_documents import canonical_json
-from creepkit.inverse.composite_predictor import CompositePredictor, predictor_for_law, underlying_specimen
+from creepkit.errors import CreepkitError
+from creepkit.inverse.composite_predictor import predictor_for_law, underlying_specimen
 from creepkit.inverse.confirmation import Confirmation, confirm, outside_domain
+from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash, single_threaded
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.reference_conditions import with_arrhenius
@@ -33,49 +29,10 @@ from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
 from creepkit.inverse.sparsity.term_selection import identify_full, identify_reduced
 from creepkit.jobs.worker_process import TaskResult
 from creepkit.language import CreepLaw
-from creepkit.records import History, Predictor, Program
-from creepkit.registry.specimen_documents import specimen_to_json
+from creepkit.records import History, Predictor
 from creepkit.screening import files
 from creepkit.screening.alloys import Alloy, check_tests, limitations
 from creepkit.screening.results import AlloyResult, PredictedOutputs, WeightedLaw
-
-
-def single_threaded(predictor: Predictor) -> Predictor:
-    """The same predictor, which starts no threads."""
-    untyped: Any = predictor
-    if isinstance(untyped, CompositePredictor):
-        return CompositePredictor({name: single_threaded(p) for name, p in untyped.predictors.items()})
-    if _is_surrogate(untyped):
-        metadata = replace(untyped.metadata, specimen=single_threaded(untyped.metadata.specimen))
-        return untyped.recipe.surrogate(untyped.weights, metadata)  # type: ignore[no-any-return]
-    if "specimen" in getattr(untyped, "__dataclass_fields__", ()):  # the reduced-order model of a specimen
-        return replace(untyped, specimen=single_threaded(untyped.specimen))  # type: ignore[no-any-return]
-    if getattr(untyped, "threads", 1) == 1:
-        return predictor
-    return untyped.replace(threads=1)  # type: ignore[no-any-return]
-
-
-def predictor_fingerprint(predictor: Predictor) -> str:
-    """SHA-256, shortened, of what decides the predictions of a predictor; the number of threads does not."""
-    return hashlib.sha256(_serialised_predictor(single_threaded(predictor))).hexdigest()[:16]
-
-
-def _serialised_predictor(predictor: Predictor) -> bytes:
-    untyped: Any = predictor
-    if isinstance(untyped, CompositePredictor):
-        return b"".join(name.encode() + _serialised_predictor(p) for name, p in sorted(untyped.predictors.items()))
-    if _is_surrogate(untyped):
-        weights = b"".join(array.tobytes() for array in untyped.weights.values())
-        return canonical_json(untyped.file_header) + weights
-    try:
-        return canonical_json(specimen_to_json(untyped))
-    except (DatasetError, AttributeError):  # a mesh of its own, or no record at all
-        return pickle.dumps(predictor)
-
-
-def _is_surrogate(predictor: Any) -> bool:
-    """Whether it is a surrogate.Surrogate; asking by class would load surrogates for everybody."""
-    return all(hasattr(predictor, name) for name in ("recipe", "weights", "metadata"))
 
 
 def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
@@ -162,10 +119,6 @@ FITS_FOLDER = "fits"
 """The folder of the best identifications, inside that of the results."""
 
 
-METADATA_FIELDS = ("source", "labels")
-"""Fields of a history that no identification uses."""
-
-
 @dataclass(frozen=True)
 class ScreeningJob:
     """How each alloy is identified, and the folder in which results are kept.
@@ -192,12 +145,12 @@ class ScreeningJob:
         file_name = re.sub(r"[^A-Za-z0-9.=+-]+", "-", name).strip("-.")
         is_valid_name = file_name == name and [a.name.lower() for a in self.alloys].count(name.lower()) == 1
         return self.folder / (
-            f"{file_name}.json" if is_valid_name else f"{file_name or 'alloy'}_{_short_hash(name.encode())[:6]}.json"
+            f"{file_name}.json" if is_valid_name else f"{file_name or 'alloy'}_{short_hash(name.encode())[:6]}.json"
         )
 
     def fingerprint(self, number: int) -> str:
         """SHA-256, shortened, of the tests of an alloy and of how they are identified."""
-        return _short_hash("\n".join([self._settings_text, *map(_history_text, self.alloys[number].tests)]).encode())
+        return short_hash("\n".join([self._settings_text, *map(history_text, self.alloys[number].tests)]).encode())
 
     def on_one_thread(self) -> ScreeningJob:
         """The same with predictors that start no threads."""
@@ -223,26 +176,3 @@ class ScreeningJob:
         for predictor in (self.predictor, self.surrogate):
             yield "none" if predictor is None else predictor_fingerprint(predictor)
         yield repr((self.settings, self.dense_law is None, self.penalty, self.confirm))
-
-
-def _history_text(history: History) -> str:
-    """All data of a history, for hashing."""
-    values = {f.name: getattr(history, f.name) for f in fields(history) if f.name not in METADATA_FIELDS}
-    program = history.loading.program()
-    loading = (type(history.loading).__name__, _plain_value(program), getattr(history.loading, "control", ""))
-    return repr([(name, _plain_value(value)) for name, value in {**values, "loading": loading}.items()])
-
-
-def _plain_value(value: Any) -> Any:
-    """A value whose repr is complete."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, Program):
-        return value.times.tolist(), value.values.tolist()
-    if hasattr(value, "items"):
-        return sorted((name, _plain_value(item)) for name, item in value.items())
-    return value
-
-
-def _short_hash(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()[:24]

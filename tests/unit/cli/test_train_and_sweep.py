@@ -7,7 +7,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.dataset.storage import write_dataset
-from creepkit.report.surrogate import size_study_rows
+from creepkit.reports.surrogate import size_study_rows
 from creepkit.surrogates import training as sweeping
 from creepkit.surrogates.evaluation import evaluate
 from creepkit.surrogates.training_rows import training_split

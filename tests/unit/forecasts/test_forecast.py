@@ -14,7 +14,7 @@ from creepkit.forecasts.draws import law_draws
 from creepkit.forecasts.forecast import forecast
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.records import Status
-from creepkit.report.forecast import forecast_to_json
+from creepkit.reports.forecast import forecast_to_json
 from helpers.rupture_tests import BAR
 
 TIMES = np.geomspace(3.6e3, 3.6e5, 40)

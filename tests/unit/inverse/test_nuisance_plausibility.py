@@ -10,7 +10,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import Nuisance
-from creepkit.report.ranking import ranking_text
+from creepkit.reports.ranking import ranking_text
 from helpers.steady_rate_predictor import planted
 from helpers.two_outputs_predictor import TwoOutputs, with_two_outputs
 

@@ -12,7 +12,7 @@ from creepkit.quality.rig_flags import temperature_step
 from creepkit.quality.smooth_curve import smooth_curve
 from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, PressureJump
-from creepkit.report.data_quality import data_quality_to_json
+from creepkit.reports.data_quality import data_quality_to_json
 from helpers.paths import SHARED, needs_shared_data
 
 TIMES = 150.0 * np.arange(1, 97)

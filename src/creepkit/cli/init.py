@@ -1,0 +1,33 @@
+"""`creepkit init`: a commented study file for the data of a folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def command(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of measured files.")],
+    to: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The study file; by default study.toml in the folder.")
+    ] = None,
+    reader: Annotated[str | None, typer.Option(help="Reader of the files; by default what accepts them.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a study file that exists.")] = False,
+) -> None:
+    """Write a study file for a folder of data.
+
+    The files are read as 'creepkit read' reads them; candidate laws and stages follow from what the tests hold.
+    """
+    from creepkit.errors import StudyError
+    from creepkit.files.writing import check_target, write_text
+    from creepkit.studies.proposal import propose_study
+
+    path = folder / "study.toml" if to is None else to
+    check_target(path, StudyError, force=force)
+    proposal = propose_study(folder, path, reader)
+    write_text(proposal.text, path, StudyError)
+    for line in proposal.summary:
+        typer.echo(line)
+    typer.echo(f"wrote {path}; look through it, then: creepkit run {path}")

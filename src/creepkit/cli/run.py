@@ -1,0 +1,89 @@
+"""`creepkit run`: a study file, or the study that a report carries, carried out; what was made before is kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from creepkit.reports.terminal import ProgressBar, print_json, print_table
+
+if TYPE_CHECKING:
+    from creepkit.studies.result import StudyResult
+
+REPORT_SUFFIXES = (".html", ".htm")
+
+
+def command(
+    study: Annotated[Path, typer.Argument(metavar="STUDY.toml|REPORT.html", help="A study file, or a study's report.")],
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="STAGE",
+            help="quality, identification, temperature, rupture, forecast, design, export or report, with what it "
+            "needs; may be given several times.",
+        ),
+    ] = None,
+    to: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="For results, lock, exports and report; by default beside it.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Make everything again.")] = False,
+    locked: Annotated[
+        bool, typer.Option("--locked", help="Refuse to run where anything differs from study.lock.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print how each stage ended as JSON.")] = False,
+) -> None:
+    """Carry out a study, from data to its report.
+
+    Only what changed runs again. Interrupted, it goes on where it was when it is started again. A report is written
+    back to its study and data in a folder, which then runs.
+    """
+    from creepkit.errors import StudyError
+    from creepkit.studies.extraction import study_of_report
+    from creepkit.studies.study import Study
+
+    if study.suffix.lower() in REPORT_SUFFIXES:
+        folder = to if to is not None else study.parent / f"{study.stem}_study"
+        loaded, target = study_of_report(study, folder), folder
+    else:
+        loaded, target = Study.load(study), to if to is not None else study.parent
+    with ProgressBar() as progress:
+        result = loaded.run(to=target, only=only or None, force=force, locked=locked, progress=progress.tick)
+    for change in result.changes:
+        typer.echo(f"since the last lock: {change}", err=True)
+    if as_json:
+        print_json(result_to_json(result))
+    else:
+        print_result(result)
+    if result.failures:
+        first = result.failures[0]
+        others = f" ({len(result.failures) - 1} more)" if len(result.failures) > 1 else ""
+        raise StudyError(f"{study}: {first.stage} failed: {first.sentence}{others}")
+
+
+def print_result(result: StudyResult) -> None:
+    """How each stage ended, what was found, and where the report is."""
+    print_table(result.title, ("stage", "state", ""), [(one.name, one.state, one.sentence) for one in result.stages])
+    for exclusion in result.exclusions:
+        frames = f" {len(exclusion.frames)} frames" if exclusion.frames else ""
+        typer.echo(f"left out: {exclusion.test}{frames}: {exclusion.reason}")
+    for group, ranking in result.rankings.items():
+        typer.echo(f"{group}: {ranking.verdict}" if group else ranking.verdict)
+    if result.report is not None:
+        typer.echo(f"report: {result.report}")
+
+
+def result_to_json(result: StudyResult) -> dict[str, object]:
+    """Stages, exclusions, changes and the verdict of each group."""
+    return {
+        "title": result.title,
+        "stages": [
+            {"name": one.name, "kind": one.kind, "state": one.state, "key": one.key, "sentence": one.sentence}
+            for one in result.stages
+        ],
+        "exclusions": [{"test": e.test, "frames": e.frames, "reason": e.reason} for e in result.exclusions],
+        "changes": result.changes,
+        "verdicts": {group: ranking.verdict for group, ranking in result.rankings.items()},
+        "report": None if result.report is None else str(result.report),
+    }

@@ -1,0 +1,167 @@
+"""Identifications kept in a folder: within `keep_fits(folder)` one that was made there before is read, not made again.
+
+Every function that identifies, through whatever verb it is called, looks there first; so that work that was interrupted
+goes on where it was, with the same result. A file is known by a hash of all that decides the identification: the law,
+the data, what predicts them, the settings, where it begins, and the versions of what computes.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numpy as np
+
+from creepkit.errors import FitError
+from creepkit.files.json_documents import (
+    DocumentFormat,
+    canonical_json,
+    check_heading,
+    check_keys,
+    read_json,
+    write_json,
+)
+from creepkit.files.reading import FileKind
+from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError
+from creepkit.inverse.composite_predictor import predictors_for_law
+from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identification_document import identification_from_json, identification_to_json
+from creepkit.inverse.variance_components import LinearisedProblem
+from creepkit.records import Predictor
+
+KEPT_FIT = DocumentFormat(
+    "creepkit-kept-fit",
+    1,
+    FileKind("a kept identification", FitError, "remove it: it is made again", maximum_bytes=200_000_000),
+    remedy="remove it: it is made again",
+)
+
+
+COMPUTING = ("creepkit", "numpy", "scipy")
+"""Packages whose versions may change the last digits."""
+
+
+LINEARISED_CODEC = RecordCodec(default_range=ANY_NUMBER)
+
+
+@dataclass
+class FitFolder:
+    """Identifications as files of a folder, and how many of them were made and read since.
+
+    keys : of those made or read, in their order.
+    """
+
+    folder: Path
+    made: int = 0
+    read: int = 0
+    keys: list[str] = field(default_factory=list)
+
+    def path(self, key: str) -> Path:
+        """The file of an identification."""
+        return self.folder / f"{key}.json"
+
+    def load(self, key: str, histories: Any, predictor: Predictor) -> Identification | None:
+        """The identification of a key, as it was when it was made; None where there is none that can be read."""
+        try:
+            content = check_heading(read_json(self.path(key), KEPT_FIT.kind), str(self.path(key)), KEPT_FIT)
+            if check_keys(content, ("identification", "linearised"), "kept identification"):
+                return None
+            fit = identification_from_json(content["identification"], str(self.path(key)))
+            stored = content["linearised"]
+            linearised = None if stored is None else LINEARISED_CODEC.from_json(LinearisedProblem, stored)
+        except (FitError, RecordError):
+            return None
+        return replace(fit, histories=tuple(histories), predictor=predictor, linearised=linearised)
+
+    def save(self, key: str, fit: Identification) -> None:
+        """Write an identification, whole or not at all."""
+        linearised = None if fit.linearised is None else LINEARISED_CODEC.to_json(fit.linearised)
+        content = {"identification": identification_to_json(fit), "linearised": linearised}
+        self.folder.mkdir(parents=True, exist_ok=True)
+        write_json({**KEPT_FIT.heading, **content}, self.path(key), KEPT_FIT.kind)
+
+
+Identify = TypeVar("Identify", bound=Callable[..., Identification])
+
+
+_FOLDER: ContextVar[FitFolder | None] = ContextVar("folder of kept fits", default=None)
+
+
+@contextmanager
+def keep_fits(folder: Path) -> Iterator[FitFolder]:
+    """Keep identifications that are made within the context, and read those that were made before."""
+    kept = FitFolder(folder)
+    token = _FOLDER.set(kept)
+    try:
+        yield kept
+    finally:
+        _FOLDER.reset(token)
+
+
+def kept_where_asked(identify: Identify) -> Identify:
+    """A function that identifies a law from histories with a predictor, which keeps what it makes where that is asked.
+
+    What it identifies on the way is not kept.
+    """
+
+    @functools.wraps(identify)
+    def run(law: Any, histories: Any, using: Any, **how: Any) -> Identification:
+        kept = _FOLDER.get()
+        if kept is None:
+            return identify(law, histories, using, **how)
+        predictor, through, _ = predictors_for_law(law, using, how.get("through"))
+        key = _key(getattr(identify, "__name__", ""), law, histories, predictor, {**how, "through": through})
+        kept.keys.append(key)
+        fit = kept.load(key, histories, predictor)
+        if fit is not None:
+            kept.read += 1
+            return fit
+        token = _FOLDER.set(None)
+        try:
+            fit = identify(law, histories, using, **how)
+        finally:
+            _FOLDER.reset(token)
+        kept.made += 1
+        if _can_be_kept(fit):
+            kept.save(key, fit)
+        return fit
+
+    return cast(Identify, run)
+
+
+def _can_be_kept(fit: Identification) -> bool:
+    """Whether a file gives it back: JSON holds no shape of empty arrays."""
+    linear = fit.linearised
+    arrays = () if linear is None else (linear.step_bounds, linear.residuals.values, linear.residuals.jacobian)
+    return all(array is None or array.size for array in arrays)
+
+
+def _key(kind: str, law: Any, histories: Any, predictor: Predictor, how: Mapping[str, Any]) -> str:
+    """Hash of all that decides an identification."""
+    start, through = how.get("start"), how.get("through")
+    parts = {
+        "kind": kind,
+        "versions": {name: version(name) for name in COMPUTING},
+        "law": [law.name, law.fingerprint, [(name, repr(p.bounds), repr(p.off)) for name, p in law.table.items()]],
+        "histories": [history_digest(history) for history in histories],
+        "predictor": predictor_fingerprint(predictor),
+        "through": None if through is None else predictor_fingerprint(through),
+        "settings": repr(how.get("settings")),
+        "search": repr(how.get("search")),
+        "start": None
+        if start is None
+        else [None if start.u is None else np.asarray(start.u).tolist(), repr(start.nuisances), repr(start.reference)],
+    }
+    return short_hash(canonical_json(parts))
+
+
+def history_digest(history: Any) -> str:
+    """Hash of a history, its labels included, wherever its file lies."""
+    return short_hash(f"{history_text(history)}\n{sorted(history.labels.items())}".encode())

@@ -1,0 +1,168 @@
+"""Colours and groups of tests by their conditions: a colour each for a few tests, a colour scale for many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_stresses
+from creepkit.records import ZERO_CELSIUS, History, Predictor
+from creepkit.reports.figures import logarithmic_labels
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+MOST_NAMED_TESTS = 10
+"""Up to this many tests have a colour and a name each; more are coloured by condition, in a panel for each group."""
+
+
+MOST_GROUPS = 12
+"""Panels of groups of tests at most."""
+
+
+MOST_IN_GROUP = 16
+"""Tests of a group from which it is split, while there are panels left."""
+
+
+USED_SHARE = 0.86
+"""Of a colour map: its palest colours cannot be seen on white."""
+
+
+@dataclass(frozen=True, eq=False)
+class ColourScale:
+    """A colour scale by a condition.
+
+    label : the condition and its unit; values : (tests,) the condition of each test; logarithmic : of the scale.
+    """
+
+    label: str
+    values: Floats
+    logarithmic: bool = False
+    colour_map: str = "viridis"
+
+    def __call__(self, value: float) -> Any:
+        """The colour of a value of the condition."""
+        from matplotlib import colormaps
+
+        transform: Callable[[Any], Any] = np.log if self.logarithmic else np.asarray
+        low, high = float(transform(self.values.min())), float(transform(self.values.max()))
+        share = (float(transform(value)) - low) / (high - low) if high > low else 0.0
+        return colormaps[self.colour_map](USED_SHARE * share)
+
+    @property
+    def colours(self) -> list[Any]:
+        """The colour of each test."""
+        return [self(value) for value in self.values]
+
+    def add_bar(self, figure: Figure, panels: Sequence[Axes]) -> None:
+        """The colour bar of the scale at the right of panels, with a label at either end."""
+        from matplotlib import colormaps
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import ListedColormap, LogNorm, Normalize
+        from matplotlib.ticker import NullFormatter, NullLocator
+
+        low, high = float(self.values.min()), float(self.values.max())
+        norm = (LogNorm if self.logarithmic else Normalize)(low, high)
+        colours = ListedColormap(colormaps[self.colour_map](np.linspace(0.0, USED_SHARE, 256)))
+        bar = figure.colorbar(ScalarMappable(norm, colours), ax=list(panels), label=self.label, pad=0.01, aspect=30)
+        ticks = _with_ends(low, high, self.logarithmic)
+        bar.set_ticks(list(ticks), labels=[f"{v:.3g}" if v < 1000 else f"{v:.0f}" for v in ticks])
+        bar.ax.yaxis.set_minor_locator(NullLocator())
+        bar.ax.yaxis.set_minor_formatter(NullFormatter())
+
+
+SMALLEST_GAP = 0.08
+"""Of the length of a colour bar, between its ends and the round numbers beside them."""
+
+
+def _with_ends(low: float, high: float, logarithmic: bool) -> Floats:
+    """(labels,) low, high and the round numbers between them."""
+    from matplotlib.ticker import MaxNLocator
+
+    if not high > low:
+        return np.array([low])
+    transform: Callable[[Any], Any] = np.log if logarithmic else np.asarray
+    inner = np.asarray(logarithmic_labels(low, high) if logarithmic else MaxNLocator(6).tick_values(low, high))
+    share = (transform(np.maximum(inner, 1e-300) if logarithmic else inner) - transform(low)) / (
+        transform(high) - transform(low)
+    )
+    return np.array([low, *inner[(share > SMALLEST_GAP) & (share < 1 - SMALLEST_GAP)], high])
+
+
+def temperatures_celsius(histories: Sequence[History]) -> Floats:
+    """(tests,) mean temperature, °C."""
+    return np.array([h.mean_temperature for h in histories]) - ZERO_CELSIUS
+
+
+def mean_stresses(histories: Sequence[History], predictor: Predictor | None) -> Floats:
+    """(tests,) MPa, the geometric mean of the reference stresses of each test."""
+    means = []
+    for history in histories:
+        stresses = reference_stresses(history, predictor)
+        positive = stresses[stresses > 0]
+        means.append(float(np.exp(np.mean(np.log(positive)))) if positive.size else 1.0)
+    return np.array(means)
+
+
+def temperature_scale(histories: Sequence[History]) -> ColourScale:
+    """Colours by temperature."""
+    return ColourScale("temperature, °C", temperatures_celsius(histories), colour_map="inferno")
+
+
+def stress_scale(histories: Sequence[History], predictor: Predictor | None) -> ColourScale:
+    """Colours by stress."""
+    return ColourScale("stress, MPa", mean_stresses(histories, predictor), logarithmic=True)
+
+
+def distinct_colours(count: int) -> list[Any]:
+    """A colour for each of at most ten tests."""
+    from matplotlib import colormaps
+
+    return [colormaps["tab10"](k % 10) for k in range(count)]
+
+
+def condition_groups(histories: Sequence[History], predictor: Predictor | None) -> list[tuple[str, list[int]]]:
+    """Title and positions of the tests of each group: of one temperature, and of neighbouring stresses where many.
+
+    Temperatures that differ little are one; of more than MOST_GROUPS groups, neighbours are joined.
+    """
+    temperatures, stresses = temperatures_celsius(histories), mean_stresses(histories, predictor)
+    groups: list[list[int]] = []
+    for k in np.argsort(temperatures, kind="stable"):
+        if groups and temperatures[k] - temperatures[groups[-1][0]] <= ISOTHERMAL_RANGE:
+            groups[-1].append(int(k))
+        else:
+            groups.append([int(k)])
+    if len(groups) > MOST_GROUPS:
+        sizes = np.cumsum([len(g) for g in groups])
+        panel = (sizes - 1) * MOST_GROUPS // sizes[-1]
+        groups = [[k for g, p in zip(groups, panel, strict=True) if p == i for k in g] for i in np.unique(panel)]
+    while len(groups) < MOST_GROUPS and max(map(len, groups)) > MOST_IN_GROUP:
+        position = max(range(len(groups)), key=lambda i: len(groups[i]))
+        members = sorted(groups[position], key=lambda k: stresses[k])
+        middle = _split(stresses[members])
+        groups[position : position + 1] = [members[:middle], members[middle:]]
+    return [(_group_title(temperatures[g], stresses[g]), g) for g in groups]
+
+
+def _split(stresses: Floats) -> int:
+    """Where sorted stresses (tests,) are split into halves; tests of one stress stay together if they can."""
+    middle = stresses.size // 2
+    boundaries = np.flatnonzero(np.diff(stresses) > 0) + 1
+    return int(boundaries[np.abs(boundaries - middle).argmin()]) if boundaries.size else middle
+
+
+def _group_title(temperatures: Floats, stresses: Floats) -> str:
+    tests = f"{temperatures.size} test{'s' if temperatures.size > 1 else ''}"
+    return f"{_range_text(temperatures, '.0f')} °C, {_range_text(stresses, '.3g')} MPa, {tests}"
+
+
+def _range_text(values: Floats, number: str) -> str:
+    low, high = format(values.min(), number), format(values.max(), number)
+    return low if low == high else f"{low} to {high}"

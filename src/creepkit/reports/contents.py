@@ -1,0 +1,132 @@
+"""What a report shows: one frozen record, of which every part is optional, and the small records that it is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from creepkit.discovery.discover import TemperatureStudy
+    from creepkit.discovery.temperature_law import TemperatureLaw
+    from creepkit.experiments.planned_design import Design
+    from creepkit.extraction.extraction import Extraction
+    from creepkit.forecasts.forecast import Forecast
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.quality.flags import DataQuality
+    from creepkit.records import History
+    from creepkit.rupture_assessment.assessment import RuptureAssessment
+    from creepkit.screening.results import AlloyResult
+
+
+@dataclass(frozen=True)
+class ReportGroup:
+    """Tests of one material, and what was identified from them.
+
+    name : of the alloy or heat; "" where there is only one. result : a ranking of laws, one identification, an alloy of
+    a plate, or None where nothing was identified. histories : the tests as measured; by default those that `result`
+    holds. failure : why nothing was identified, in a sentence.
+    """
+
+    name: str
+    result: Ranking | Identification | AlloyResult | None = None
+    histories: tuple[History, ...] = ()
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class Exclusion:
+    """What was left out of the identification, and why.
+
+    test : name of the history. frames : numbers of its frames as measured, counted from 0; empty for the whole test.
+    """
+
+    test: str
+    frames: tuple[int, ...]
+    reason: str
+
+
+@dataclass(frozen=True)
+class StageFailure:
+    """A stage of a study that failed: what the report therefore lacks. sentence : the error message."""
+
+    stage: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class ExportedFile:
+    """A law as text for a target, to download from the report.
+
+    name : of the file. target : name of the exporter. text : its content.
+    """
+
+    name: str
+    target: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What is needed to repeat the work.
+
+    versions : {package: version}. seed : of all draws, None where nothing was drawn. settings : {name: value}, values
+    that JSON can hold. inputs : {file: sha256 of its content}. commands : of a shell, in their order, that repeat it.
+    """
+
+    versions: Mapping[str, str] = field(default_factory=dict)
+    seed: int | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    commands: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        _freeze(self, "versions", "settings", "inputs")
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A file that the report carries, so that the study can be run from the report alone.
+
+    name : a relative POSIX path below the folder of the study, such as study.toml or data/test_1.csv.
+    """
+
+    name: str
+    content: bytes = field(repr=False)
+
+
+@dataclass(frozen=True)
+class ReportContents:
+    """Everything that a report shows; what is empty is left out of the page.
+
+    title : of the page. groups : one for each material. quality : what is suspect in the tests. exclusions : what was
+    left out. temperature, forecasts, design, rupture, extractions : results of the other stages by a title of their
+    own, which is the name of their group or of their file. exports : laws to download. failures : of stages.
+    attachments : study, lock and data. notes : further remarks, one sentence each.
+    """
+
+    title: str
+    groups: tuple[ReportGroup, ...] = ()
+    quality: DataQuality | None = None
+    exclusions: tuple[Exclusion, ...] = ()
+    temperature: Mapping[str, TemperatureStudy | TemperatureLaw] = field(default_factory=dict)
+    forecasts: Mapping[str, Forecast] = field(default_factory=dict)
+    design: Mapping[str, Design] = field(default_factory=dict)
+    rupture: Mapping[str, RuptureAssessment] = field(default_factory=dict)
+    extractions: Mapping[str, Extraction] = field(default_factory=dict)
+    exports: tuple[ExportedFile, ...] = ()
+    failures: tuple[StageFailure, ...] = ()
+    provenance: Provenance = field(default_factory=Provenance)
+    attachments: tuple[Attachment, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        _freeze(self, "temperature", "forecasts", "design", "rupture", "extractions")
+
+
+def _freeze(record: object, *names: str) -> None:
+    """Mappings of a frozen record that cannot be changed either."""
+    for name in names:
+        object.__setattr__(record, name, MappingProxyType(dict(getattr(record, name))))

@@ -1,0 +1,247 @@
+"""Text, JSON and plot of a design: the advice, a table of planned tests, and a map of what they tell for each hour."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.experiments.planned_design import kind_of_reason, precision_text
+from creepkit.records import load_unit
+from creepkit.reports.figures import empty_figure, save_figure, wrapped
+from creepkit.reports.terminal import print_table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+    from matplotlib.figure import Figure
+
+    from creepkit.experiments.expectations import Expectation
+    from creepkit.experiments.planned_design import Design, PlannedTest
+
+
+ROWS = 8
+"""Tests in a table."""
+
+
+def _columns(design: Design) -> tuple[str, ...]:
+    last = {"law": "decisive and right", "parameters": "standard deviations, before > after"}.get(
+        design.goal, "sd after"
+    )
+    return ("planned test", "oven, h", "nats", "nats / h", last)
+
+
+def _cells(design: Design, test: PlannedTest) -> tuple[str, ...]:
+    e = test.expectation
+    if design.goal == "law":
+        last = f"{e.probability:.2f}"
+    elif design.goal == "parameters":
+        last = ", ".join(f"{name} {e.current_parameter_sd[name]:.3g} > {sd:.3g}" for name, sd in e.parameter_sd.items())
+    else:
+        last = precision_text(e.sd, design.unit)
+    return (test.description, f"{test.hours:.3g}", f"{e.information:.2g}", f"{test.information_per_hour:.2g}", last)
+
+
+def design_text(design: Design) -> str:
+    """The advice, the best tests in a table, and of the law the chi-squares of the first in every direction."""
+    lines = [design.sentence]
+    if design.tests:
+        rows = [_columns(design), *(_cells(design, test) for test in design.tests[:ROWS])]
+        widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+        lines += ["", *("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows)]
+    lines += direction_lines(design)
+    return "\n".join(lines + _ending(design))
+
+
+def direction_lines(design: Design) -> list[str]:
+    """The expected chi-squares of the plan, else of the first test, a line for each direction."""
+    first = design.plan[0] if design.plan else design.tests[0] if design.tests else None
+    expected = design.expected or (None if first is None else first.expectation)
+    if first is None or expected is None or not expected.chi_squares:
+        return []
+    lines = ["", f"expected chi-squares with {'the plan' if len(design.plan) > 1 else first.description}:"]
+    for each in expected.chi_squares:
+        lines.append(
+            f"  if {each.reference_law} holds, {each.alternative_law} is {_by(each.expected)} (now {_by(each.current)})"
+        )
+    return lines
+
+
+def _by(chi_square: float) -> str:
+    return f"worse by {chi_square:.3g}" if chi_square >= 0 else f"better by {-chi_square:.3g}"
+
+
+def _ending(design: Design) -> list[str]:
+    reasons: dict[str, list[str]] = {}
+    for description, reason in design.left_out:
+        reasons.setdefault(kind_of_reason(reason), []).append(description)
+    lines = [f"left out: {len(names)} that {reason} ({names[0]})" for reason, names in reasons.items()]
+    if design.interrupted:
+        lines.append("stopped before the end: the best so far")
+    notes = design.notes if design.tests else ()
+    return ["", *lines, *notes] if lines or notes else []
+
+
+def print_design(design: Design) -> None:
+    """Print the table, the advice and what was left out, as wide as the terminal."""
+    if design.tests:
+        rows = [_cells(design, test) for test in design.tests[:ROWS]]
+        print_table(f"{len(design.tests)} planned tests, goal: {design.goal}", _columns(design), rows)
+    print("\n".join([design.sentence, *direction_lines(design), *_ending(design)]))
+
+
+def design_to_json(design: Design) -> dict[str, object]:
+    """Laws, advice, plan and every test considered, as JSON-able data."""
+
+    def row(test: PlannedTest) -> dict[str, object]:
+        return {
+            "description": test.description,
+            "oven_hours": test.hours,
+            "information_per_hour": test.information_per_hour,
+            "at_draws": test.at_draws,
+            "tests": [
+                {
+                    "specimen": h.specimen,
+                    "loading": {
+                        "quantity": h.loading.quantity,
+                        "times": h.loading.program().times.tolist(),
+                        "values": h.loading.program().values.tolist(),
+                    },
+                    "temperature": h.mean_temperature,
+                    "geometry": dict(h.geometry),
+                    "duration": float(h.times[-1]),
+                }
+                for h in test.histories
+            ],
+            **_expectation_to_json(test.expectation),
+        }
+
+    return {
+        "goal": design.goal,
+        "laws": dict(zip(design.laws, design.weights, strict=True)),
+        "to_exclude": list(design.altered),
+        "advice": design.sentence,
+        "budget": design.budget,
+        "plan": [row(test) for test in design.plan],
+        "plan_oven_hours": sum(test.hours for test in design.plan),
+        "expected": None if design.expected is None else _expectation_to_json(design.expected),
+        "interrupted": design.interrupted,
+        "tests": [row(test) for test in design.tests],
+        "left_out": dict(design.left_out),
+        "notes": list(design.notes),
+    }
+
+
+def _expectation_to_json(e: Expectation) -> dict[str, object]:
+    known: dict[str, object] = {"information": float(e.information)}
+    for name in ("sd", "current_sd", "probability", "wrong"):
+        value = float(getattr(e, name))
+        if np.isfinite(value):
+            known[name] = value
+    if e.parameter_sd:
+        known["parameter_sd"] = dict(e.parameter_sd)
+        known["current_parameter_sd"] = dict(e.current_parameter_sd)
+    if e.chi_squares:
+        known["chi_squares"] = [
+            {
+                "true": c.reference_law,
+                "alternative": c.alternative_law,
+                "current": c.current,
+                "expected": c.expected,
+                "refitted": c.refitted,
+            }
+            for c in e.chi_squares
+        ]
+    return known
+
+
+# ---- map -------------------------------------------------------------------------------------------------------------
+
+
+def design_figure(design: Design, path: str | Path | None = None) -> Figure:
+    """What candidates tell for each hour of the oven, over the first load and the duration; the best of each place.
+
+    To first order about the estimates, which is what is known of all candidates alike. Left: constant loads; right: the
+    load changes during the test. The runs of the plan are marked. Of several specimens that of the best test is drawn.
+    """
+    figure = empty_figure(10.5, 5.0)
+    axes = figure.subplots(1, 2, sharex=True, sharey=True)
+    drawn_tests = [test for test in design.tests if test.histories[0].specimen == design.best.histories[0].specimen]
+    rates = [test.first_order_per_hour for test in drawn_tests] or [1.0]
+    largest = max(*rates, 1e-9)
+    groups = [[t for t in drawn_tests if _is_constant(t)], [t for t in drawn_tests if not _is_constant(t)]]
+    drawn = None
+    for panel, tests, title in zip(axes, groups, ("constant load", "the load changes during the test"), strict=True):
+        drawn = _draw_map(panel, tests, largest) or drawn
+        panel.set_title(title)
+        for k, test in enumerate(t for t in design.plan if _is_constant(t) == (title == "constant load")):
+            label = "plan" if k == 0 else None
+            panel.plot(
+                test.first_level, test.candidate.duration / 3600.0, "s", ms=24, mfc="none", mec="r", mew=2, label=label
+            )
+        if any(_is_constant(t) == (title == "constant load") for t in design.plan):
+            panel.legend(loc="best", frameon=True, markerscale=0.4)
+        panel.set_xlabel(_load_label(design))
+    axes[0].set_ylabel("duration, h")
+    if drawn is not None:
+        figure.colorbar(drawn, ax=list(axes), label="expected information to first order, nats per oven hour")
+    figure.suptitle(wrapped(design.sentence, 10.0, 9.0), fontsize=9)
+    return save_figure(figure, path)
+
+
+def _draw_map(panel: Axes, tests: list[PlannedTest], largest: float) -> QuadMesh | None:
+    """One cell for each load and duration, coloured by the best candidate there; its largest probability beside."""
+    if not tests:
+        panel.text(0.5, 0.5, "none considered", transform=panel.transAxes, ha="center")
+        return None
+    best: dict[tuple[float, float], PlannedTest] = {}
+    for test in tests:
+        place = round(test.first_level, 6), round(test.candidate.duration / 3600.0, 6)
+        if place not in best or test.first_order_per_hour > best[place].first_order_per_hour:
+            best[place] = test
+    loads, durations = (sorted({place[k] for place in best}) for k in (0, 1))
+    values = np.full((len(durations), len(loads)), np.nan)
+    for (load, duration), test in best.items():
+        values[durations.index(duration), loads.index(load)] = test.first_order_per_hour
+    mesh = panel.pcolormesh(
+        _edges(loads), _edges(durations), values, cmap="viridis", vmin=0.0, vmax=largest, edgecolors="w", linewidth=0.5
+    )
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    for axis, ticks in ((panel.xaxis, loads), (panel.yaxis, durations)):
+        shown = ticks if len(ticks) <= 8 else ticks[:: -(-len(ticks) // 8)]
+        axis.set_ticks(shown, labels=[f"{tick:.3g}" for tick in shown])
+        axis.set_ticks([], minor=True)
+    for (load, duration), test in best.items():
+        if np.isfinite(test.first_order.probability):
+            light = test.first_order_per_hour > 0.6 * largest
+            panel.text(load, duration, f"{test.first_order.probability:.2f}", ha="center", va="center", fontsize=7,
+                       color="k" if light else "w")  # fmt: skip
+    return mesh
+
+
+def _edges(centres: list[float]) -> Floats:
+    """Edges of cells about centres, geometric."""
+    logs = np.log(centres)
+    if len(logs) == 1:
+        return np.asarray(np.exp(logs[0] + np.array([-0.2, 0.2])))
+    middle = 0.5 * (logs[1:] + logs[:-1])
+    return np.asarray(
+        np.exp(np.concatenate([[1.5 * logs[0] - 0.5 * logs[1]], middle, [1.5 * logs[-1] - 0.5 * logs[-2]]]))
+    )
+
+
+def _is_constant(test: PlannedTest) -> bool:
+    values = test.histories[0].loading.program().values
+    values = values[values > 0]
+    return bool(np.ptp(values) <= 1e-6 * values.max())
+
+
+def _load_label(design: Design) -> str:
+    if not design.tests:
+        return "load"
+    first = design.tests[0].histories[0]
+    unit = load_unit(first)
+    return f"first {first.loading.quantity}, {unit}" if unit else first.loading.quantity

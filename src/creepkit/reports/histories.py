@@ -1,0 +1,160 @@
+"""Measured tests as they were understood: text, data, and a plot of every output over time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.readers.table_summary import TableSummary
+from creepkit.records import History, output_unit
+from creepkit.reports.figures import empty_figure, save_figure
+from creepkit.reports.load_programs import SECONDS_PER_HOUR, program_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+MOST_NAMED = 12
+"""Tests that a plot names."""
+
+
+def tables_text(tables: Sequence[TableSummary]) -> str:
+    """One line for each table: where it stands, how it is written, and which column means what."""
+    lines = []
+    for table in tables:
+        renamed = [f"{new} ('{old}')" if old != new else new for old, new in table.columns.items()]
+        how = ", ".join(part for part in (table.test and f"test {table.test}", table.dialect) if part)
+        lines.append(f"{table.place}{how and f' ({how})'}: {', '.join(renamed)}; rows {table.rows}")
+    return "\n".join(lines)
+
+
+def histories_text(histories: Sequence[History]) -> str:
+    """A paragraph for each test: its conditions, what was measured, how it ended, what was assumed, its labels."""
+    return "\n".join(line for history in histories for line in _lines(history))
+
+
+def assumptions_text(histories: Sequence[History]) -> str:
+    """One line for each thing that was assumed of tests, with the number of tests; numbers may differ among them."""
+    groups: dict[str, list[str]] = {}
+    for history in histories:
+        for text in filter(None, history.labels.get("assumed", "").split(", ")):
+            groups.setdefault(re.sub(r"\d[\w.:+-]*", "0", text), []).append(text)
+    return "\n".join(
+        f"assumed of {len(texts)} of {len(histories)} tests: {texts[0]}{' or the like' * (len(set(texts)) > 1)}"
+        for texts in groups.values()
+    )
+
+
+def _lines(history: History) -> list[str]:
+    lines = [f"{history.name}: {history.specimen}{history.alloy and f', {history.alloy}'}, {program_text(history)}"]
+    lines += [f"  {_output_text(history, name)}" for name in history.outputs]
+    lines += [f"  {text}" for text in (_frames_text(history), _end_text(history)) if text]
+    if "strain" in history.outputs:
+        elastic = "with" if history.includes_elastic else "without"
+        lines.append(f"  strain is {history.strain_measure}, {elastic} its elastic part")
+    for name, length in history.geometry.items():
+        lines.append(f"  {name} {length:g}")
+    if assumed := history.labels.get("assumed"):
+        lines.append(f"  assumed: {assumed}")
+    if labels := [f"{key}: {value}" for key, value in history.labels.items() if key != "assumed"]:
+        lines.append(f"  labels: {'; '.join(labels)}")
+    return lines
+
+
+def _output_text(history: History, name: str) -> str:
+    values, unit = history.outputs[name], output_unit(name, history.specimen)
+    first, last = f"{values[0]:.4g}", f"{values[-1]:.4g}"
+    deviation = history.standard_deviation.get(name)
+    noise = "" if deviation is None else f", standard deviation {float(np.median(deviation)):.2g}"
+    return f"{name} {first} to {last}{unit and f' {unit}'}{noise}"
+
+
+def _frames_text(history: History) -> str:
+    if not history.outputs:
+        return _rate_text(history)
+    count, unused = history.times.size, int((~np.asarray(history.used)).sum())
+    span = f"{history.times[0] / SECONDS_PER_HOUR:.4g} to {history.times[-1] / SECONDS_PER_HOUR:.4g} h"
+    return f"{count} frame{'s' if count > 1 else ''} from {span}{f', {unused} not used' if unused else ''}"
+
+
+def _rate_text(history: History) -> str:
+    """What is known of a test without frames, beside its end."""
+    if history.minimum_rate is None:
+        return "no frames"
+    sd = "" if history.minimum_rate_sd is None else f" +- {history.minimum_rate_sd:.2g}"
+    return f"minimum creep rate {history.minimum_rate:.4g}{sd} 1/s, no frames"
+
+
+def _end_text(history: History) -> str:
+    if history.unruptured and not history.outputs:
+        return f"stopped before rupture at {history.times[-1] / SECONDS_PER_HOUR:.4g} h"
+    if history.rupture_time is not None:
+        return f"ruptured at {history.rupture_time / SECONDS_PER_HOUR:.4g} h"
+    return "stopped before rupture" if history.unruptured else ""
+
+
+def histories_to_json(histories: Sequence[History], tables: Sequence[TableSummary]) -> dict[str, Any]:
+    """The tests without their frames, for JSON: times in s, temperatures in K, outputs in creepkit's units."""
+    return {
+        "tables": [
+            {"place": t.place, "dialect": t.dialect, "test": t.test, "columns": dict(t.columns), "rows": t.rows}
+            for t in tables
+        ],
+        "tests": [
+            {
+                "name": history.name,
+                "source": history.source,
+                "specimen": history.specimen,
+                "alloy": history.alloy,
+                "condition": program_text(history),
+                "frames": int(history.times.size),
+                "used_frames": int(np.asarray(history.used).sum()),
+                "times": [float(history.times[0]), float(history.times[-1])],
+                "outputs": {
+                    name: {
+                        "unit": output_unit(name, history.specimen),
+                        "first": float(values[0]),
+                        "last": float(values[-1]),
+                    }
+                    for name, values in history.outputs.items()
+                },
+                "strain_measure": history.strain_measure,
+                "includes_elastic": history.includes_elastic,
+                "minimum_rate": history.minimum_rate,
+                "rupture_time": history.rupture_time,
+                "unruptured": history.unruptured,
+                "geometry": dict(history.geometry),
+                "labels": dict(history.labels),
+            }
+            for history in histories
+        ],
+    }
+
+
+def histories_figure(histories: Sequence[History], path: str | Path | None = None) -> Figure:
+    """A panel for each output, over time; frames that are not used are drawn hollow."""
+    names = list(dict.fromkeys(name for history in histories for name in history.outputs)) or [""]
+    figure = empty_figure(7.0, 1.0 + 2.8 * len(names))
+    for axes, name in zip(figure.subplots(len(names), 1, squeeze=False)[:, 0], names, strict=True):
+        for number, history in enumerate(history for history in histories if name in history.outputs):
+            hours, used = history.times / SECONDS_PER_HOUR, np.asarray(history.used)
+            (line,) = axes.plot(
+                hours,
+                history.outputs[name],
+                lw=1.0,
+                marker=".",
+                ms=3,
+                label=history.name if number < MOST_NAMED else None,
+            )
+            axes.plot(hours[~used], history.outputs[name][~used], "o", mfc="none", color=line.get_color())
+            axes.set_ylabel(", ".join(part for part in (name, output_unit(name, history.specimen)) if part))
+        axes.set_xlabel("time, h")
+        if axes.lines:
+            axes.legend(fontsize="small")
+    if path is not None:
+        save_figure(figure, path)
+    return figure

@@ -1,0 +1,121 @@
+"""The last sections: files to download, methods for a paper, provenance and how to repeat, and what is missing."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from creepkit.reports.attachments import problem_of_name
+from creepkit.reports.html.elements import (
+    Block,
+    Downloads,
+    Items,
+    Paragraph,
+    Section,
+    Table,
+    Verbatim,
+    printable,
+    printable_lines,
+    sentence,
+)
+from creepkit.reports.html.methods import methods_text
+
+if TYPE_CHECKING:
+    from creepkit.reports.contents import ExportedFile, ReportContents
+    from creepkit.reports.html.groups import GroupFindings
+
+
+def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -> list[Section]:
+    """Exports, methods, provenance, and what is missing."""
+    return [
+        Section("exports", "Files to download", _export_blocks(contents.exports)),
+        Section(
+            "methods",
+            "Methods text",
+            [
+                Verbatim(
+                    "To be copied into a paper and shortened",
+                    printable_lines(methods_text(contents, found)),
+                    prose=True,
+                )
+            ]
+            if found or contents.rupture
+            else [],
+        ),
+        Section("provenance", "Provenance, and how to repeat", _provenance_blocks(contents)),
+        Section("missing", "What is missing", _missing_blocks(contents)),
+    ]
+
+
+# ---- files -----------------------------------------------------------------------------------------------------------
+
+
+def _export_blocks(exports: Sequence[ExportedFile]) -> list[Block]:
+    if not exports:
+        return []
+    files = [
+        (file_name(one.name), _address(one.text), f"{printable(one.target, 80)}, {_size(one.text)}") for one in exports
+    ]
+    return [Paragraph("The page holds these files itself."), Downloads(files)]
+
+
+def file_name(name: str) -> str:
+    """A name under which any system can save a file: letters, digits, dots, hyphens and underscores."""
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name).lstrip("._")[-100:]
+    return plain or "file.txt"
+
+
+def _address(text: str) -> str:
+    encoded = base64.b64encode(text.encode("utf-8", "replace")).decode("ascii")
+    return f"data:text/plain;charset=utf-8;base64,{encoded}"
+
+
+def _size(text: str) -> str:
+    size = len(text.encode("utf-8", "replace"))
+    return f"{size} bytes" if size < 1000 else f"{size / 1000:.3g} kB"
+
+
+# ---- provenance ------------------------------------------------------------------------------------------------------
+
+
+def _provenance_blocks(contents: ReportContents) -> list[Block]:
+    provenance, blocks = contents.provenance, list[Block]()
+    if contents.attachments:
+        total = sum(len(one.content) for one in contents.attachments)
+        blocks.append(
+            Paragraph(
+                f"This page carries {len(contents.attachments)} files of the study ({total / 1e6:.3g} MB): with the page "
+                "alone, 'creepkit run' and the name of its file repeat the study and compare the numbers."
+            )
+        )
+    if provenance.commands:
+        blocks.append(Verbatim("Commands that repeat the work", printable_lines("\n".join(provenance.commands))))
+    settings = {"seed": provenance.seed} if provenance.seed is not None else {}
+    rows = [(printable(k, 120), printable(v, 400)) for k, v in {**settings, **provenance.settings}.items()]
+    if rows:
+        blocks.append(Table("Settings", ("setting", "value"), rows))
+    if provenance.versions:
+        rows = [(printable(k, 120), printable(v, 120)) for k, v in provenance.versions.items()]
+        blocks.append(Table("Versions", ("package", "version"), rows))
+    if provenance.inputs:
+        rows = [(printable(name, 200), printable(digest, 80)) for name, digest in provenance.inputs.items()]
+        blocks.append(Table("Input files", ("file", "sha256 of its content"), rows))
+    carried = [one.name for one in contents.attachments if not problem_of_name(one.name)]
+    if carried:
+        blocks.append(Paragraph("Files that the page carries:"))
+        blocks.append(Items([printable(name, 200) for name in carried]))
+    return blocks
+
+
+def _missing_blocks(contents: ReportContents) -> list[Block]:
+    groups = [group for group in contents.groups if group.failure]
+    rows = [
+        *((printable(one.stage, 80), sentence(one.sentence)) for one in contents.failures),
+        *((f"identification of {printable(group.name, 80)}", sentence(group.failure)) for group in groups),
+    ]
+    blocks: list[Block] = []
+    if rows:
+        blocks.append(Table("Stages that failed, and why", ("stage", "reason"), rows))
+    return [*blocks, Items([sentence(note) for note in contents.notes])] if contents.notes else blocks

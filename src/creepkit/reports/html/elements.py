@@ -1,0 +1,132 @@
+"""What a section of the page is made of: paragraphs, lists, tables, figures, formulas, texts and files to download.
+
+Strings are text, which the template escapes; Markup is what is HTML already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar, TypeAlias
+
+from markupsafe import Markup
+
+LONGEST_TEXT = 4000
+"""Characters of a cell or paragraph; an error message may hold a name of any length."""
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A paragraph. role : "", "lead" for what is to be read first, "note" for remarks, "warning"."""
+
+    kind: ClassVar[str] = "paragraph"
+    text: str
+    role: str = ""
+
+
+@dataclass(frozen=True)
+class Items:
+    """A list of sentences."""
+
+    kind: ClassVar[str] = "items"
+    items: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with a caption; the first cell of each row is its head. numeric : columns that stand right."""
+
+    kind: ClassVar[str] = "table"
+    caption: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    numeric: Sequence[int] = ()
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure: <svg> with its own title and description, and what the caption says below it."""
+
+    kind: ClassVar[str] = "picture"
+    svg: Markup
+    caption: str
+
+
+@dataclass(frozen=True)
+class Formula:
+    """An equation as MathML."""
+
+    kind: ClassVar[str] = "formula"
+    mathml: Markup
+
+
+@dataclass(frozen=True)
+class Verbatim:
+    """Text with its line ends, to be copied: a program, commands, a paragraph for a paper."""
+
+    kind: ClassVar[str] = "verbatim"
+    caption: str
+    text: str
+    prose: bool = False
+
+
+@dataclass(frozen=True)
+class Downloads:
+    """Files within the page. files : (name, address, what it is) with the content in the address."""
+
+    kind: ClassVar[str] = "downloads"
+    files: Sequence[tuple[str, str, str]]
+
+
+Block: TypeAlias = Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page with its heading; identifier : letters, digits and hyphens, of its own in the page."""
+
+    identifier: str
+    title: str
+    blocks: Sequence[Block] = ()
+    sections: Sequence[Section] = field(default=())
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is nothing under the heading."""
+        return not self.blocks and not self.sections
+
+
+def printable(text: object, longest: int = LONGEST_TEXT) -> str:
+    """A text on one line, without characters that cannot be seen or turn the direction of writing, of bounded length."""
+    shown = "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in str(text))
+    return shown if len(shown) <= longest else f"{shown[: longest - 1]}…"
+
+
+def printable_lines(text: str) -> str:
+    """The same of a text of several lines, of any length."""
+    return "\n".join(printable(line, len(line) + 1).rstrip() for line in text.expandtabs(4).splitlines())
+
+
+def sentence(text: str) -> str:
+    """A text with a capital and a full stop."""
+    text = printable(text).strip()
+    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?', ':', '…')) else '.'}"
+
+
+def plural(count: int, noun: str) -> str:
+    """A number of things in words: '1 test', '3 tests'."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number as people write it: 4.2e-05 as 4.2 × 10⁻⁵, NaN as a dash, a true minus."""
+    if value != value:
+        return "–"
+    if value in (float("inf"), float("-inf")):
+        return "∞" if value > 0 else "−∞"
+    mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
+    mantissa = mantissa.replace("-", "−")
+    if not exponent:
+        return mantissa
+    power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"10{power}" if mantissa == "1" else f"{mantissa} × 10{power}"

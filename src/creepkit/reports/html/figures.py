@@ -1,0 +1,30 @@
+"""The figures of one page: each with identifiers of its own, numbered in their order."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+from creepkit.reports.html.elements import Picture
+from creepkit.reports.html.svg import svg_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class PageFigures:
+    """Turns figures into pictures of a page, and counts them."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def picture(self, figure: Figure, title: str, description: str, caption: str) -> Picture:
+        """A figure with its alternative text (title and description) and a caption, which gets its number.
+
+        Its own heading is left out: the page says the same above it.
+        """
+        self.count += 1
+        figure.suptitle("")
+        svg = svg_text(figure, f"f{self.count}", title, description)
+        return Picture(Markup(svg), f"Figure {self.count}. {caption}")

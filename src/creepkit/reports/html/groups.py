@@ -1,0 +1,370 @@
+"""The sections on one material: verdict and values, curves, tests, ranking of laws, nuisance parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from markupsafe import Markup
+
+from creepkit.exporters.mathml import law_equations, symbol_element
+from creepkit.records import output_unit
+from creepkit.reports.html.elements import (
+    Block,
+    Formula,
+    Items,
+    Paragraph,
+    Section,
+    Table,
+    number,
+    plural,
+    printable,
+    sentence,
+)
+from creepkit.reports.html.figures import PageFigures
+from creepkit.reports.identification_plot import identification_figure
+from creepkit.reports.identification_text import rupture_rows
+from creepkit.reports.load_programs import SECONDS_PER_HOUR
+from creepkit.reports.prediction_bands import fitted_curves
+from creepkit.reports.ranking import equivalents_among_remaining, explanation, misfit_cells, misfit_columns
+from creepkit.reports.ranking_plot import misfit_of, ranking_figure
+from creepkit.reports.test_figure import fitted_test_figure, fitted_test_text
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.reports.contents import ReportGroup
+
+
+LARGEST_PER_CENT = 0.4
+"""Of a logarithm, from which its change is given as a factor."""
+
+
+@dataclass(frozen=True)
+class GroupFindings:
+    """What was found of one material, whatever it was found by.
+
+    fit : the best law. ranking : of all laws, None where one law alone was identified. verdict : in a sentence.
+    equivalents : pairs of laws that the tests do not separate. remarks : further sentences.
+    """
+
+    name: str
+    fit: Identification
+    ranking: Ranking | None
+    verdict: str
+    equivalents: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+def findings_of(group: ReportGroup) -> GroupFindings | None:
+    """What was found of a group; None where nothing was."""
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection.ranking import RankedLaw, Ranking
+    from creepkit.screening.results import AlloyResult
+
+    result = group.result
+    if isinstance(result, AlloyResult):
+        if not result.identified:
+            return None
+        laws = tuple(RankedLaw(w.fit, w.bic_difference, w.weight) for w in result.laws)
+        ranking = Ranking(laws, failed=result.failed_laws) if len(laws) > 1 else None
+        return GroupFindings(group.name, result.best, ranking, result.verdict, result.equivalents, result.notes)
+    if isinstance(result, Ranking):
+        equivalents = () if result.decisive else tuple(map(str, equivalents_among_remaining(result)))
+        return GroupFindings(group.name, result.best, result, result.verdict, equivalents)
+    if isinstance(result, Identification):
+        adequacy = "was identified; whether it explains the tests is not known"
+        adequacy = adequacy if result.adequacy is None else str(result.adequacy)
+        return GroupFindings(group.name, result, None, f"the law '{result.law.name}' {adequacy}")
+    return None
+
+
+def with_histories(group: ReportGroup) -> ReportGroup:
+    """The group with its histories taken from its result where it states none."""
+    found = findings_of(group)
+    return group if group.histories or found is None else replace(group, histories=found.fit.histories)
+
+
+# ---- verdict and values ----------------------------------------------------------------------------------------------
+
+
+def verdict_blocks(found: GroupFindings) -> list[Block]:
+    """The verdict, the law as a formula, its values with intervals, adequacy, and what is not determined."""
+    fit = found.fit
+    blocks: list[Block] = [Paragraph(sentence(found.verdict), "lead")]
+    if found.equivalents:
+        blocks.append(Items([sentence(text) for text in found.equivalents]))
+    blocks.append(Paragraph(f"{'The best law' if found.ranking else 'The law'}: {fit.law.title or fit.law.name}."))
+    blocks += [Formula(Markup(equation)) for equation in law_equations(fit.law)]
+    blocks += [_values(fit), _point(fit)]
+    if fit.adequacy is not None and found.ranking is not None:
+        blocks.append(Paragraph(sentence(f"the law {fit.adequacy}")))
+    undetermined = _undetermined(fit)
+    if undetermined:
+        blocks += [Paragraph("What these tests do not determine:"), Items(undetermined)]
+    else:
+        blocks.append(Paragraph("The tests determine every parameter of the law."))
+    unmodelled = [
+        sentence(f"{effect.description} in a test, which changes its rate by {_change(effect.rate_change)}")
+        for effect in fit.unmodelled
+    ]
+    if unmodelled:
+        blocks += [Paragraph("The intervals do not include:"), Items(unmodelled)]
+    remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *fit.notes])))
+    return [*blocks, Paragraph("Remarks:"), Items(remarks)] if remarks else blocks
+
+
+def _change(log_factor: float) -> str:
+    """A change of a logarithm in words."""
+    if abs(log_factor) < LARGEST_PER_CENT:
+        return f"{number(100 * float(np.expm1(log_factor)), 2)} %"
+    return f"a factor of {number(float(np.exp(log_factor)), 2)}"
+
+
+def _undetermined(fit: Identification) -> list[str]:
+    return [sentence(text) for text in fit.undetermined()]
+
+
+def _values(fit: Identification) -> Table:
+    table, symbols = fit.law.table, {str(symbol): symbol for symbol in fit.law.params}
+    rows = [
+        (
+            Markup(symbol_element(symbols[e.name])),
+            table[e.name].meaning,
+            number(e.value, 5),
+            f"{number(e.low)} to {number(e.high)}",
+            "" if e.unit == "1" else e.unit,
+            e.verdict,
+        )
+        for e in fit.estimates
+    ]
+    columns = ("parameter", "meaning", "value", "95 % interval", "unit", "by these tests")
+    caption = "Values for stress in MPa as a ratio to 1 MPa, and time in s as a ratio to 1 s"
+    return Table(caption, columns, rows, numeric=(2, 3))
+
+
+def _point(fit: Identification) -> Paragraph:
+    """Rate and local exponent at the reference point."""
+    r = fit.reference
+    rate = [number(float(v), 3) for v in fit.rate(r.stress, warn=False)]
+    exponent = [number(float(v), 3) for v in fit.local_exponent(r.stress, warn=False)]
+    virgin = " of virgin material" if fit.law.states else ""
+    return Paragraph(
+        f"Amid the tests, at {number(r.stress)} MPa, {r.temperature:.0f} K, a strain of {number(r.strain, 2)} and "
+        f"{number(r.time / SECONDS_PER_HOUR, 3)} h, the creep rate{virgin} is {rate[0]} per second (95 % interval "
+        f"{rate[1]} to {rate[2]}) and the local stress exponent is {exponent[0]} ({exponent[1]} to {exponent[2]})."
+    )
+
+
+# ---- curves and tests ------------------------------------------------------------------------------------------------
+
+
+def curve_blocks(found: GroupFindings, figures: PageFigures) -> list[Block]:
+    """All tests in one figure: measured over identified, residuals, rates over stress, rupture."""
+    fit = found.fit
+    if not fit.histories or fit.predictor is None:
+        return [Paragraph("No curves are drawn: the tests were not given with this identification.", "note")]
+    return [
+        figures.picture(
+            identification_figure(fit),
+            f"Identified law and tests{_of(found)}",
+            f"Curves of {plural(len(fit.histories), 'test')} over time with the law's 95 % bands, residuals, and creep "
+            f"rates over stress. {sentence(found.verdict)} The table of tests holds the numbers.",
+            "Measured (dots) and identified (lines with 95 % band); residuals; creep rate over stress.",
+        )
+    ]
+
+
+def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[Block]:
+    """A table of all tests, and a figure for each of those whose misfit is largest, at most so many."""
+    fit = found.fit
+    blocks: list[Block] = [_table_of_tests(fit)]
+    if rupture_rows(fit):
+        blocks.append(_table_of_ruptures(fit))
+    with_frames = [k for k, test in enumerate(fit.tests) if test.outputs]
+    if not fit.histories or fit.predictor is None or not with_frames:
+        return blocks
+    curves = fitted_curves(fit)
+    worst = sorted(with_frames, key=lambda k: -np.nan_to_num(misfit_of(fit.tests[k])))[:most]
+    if len(worst) < len(with_frames):
+        blocks.append(
+            Paragraph(f"Drawn are the {len(worst)} of {len(with_frames)} tests whose misfit is largest.", "note")
+        )
+    for k in sorted(worst):
+        name = printable(fit.tests[k].name, 120)
+        blocks.append(
+            figures.picture(
+                fitted_test_figure(fit, curves, k),
+                f"Test {name}",
+                fitted_test_text(fit, curves, k),
+                f"{name}: measured (dots), identified with 95 % band of the law, and measured less identified; grey: "
+                "two standard deviations of the noise of a frame.",
+            )
+        )
+    return blocks
+
+
+def _table_of_tests(fit: Identification) -> Table:
+    rows = []
+    for test in fit.tests:
+        first = test.outputs[0] if test.outputs else None
+        unit = f" {output_unit(first.output)}" if first is not None and output_unit(first.output) else ""
+        rows.append(
+            (
+                printable(test.name, 120),
+                printable(test.condition, 200),
+                str(test.frames),
+                "–" if first is None else number(misfit_of(test), 3),
+                "–" if first is None else number(first.errors.relative_squared_error, 2),
+                "–" if first is None else f"{number(first.offset, 2)}{unit}",
+                number(test.rate_factor, 3),
+                number(test.weight, 2),
+            )
+        )
+    columns = ("test", "condition", "frames", "reduced χ²", "relative squared error", "offset", "rate × law", "weight")
+    caption = (
+        "Tests: misfit of the law over the noise of a frame (1: noise alone), error of the first output, its offset, "
+        "and the test's own factor on the rate"
+    )
+    return Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6, 7))
+
+
+def _table_of_ruptures(fit: Identification) -> Table:
+    rows = [
+        (
+            printable(name, 120),
+            printable(condition, 200),
+            f"{'> ' if r.censored else ''}{number(r.measured / SECONDS_PER_HOUR)}",
+            number(r.predicted / SECONDS_PER_HOUR),
+            f"{number(r.low / SECONDS_PER_HOUR)} to {number(r.high / SECONDS_PER_HOUR)}",
+        )
+        for name, condition, r in rupture_rows(fit)
+    ]
+    columns = ("test", "condition", "lasted, h", "by the law, h", "95 % interval of a single test, h")
+    return Table("Rupture times; > marks tests that were stopped before", columns, rows, numeric=(2, 3, 4))
+
+
+def _of(found: GroupFindings) -> str:
+    return f" of {printable(found.name, 80)}" if found.name else ""
+
+
+# ---- ranking ---------------------------------------------------------------------------------------------------------
+
+
+def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -> list[Block]:
+    """The laws tried with misfits and weights, and what separates them: the misfit of each law in each test."""
+    ranking = found.ranking
+    if ranking is None:
+        return []
+    rows = [
+        (
+            printable(one.fit.law.name, 120),
+            str(len(one.fit.law.params)),
+            *misfit_cells(one.fit),
+            number(one.excess, 3),
+            f"{one.weight:.3f}",
+            explanation(one.fit),
+        )
+        for one in ranking.laws
+    ]
+    criterion = {"bic": "BIC", "aicc": "AICc"}.get(ranking.criterion, ranking.criterion)
+    columns = (
+        *("law", "parameters", *misfit_columns(ranking.best), f"{criterion} − best", "weight", "explains the tests"),
+    )
+    blocks: list[Block] = [Table("Laws tried, the best first", columns, rows, numeric=(1, 2, 3, 4, 5))]
+    blocks += [Paragraph(text) for text in _separation(ranking)]
+    if ranking.challenges:
+        blocks += [
+            Paragraph("What the tests allow beside the best law:"),
+            Items([sentence(str(challenge)) for challenge in ranking.challenges]),
+        ]
+    if ranking.failed:
+        blocks.append(Items([sentence(f"{name}: {reason}") for name, reason in ranking.failed.items()]))
+    if drawn and ranking.best.tests:
+        blocks.append(
+            figures.picture(
+                ranking_figure(ranking),
+                f"Misfit of each law in each test{_of(found)}",
+                f"Mean square deviation over noise of {plural(len(ranking.laws), 'law')} in "
+                f"{plural(len(ranking.best.tests), 'test')}, the weights of the laws, and the curves of the credible "
+                f"ones. {' '.join(_separation(ranking))} Weights: "
+                + ", ".join(f"{printable(r.fit.law.name, 60)} {r.weight:.3f}" for r in ranking.laws)
+                + ".",
+                "Where the laws differ: misfit of each law in each test over the noise, and weights.",
+            )
+        )
+    return blocks
+
+
+def _separation(ranking: Ranking) -> Iterator[str]:
+    """In which test the second law is farthest behind the best one."""
+    if len(ranking.laws) < 2:
+        return
+    best, second = ranking.laws[0].fit, ranking.laws[1].fit
+    differences = np.array(
+        [misfit_of(b) - misfit_of(a) for a, b in zip(best.tests, second.tests, strict=False)], dtype=float
+    )
+    if not np.isfinite(differences).any():
+        return
+    k = int(np.nanargmax(differences))
+    first, other = misfit_of(best.tests[k]), misfit_of(second.tests[k])
+    yield (
+        f"What separates {second.law.name} from {best.law.name} most is test {printable(best.tests[k].name, 120)} "
+        f"({printable(best.tests[k].condition, 200)}): there the reduced chi-square is {number(other, 3)} with "
+        f"{second.law.name} and {number(first, 3)} with {best.law.name}."
+    )
+
+
+# ---- nuisance parameters ---------------------------------------------------------------------------------------------
+
+
+def nuisance_blocks(found: GroupFindings) -> list[Block]:
+    """Noise and scatter as they were estimated, and explicit nuisance parameters."""
+    fit = found.fit
+    noise = [
+        (name.replace("_", " "), f"{number(one.noise, 2)}{_unit(name)}", f"{number(one.offset, 2)}{_unit(name)}")
+        for name, one in fit.noise_model.outputs.items()
+    ]
+    blocks: list[Block] = [
+        Paragraph(
+            f"The creep rates of single tests scatter by {number(100 * fit.noise_model.rate, 3)} % (one standard deviation "
+            "of their logarithm) about the law."
+        )
+    ]
+    if noise:
+        blocks.append(
+            Table("Noise as it was estimated, one standard deviation", ("output", "frame", "offset of a test"), noise)
+        )
+    rows = [
+        (
+            n.key,
+            printable(n.owner, 120) or "all",
+            f"{number(n.value)} ± {number(n.sd, 2)}",
+            f"{number(n.prior_mean)} ± {number(n.prior_sd, 2)}",
+            number((n.value - n.prior_mean) / n.prior_sd, 2) if n.prior_sd > 0 else "–",
+        )
+        for n in fit.nuisances
+    ]
+    if rows:
+        columns = ("nuisance parameter", "of", "estimate", "prior", "deviation, sd")
+        blocks.append(Table("Nuisance parameters estimated beside the law", columns, rows, numeric=(2, 3, 4)))
+    return blocks
+
+
+def _unit(output: str) -> str:
+    unit = output_unit(output)
+    return f" {unit}" if unit else ""
+
+
+def group_sections(
+    found: GroupFindings, figures: PageFigures, prefix: str, *, most_tests: int, ranking_drawn: bool
+) -> Sequence[Section]:
+    """The sections on what was found, but for the verdict."""
+    return [
+        Section(f"{prefix}curves", "The law over the tests", curve_blocks(found, figures)),
+        Section(f"{prefix}tests", "Tests", test_blocks(found, figures, most_tests)),
+        Section(f"{prefix}ranking", "Laws tried", ranking_blocks(found, figures, drawn=ranking_drawn)),
+        Section(f"{prefix}nuisances", "Noise and nuisance parameters", nuisance_blocks(found)),
+    ]

@@ -1,0 +1,178 @@
+"""report_html: the contents of a report as the text of one HTML page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from importlib.metadata import version
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+from creepkit.reports.attachments import embed
+from creepkit.reports.html.closing import closing_sections
+from creepkit.reports.html.elements import Block, Paragraph, Section, Table, number, plural, printable, printable_lines
+from creepkit.reports.html.figures import PageFigures
+from creepkit.reports.html.groups import GroupFindings, findings_of, group_sections, verdict_blocks, with_histories
+from creepkit.reports.html.stages import data_section, stage_sections
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+    from creepkit.reports.contents import ReportContents
+
+MOST_TEST_FIGURES = 160
+"""Figures of single tests in one page; of more tests those of largest misfit are drawn."""
+
+
+MOST_RANKINGS_DRAWN = 12
+"""Groups up to which the misfit of each law in each test is drawn as well."""
+
+
+def report_html(contents: ReportContents) -> str:
+    """The page: findings first, then curves, tests, laws tried, data, other stages, files, methods and provenance.
+
+    It holds everything itself, runs no script, loads nothing, and is the same text for the same contents.
+    """
+    import dataclasses
+
+    contents = dataclasses.replace(contents, groups=tuple(map(with_histories, contents.groups)))
+    figures = PageFigures()
+    found = [one for one in map(findings_of, contents.groups) if one is not None]
+    sections = [
+        _findings_section(contents, found),
+        *_group_sections(found, figures),
+        data_section(contents),
+        *stage_sections(contents, figures),
+        *closing_sections(contents, found),
+    ]
+    shown = [section for section in map(_without_empty, sections) if not section.empty]
+    return _template().render(
+        title=printable(contents.title, 200) or "Report",
+        summary=_summary(contents, found),
+        sections=shown,
+        style=Markup(_resource("style.css")),
+        attachments=Markup(embed(contents.attachments)),
+        version=version("creepkit"),
+    )
+
+
+@cache
+def _template() -> Template:
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=False)
+    environment.filters["lines"] = printable_lines
+    return environment.from_string(_resource("page.html"))
+
+
+@cache
+def _resource(name: str) -> str:
+    return files("creepkit.reports.html").joinpath("templates", name).read_text("utf-8")
+
+
+def _without_empty(section: Section) -> Section:
+    inner = [one for one in map(_without_empty, section.sections) if not one.empty]
+    return Section(section.identifier, section.title, section.blocks, inner)
+
+
+def _summary(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
+    tests = sum(len(group.histories) for group in contents.groups) or sum(len(one.fit.tests) for one in found)
+    parts = [plural(tests, "test")] if tests else []
+    if len(contents.groups) > 1:
+        parts.append(plural(len(contents.groups), "material"))
+    days = [str(one.fit.provenance.get("when", ""))[:10] for one in found]
+    dates = sorted({day for day in days if day})
+    parts += [f"identified {dates[0]}" if len(dates) == 1 else f"identified {dates[0]} to {dates[-1]}"] if dates else []
+    return ", ".join(parts)
+
+
+# ---- findings --------------------------------------------------------------------------------------------------------
+
+
+def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) -> Section:
+    """The verdict of each group; of several groups a table, and their verdicts in sections of their own."""
+    missing = [printable(one.stage, 80) for one in contents.failures]
+    missing += [f"identification of {printable(g.name, 80)}" for g in contents.groups if g.failure]
+    warning: list[Block] = []
+    if missing:
+        listed = ", ".join(missing[:12]) + (f" and {len(missing) - 12} more" if len(missing) > 12 else "")
+        warning.append(
+            Paragraph(
+                f"This report is not complete. Failed: {listed}. The reasons stand in the last section.", "warning"
+            )
+        )
+    if len(found) == 1:
+        return Section("findings", "Findings", [*warning, *verdict_blocks(found[0])])
+    if not found:
+        text = "No law was identified."
+        return Section("findings", "Findings", [*warning, *([Paragraph(text, "lead")] if contents.groups else [])])
+    blocks = [*warning, Paragraph(_overview(contents, found), "lead"), _table_of_groups(found)]
+    return Section("findings", "Findings", blocks)
+
+
+def _overview(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
+    explained = sum(one.fit.adequacy is not None and one.fit.adequacy.explains for one in found)
+    laws = [one.fit.law.name for one in found]
+    counts = sorted({name: laws.count(name) for name in laws}.items(), key=lambda pair: (-pair[1], pair[0]))
+    named = ", ".join(f"{printable(name, 60)} in {count}" for name, count in counts[:8])
+    return (
+        f"Laws were identified of {len(found)} of {plural(len(contents.groups), 'material')}. The best law is {named}. "
+        f"It explains the tests to their noise in {explained} of {len(found)}."
+    )
+
+
+def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
+    rows = []
+    for one in found:
+        fit, r = one.fit, one.fit.reference
+        rate = [number(float(v), 3) for v in fit.rate(r.stress, warn=False)]
+        exponent = [number(float(v), 3) for v in fit.local_exponent(r.stress, warn=False)]
+        weight = "–" if one.ranking is None else f"{one.ranking.laws[0].weight:.2f}"
+        adequacy = "?" if fit.adequacy is None else "yes" if fit.adequacy.explains else "no"
+        adequacy = "?" if fit.adequacy is not None and fit.adequacy.verdict == "cannot be judged" else adequacy
+        rows.append(
+            (
+                printable(one.name, 120),
+                printable(fit.law.name, 120),
+                weight,
+                adequacy,
+                number(r.stress, 3),
+                f"{rate[0]} ({rate[1]} to {rate[2]})",
+                f"{exponent[0]} ({exponent[1]} to {exponent[2]})",
+            )
+        )
+    columns = (
+        "material",
+        "best law",
+        "weight",
+        "explains the tests",
+        "at MPa",
+        "creep rate there, 1/s",
+        "local exponent",
+    )
+    return Table("Materials, with 95 % intervals", columns, rows, numeric=(2, 4, 5, 6))
+
+
+def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> list[Section]:
+    drawn = len(found) <= MOST_RANKINGS_DRAWN
+    most = _figures_of_tests(found)
+    if len(found) == 1:
+        return [*group_sections(found[0], figures, "", most_tests=most, ranking_drawn=drawn)]
+    sections = []
+    for k, one in enumerate(found, start=1):
+        inner = group_sections(one, figures, f"m{k}-", most_tests=most, ranking_drawn=drawn)
+        title = printable(one.name, 120) or f"Material {k}"
+        sections.append(Section(f"m{k}", title, verdict_blocks(one), inner))
+    return sections
+
+
+def _figures_of_tests(found: Sequence[GroupFindings]) -> int:
+    """How many tests of each group are drawn, so that the page has at most MOST_TEST_FIGURES of them."""
+    counts = sorted(len(one.fit.tests) for one in found)
+    left, most = MOST_TEST_FIGURES, 0
+    for k, count in enumerate(counts):
+        most = max(most, min(count, left // (len(counts) - k)))
+        left -= min(count, most)
+    return max(most, 1)

@@ -1,0 +1,257 @@
+"""The sections on the other stages of a study: data, exclusions, extraction, temperature, rupture, forecasts, design."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from creepkit.quality.flags import frame_ranges_text
+from creepkit.reports.design import design_figure, direction_lines
+from creepkit.reports.extraction_plot import extraction_figure
+from creepkit.reports.extraction_text import extraction_text
+from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows
+from creepkit.reports.forecast_plot import forecast_figure
+from creepkit.reports.html.elements import (
+    Block,
+    Items,
+    Paragraph,
+    Section,
+    Table,
+    Verbatim,
+    number,
+    plural,
+    printable,
+    printable_lines,
+    sentence,
+)
+from creepkit.reports.html.figures import PageFigures
+from creepkit.reports.rupture import rupture_text
+from creepkit.reports.rupture_plot import rupture_figure
+from creepkit.reports.temperature_law import plot_temperature_law, temperature_law_text, temperature_study_text
+
+if TYPE_CHECKING:
+    from creepkit.experiments.planned_design import Design
+    from creepkit.extraction.extraction import Extraction
+    from creepkit.forecasts.forecast import Forecast
+    from creepkit.quality.flags import DataQuality
+    from creepkit.records import History
+    from creepkit.reports.contents import Exclusion, ReportContents
+    from creepkit.rupture_assessment.assessment import RuptureAssessment
+
+MOST_LISTED = 400
+"""Rows of a table of tests."""
+
+
+MOST_DESIGNS = 8
+"""Planned tests that are listed."""
+
+
+def data_section(contents: ReportContents) -> Section:
+    """The tests as measured, what is suspect in them, and what was left out and why."""
+    histories = [h for group in contents.groups for h in group.histories]
+    blocks: list[Block] = []
+    if histories:
+        blocks.append(_table_of_histories(histories))
+    if contents.quality is not None:
+        blocks += _quality_blocks(contents.quality)
+    sections = [Section("exclusions", "Left out", _exclusion_blocks(contents.exclusions))]
+    return Section("data", "Data", blocks, [s for s in sections if histories or not s.empty])
+
+
+def _table_of_histories(histories: Sequence[History]) -> Table:
+    rows = [
+        (
+            printable(h.name, 120),
+            printable(h.alloy or "–", 80),
+            printable(h.condition, 200),
+            str(h.times.size),
+            number(float(h.times[-1]) / 3600.0),
+            _ending(h),
+            printable(re.split(r"[/\\]", h.source)[-1] or "–", 160),
+        )
+        for h in histories[:MOST_LISTED]
+    ]
+    more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
+    columns = ("test", "alloy", "condition", "frames", "last frame, h", "ended", "file")
+    return Table(f"{plural(len(histories), 'test')} as measured{more}", columns, rows, numeric=(3, 4))
+
+
+def _ending(history: History) -> str:
+    if history.rupture_time is not None:
+        return f"ruptured at {number(history.rupture_time / 3600.0)} h"
+    return "stopped unruptured" if history.unruptured else "–"
+
+
+def _quality_blocks(quality: DataQuality) -> list[Block]:
+    if not quality.flags:
+        return [Paragraph(f"The check of data quality found nothing suspect in {plural(quality.tests, 'test')}.")]
+    rows = [
+        (
+            printable(flag.history, 160),
+            flag.kind,
+            frame_ranges_text(flag.frames) if flag.frames else "–",
+            "–" if flag.time is None else number(flag.time / 3600.0),
+            printable(flag.reason),
+            printable(flag.proposal or "–"),
+        )
+        for flag in quality.flags[:MOST_LISTED]
+    ]
+    columns = ("test", "what", "frames", "at, h", "reason", "what may be done")
+    caption = f"What the check of data quality found in {plural(quality.tests, 'test')}; it drops nothing by itself"
+    return [Table(caption, columns, rows, numeric=(3,))]
+
+
+def _exclusion_blocks(exclusions: Sequence[Exclusion]) -> list[Block]:
+    if not exclusions:
+        return [Paragraph("Nothing was left out: every frame of every test counts.")]
+    rows = [
+        (
+            printable(one.test, 120),
+            frame_ranges_text(one.frames) if one.frames else "the whole test",
+            printable(one.reason),
+        )
+        for one in exclusions[:MOST_LISTED]
+    ]
+    return [Table("Left out of the identification", ("test", "what", "reason"), rows)]
+
+
+def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[Section]:
+    """Extraction, temperature, rupture, forecasts and further tests, where there are such results."""
+    stages: tuple[tuple[str, str, Mapping[str, Any], Callable[[str, Any, PageFigures], list[Block]]], ...] = (
+        ("extraction", "Extraction from camera frames", contents.extractions, _extraction_blocks),
+        ("temperature", "Trends with temperature", contents.temperature, _temperature_blocks),
+        ("rupture", "Rupture", contents.rupture, _rupture_blocks),
+        ("forecasts", "Forecasts", contents.forecasts, _forecast_blocks),
+        ("design", "Further tests proposed", contents.design, _design_blocks),
+    )
+    for identifier, title, results, blocks_of in stages:
+        if len(results) == 1:
+            (name, result), *_ = results.items()
+            yield Section(identifier, title, blocks_of(name, result, figures))
+        elif results:
+            inner = [
+                Section(f"{identifier}-{k}", printable(name, 120) or "All tests", blocks_of(name, result, figures))
+                for k, (name, result) in enumerate(results.items(), start=1)
+            ]
+            yield Section(identifier, title, (), inner)
+
+
+def _of(name: str) -> str:
+    return f" of {printable(name, 80)}" if name else ""
+
+
+def _extraction_blocks(name: str, extraction: Extraction, figures: PageFigures) -> list[Block]:
+    used = int(extraction.used.sum())
+    outputs = ", ".join(output.replace("_", " ") for output in extraction.outputs)
+    picture = figures.picture(
+        extraction_figure(extraction),
+        f"Extraction{_of(name)}",
+        f"Maps of height of some frames, and over time {outputs}, rigid motion and residuals; {used} of "
+        f"{extraction.times.size} frames were used, {plural(len(extraction.flags), 'flag')}.",
+        f"Extraction{_of(name)}: maps of height, outputs with 95 % bands, rigid motion and residuals; flagged frames "
+        "in red.",
+    )
+    return [picture, Verbatim("What was extracted, and how well", printable_lines(extraction_text(extraction)))]
+
+
+def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Block]:
+    law = getattr(result, "temperature_law", result)
+    blocks: list[Block] = []
+    if law is not None:
+        low, high = law.temperature_range
+        forms = ", ".join(f"{parameter} {form}" for parameter, form in law.forms.items())
+        blocks.append(
+            Paragraph(
+                f"Between {low:.0f} and {high:.0f} K the parameters follow these forms best: {forms}. The values are "
+                f"those at {law.T_ref:.1f} K."
+            )
+        )
+        rows = [
+            (
+                e.name,
+                number(e.value, 5),
+                f"{number(e.low)} to {number(e.high)}",
+                "" if e.unit == "1" else e.unit,
+                e.verdict,
+            )
+            for e in law.estimates
+        ]
+        columns = ("parameter", "value", "95 % interval", "unit", "by these tests")
+        blocks.append(Table("Values of the temperature law", columns, rows, numeric=(1, 2)))
+        blocks.append(
+            figures.picture(
+                plot_temperature_law(law),
+                f"Parameters over temperature{_of(name)}",
+                f"Isothermal estimates with 95 % intervals at {law.isothermal_estimates.temperatures.size} temperatures "
+                f"from {low:.0f} to {high:.0f} K, and the curves of the forms that remain. Best forms: {forms}.",
+                "Parameters at each temperature with 95 % intervals, and the forms that remain with their weights.",
+            )
+        )
+    text = temperature_law_text(result) if result is law else temperature_study_text(result)
+    return [*blocks, Verbatim("The temperature law in full", printable_lines(text))]
+
+
+def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigures) -> list[Block]:
+    picture = figures.picture(
+        rupture_figure(assessment),
+        f"Rupture assessment{_of(name)}",
+        f"Isotherms of stress over rupture time with tests and bounds, the master curve, and predicted over measured "
+        f"times of {plural(len(assessment.tests), 'test')}. {sentence(assessment.verdict)}",
+        "Isotherms with tests and bounds; master curve; predicted against measured times. Broken lines lie beyond the "
+        "stresses tested.",
+    )
+    text = Verbatim("Methods, strengths with bounds, and checks", printable_lines(rupture_text(assessment)))
+    return [Paragraph(sentence(assessment.verdict), "lead"), picture, text]
+
+
+def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> list[Block]:
+    laws = ", ".join(f"{law} ({weight:.2g})" for law, weight in forecast.laws.items())
+    blocks: list[Block] = [
+        Paragraph(
+            f"By {laws}: bands and intervals hold a measured value of a single test with a probability of "
+            f"{100 * forecast.level:g} %."
+        ),
+        Table("Forecasts", FORECAST_COLUMNS, [tuple(map(printable, row)) for row in forecast_rows(forecast)]),
+    ]
+    if any(test.outputs for test in forecast.tests):
+        ends = " ".join(f"{printable(row[0], 80)}: {printable(row[2], 200)}." for row in forecast_rows(forecast)[:12])
+        blocks.append(
+            figures.picture(
+                forecast_figure(forecast),
+                f"Forecasts{_of(name)}",
+                f"Forecast curves over time with pointwise and simultaneous bands, and what the variance is made of. {ends}",
+                f"Forecast with bands of {100 * forecast.level:g} %, and below it what the variance is made of.",
+            )
+        )
+    remarks = [sentence(f"{test.name}: {note}") for test in forecast.tests for note in test.notes]
+    return [*blocks, Items(remarks)] if remarks else blocks
+
+
+def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Block]:
+    blocks: list[Block] = [Paragraph(sentence(design.sentence), "lead")]
+    if design.tests:
+        rows = [
+            (
+                printable(test.description, 200),
+                number(test.hours, 3),
+                number(test.expectation.information, 2),
+                number(test.information_per_hour, 2),
+            )
+            for test in design.tests[:MOST_DESIGNS]
+        ]
+        columns = ("planned test", "oven, h", "expected information, nats", "nats per hour")
+        caption = f"The best of {plural(len(design.tests), 'planned test')} considered; goal: {design.goal}"
+        blocks.append(Table(caption, columns, rows, numeric=(1, 2, 3)))
+        blocks.append(
+            figures.picture(
+                design_figure(design),
+                f"What further tests tell{_of(name)}",
+                "Map of the expected information for an hour of the oven over the first load and the duration, left of "
+                f"constant loads, right of loads that change. {sentence(design.sentence)}",
+                "Expected information for an hour of the oven, over the first load and the duration; the plan is marked.",
+            )
+        )
+    lines = [line.strip() for line in direction_lines(design) if line.strip()]
+    remarks = [*lines[1:], *(design.notes if design.tests else ())]
+    return [*blocks, Items([sentence(text) for text in remarks])] if remarks else blocks

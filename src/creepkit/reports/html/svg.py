@@ -1,0 +1,84 @@
+"""Figures as SVG within a page: thinned, with text as text, with identifiers of their own, always the same bytes.
+
+The ground of a figure is transparent; its colours are those of a figure on white.
+"""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+from creepkit.reports.figures import POWER_OF_TEN, save_figure
+from creepkit.reports.html.compact_svg import compact
+from creepkit.reports.html.elements import printable
+from creepkit.reports.html.thinning import thin_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LONGEST_LABEL = 160
+"""Characters of one line of text in a figure."""
+
+
+_SETTINGS = {"svg.fonttype": "none", "svg.hashsalt": "creepkit", "path.simplify": False, "svg.image_inline": True}
+_FONTS = "system-ui, 'DejaVu Sans', Verdana, sans-serif"
+
+
+def svg_text(figure: Figure, identifier: str, title: str, description: str) -> str:
+    """A figure as an <svg> element, with its title and description for those who do not see it.
+
+    identifier : letters and digits, of its own in the page: all identifiers of the figure begin with it.
+    """
+    import matplotlib
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    for axes in figure.axes:
+        axes.patch.set_alpha(0.0)
+    figure.patch.set_alpha(0.0)
+    save_figure(figure, None)  # a dollar in a name is a dollar
+    _shorten_texts(figure)
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)  # axes have their places and ranges from here on
+        figure.set_layout_engine("none")
+    thin_figure(figure)
+    buffer = io.StringIO()
+    with matplotlib.rc_context(_SETTINGS):
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+    root = ElementTree.fromstring(buffer.getvalue())
+    width = float(str(root.get("viewBox")).split()[2])
+    compact(root, identifier)
+    view_box = str(root.get("viewBox"))
+    root.attrib.clear()
+    root.attrib.update(
+        {
+            "viewBox": view_box,
+            "role": "img",
+            "aria-labelledby": f"{identifier}-t {identifier}-d",
+            "font-family": _FONTS,
+            "style": f"max-width:{4 * width / 3:.0f}px",
+        }
+    )
+    for position, (tag, text) in enumerate((("title", title), ("desc", description))):
+        element = ElementTree.Element(tag, {"id": f"{identifier}-{tag[0]}"})
+        element.text = printable(text)
+        root.insert(position, element)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _shorten_texts(figure: Figure) -> None:
+    """Names in labels and legends on a line of bounded length, without characters that cannot be seen."""
+    from matplotlib.text import Text
+    from matplotlib.ticker import FixedFormatter
+
+    for text in figure.findobj(Text):
+        content: str = text.get_text()  # type: ignore[attr-defined]
+        if content and not POWER_OF_TEN.fullmatch(content):
+            lines = [printable(line, LONGEST_LABEL) for line in content.split("\n")]
+            text.set_text("\n".join(lines))  # type: ignore[attr-defined]
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            formatter = axis.get_major_formatter()
+            if isinstance(formatter, FixedFormatter):
+                formatter.seq = [printable(label, LONGEST_LABEL // 2) for label in formatter.seq]

@@ -1,0 +1,152 @@
+"""Texts and plots of instruments' records, of the alignment of clocks, and of what was imposed."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.instruments.clock_alignment import UNIX_TIME
+from creepkit.records.quantities import ZERO_CELSIUS
+from creepkit.reports.figures import empty_figure, save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from creepkit.instruments.imposed import Imposed
+    from creepkit.records import Channel, ClockAlignment, InstrumentRecord
+
+UNITS = {"pressure": "MPa", "temperature": "C", "length": "mm", "force": "N"}
+MOST_DRAWN = 4000
+"""Points of a line; of a longer record the least and largest readings of equal spans are drawn."""
+
+
+def record_text(record: InstrumentRecord) -> str:
+    """Rows, clock, gaps, one line for each channel, and notes."""
+    clock = "of unknown date or zone"
+    if record.start is not None:
+        clock = f"{datetime.fromtimestamp(record.start, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    gaps = record.gaps
+    lines = [
+        f"record '{record.name}': {record.times.size} rows every {record.interval:.6g} s over "
+        f"{float(np.ptp(record.times)):.6g} s, time zero {clock}"
+    ]
+    if gaps.size:
+        widest = float(np.diff(gaps, axis=1).max())
+        lines.append(f"  {len(gaps)} gap{'s' if len(gaps) > 1 else ''} between rows, the longest of {widest:g} s")
+    width = max((len(name) for name in record.channels), default=0)
+    lines += [f"  {name:{width}}  {_channel_text(channel)}" for name, channel in record.channels.items()]
+    return "\n".join([*lines, *(f"  note: {note}" for note in record.notes)])
+
+
+def record_to_json(record: InstrumentRecord) -> dict[str, Any]:
+    """What record_text says, as data; values in MPa, K, mm, N or as written."""
+    channels = [
+        {
+            "name": channel.name,
+            "quantity": channel.quantity,
+            "reference": channel.reference,
+            "written_unit": channel.written_unit,
+            "missing": channel.missing,
+            "least": None if channel.missing == channel.values.size else float(np.nanmin(channel.values)),
+            "largest": None if channel.missing == channel.values.size else float(np.nanmax(channel.values)),
+        }
+        for channel in record.channels.values()
+    ]
+    return {
+        "name": record.name,
+        "source": record.source,
+        "rows": int(record.times.size),
+        "interval_s": record.interval,
+        "duration_s": float(np.ptp(record.times)),
+        "start_unix_s": record.start,
+        "gaps_s": record.gaps.tolist(),
+        "channels": channels,
+        "notes": list(record.notes),
+    }
+
+
+def _channel_text(channel: Channel) -> str:
+    unit = UNITS.get(channel.quantity, channel.written_unit)
+    shift = ZERO_CELSIUS if channel.quantity == "temperature" else 0.0
+    what = " ".join(text for text in (channel.reference, channel.quantity) if text)
+    if channel.missing == channel.values.size:
+        return f"{what}, no reading"
+    low, high = float(np.nanmin(channel.values)) - shift, float(np.nanmax(channel.values)) - shift
+    lost = f", {channel.missing} readings missing" if channel.missing else ""
+    written = f" (written in {channel.written_unit})" if channel.written_unit not in ("", unit) else ""
+    return f"{what}, {low:.4g} to {high:.4g} {unit}".rstrip() + written + lost
+
+
+def record_figure(record: InstrumentRecord, path: str | Path | None = None) -> Figure:
+    """Every channel over time, one panel for each quantity."""
+    quantities = list(dict.fromkeys(channel.quantity for channel in record.channels.values()))
+    figure = empty_figure(7.0, 1.0 + 2.2 * max(len(quantities), 1))
+    panels = figure.subplots(max(len(quantities), 1), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, quantity in zip(panels, quantities, strict=False):
+        shift = ZERO_CELSIUS if quantity == "temperature" else 0.0
+        for name, channel in record.channels.items():
+            if channel.quantity == quantity:
+                rows = _drawn_rows(channel.values)
+                axes.plot(record.times[rows], channel.values[rows] - shift, lw=0.8, label=name)
+        unit = UNITS.get(quantity, "")
+        axes.set_ylabel(f"{quantity}, {unit}" if unit else quantity)
+        if sum(channel.quantity == quantity for channel in record.channels.values()) <= 6:
+            axes.legend(fontsize=7)
+    panels[-1].set_xlabel("time of the record, s")
+    return save_figure(figure, path)
+
+
+def _drawn_rows(values: np.ndarray) -> np.ndarray:
+    """Rows of the least and largest reading in each of equal spans, in order; all rows of a short record."""
+    if values.size <= MOST_DRAWN:
+        return np.arange(values.size)
+    size = -(-values.size // (MOST_DRAWN // 2))
+    filled = np.pad(np.nan_to_num(values), (0, -values.size % size), mode="edge").reshape(-1, size)
+    first = np.arange(len(filled)) * size
+    rows = np.concatenate([first + filled.argmin(axis=1), first + filled.argmax(axis=1)])
+    return np.unique(np.minimum(rows, values.size - 1))
+
+
+def alignment_text(alignment: ClockAlignment) -> str:
+    """Lag and drift with their intervals, in a few lines."""
+    low, high = alignment.lag_interval
+    if not alignment.lags.size:
+        return f"clock of the record ahead by {alignment.lag:g} s, drift {alignment.drift:g} (stated)"
+    lines = [
+        f"clock of the record ahead by {alignment.lag:.4g} s ({low:.4g} to {high:.4g} s, 95 %) at "
+        f"{_camera_time_text(alignment.middle)}, from {alignment.frames} frames and channel '{alignment.channel}'"
+    ]
+    if alignment.drift_interval != (0.0, 0.0):
+        low, high = (1e6 * x for x in alignment.drift_interval)
+        lines.append(f"  gains {1e6 * alignment.drift:.3g} us a second ({low:.3g} to {high:.3g}, 95 %)")
+    lines.append(
+        f"  displacements differ from what was expected by {1e3 * alignment.residual:.3g} um (rms), "
+        f"their noise is {1e3 * alignment.noise:.3g} um"
+    )
+    return "\n".join(lines)
+
+
+def _camera_time_text(time: float) -> str:
+    """A time on the camera's clock, in words; a unix time as a date."""
+    if time > UNIX_TIME:
+        return f"{datetime.fromtimestamp(time, UTC):%Y-%m-%d %H:%M:%S.%f} UTC of the camera"
+    return f"{time:.6g} s of the camera"
+
+
+def imposed_text(imposed: Imposed) -> str:
+    """What was imposed, and how well the programs follow the record."""
+    load, warm = imposed.load, imposed.temperature
+    celsius = warm.values - ZERO_CELSIUS
+    lines = [
+        f"imposed on {imposed.specimen or 'the specimen'}: '{imposed.channels[0]}' up to {load.values.max():.4g} MPa, "
+        f"'{imposed.channels[1]}' {celsius.min():.4g} to {celsius.max():.4g} C; the first ramp starts at "
+        f"{_camera_time_text(imposed.time_zero)}",
+        f"  load: {load.times.size} points, off its record by {imposed.load_error:.2g} MPa at most, noise "
+        f"{imposed.load_noise:.2g} MPa",
+        f"  temperature: {warm.times.size} points, off its record by {imposed.temperature_error:.2g} K at most, noise "
+        f"{imposed.temperature_noise:.2g} K",
+    ]
+    return "\n".join([*lines, *(f"  note: {note}" for note in imposed.notes)])

@@ -1,0 +1,184 @@
+"""The identified curves of tests with what the estimates leave uncertain of them, and the creep rate of each test.
+
+With y(x) a predicted output, x = (u, e) the unknowns (coordinates of the law and nuisance parameters of the tests) and
+C their covariance, its standard deviation is sqrt(dy/dx C dy/dx'). One prediction with sensitivities gives y and dy/dx.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats
+from creepkit.errors import FitError
+from creepkit.inverse.composite_predictor import predict_with_sensitivities
+from creepkit.inverse.frame_noise import usable_frames
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.reference_conditions import LOAD_TOLERANCE, reference_stresses
+from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
+from creepkit.records import History, Prediction
+from creepkit.reports.load_programs import holds
+
+
+@dataclass(frozen=True, eq=False)
+class FittedCurves:
+    """What an identification predicts of its own tests, at their own nuisances and offsets.
+
+    half_width : (tests, times, outputs) half width of the 95 % band from the covariance of the law's parameters and of
+        explicit nuisance parameters, in the output's unit. Noise, the scatter of rates between tests and the offsets'
+        uncertainty are not in it.
+    """
+
+    prediction: Prediction
+    half_width: Floats
+
+    def of(self, test: int, output: str) -> tuple[Floats, Floats]:
+        """Curve and half width of the band, (times,) each, of one output of one test, in the output's unit."""
+        position, length = self.prediction.outputs.index(output), int(self.prediction.lengths[test])
+        return self.prediction.of(test)[:, position], self.half_width[test, :length, position]
+
+
+_KNOWN_CURVES: WeakKeyDictionary[Identification, FittedCurves] = WeakKeyDictionary()
+"""Of identifications that are in use: the figures of one report draw the same curves."""
+
+
+def fitted_curves(fit: Identification) -> FittedCurves:
+    """The curves of the fitted tests with their bands: one prediction with sensitivities, made once."""
+    if fit not in _KNOWN_CURVES:
+        _KNOWN_CURVES[fit] = _fitted_curves(fit)
+    return _KNOWN_CURVES[fit]
+
+
+def _fitted_curves(fit: Identification) -> FittedCurves:
+    if fit.predictor is None or not fit.histories:
+        raise FitError(
+            "this identification was loaded without its histories: attach them with "
+            "fit.with_histories(histories, using)"
+        )
+    histories, coordinates = fit.histories, fit.coordinates
+    nuisances = fit.nuisance_values(histories)
+    prediction = predict_with_sensitivities(fit.predictor, fit.law, coordinates.theta(fit.u), histories, nuisances)
+    assert prediction.jacobian is not None
+    with np.errstate(invalid="ignore"):
+        jacobian = prediction.jacobian[0] @ coordinates.jacobian(fit.u)
+    jacobian = np.concatenate([jacobian, _nuisance_jacobian(fit, prediction)], axis=-1)
+    variance = np.einsum("...i,ij,...j->...", jacobian, joint_covariance(fit), jacobian)
+    for k, test in enumerate(fit.tests):
+        for output_fit in test.outputs:
+            prediction.values[:, k, :, prediction.outputs.index(output_fit.output)] += output_fit.offset
+    quantile = interval_quantile(fit.freedom)
+    return FittedCurves(prediction, quantile * np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _nuisance_jacobian(fit: Identification, prediction: Prediction) -> Floats:
+    """(tests, times, outputs, nuisances) derivatives of the outputs to the nuisance parameters that were estimated."""
+    shape = prediction.values.shape[1:]
+    if not fit.nuisances:
+        return np.zeros((*shape, 0))
+    by_kind = {kind: values[0].reshape(shape[0], -1) for kind, values in prediction.nuisance_jacobian.items()}
+    jacobian = fit.least_squares_problem.nuisance_parameters.jacobian(by_kind)
+    return jacobian.reshape(*shape, len(fit.nuisances))
+
+
+def joint_covariance(fit: Identification) -> Floats:
+    """(unknowns, unknowns) covariance of x = (u, e): that of u as it was identified, and what e does given u.
+
+    A curve is known better than the law where a parameter and a nuisance parameter can only move it together. With
+    P = J'J the precision at the optimum, e given u has the mean -P_ee^-1 P_eu u and the covariance P_ee^-1.
+    """
+    count, size = fit.u.size, len(fit.nuisances)
+    if not size:
+        return fit.covariance
+    whitened = fit.least_squares_problem.jacobian(fit.x)
+    precision = whitened.T @ whitened
+    inverse = np.linalg.pinv(precision[count:, count:], hermitian=True)
+    gain = -inverse @ precision[count:, :count]
+    lift = np.concatenate([np.eye(count), gain])
+    covariance = lift @ fit.covariance @ lift.T
+    covariance[count:, count:] += inverse
+    return np.asarray(covariance)
+
+
+@dataclass(frozen=True)
+class HoldRate:
+    """The creep rate that one hold of one test shows, at the strain and time of the reference point.
+
+    stress : MPa; temperature : K; rate : 1/s, the identified one times measured over identified growth of the output
+    that grows with creep, the median over the hold; of a test without frames times measured over identified minimum
+    rate, which is `stated`.
+    """
+
+    test: int
+    stress: float
+    temperature: float
+    rate: float
+    stated: bool = False
+
+
+FEWEST_FRAMES = 3
+"""Frames of a hold from which a rate is taken."""
+
+
+def rates_of_tests(fit: Identification, prediction: Prediction) -> list[HoldRate]:
+    """The creep rate of each hold of each test; a hold without growth has none.
+
+    prediction : of the fitted tests, at their own nuisances.
+    """
+    rates = []
+    for k, (history, test) in enumerate(zip(fit.histories, fit.tests, strict=True)):
+        if not test.outputs:
+            rates += _stated_rate(fit, k)
+            continue
+        output = test.outputs[0].output
+        predicted = prediction.of(k)[:, prediction.outputs.index(output)]
+        for stress, frames in _levels(fit, history, output):
+            frames = frames & np.isfinite(predicted)
+            if frames.sum() < FEWEST_FRAMES:
+                continue
+            ratio = _growth_ratio(history.outputs[output][frames], predicted[frames])
+            if ratio > 0:
+                rate = ratio * float(fit.rate(stress, history.mean_temperature, warn=False)[0])
+                rates.append(HoldRate(k, stress, history.mean_temperature, rate))
+    return rates
+
+
+def _stated_rate(fit: Identification, test: int) -> list[HoldRate]:
+    """The creep rate that the minimum rate of a test without frames shows, if it has one."""
+    history, compared = fit.histories[test], fit.tests[test].minimum_rate
+    if compared is None or not compared.ratio > 0:
+        return []
+    stress, temperature = float(reference_stresses(history, fit.predictor)[0]), history.mean_temperature
+    rate = float(fit.rate(stress, temperature, warn=False)[0]) / compared.ratio
+    return [HoldRate(test, stress, temperature, rate, stated=True)]
+
+
+def _levels(fit: Identification, history: History, output: str) -> list[tuple[float, Bools]]:
+    """The reference stress, MPa, of each level of the load, and (frames,) which frames were taken under it."""
+    stresses = np.unique([s for s in reference_stresses(history, fit.predictor) if s > 0])
+    used, program = usable_frames(history, output), history.loading.program()
+    tolerance = LOAD_TOLERANCE * float(np.abs(program.values).max())
+    pieces = [p for p in holds(program, float(history.times[-1]), tolerance) if p[2] > 0]
+    levels = np.unique([p[2] for p in pieces])
+    if levels.size != stresses.size or history.loading.quantity == "components":
+        return [(float(np.exp(np.mean(np.log(stresses)))), used)] if stresses.size else []
+    by_load = dict(zip(levels, stresses, strict=True))
+    return [(by_load[v], used & (history.times > start) & (history.times <= end)) for start, end, v in pieces]
+
+
+GROWTH_INTERVALS = 8
+"""Pieces of a hold over which growth is compared."""
+
+
+def _growth_ratio(measured: Floats, predicted: Floats) -> float:
+    """Median of measured over predicted increments across an eighth of a hold's frames; both (frames,).
+
+    Increments of under 1 % of the predicted range are left out; without any, there is no growth and the ratio is 0.
+    """
+    stride = max(1, measured.size // GROWTH_INTERVALS)
+    increments = predicted[stride:] - predicted[:-stride]
+    large = np.abs(increments) > 0.01 * float(np.ptp(predicted))
+    if not large.any():
+        return 0.0
+    return float(np.median((measured[stride:] - measured[:-stride])[large] / increments[large]))

@@ -1,0 +1,107 @@
+"""Panels of creep rates against stress and of rupture times, measured beside identified, with 95 % intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.records import ZERO_CELSIUS
+from creepkit.reports.condition_colours import ColourScale, temperature_scale
+from creepkit.reports.figures import place_legend_right, set_range
+from creepkit.reports.load_programs import SECONDS_PER_HOUR
+from creepkit.reports.prediction_bands import HoldRate
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from creepkit.inverse.identification import Identification
+
+
+MOST_TEMPERATURES = 6
+"""Curves of rate over stress at most."""
+
+
+SMALLEST_SHARE = 1e-4
+"""Of the lowest curve: rates of tests below that are not drawn."""
+
+
+def draw_rates(axes: Axes, fit: Identification, rates: Sequence[HoldRate]) -> None:
+    """Identified rate over stress with its 95 % band at some temperatures, and the rate that each test shows."""
+    stresses = [v for h in fit.histories for v in reference_stresses(h, fit.predictor) if v > 0]
+    if not stresses:
+        axes.set_axis_off()
+        return
+    grid = np.geomspace(0.8 * min(stresses), 1.25 * max(stresses), 60)
+    scale = temperature_scale(fit.histories)
+    bounds: list[float] = []
+    for celsius in _drawn_temperatures(scale):
+        rate, low, high = fit.rate(grid, np.full_like(grid, celsius + ZERO_CELSIUS), warn=False)
+        axes.fill_between(grid, low, high, color=scale(celsius), alpha=0.25, lw=0)
+        axes.plot(grid, rate, color=scale(celsius), lw=1.4, label=f"{celsius:.0f} °C")
+        bounds += [float(rate.min()), float(rate.max()), float(low.min()), float(high.max())]
+    shown = [r for r in rates if r.rate > SMALLEST_SHARE * min(bounds)]
+    for marker, label, tests in (
+        ("o", "tests", [r for r in shown if not r.stated]),
+        ("s", "minimum rates", [r for r in shown if r.stated]),
+    ):
+        for k, test in enumerate(tests):
+            axes.plot(
+                test.stress,
+                test.rate,
+                marker,
+                ms=4,
+                color=scale(test.temperature - ZERO_CELSIUS),
+                mec="black",
+                mew=0.4,
+                label=label if k == 0 else None,
+            )
+    bounds += [r.rate for r in shown]
+    set_range(axes, "x", float(grid[0]), float(grid[-1]), logarithmic=True)
+    finite = [b for b in bounds if np.isfinite(b) and b > 0]
+    set_range(axes, "y", max(min(finite), 1e-12 * max(finite)), max(finite), logarithmic=True)
+    axes.set(xlabel="von Mises stress, MPa", ylabel="creep rate, 1/s")
+    axes.grid(alpha=0.25)
+    place_legend_right(axes, "95 % band:\nlaw")
+    reference = fit.reference
+    axes.set_title(
+        f"rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.4g} h\n"
+        "tests: identified rate × measured / identified growth or minimum rate",
+        fontsize=9,
+    )
+
+
+def _drawn_temperatures(scale: ColourScale) -> list[float]:
+    """Temperatures of tests, °C: all where they are few, else some of them from the lowest to the highest."""
+    values = np.unique(np.round(scale.values, 0))
+    wanted = np.linspace(values[0], values[-1], MOST_TEMPERATURES)
+    return [float(v) for v in np.unique(values[np.abs(values[:, None] - wanted).argmin(axis=0)])]
+
+
+def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> None:
+    """One point a test with its 95 % interval; tests that were stopped are open, and lie where they were stopped."""
+    ruptures = [(m.rupture, colour) for m, colour in zip(fit.tests, colours, strict=True) if m.rupture is not None]
+    for r, colour in ruptures:
+        if not np.isfinite(r.predicted):
+            continue
+        measured, predicted = r.measured / SECONDS_PER_HOUR, r.predicted / SECONDS_PER_HOUR
+        ends = [predicted - r.low / SECONDS_PER_HOUR, r.high / SECONDS_PER_HOUR - predicted]
+        interval = [[max(end, 0.0)] for end in ends]  # the median may lie outside where draws disagree with it
+        marker, face = (">", "white") if r.censored else ("o", colour)
+        axes.errorbar(measured, predicted, yerr=interval, fmt=marker, ms=4.5, lw=0.7, color=colour, mfc=face)
+    finite = [(r.measured, r.predicted, r.low, r.high) for r, _ in ruptures if np.isfinite(r.predicted)]
+    hours = np.array([*(t for row in finite for t in row), *(r.measured for r, _ in ruptures)]) / SECONDS_PER_HOUR
+    hours = hours[np.isfinite(hours) & (hours > 0)]
+    set_range(axes, "x", 0.8 * float(hours.min()), 1.25 * float(hours.max()), logarithmic=True, most=6)
+    set_range(axes, "y", 0.8 * float(hours.min()), 1.25 * float(hours.max()), logarithmic=True, most=6)
+    limits = np.array(axes.get_xlim())
+    axes.plot(limits, limits, "k-", lw=1.2)
+    axes.fill_between(limits, limits / 2, limits * 2, color="black", alpha=0.08, lw=0, label="factor of 2")
+    if any(r.censored for r, _ in ruptures):
+        axes.plot([], [], ">", ms=4.5, mfc="white", color="grey", label="stopped: broke\nlater, if at all")
+    axes.set(xlabel="measured time to rupture, h", ylabel="identified time to rupture, h", ylim=tuple(limits))
+    axes.grid(alpha=0.25)
+    place_legend_right(axes)
+    axes.set_title("time to rupture; bars: 95 % of a single test\n(law, scatter between tests)", fontsize=9)

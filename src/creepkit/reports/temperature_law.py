@@ -1,0 +1,274 @@
+"""Text of temperature laws, studies and moduli, and the plot of parameters against temperature with plausible forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.discovery.regression import INFINITE_FREEDOM
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_quantile
+from creepkit.language import Param
+from creepkit.language.printing import expression_text
+from creepkit.reports.figures import empty_figure, place_legend_right, save_figure, set_range
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from creepkit.discovery.combinations import FormWeight
+    from creepkit.discovery.discover import TemperatureStudy
+    from creepkit.discovery.elastic_moduli import ModulusEstimates
+    from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw
+
+
+MAX_PANELS_PER_ROW = 3
+
+
+MIN_WEIGHT_SHOWN = 0.02
+"""Combinations of less weight are not drawn, but those that a parameter's set names."""
+
+
+def plot_temperature_law(temperature_law: TemperatureLaw, path: str | Path | None = None) -> Figure:
+    """One panel a parameter: estimates with 95 % intervals, and curves; a coefficient is shown by its rate.
+
+    The rate is that at the reference stress: coefficients themselves move with their exponents.
+    """
+    coordinates = Coordinates(temperature_law.isothermal_law, temperature_law.isothermal_estimates.reference)
+    names = temperature_law.isothermal_law.names
+    columns = min(MAX_PANELS_PER_ROW, len(names))
+    rows = -(-len(names) // columns)
+    figure = empty_figure(5.2 * columns, 3.7 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False)
+    for k, name in enumerate(names):
+        _plot_parameter(panels.flat[k], temperature_law, coordinates, k)
+        panels.flat[k].set_title(_panel_title(temperature_law, coordinates, k, name), fontsize=9)
+    for unused in list(panels.flat)[len(names) :]:
+        unused.set_visible(False)
+    figure.suptitle(
+        f"{temperature_law.law.title or temperature_law.law.name}, judged by the {temperature_law.criterion_data}",
+        fontsize=10,
+    )
+    return save_figure(figure, path)
+
+
+def _plot_parameter(axes: Any, temperature_law: TemperatureLaw, coordinates: Coordinates, k: int) -> None:
+    estimates, name = temperature_law.isothermal_estimates, temperature_law.isothermal_law.names[k]
+    is_rate_coefficient = k in coordinates.coefficients
+    scale = (
+        1 / np.log(10.0) if is_rate_coefficient or temperature_law.isothermal_law.table[name].scale == "log" else 1.0
+    )
+
+    def shown_of(theta: Floats) -> Floats:
+        return np.asarray((coordinates.u(theta) if is_rate_coefficient else theta)[..., k] * scale)
+
+    values, half_widths = (
+        shown_of(estimates.theta),
+        interval_quantile(INFINITE_FREEDOM) * _standard_deviations(shown_of, estimates.theta, estimates.covariance),
+    )
+    low, high = (
+        (-np.inf, np.inf) if is_rate_coefficient else _plotted_bounds(temperature_law.isothermal_law.table[name], scale)
+    )
+    error_bars = np.maximum([np.minimum(half_widths, values - low), np.minimum(half_widths, high - values)], 0.0)
+    axes.errorbar(estimates.temperatures, values, error_bars, fmt="o", ms=4, color="0.25", capsize=2, lw=1)
+    plotted_values = [values]
+    T = np.linspace(*temperature_law.temperature_range, 60)
+    drawn_forms: set[str] = set()
+    for candidate in temperature_law.candidates:
+        form = candidate.forms[name]
+        if form in drawn_forms or (candidate.weight < MIN_WEIGHT_SHOWN and drawn_forms):
+            continue
+        drawn_forms.add(form)
+        curve = shown_of(candidate.theta(T))
+        plotted_values.append(curve)
+        axes.plot(
+            T,
+            curve,
+            lw=1.8 if len(drawn_forms) == 1 else 1.0,
+            label=f"{form} {_form_weight(temperature_law, k, form):.2f}",
+        )
+        if len(drawn_forms) == 1:
+            half_width = _curve_standard_deviations(shown_of, candidate, T) * interval_quantile(
+                candidate.degrees_of_freedom
+            )
+            axes.fill_between(T, curve - half_width, curve + half_width, color="C0", alpha=0.15, lw=0)
+    lowest, highest = float(np.min(np.concatenate(plotted_values))), float(np.max(np.concatenate(plotted_values)))
+    margin = max(
+        0.15 * (highest - lowest),
+        min(1.2 * float(np.median(half_widths)), highest - lowest),
+        0.02 * abs(highest) + 1e-9,
+    )
+    set_range(axes, "x", *_with_margin(temperature_law.temperature_range), most=6)
+    set_range(axes, "y", lowest - margin, highest + margin)
+    axes.set(xlabel="temperature, K")
+    place_legend_right(axes, "form, weight", size=7)
+    axes.grid(alpha=0.25)
+
+
+def _with_margin(ends: tuple[float, float]) -> tuple[float, float]:
+    margin = 0.03 * (ends[1] - ends[0])
+    return ends[0] - margin, ends[1] + margin
+
+
+def _form_weight(temperature_law: TemperatureLaw, k: int, form: str) -> float:
+    forms = temperature_law.plausible_forms[temperature_law.isothermal_law.names[k]]
+    return next((form_weight.weight for form_weight in forms if form_weight.name == form), 0.0)
+
+
+def _panel_title(temperature_law: TemperatureLaw, coordinates: Coordinates, k: int, name: str) -> str:
+    param, reference = temperature_law.isothermal_law.table[name], temperature_law.isothermal_estimates.reference
+    if k in coordinates.coefficients:
+        return f"log10 of the rate of {name} (1/s) at {reference.stress:.3g} MPa, {reference.time:.3g} s"
+    unit = "" if param.unit == "1" else f", {param.unit}"
+    return f"{'log10 of ' if param.scale == 'log' else ''}{name}: {param.meaning}{unit}"
+
+
+def _plotted_bounds(param: Param, scale: float) -> tuple[float, float]:
+    """The bounds as they are drawn, beyond which no interval goes."""
+    low, high = (param.to_internal(b) * scale for b in param.bounds)
+    return low, high
+
+
+def _standard_deviations(function: Callable[[Floats], Floats], theta: Floats, covariance: Floats) -> Floats:
+    """(temperatures,) standard deviations of a function of theta at each point."""
+    deviations = [
+        delta_method(function, row, covariance_of_row)[1]
+        for row, covariance_of_row in zip(theta, covariance, strict=True)
+    ]
+    return np.array(deviations, float)
+
+
+def _curve_standard_deviations(function: Callable[[Floats], Floats], candidate: CandidateLaw, T: Floats) -> Floats:
+    """(temperatures,) standard deviations of a function of theta along a candidate's curve."""
+    names = list(candidate.internal_values)
+
+    def along(values: Floats) -> Floats:
+        displaced = replace(candidate, internal_values=dict(zip(names, map(float, values), strict=True)))
+        return function(displaced.theta(T))
+
+    return delta_method(along, np.array(list(candidate.internal_values.values())), candidate.covariance)[1]
+
+
+MAX_COMBINATIONS_LISTED = 6
+
+
+CRITERION = {"points": "the quasi AICc of the estimates", "histories": "the BIC of the tests"}
+
+
+EQUIVALENCE_NOTE = {
+    "points": "=: these data cannot tell it from the best",
+    "histories": "=: not refitted; these data cannot tell it from one that was",
+}
+
+
+def temperature_law_text(temperature_law: TemperatureLaw) -> str:
+    """The law, its numbers, the forms that remain for each parameter, and the combinations."""
+    low, high = temperature_law.temperature_range
+    count, data = temperature_law.isothermal_estimates.temperatures.size, temperature_law.criterion_data
+    return "\n".join(
+        [
+            f"{temperature_law.law.title or temperature_law.law.name}",
+            *(f"  {label}: {expression_text(term)}" for label, term in temperature_law.law.terms.items()),
+            "",
+            *_parameter_lines(temperature_law),
+            "",
+            f"  found from {count} temperatures, {low:.0f} to {high:.0f} K, and valid between "
+            f"them; T_ref = {temperature_law.T_ref:.2f} K",
+            f"  forms that remain, weighed by {CRITERION[data]} ({EQUIVALENCE_NOTE[data]}):",
+            *_form_lines(temperature_law.plausible_forms),
+            "",
+            *_combination_lines(temperature_law),
+            *_prior_lines(temperature_law),
+            *([] if temperature_law.adequacy is None else [f"  the law {temperature_law.adequacy}"]),
+            *(f"  note: {note}" for note in temperature_law.notes),
+        ]
+    )
+
+
+def _parameter_lines(temperature_law: TemperatureLaw) -> list[str]:
+    width, lines = max(len(e.name) for e in temperature_law.estimates), []
+    for e in temperature_law.estimates:
+        unit = "" if e.unit == "1" else f" {e.unit}"
+        note = "" if e.verdict == "determined" else f"   <- {e.verdict}"
+        lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{e.low:.4g}, {e.high:.4g}]{unit}{note}")
+    return lines
+
+
+def _form_lines(plausible_forms: Mapping[str, tuple[FormWeight, ...]]) -> list[str]:
+    width = max(len(name) for name in plausible_forms)
+    return [
+        f"    {name:{width}}  {', '.join(_form_text(form) for form in form_weights)}"
+        for name, form_weights in plausible_forms.items()
+    ]
+
+
+def _form_text(form: FormWeight) -> str:
+    if form.equivalent:
+        return f"={form.name} {form.weight:.2f}" if form.weight > 0 else f"={form.name}"
+    return f"{form.name} {form.weight:.2f}"
+
+
+def _combination_lines(temperature_law: TemperatureLaw) -> list[str]:
+    """The best combinations: forms, numbers, criterion less the best, weight."""
+    lines = ["  combination | numbers | criterion - best | weight"]
+    for candidate in temperature_law.candidates[:MAX_COMBINATIONS_LISTED]:
+        forms = ", ".join(f"{name}:{form}" for name, form in candidate.forms.items())
+        lines.append(
+            f"    {forms} | {len(candidate.internal_values)} | {candidate.criterion_difference:.1f} "
+            f"| {candidate.weight:.3f}"
+        )
+    remaining = len(temperature_law.candidates) - MAX_COMBINATIONS_LISTED
+    return [*lines, f"    and {remaining} more"] if remaining > 0 else lines
+
+
+def _prior_lines(temperature_law: TemperatureLaw) -> list[str]:
+    """The prior: stated where it is not uniform."""
+    odds_lines = []
+    for name, odds_by_form in temperature_law.prior_odds.items():
+        if len(odds_by_form) > 1:
+            largest = max(odds_by_form.values())
+            odds_lines.append(
+                f"{name}: {', '.join(f'{form} {odds / largest:.2g}' for form, odds in odds_by_form.items())}"
+            )
+    return ["  prior odds, the likeliest as 1:", *(f"    {line}" for line in odds_lines)] if odds_lines else []
+
+
+def temperature_study_text(study: TemperatureStudy) -> str:
+    """The moduli, the law of all tests at once and the temperature law, one below the other, then the notes."""
+    parts = [study.moduli_fit, study.joint_fit, study.temperature_law]
+    texts = [str(part) for part in parts if part is not None]
+    return "\n\n".join([*texts, *(f"note: {note}" for note in study.notes)])
+
+
+def modulus_estimates_text(estimates: ModulusEstimates) -> str:
+    """The modulus of each test with its standard deviation, and the form through them."""
+    rows = zip(estimates.names, estimates.temperatures, estimates.values, estimates.sd, strict=True)
+    lines = [f"  {name}: {E / 1e3:.1f} +- {sd / 1e3:.1f} GPa at {T:.1f} K" for name, T, E, sd in rows]
+    form = estimates.elastic.E if estimates.elastic else "-"
+    return "\n".join(["modulus from the first frames", *lines, f"  E(T) = {form}"])
+
+
+def temperature_law_to_json(temperature_law: TemperatureLaw, written: Sequence[Path]) -> dict[str, Any]:
+    """The result and the files that were written, as JSON-able data."""
+    return {
+        "law": temperature_law.law.name,
+        "judged_by": temperature_law.criterion_data,
+        "range_K": list(temperature_law.temperature_range),
+        "T_ref_K": temperature_law.T_ref,
+        "forms": temperature_law.forms,
+        "sets": {
+            name: [vars(form_weight) for form_weight in form_weights]
+            for name, form_weights in temperature_law.plausible_forms.items()
+        },
+        "parameters": {e.name: {k: v for k, v in vars(e).items() if k != "name"} for e in temperature_law.estimates},
+        "candidates": [
+            {"forms": candidate.forms, "excess": candidate.criterion_difference, "weight": candidate.weight}
+            for candidate in temperature_law.candidates
+        ],
+        "notes": list(temperature_law.notes),
+        "files": [str(path) for path in written],
+    }

@@ -1,0 +1,349 @@
+"""What a study file says, as arguments of the public functions; an error names file, line and key."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from creepkit.errors import nearest
+from creepkit.readers.vocabulary import split_unit
+from creepkit.records import (
+    ZERO_CELSIUS,
+    History,
+    Nuisance,
+    Predictor,
+    Program,
+    Specimen,
+    dimensions_of,
+    is_length_nuisance,
+    loads_of,
+    outputs_of,
+)
+from creepkit.records.quantities import LENGTH, QuantityKind
+from creepkit.studies.model import ForecastPart, NuisancePart, Step
+from creepkit.studies.study_file import StudyFile
+
+if TYPE_CHECKING:
+    from creepkit.experiments.design_task import Goal
+    from creepkit.experiments.rig import Rig
+    from creepkit.inverse.settings import IdentificationSettings
+    from creepkit.language import CreepLaw
+
+HOUR = 3600.0
+
+
+def quantity(file: StudyFile, key: tuple[str | int, ...], kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:
+    """The quantity and the unit of a key such as pressure_bar; StudyError with the nearest key for any other."""
+    name = str(key[-1])
+    found = split_unit(name, kinds)
+    if found is not None and found[1] in kinds[found[0]].units:
+        return found
+    known = [f"{one}_{next(iter(kind.units))}".rstrip("_") for one, kind in kinds.items()]
+    what = f"has no unit of '{found[0]}' that is known" if found else "is no quantity that is known here"
+    raise file.error(key, f"{what}; {nearest(name, known)}")
+
+
+def value_of(file: StudyFile, key: tuple[str | int, ...], kinds: Mapping[str, QuantityKind], number: float) -> float:
+    """A number in creepkit's unit, from the unit of its key."""
+    name, unit = quantity(file, key, kinds)
+    with file.at(*key):
+        return kinds[name].convert(number, unit, "it", name)
+
+
+def laws_of(file: StudyFile) -> list[CreepLaw]:
+    """The candidate laws, with parameters bounded and fixed, each where it has them."""
+    import creepkit as ck
+
+    part = file.model.identification
+    assert part is not None
+    laws = []
+    for k, name in enumerate(dict.fromkeys(part.laws)):
+        with file.at("identification", "laws", k):
+            laws.append(ck.law(name))
+    known = {name for law in laws for name in law.names}
+    for table, changes in (("bounds", part.bounds), ("fix", part.fix)):
+        for name in changes:
+            if name not in known:
+                raise file.error(
+                    ("identification", table, name), f"no law has a parameter '{name}'; {nearest(name, known)}"
+                )
+    with file.at("identification", "bounds"):
+        bounds: dict[str, Any] = {name: (low, high) for name, (low, high) in part.bounds.items()}
+        laws = [law.with_bounds(**{n: b for n, b in bounds.items() if n in law.names}) for law in laws]
+    with file.at("identification", "fix"):
+        return [law.fix(**{n: v for n, v in part.fix.items() if n in law.names}) for law in laws]
+
+
+def predictor_of(file: StudyFile) -> Predictor | None:
+    """What predicts the tests: the specimen of the study, or a surrogate; None for the specimens that tests name."""
+    import creepkit as ck
+
+    model, specimen = file.model, None
+    if model.specimen is not None:
+        with file.at("specimen", "name"):
+            specimen = ck.specimen(model.specimen.name)
+        lengths = lengths_of(file, ("specimen", "lengths"), model.specimen.lengths, specimen)
+        untyped: Any = specimen
+        with file.at("specimen", "lengths"):
+            specimen = untyped.replace(**lengths) if lengths else specimen
+    named = None if model.identification is None else model.identification.predictor
+    if named in (None, "specimen"):
+        return specimen
+    beside = file.path.parent / str(named)
+    with file.at("identification", "predictor"):
+        return ck.surrogate(beside if beside.is_file() else str(named))
+
+
+def lengths_of(
+    file: StudyFile, table: tuple[str | int, ...], given: Mapping[str, float], specimen: object
+) -> dict[str, float]:
+    """{length of a specimen: mm}."""
+    kinds = {name: LENGTH for one in dimensions_of(specimen) for name in one.names}
+    names = {name: one.name for one in dimensions_of(specimen) for name in one.names}
+    lengths: dict[str, float] = {}
+    for key, number in given.items():
+        name = names[quantity(file, (*table, key), kinds)[0]]
+        if name in lengths:
+            raise file.error((*table, key), f"{name} is given twice; keep one of them")
+        lengths[name] = value_of(file, (*table, key), kinds, number)
+    return lengths
+
+
+def nuisances_of(file: StudyFile) -> tuple[Nuisance, ...] | None:
+    """The default nuisances with those of the study; None where it names none."""
+    from creepkit.inverse.settings import default_nuisances
+
+    part = file.model.identification
+    if part is None or not (part.nuisances or part.without_nuisances):
+        return None
+    further = [_nuisance(file, k, one) for k, one in enumerate(part.nuisances)]
+    with file.at("identification", "without_nuisances" if part.without_nuisances else "nuisances"):
+        return default_nuisances(*further, without=part.without_nuisances)
+
+
+def _nuisance(file: StudyFile, number: int, part: NuisancePart) -> Nuisance:
+    place = ("identification", "nuisances", number)
+    with file.at(*place, "kind"):
+        Nuisance(part.kind, start=1.0 if part.kind.endswith("step") else 0.0)
+    unit = _unit_of_kind(part.kind)
+    values: dict[str, Any] = {}
+    for name in ("mean", "sd"):
+        for suffix in ("", "_mm", "_K"):
+            value = getattr(part, name + suffix)
+            if value is not None and suffix.removeprefix("_") != unit and part.kind != "offset":
+                right = f"{name}_{unit}" if unit else name
+                raise file.error((*place, name + suffix), f"a nuisance '{part.kind}' is given as {right}")
+            if value is not None:
+                values[name] = value
+    with file.at(*place):
+        return Nuisance(
+            part.kind,
+            part.scope,
+            output=part.output or "",
+            tests=tuple(part.tests),
+            start=HOUR * (part.start_h or 0.0),
+            **values,
+        )
+
+
+def _unit_of_kind(kind: str) -> str:
+    return "mm" if is_length_nuisance(kind) else "K" if kind.startswith("temperature") else ""
+
+
+def settings_of(file: StudyFile) -> IdentificationSettings:
+    """Settings of every identification: the defaults with what the study changes."""
+    import creepkit as ck
+    from creepkit.api.identification import change_settings
+
+    model, changes = file.model, {"seed": file.model.study.seed, "suspect_frames": file.model.data.suspect_frames}
+    base = ck.IdentificationSettings()
+    if model.identification is not None:
+        part = model.identification
+        for name in ("starts", "frames", "loss", "test_loss", "weights"):
+            value = getattr(part, name)
+            if value is not None:
+                with file.at("identification", name):
+                    change_settings(base, {name: value})  # type: ignore[misc]
+                changes[name] = value
+        changes["nuisances"] = nuisances_of(file)  # type: ignore[assignment]
+    if model.selection is not None and model.selection.further_laws is not None:
+        changes["further_laws"] = model.selection.further_laws
+    with file.at("identification"):
+        return change_settings(base, changes)  # type: ignore[arg-type]
+
+
+def steps_of(steps: Sequence[Step]) -> list[tuple[float, float]]:
+    """(start in s, level) of each step."""
+    return [(HOUR * one.from_h, one.level) for one in steps]
+
+
+def temperature_of(file: StudyFile, key: tuple[str | int, ...], steps: Sequence[Step]) -> float | Program:
+    """K, a number or a program."""
+    levels = [(start, level + ZERO_CELSIUS) for start, level in steps_of(steps)]
+    if any(not 0.0 < level < 1e4 for _, level in levels):
+        raise file.error(key, f"{min(steps, key=lambda s: s.level).level:g} C is no temperature of a test")
+    if levels[0][0] != 0.0:
+        raise file.error(key, "nothing is said of the time before; give the first level from_h = 0")
+    with file.at(*key):
+        return levels[0][1] if len(levels) == 1 else Program.steps(levels)
+
+
+def planned_test(file: StudyFile, number: int, temperature: float | Program | None) -> History:
+    """The planned test of a forecast; temperature : K, where the study gives none.
+
+    StudyError where a test cannot be made of what is said.
+    """
+    import creepkit as ck
+    from creepkit.api.planned_tests import planned_history, stepped_load
+
+    part, place = file.model.forecast[number], ("forecast", number)
+    specimen = _specimen_of(file, number, part)
+    kinds = {load.name: load.kind for load in loads_of(specimen)}
+    ((key, steps),) = part.load.items()
+    name, unit = quantity(file, (*place, "load", key), kinds)
+    end = HOUR * float(part.end_h or 0.0)
+    with file.at(*place, "load", key):
+        levels = [(start, kinds[name].convert(level, unit, "it", name)) for start, level in steps_of(steps)]
+        load = next(one for one in loads_of(specimen) if one.name == name)
+        loading = stepped_load(name, load, levels, control=part.control, ramp=part.ramp_s, end=end)
+    if part.temperature_C is not None:
+        temperature = temperature_of(file, (*place, "temperature_C"), part.temperature_C)
+    if temperature is None:
+        raise file.error(place, "the fitted tests were made at several temperatures; give temperature_C")
+    if part.modulus_GPa is None and "modulus" in getattr(specimen, "conditions", {}):
+        raise file.error(place, f"specimen '{specimen.name}' needs modulus_GPa, such as 150")
+    with file.at(*place):
+        return planned_history(
+            specimen,
+            loading,
+            end,
+            temperature=temperature,
+            elastic=None if part.modulus_GPa is None else ck.Elastic(1e3 * part.modulus_GPa),
+            lengths=lengths_of(file, (*place, "lengths"), part.lengths, specimen),
+            name=part.name,
+        ).replace(labels=dict(part.labels))
+
+
+def _specimen_of(file: StudyFile, number: int, part: ForecastPart) -> Specimen:
+    """The specimen of a planned test: as named, as the study says, else the first that takes its load."""
+    import creepkit as ck
+
+    place = ("forecast", number)
+    if part.specimen is not None:
+        with file.at(*place, "specimen"):
+            return ck.specimen(part.specimen)
+    if file.model.specimen is not None:
+        with file.at("specimen", "name"):
+            return ck.specimen(file.model.specimen.name)
+    key = next(iter(part.load))
+    known: dict[str, QuantityKind] = {}
+    specimens: dict[str, Specimen] = ck.available("specimens")
+    for specimen in specimens.values():
+        kinds = {load.name: load.kind for load in loads_of(specimen)}
+        known |= kinds
+        found = split_unit(key, kinds)
+        if found is not None and found[1] in kinds[found[0]].units:
+            return specimen
+    quantity(file, (*place, "load", key), known)
+    raise file.error((*place, "load", key), "no specimen takes such a load")
+
+
+def check_forecast(file: StudyFile, number: int) -> None:
+    """StudyError for a forecast that is neither of measured tests nor of a planned one, or of both."""
+    part, place = file.model.forecast[number], ("forecast", number)
+    planned = ("load", "end_h", "temperature_C", "lengths", "modulus_GPa", "control", "ramp_s", "specimen", "labels")
+    given = [name for name in planned if getattr(part, name) not in (None, {})]
+    if part.tests:
+        if given:
+            raise file.error((*place, given[0]), "describes a planned test, and tests are given; leave one of them out")
+        return
+    if len(part.load) != 1:
+        found = "none" if not part.load else " and ".join(part.load)
+        raise file.error((*place, "load"), f"a planned test has one load, such as {{ stress_MPa = 80 }}, found {found}")
+    if part.end_h is None:
+        raise file.error(place, "a planned test needs its end: end_h, such as 100")
+    planned_test(file, number, ZERO_CELSIUS + 20.0 if part.temperature_C is None else None)
+
+
+def numbers_by_output(file: StudyFile, key: tuple[str | int, ...], given: Mapping[str, Any]) -> dict[str, Any]:
+    """{output: its values in creepkit's unit} of keys such as amplitude_mm."""
+    import creepkit as ck
+
+    kinds = {str(o): o.kind for one in ck.available("specimens").values() for o in outputs_of(one)}
+    values: dict[str, Any] = {}
+    for name, numbers in given.items():
+        output, _ = quantity(file, (*key, name), kinds)
+        values[output] = [value_of(file, (*key, name), kinds, number) for number in numbers]
+    return values
+
+
+def goal_of(file: StudyFile) -> Goal | None:
+    """The goal of a design, as ck.design takes it."""
+    import creepkit as ck
+
+    part = file.model.design
+    assert part is not None
+    if part.goal is None or part.goal == "law" or part.goal == "parameters":
+        if part.at_stress_MPa is not None or part.at_temperature_C is not None:
+            name = "at_stress_MPa" if part.at_stress_MPa is not None else "at_temperature_C"
+            raise file.error(("design", name), 'belongs to the goals "rate" and "exponent"; leave it out')
+        return part.goal
+    if part.at_stress_MPa is None:
+        raise file.error(("design", "goal"), f"{part.goal} is asked for at a stress: give at_stress_MPa")
+    place = [part.at_stress_MPa]
+    if part.at_temperature_C is not None:
+        place.append(part.at_temperature_C + ZERO_CELSIUS)
+    with file.at("design", "goal"):
+        return {"rate": ck.rate_at, "exponent": ck.exponent_at}[part.goal](*place)
+
+
+def rigs_of_study(file: StudyFile, rigs: Sequence[Rig], predictor: object) -> list[Rig]:
+    """The rigs of the tests, one of them changed by what the study says of it."""
+    part = file.model.design
+    assert part is not None
+    names = [rig.specimen for rig in rigs]
+    chosen = part.specimen or names[0]
+    if chosen not in names:
+        raise file.error(("design", "specimen"), f"the tests are of {' and '.join(names)}")
+    from creepkit.registry.arguments import specimen_by_name
+
+    specimen = specimen_by_name(chosen)
+    changes: dict[str, Any] = {
+        "longest_hours": part.longest_h,
+        "tests_per_run": part.tests_per_run,
+        "setup_hours": part.setup_h,
+        "frame_interval": part.frame_interval_s,
+    }
+    if part.temperatures_C is not None:
+        changes["temperatures"] = tuple(T + ZERO_CELSIUS for T in part.temperatures_C)
+    kinds = {load.name: load.kind for load in loads_of(specimen)}
+    for key, bounds in part.levels.items():
+        changes["levels"] = tuple(value_of(file, ("design", "levels", key), kinds, one) for one in bounds)
+    lengths = {name: LENGTH for one in dimensions_of(specimen) for name in one.names}
+    if part.lengths:
+        changes["dimensions"] = {
+            quantity(file, ("design", "lengths", key), lengths)[0]: tuple(
+                value_of(file, ("design", "lengths", key), lengths, one) for one in values
+            )
+            for key, values in part.lengths.items()
+        }
+    changes = {name: value for name, value in changes.items() if value is not None}
+    if changes and len(rigs) > 1 and part.specimen is None:
+        raise file.error(("design",), f"the tests are of {' and '.join(names)}: say by specimen whose rig is described")
+    with file.at("design"):
+        return [rig.replace(**changes) if rig.specimen == chosen else rig for rig in rigs]
+
+
+def tolerances_of(file: StudyFile, number: int) -> dict[str, float]:
+    """{kind: standard deviation} of a forecast, in the unit of the nuisance parameter of that kind."""
+    from creepkit.records.known_specimens import all_dimensions
+    from creepkit.records.prediction import GENERAL_NUISANCES
+
+    known = [*GENERAL_NUISANCES, *all_dimensions()]
+    spelt = {f"{kind}_{unit}" if (unit := _unit_of_kind(kind)) else kind: kind for kind in known}
+    tolerances: dict[str, float] = {}
+    for key, value in file.model.forecast[number].tolerances.items():
+        if key not in spelt:
+            raise file.error(("forecast", number, "tolerances", key), f"is not known; {nearest(key, spelt)}")
+        tolerances[spelt[key]] = value
+    return tolerances

@@ -1,0 +1,209 @@
+"""Results of stages as files of a folder, each with the hash of all that it was made from; and how they are read."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from creepkit.errors import StudyError
+from creepkit.files.json_documents import (
+    DocumentFormat,
+    canonical_json,
+    check_heading,
+    check_keys,
+    read_json,
+    write_json,
+)
+from creepkit.files.reading import FileKind
+from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError, ValueCodec
+from creepkit.inverse.fingerprints import short_hash
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
+from creepkit.inverse.kept_fits import LINEARISED_CODEC, history_digest
+from creepkit.inverse.variance_components import LinearisedProblem
+from creepkit.language import CreepLaw, Elastic
+from creepkit.records import (
+    History,
+    Loading,
+    PointLoading,
+    Predictor,
+    PressureJump,
+    Program,
+    RecordedLoading,
+    StrainSteps,
+    StressSteps,
+)
+
+STAGE_RESULT = DocumentFormat(
+    "creepkit-stage-result",
+    1,
+    FileKind("a result of a stage", StudyError, "remove it: it is made again", maximum_bytes=500_000_000),
+    remedy="remove it: it is made again",
+)
+
+
+LOADINGS: Mapping[str, type[Any]] = {
+    one.__name__: one for one in (StressSteps, StrainSteps, PressureJump, RecordedLoading, PointLoading)
+}
+"""Kinds of loading of planned tests, by the name that files give them."""
+
+
+PLAIN = RecordCodec(default_range=ANY_NUMBER)
+
+
+HISTORY_FIELDS: Mapping[str, Any] = {
+    "name": str,
+    "times": list[float],
+    "specimen": str,
+    "geometry": dict[str, float],
+    "alloy": str,
+    "labels": dict[str, str],
+    "operator": str,
+    "strain_measure": str,
+    "includes_elastic": bool,
+}
+"""What a file holds of a planned test as it is; its loading, temperature and modulus are written apart."""
+
+
+@dataclass(frozen=True)
+class ResultCodec:
+    """How results of stages are written and read.
+
+    histories : the tests of the study, which are stored by name and hash; planned tests are stored whole.
+    predictor : of identifications whose file does not give one, such as a surrogate.
+    """
+
+    histories: Sequence[History]
+    predictor: Predictor | None = None
+
+    @property
+    def codec(self) -> RecordCodec:
+        """Of all records that stages make."""
+        by_name = {history.name: history for history in self.histories}
+        digests = {name: history_digest(history) for name, history in by_name.items()}
+
+        def to_json(history: History) -> Any:
+            if digests.get(history.name) == history_digest(history):
+                return {"test": history.name}
+            return planned_to_json(history)
+
+        def from_json(data: Any, source: str) -> History:
+            if isinstance(data, dict) and [*data] == ["test"] and data["test"] in by_name:
+                return by_name[data["test"]]
+            return planned_from_json(data)
+
+        def fit_from_json(data: Any, source: str) -> Identification:
+            problem = check_keys(data, ("identification", "linearised"), "identification")
+            if problem:
+                raise StudyError(problem)
+            fit = identification_from_json(data["identification"], source)
+            stored = data["linearised"]
+            linearised = None if stored is None else LINEARISED_CODEC.from_json(LinearisedProblem, stored)
+            names = [one.name for one in fit.tests]
+            if not all(name in by_name for name in names):
+                raise StudyError("its tests are not those of the study")
+            tests = tuple(by_name[name] for name in names)
+            return replace(fit, histories=tests, predictor=fit.predictor or self.predictor, linearised=linearised)
+
+        values: dict[Any, ValueCodec] = {
+            CreepLaw: LAW_CODEC,
+            History: ValueCodec(to_json, from_json),
+            Identification: ValueCodec(_fit_to_json, fit_from_json),
+        }
+        from creepkit.inverse.selection.challenges import Challenge
+
+        return RecordCodec(values=values, names={"Challenge": Challenge}, default_range=ANY_NUMBER)
+
+
+def _fit_to_json(fit: Identification) -> dict[str, Any]:
+    linearised = None if fit.linearised is None else LINEARISED_CODEC.to_json(fit.linearised)
+    return {"identification": identification_to_json(fit), "linearised": linearised}
+
+
+def planned_to_json(history: History) -> dict[str, Any]:
+    """A planned test; RecordError for one with outputs, or of a loading that is not creepkit's."""
+    kind = type(history.loading).__name__
+    if history.outputs or LOADINGS.get(kind) is not type(history.loading):
+        raise RecordError(f"test '{history.name}' cannot be stored")
+    elastic = history.elastic
+    if elastic is not None and not isinstance(elastic.E, float):
+        raise RecordError(f"test '{history.name}' has a modulus that depends on temperature")
+    return {
+        **{name: PLAIN.to_json(getattr(history, name)) for name in HISTORY_FIELDS},
+        "loading": {"kind": kind, **PLAIN.to_json(history.loading)},
+        "temperature": PLAIN.to_json(history.temperature_program()),
+        "elastic": None if elastic is None else [elastic.E, elastic.nu],
+    }
+
+
+def planned_from_json(data: Any) -> History:
+    """The planned test that `planned_to_json` wrote; RecordError or another error of creepkit for other data."""
+    names = (*HISTORY_FIELDS, "loading", "temperature", "elastic")
+    problem = "it is no object" if not isinstance(data, dict) else check_keys(data, names, "test")
+    kind = LOADINGS.get(str(data["loading"].get("kind"))) if not problem and isinstance(data["loading"], dict) else None
+    if problem or kind is None:
+        raise RecordError(f"a planned test cannot be read: {problem or 'its loading is not known'}")
+    fields = {name: PLAIN.from_json(hint, data[name], name) for name, hint in HISTORY_FIELDS.items()}
+    loading: Loading = PLAIN.from_json(kind, {k: v for k, v in data["loading"].items() if k != "kind"}, "loading")
+    program = PLAIN.from_json(Program, data["temperature"], "temperature")
+    elastic = None if data["elastic"] is None else PLAIN.from_json(list[float], data["elastic"], "elastic")
+    constant = bool((program.values == program.values[0]).all())
+    return History(
+        **fields,
+        outputs={},
+        loading=loading,
+        temperature=float(program.values[0]) if constant else program,
+        elastic=None if elastic is None else Elastic(*elastic),
+    )
+
+
+def key_of(parts: Mapping[str, Any]) -> str:
+    """Hash of all that decides a result."""
+    return short_hash(canonical_json(parts))
+
+
+@dataclass(frozen=True)
+class ResultFolder:
+    """The folder in which results of stages are kept, one file each."""
+
+    folder: Path
+
+    @property
+    def fits(self) -> Path:
+        """Folder of single identifications, see creepkit.inverse.kept_fits."""
+        return self.folder / "fits"
+
+    def path(self, stage: str) -> Path:
+        """The file of a stage."""
+        return self.folder / f"{file_name(stage)}.json"
+
+    def clear(self) -> None:
+        """Remove all results and identifications, those half written among them."""
+        for folder in (self.folder, self.fits):
+            for path in (*folder.glob("*.json"), *folder.glob(".*.part")):
+                path.unlink(missing_ok=True)
+
+    def load(self, stage: str, key: str) -> Any:
+        """The data of a stage; None where there are none, or of another key."""
+        try:
+            content = check_heading(read_json(self.path(stage), STAGE_RESULT.kind), str(self.path(stage)), STAGE_RESULT)
+        except StudyError:
+            return None
+        if check_keys(content, ("stage", "key", "result"), "result") or content["key"] != key:
+            return None
+        return content["result"]
+
+    def save(self, stage: str, key: str, result: Any) -> None:
+        """Write the data of a stage, whole or not at all."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        content = {**STAGE_RESULT.heading, "stage": stage, "key": key, "result": result}
+        write_json(content, self.path(stage), STAGE_RESULT.kind)
+
+
+def file_name(text: str) -> str:
+    """A name as part of a file's; with the beginning of a hash where signs were lost."""
+    plain = re.sub(r"[^A-Za-z0-9.=+-]+", "-", text).strip("-.")[:80]
+    return plain if plain == text.replace(" ", "-") and plain else f"{plain or 'x'}_{short_hash(text.encode())[:6]}"

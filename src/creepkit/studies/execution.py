@@ -1,0 +1,185 @@
+"""Carrying out stages: what was made before from the same inputs is read, the rest is made and kept."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+from creepkit.errors import CreepkitError, StudyError
+from creepkit.files.record_codec import RecordError
+from creepkit.inverse.kept_fits import COMPUTING, keep_fits
+from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text
+from creepkit.records import History
+from creepkit.reports.contents import StageFailure
+from creepkit.studies.documents import ResultCodec, ResultFolder, key_of
+from creepkit.studies.stages import Stage
+
+LOCK_NAME = "running.lock"
+
+
+@dataclass(frozen=True)
+class StageRecord:
+    """How a stage of a run ended.
+
+    name, kind, group : of the stage. state : "made", "kept" from an earlier run, "failed", or "left out" where it was
+    not asked for. key : hash of all that decides its result. sentence : why it failed.
+    """
+
+    name: str
+    kind: str
+    group: str
+    state: Literal["made", "kept", "failed", "left out"]
+    key: str
+    sentence: str = ""
+
+
+class LazyResults:
+    """{name of a stage: its result}; what a file holds is read when it is asked for."""
+
+    def __init__(self) -> None:
+        self._makers: dict[str, Callable[[], Any]] = {}
+        self._values: dict[str, Any] = {}
+
+    def set(self, name: str, value: Any) -> None:
+        """Keep a result."""
+        self._values[name] = value
+
+    def defer(self, name: str, make: Callable[[], Any]) -> None:
+        """Read, or make, a result when it is asked for first."""
+        self._makers[name] = make
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._values or name in self._makers
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._values:
+            self._values[name] = self._makers[name]()
+        return self._values[name]
+
+
+@contextmanager
+def running_alone(folder: Path) -> Iterator[None]:
+    """StudyError where another process is carrying out the same study; the system frees the lock of one that dies."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = ShardLock(folder / LOCK_NAME)
+        lock.__enter__()
+    except OSError as error:
+        raise StudyError(
+            f"{folder}: results cannot be kept there ({error.strerror}); name another folder by --to"
+        ) from None
+    try:
+        if not lock.held:
+            raise StudyError(f"{folder}: another process is carrying out this study; wait for it, or end it")
+        yield
+    finally:
+        lock.__exit__(None, None, None)
+
+
+@dataclass
+class Execution:
+    """One run over the stages of a study.
+
+    folder : of kept results. histories : the tests. force : whether everything is made again.
+    progress : called as progress(task, done, total, note).
+    """
+
+    folder: ResultFolder
+    histories: Sequence[History]
+    progress: ProgressCallback | None = None
+    force: bool = False
+    records: list[StageRecord] = field(default_factory=list)
+    results: Any = field(default_factory=LazyResults)
+
+    @property
+    def failures(self) -> tuple[StageFailure, ...]:
+        """Stages that failed, with their reasons."""
+        return tuple(StageFailure(one.name, one.sentence) for one in self.records if one.state == "failed")
+
+    def run(self, stages: Sequence[Stage], wanted: Collection[str]) -> None:
+        """Carry out the stages of these names, each behind those that it needs."""
+        for number, stage in enumerate(stages, 1):
+            key = self._key(stage)
+            if stage.name not in wanted:
+                self._record(stage, "left out", key)
+                continue
+            failed = [name for name in stage.needs if name not in self.results]
+            if failed:
+                self._record(stage, "failed", key, f"{failed[0]} failed, which it needs")
+                continue
+            self._report(stage, 0, 1, f"stage {number} of {len(stages)}")
+            if not self.force and self._read(stage, key):
+                self._record(stage, "kept", key)
+                self._report(stage, 1, 1, "kept from before")
+                continue
+            self._make(stage, key)
+
+    def _key(self, stage: Stage) -> str:
+        keys = {one.name: one.key for one in self.records}
+        needs = [keys.get(name, "") for name in stage.needs]
+        versions = {name: version(name) for name in COMPUTING}
+        return key_of({"kind": stage.kind, "settings": stage.settings, "needs": needs, "versions": versions})
+
+    def _record(self, stage: Stage, state: Any, key: str, sentence: str = "") -> None:
+        self.records.append(StageRecord(stage.name, stage.kind, stage.group, state, key, sentence))
+
+    def _report(self, stage: Stage, done: int, total: int, note: str) -> None:
+        if self.progress is not None:
+            self.progress(stage.name, done, total, note)
+
+    def _codec(self, stage: Stage) -> Any:
+        return ResultCodec(self.histories, stage.predictor).codec
+
+    def _read(self, stage: Stage, key: str) -> bool:
+        """Whether a result of this key is there; it is read at once where it is a record, for a file may be damaged."""
+        data = self.folder.load(stage.name, key)
+        if data is None:
+            return False
+        if stage.record is None:
+            self.results.defer(stage.name, lambda: self._made(stage, _no_tick))
+            return True
+        try:
+            self.results.set(stage.name, self._codec(stage).from_json(stage.record, data["record"]))
+        except (CreepkitError, KeyError, TypeError, ValueError, AssertionError):
+            return False
+        return True
+
+    def _make(self, stage: Stage, key: str) -> None:
+        start = time.monotonic()
+        begun: dict[str, float] = {}
+
+        def tick(task: str, done: int, total: int) -> None:
+            elapsed = time.monotonic() - begun.setdefault(task, start if not begun else time.monotonic())
+            left = (
+                f", {duration_text(elapsed / done * (total - done))} left" if elapsed > 0 and 0 < done < total else ""
+            )
+            self._report(stage, min(done, total), total, f"{task}{left}")
+
+        try:
+            result = self._made(stage, tick)
+        except CreepkitError as error:
+            self._record(stage, "failed", key, " ".join(str(error).split()))
+            self._report(stage, 1, 1, "failed")
+            return
+        self.results.set(stage.name, result)
+        self._record(stage, "made", key)
+        try:
+            data = {} if stage.record is None else {"record": self._codec(stage).to_json(result)}
+        except RecordError:  # of what a plugin brought; it is made again next time
+            data = None
+        if data is not None:
+            self.folder.save(stage.name, key, data)
+        self._report(stage, 1, 1, f"done in {duration_text(time.monotonic() - start)}")
+
+    def _made(self, stage: Stage, tick: Callable[[str, int, int], None]) -> Any:
+        with keep_fits(self.folder.fits):
+            return stage.make(self.results, tick)
+
+
+def _no_tick(task: str, done: int, total: int) -> None:
+    """Progress of what is only read again."""

@@ -1,0 +1,44 @@
+"""Identification of several laws otherwise than by their likelihood, and the searches and penalties that files name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from creepkit.studies.model import IdentificationPart
+
+if TYPE_CHECKING:
+    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.settings import IdentificationSettings
+    from creepkit.language import CreepLaw
+    from creepkit.records import History, Predictor
+
+
+def search_of(part: IdentificationPart) -> tuple[Any, Any]:
+    """The search and the penalty of an identification, None for the default and for none."""
+    import creepkit as ck
+
+    searches: dict[str, Any] = {"multi-start": None, "swarm": ck.ParticleSwarm(), "cma-es": ck.CmaEs()}
+    penalties: dict[str, Any] = {"l2": ck.L2, "group-l2": ck.GroupL2, "sqrt": ck.Sqrt, "subsets": ck.Subsets}
+    return searches[part.search], None if part.penalty is None else penalties[part.penalty]()
+
+
+def identified_laws(
+    laws: Sequence[CreepLaw],
+    tests: list[History],
+    using: Predictor | None,
+    settings: IdentificationSettings,
+    how: tuple[Any, Any],
+    tick: Callable[[str, int, int], None],
+) -> Ranking:
+    """Each law identified by itself, and all ranked. how : search and penalty."""
+    import creepkit as ck
+
+    fits, (search, penalty) = [], how
+    for law in laws:
+
+        def of_law(task: str, done: int, total: int, name: str = law.name) -> None:
+            tick(f"{name}, {task}", done, total)
+
+        fits.append(ck.identify(law, tests, using, search=search, penalty=penalty, settings=settings, progress=of_law))
+    return ck.rank(fits)

@@ -1,0 +1,249 @@
+"""Inputs of a study: its files with their hashes, the tests that they hold, what is left out, and groups of tests."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from creepkit.errors import StudyError, nearest
+from creepkit.files.reading import FileKind, open_binary
+from creepkit.inverse.history_checks import SUSPECT_LABEL, truncated_at_strain
+from creepkit.records import ZERO_CELSIUS, History
+from creepkit.records.history_selection import select_tests
+from creepkit.reports.contents import Exclusion
+from creepkit.studies.arguments import HOUR
+from creepkit.studies.study_file import StudyFile
+
+DATA_FILE = FileKind("a data file", StudyError, "name files of tests", maximum_bytes=2_000_000_000)
+
+
+MOST_FILES = 10_000
+"""Of one study."""
+
+
+PIECE = 1 << 20
+
+
+NOT_STATED = "not stated"
+"""The group of tests that lack the label by which tests are grouped."""
+
+
+@dataclass(frozen=True)
+class InputFile:
+    """A file that a study reads. name : relative to the study file, `..` written `up`; sha256 : of its content."""
+
+    name: str
+    path: Path
+    sha256: str
+
+
+@dataclass(frozen=True)
+class TestGroup:
+    """Tests that are identified together. name : value of the label that they share, "" where all are together."""
+
+    __test__ = False  # not a test case, whatever its name says to pytest
+
+    name: str
+    histories: tuple[History, ...]
+
+
+@dataclass(frozen=True)
+class StudyInputs:
+    """The tests of a study as they are used, and what was left out.
+
+    measured : all tests as files hold them. exclusions : with reasons. groups : of the tests that remain.
+    """
+
+    measured: tuple[History, ...]
+    exclusions: tuple[Exclusion, ...]
+    groups: tuple[TestGroup, ...]
+
+    @property
+    def histories(self) -> tuple[History, ...]:
+        """The tests that remain."""
+        return tuple(history for group in self.groups for history in group.histories)
+
+
+def resolve_paths(file: StudyFile, key: tuple[str | int, ...], texts: Sequence[str], root: Path | None) -> list[Path]:
+    """Existing files and folders of patterns relative to the study file; StudyError where there is none.
+
+    root : folder of files that a report carried, in which `..` is written `up`.
+    """
+    found: dict[Path, None] = {}
+    for k, text in enumerate(texts):
+        place = (*key, k)
+        pattern = PurePosixPath(text.replace("\\", "/"))
+        if pattern.is_absolute() or text.startswith("~") or re.match(r"^[A-Za-z]:", text):
+            raise file.error(place, f"'{text}' is absolute; write it relative to the study file, such as data/*.csv")
+        base, relative = (file.path.parent, pattern) if root is None else (root, PurePosixPath(carried_name(pattern)))
+        path = base / relative
+        matches = [path] if path.exists() else _matches(base, relative)
+        if not matches:
+            raise file.error(place, f"there is no file or folder '{text}' beside the study, and none matches it")
+        found.update(dict.fromkeys(matches))
+    return list(found)
+
+
+def _matches(base: Path, pattern: PurePosixPath) -> list[Path]:
+    """Files that match a pattern; parts before its first star lead to a folder."""
+    parts = pattern.parts
+    first = next((k for k, part in enumerate(parts) if set(part) & set("*?[")), None)
+    if first is None:
+        return []
+    try:
+        return sorted((base.joinpath(*parts[:first])).glob(str(PurePosixPath(*parts[first:]))))[: MOST_FILES + 1]
+    except (ValueError, NotImplementedError, OSError):
+        return []
+
+
+def carried_name(path: PurePosixPath) -> str:
+    """The name under which a report carries a file: plain parts only."""
+    return str(PurePosixPath(*("up" if part == ".." else part for part in path.parts)))
+
+
+def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_out: Sequence[Path]) -> list[InputFile]:
+    """Every regular file among paths and in folders among them, with its hash; without what the study itself writes."""
+    base = file.path.parent if root is None else root
+    files: dict[Path, None] = {}
+    for path in paths:
+        for one in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            if one.is_file() and not any(one == own or own in one.parents for own in left_out):
+                files[one] = None
+            if len(files) > MOST_FILES:
+                raise file.error(("data", "files"), f"they are more than {MOST_FILES} files; name fewer")
+    result = []
+    for one in files:
+        relative = PurePosixPath(_relative(one, base))
+        name = str(relative) if root is not None else carried_name(relative)
+        result.append(InputFile(name, one, sha256_of(one)))
+    return result
+
+
+def _relative(path: Path, base: Path) -> str:
+    import os.path
+
+    return os.path.relpath(path, base).replace("\\", "/")
+
+
+def sha256_of(path: Path) -> str:
+    """Of the content of a regular file."""
+    digest = hashlib.sha256()
+    with open_binary(path, DATA_FILE) as stream:
+        while piece := stream.read(PIECE):
+            digest.update(piece)
+    return digest.hexdigest()
+
+
+# ---- tests ---------------------------------------------------------------------------------------------------------
+
+
+def read_inputs(file: StudyFile, paths: Sequence[Path]) -> StudyInputs:
+    """The tests of a study: read, chosen, with what is left out, in groups."""
+    import creepkit as ck
+
+    data = file.model.data
+    with file.at("data", "reader" if data.reader is not None else "files"):
+        measured = ck.read_histories(list(paths), data.reader, data.ignore)
+    chosen = measured
+    if data.only:
+        with file.at("data", "only"):
+            chosen = select_tests(measured, **_labels(data.only))
+    histories, exclusions = _excluded(file, chosen)
+    if data.suspect_frames == "exclude":
+        sound = ck.exclude_suspect_frames(histories)
+        exclusions += [
+            Exclusion(after.name, _frames(before.used & ~after.used), f"suspect: {after.labels[SUSPECT_LABEL]}")
+            for before, after in zip(histories, sound, strict=True)
+            if (before.used & ~after.used).any()
+        ]
+        histories = sound
+    if data.up_to_strain is not None:
+        before, limit = histories, data.up_to_strain
+        histories = truncated_at_strain(histories, limit)
+        names = {history.name for history in histories}
+        exclusions += [
+            Exclusion(h.name, (), f"no two frames below a strain of {limit:g}") for h in before if h.name not in names
+        ]
+    if not histories:
+        raise file.error(("data",), "no test is left; leave out fewer of them")
+    return StudyInputs(tuple(measured), tuple(exclusions), tuple(_groups(file, histories)))
+
+
+def _labels(only: dict[str, list[Any]]) -> dict[str, list[Any]]:
+    """Labels as select_tests takes them; temperature_C in K."""
+    labels = {name: values for name, values in only.items() if name != "temperature_C"}
+    if "temperature_C" in only:
+        labels["temperature"] = [float(value) + ZERO_CELSIUS for value in only["temperature_C"]]
+    return labels
+
+
+def _excluded(file: StudyFile, histories: Sequence[History]) -> tuple[list[History], list[Exclusion]]:
+    """The histories without what the study excludes."""
+    remaining, exclusions = list(histories), []
+    for k, part in enumerate(file.model.exclude):
+        named = [h for h in histories if fnmatchcase(h.name, part.test)]
+        if not named:
+            names = [h.name for h in histories]
+            raise file.error(("exclude", k, "test"), f"there is no test '{part.test}'; {nearest(part.test, names)}")
+        for history in named:
+            if part.frames is None and part.from_h is None and part.to_h is None:
+                remaining = [h for h in remaining if h.name != history.name]
+                exclusions.append(Exclusion(history.name, (), part.reason))
+                continue
+            unused = np.zeros(history.times.size, bool)
+            if part.frames is not None:
+                unused[_frame_numbers(file, k, part.frames, history)] = True
+            if part.from_h is not None or part.to_h is not None:
+                hours = history.times / HOUR
+                unused |= (hours >= (part.from_h or 0.0)) & (hours <= (np.inf if part.to_h is None else part.to_h))
+            exclusions.append(Exclusion(history.name, _frames(unused), part.reason))
+            remaining = [replace(h, used=h.used & ~unused) if h.name == history.name else h for h in remaining]
+    return remaining, exclusions
+
+
+def _frame_numbers(file: StudyFile, number: int, text: str, history: History) -> list[int]:
+    """Frames of a text such as 97-191, 193, counted from 0."""
+    frames: list[int] = []
+    for part in text.split(","):
+        first, _, last = (one.strip() for one in part.partition("-"))
+        if not (first.isascii() and first.isdigit() and (not last or (last.isascii() and last.isdigit()))):
+            raise file.error(("exclude", number, "frames"), f"'{text}' is not known; write frames = \"97-191, 193\"")
+        low, high = int(first[:9]), int((last or first)[:9])
+        if not low <= high < history.times.size:
+            size = history.times.size
+            raise file.error(
+                ("exclude", number, "frames"), f"test '{history.name}' has frames 0 to {size - 1}, found {part.strip()}"
+            )
+        frames += range(low, high + 1)
+    return frames
+
+
+def _frames(mask: Any) -> tuple[int, ...]:
+    return tuple(int(k) for k in np.flatnonzero(mask))
+
+
+def _groups(file: StudyFile, histories: Sequence[History]) -> list[TestGroup]:
+    """Groups by the label that the study names; by alloy where it names none."""
+    part = file.model.identification
+    label = "alloy" if part is None or part.group_by is None else part.group_by
+    known = {"alloy", "specimen", *(name for history in histories for name in history.labels)} - {SUSPECT_LABEL}
+    if label == "none":
+        return [TestGroup("", tuple(histories))]
+    if label not in known:
+        raise file.error(
+            ("identification", "group_by"), f"no test has a label '{label}'; {nearest(label, known | {'none'})}"
+        )
+    by_value: dict[str, list[History]] = {}
+    for history in histories:
+        value = getattr(history, label) if label in ("alloy", "specimen") else history.labels.get(label, "")
+        by_value.setdefault(value or NOT_STATED, []).append(history)
+    if len(by_value) == 1 and (part is None or part.group_by is None):
+        return [TestGroup("", tuple(histories))]
+    return [TestGroup(name, tuple(tests)) for name, tests in by_value.items()]

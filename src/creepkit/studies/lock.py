@@ -1,0 +1,125 @@
+"""study.lock: every default, seed, version and hash of a run, so that it can be repeated and differences are seen."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from creepkit.errors import CreepkitError, StudyError
+from creepkit.files.json_documents import DocumentFormat, as_read_back, check_heading, check_keys, read_json, write_json
+from creepkit.files.reading import FileKind
+from creepkit.files.record_codec import record_to_json
+from creepkit.studies import arguments
+from creepkit.studies.execution import StageRecord
+from creepkit.studies.inputs import InputFile
+from creepkit.studies.study_file import StudyFile
+
+STUDY_LOCK = DocumentFormat(
+    "creepkit-study-lock",
+    1,
+    FileKind("a study.lock", StudyError, "remove it: 'creepkit run' writes it again"),
+    remedy="remove it: 'creepkit run' writes it again",
+)
+
+
+PACKAGES = ("creepkit", "numpy", "scipy", "sympy", "torch", "llvmlite", "pydantic")
+"""Whose versions are recorded."""
+
+
+KEYS = ("study", "seed", "versions", "inputs", "declared", "settings", "laws", "stages")
+
+
+def versions_of() -> dict[str, str]:
+    """Versions of Python and of the packages that compute."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def lock_of(file: StudyFile, study_hash: str, files: Sequence[InputFile], records: Sequence[StageRecord]) -> Any:
+    """The content of study.lock; the same for the same run."""
+    model = file.model
+    settings = record_to_json(asdict(arguments.settings_of(file)))
+    laws = {} if model.identification is None else {law.name: law.fingerprint for law in arguments.laws_of(file)}
+    content = {
+        "study": study_hash,
+        "seed": model.study.seed,
+        "versions": versions_of(),
+        "inputs": {one.name: one.sha256 for one in files},
+        "declared": model.model_dump(),
+        "settings": settings,
+        "laws": laws,
+        "stages": {one.name: {"key": one.key, "state": _state(one)} for one in records},
+    }
+    return as_read_back({**STUDY_LOCK.heading, **content})
+
+
+def _state(record: StageRecord) -> str:
+    return {"failed": "failed", "left out": "left out"}.get(record.state, "done")
+
+
+def write_lock(content: Any, path: Path) -> Path:
+    """Write study.lock, whole or not at all."""
+    return write_json(content, path, STUDY_LOCK.kind)
+
+
+def read_lock(path: Path) -> dict[str, Any]:
+    """The content of a study.lock below its heading; StudyError for any other file."""
+    content = check_heading(read_json(path, STUDY_LOCK.kind), str(path), STUDY_LOCK)
+    problem = check_keys(content, KEYS, "study.lock")
+    tables = ("versions", "inputs", "declared", "settings", "laws", "stages")
+    wrong = "" if problem else next((name for name in tables if not isinstance(content[name], dict)), "")
+    if problem or wrong:
+        raise StudyError(f"{path}: {problem or f'{wrong} is no object'}; {STUDY_LOCK.kind.advice}")
+    return content
+
+
+def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """What differs between two locks, one sentence each; stages are not compared, for they follow from the rest."""
+    found = []
+    for name in ("versions", "inputs", "laws"):
+        old, new = before[name], now[name]
+        what = {"versions": "version of", "inputs": "file", "laws": "law"}[name]
+        for key in sorted({*old, *new}):
+            if key not in new:
+                found.append(f"{what} {key}: was there, and is not any more")
+            elif key not in old:
+                found.append(f"{what} {key}: is new")
+            elif old[key] != new[key]:
+                detail = f" from {old[key]} to {new[key]}" if name == "versions" else ""
+                found.append(f"{what} {key}: changed{detail}")
+    for name in ("declared", "settings"):
+        found += [f"setting {place}: changed from {a} to {b}" for place, a, b in _changes(before[name], now[name], "")]
+    if before["seed"] != now["seed"]:
+        found.append(f"seed: changed from {before['seed']} to {now['seed']}")
+    return list(dict.fromkeys(found))
+
+
+def _changes(old: Any, new: Any, place: str) -> list[tuple[str, str, str]]:
+    if isinstance(old, dict) and isinstance(new, dict):
+        inner = (_changes(old.get(key), new.get(key), f"{place}.{key}".lstrip(".")) for key in sorted({*old, *new}))
+        return [change for changes in inner for change in changes]
+    return [] if old == new else [(place, _short(old), _short(new))]
+
+
+def _short(value: Any) -> str:
+    text = "nothing" if value is None else repr(value)
+    return text if len(text) <= 60 else f"{text[:60]}..."
+
+
+def lock_if_any(path: Path) -> dict[str, Any] | None:
+    """The lock that is there, or None."""
+    if not path.exists():
+        return None
+    try:
+        return read_lock(path)
+    except CreepkitError as error:
+        raise StudyError(str(error)) from None

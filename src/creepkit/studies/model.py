@@ -1,0 +1,269 @@
+"""What a study file may hold: strict models of its tables. Units stand in the names of keys.
+
+A key that is missing takes the default of the function that it goes to, which study.lock then records.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
+from pydantic_core import PydanticCustomError
+
+MOST_ITEMS = 1000
+"""In a list of a study file."""
+
+
+Text = Annotated[str, StringConstraints(min_length=1, max_length=500, pattern=r"^[^\x00-\x1f\x7f]*$")]
+"""Without line breaks, and without signs that steer a terminal."""
+
+
+Positive = Annotated[float, Field(gt=0.0)]
+Texts = Annotated[list[Text], Field(max_length=MOST_ITEMS)]
+SomeTexts = Annotated[list[Text], Field(min_length=1, max_length=MOST_ITEMS)]
+Numbers = Annotated[list[float], Field(min_length=1, max_length=MOST_ITEMS)]
+
+
+class Part(BaseModel):
+    """A table of a study file: no other keys, no values of other types."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Step(Part):
+    """A level that begins at a time: { from_h = 4, level = 10 }, in the unit of the key that it belongs to."""
+
+    from_h: Annotated[float, Field(ge=0.0)]
+    level: float
+
+
+def _level_or_steps(value: Any) -> Any:
+    """A number as one step from 0 h on."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return [{"from_h": 0.0, "level": value}]
+    if isinstance(value, list):
+        return value
+    raise PydanticCustomError("misfit", "must be a number, or a list of steps such as { from_h = 4, level = 10 }")
+
+
+def _one_or_more(value: Any) -> Any:
+    """A single text as a list of one."""
+    return [value] if isinstance(value, str) else value
+
+
+def _label_values(value: Any) -> Any:
+    """One value of a label, or several, as a list."""
+    values = value if isinstance(value, list) else [value]
+    if values and all(isinstance(one, str | int | float) and not isinstance(one, bool) for one in values):
+        return values
+    raise PydanticCustomError("misfit", "must be a text, a number, or a list of them")
+
+
+def _output_weights(value: Any) -> Any:
+    """A word, or weights by output."""
+    numbers = isinstance(value, dict) and all(type(one) in (int, float) for one in value.values())
+    if isinstance(value, str) or (value and numbers):
+        return value
+    raise PydanticCustomError("misfit", "must be a word such as noise, or numbers by output such as { strain = 1 }")
+
+
+LevelOrSteps = Annotated[list[Step], BeforeValidator(_level_or_steps), Field(min_length=1, max_length=MOST_ITEMS)]
+Labels = Annotated[list[Any], BeforeValidator(_label_values)]
+OneOrMore = Annotated[SomeTexts, BeforeValidator(_one_or_more)]
+Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class StudyPart(Part):
+    """[study]: what the report is called, and the seed of all random draws."""
+
+    title: Text = "creep study"
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+
+
+class DataPart(Part):
+    """[data]: files of tests, patterns or folders, relative to the study file.
+
+    only : values of labels that tests must have. up_to_strain : frames beyond it are left out.
+    """
+
+    files: OneOrMore
+    reader: Text | None = None
+    ignore: Texts = []
+    only: dict[Text, Labels] = {}
+    up_to_strain: Positive | None = None
+    suspect_frames: Literal["exclude", "keep"] = "exclude"
+    check_quality: bool = True
+
+
+class ExcludePart(Part):
+    """[[exclude]]: a test, or some of its frames, with the reason. Frames are counted from 0: "97-191, 193"."""
+
+    test: Text
+    reason: Text
+    frames: Text | None = None
+    from_h: Annotated[float, Field(ge=0.0)] | None = None
+    to_h: Positive | None = None
+
+
+class SpecimenPart(Part):
+    """[specimen]: what the tests are of where files do not say, and lengths of the test piece, as thickness_mm."""
+
+    name: Text
+    lengths: dict[Text, Positive] = {}
+
+
+class NuisancePart(Part):
+    """[[identification.nuisances]]: what differs between tests; mean and sd in the unit of the kind."""
+
+    kind: Text
+    scope: Literal["test", "alloy", "all"] = "test"
+    output: Text | None = None
+    tests: Texts = []
+    start_h: Positive | None = None
+    mean: float | None = None
+    mean_mm: float | None = None
+    mean_K: float | None = None
+    sd: Positive | None = None
+    sd_mm: Positive | None = None
+    sd_K: Positive | None = None
+
+
+class IdentificationPart(Part):
+    """[identification]: candidate laws and how each is fitted, for every group of tests."""
+
+    laws: Annotated[SomeTexts, BeforeValidator(_one_or_more)]
+    group_by: Text | None = None
+    temperature: Literal["auto", "none"] = "auto"
+    predictor: Text | None = None
+    fix: dict[Text, float] = {}
+    bounds: dict[Text, Bounds] = {}
+    nuisances: Annotated[list[NuisancePart], Field(max_length=50)] = []
+    without_nuisances: Texts = []
+    starts: Annotated[int, Field(ge=1, le=1000)] | None = None
+    frames: Annotated[int, Field(ge=2, le=100_000)] | None = None
+    weights: Annotated[Any, BeforeValidator(_output_weights)] = None
+    loss: Text | None = None
+    test_loss: Text | None = None
+    search: Literal["multi-start", "swarm", "cma-es"] = "multi-start"
+    penalty: Literal["l2", "group-l2", "sqrt", "subsets"] | None = None
+
+
+class SelectionPart(Part):
+    """[selection]: how laws are compared; without sums, sums are tried where no candidate explains the tests."""
+
+    by: Literal["bic", "aicc", "hold-out"] = "bic"
+    sums: bool | None = None
+    further_laws: Annotated[int, Field(ge=0, le=100)] | None = None
+
+
+class TemperaturePart(Part):
+    """[temperature]: forms of temperature for the parameters of a law, by default the best law of each group."""
+
+    law: Text | None = None
+    forms: dict[Text, OneOrMore] = {}
+    prior_odds: dict[Text, dict[Text, Positive]] = {}
+    parameters: Texts | None = None
+    moduli: bool = False
+    within_K: Annotated[float, Field(ge=0.0)] | None = None
+
+
+class TensileStrength(Part):
+    """A tensile strength at a temperature."""
+
+    temperature_C: float
+    strength_MPa: Positive
+
+
+class RupturePart(Part):
+    """[rupture]: parametric methods for rupture tests."""
+
+    methods: Annotated[SomeTexts, BeforeValidator(_one_or_more)] | None = None
+    times_h: Numbers | None = None
+    temperatures_C: Numbers | None = None
+    tensile_strengths: Annotated[list[TensileStrength], Field(max_length=MOST_ITEMS)] = []
+    fixed: dict[Text, dict[Text, float]] = {}
+    degrees: Annotated[list[int], Field(min_length=1, max_length=10)] | None = None
+    distribution: Literal["lognormal", "weibull"] | None = None
+    criterion: Literal["bic", "aicc"] | None = None
+    level: Annotated[float, Field(ge=0.5, lt=1.0)] | None = None
+
+
+class ForecastPart(Part):
+    """[[forecast]]: measured tests by their files, or a planned one by its load, temperature and end.
+
+    load : as { stress_MPa = 80 } or steps; lengths as { thickness_mm = 0.5 }; targets as { strain = [0.01] }.
+    """
+
+    name: Text
+    group: Text | None = None
+    tests: Annotated[Texts, BeforeValidator(_one_or_more)] = []
+    specimen: Text | None = None
+    load: dict[Text, LevelOrSteps] = {}
+    control: Literal["load", "stress"] | None = None
+    ramp_s: Annotated[float, Field(ge=0.0)] | None = None
+    temperature_C: LevelOrSteps | None = None
+    end_h: Annotated[float, Field(gt=0.0, lt=1e9)] | None = None
+    modulus_GPa: Positive | None = None
+    lengths: dict[Text, Positive] = {}
+    labels: dict[Text, Text] = {}
+    level: Annotated[float, Field(ge=0.5, lt=1.0)] | None = None
+    targets: dict[Text, Numbers] = {}
+    tolerances: dict[Text, Positive] = {}
+    draws: Annotated[int, Field(ge=50, le=100_000)] | None = None
+
+
+class DesignPart(Part):
+    """[design]: further tests, by what they tell for each hour of the oven."""
+
+    goal: Literal["law", "parameters", "rate", "exponent"] | None = None
+    at_stress_MPa: Positive | None = None
+    at_temperature_C: float | None = None
+    group: Text | None = None
+    budget_h: Positive | None = None
+    specimen: Text | None = None
+    levels: dict[Text, Bounds] = {}
+    longest_h: Positive | None = None
+    temperatures_C: Numbers | None = None
+    lengths: dict[Text, Numbers] = {}
+    tests_per_run: Annotated[int, Field(ge=1)] | None = None
+    setup_h: Annotated[float, Field(ge=0.0)] | None = None
+    frame_interval_s: Positive | None = None
+
+
+class ExportPart(Part):
+    """[[export]]: the best law of a group, or its law of temperature, as text for a target."""
+
+    target: Text
+    file: Text | None = None
+    group: Text | None = None
+    law: Literal["identified", "temperature"] = "identified"
+    name: Text | None = None
+    stress_unit: Text = "MPa"
+    time_unit: Text = "s"
+    temperature_C: float | None = None
+    modulus_GPa: Positive | None = None
+    poisson: Annotated[float, Field(gt=-1.0, lt=0.5)] = 0.3
+
+
+class ReportPart(Part):
+    """[report]: the page. Data files up to attach_MB in all are put into it, of others their hashes alone."""
+
+    file: Text = "report.html"
+    attach_MB: Annotated[float, Field(ge=0.0, le=50.0)] = 3.0
+
+
+class StudyModel(Part):
+    """A whole study file; every table but [data] may be missing."""
+
+    study: StudyPart = StudyPart()
+    data: DataPart
+    exclude: Annotated[list[ExcludePart], Field(max_length=MOST_ITEMS)] = []
+    specimen: SpecimenPart | None = None
+    identification: IdentificationPart | None = None
+    selection: SelectionPart | None = None
+    temperature: TemperaturePart | None = None
+    rupture: RupturePart | None = None
+    forecast: Annotated[list[ForecastPart], Field(max_length=100)] = []
+    design: DesignPart | None = None
+    export: Annotated[list[ExportPart], Field(max_length=100)] = []
+    report: ReportPart | None = None

@@ -1,0 +1,103 @@
+"""The report of a study: its results as the contents of a page, with what is needed to repeat the study attached."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from creepkit.errors import CreepkitError, StudyError
+from creepkit.files.reading import read_bytes
+from creepkit.files.writing import write_text
+from creepkit.reports.contents import Attachment, Provenance, ReportContents, ReportGroup
+from creepkit.studies.execution import StageRecord
+from creepkit.studies.inputs import DATA_FILE
+from creepkit.studies.lock import versions_of
+from creepkit.studies.result import StudyResult
+from creepkit.studies.study_file import StudyFile
+
+if TYPE_CHECKING:
+    from creepkit.jobs.shard_progress import ProgressCallback
+
+CARRIED_FOLDER = "inputs"
+"""Of the data files that a report carries."""
+
+
+def write_page(
+    file: StudyFile, result: StudyResult, folder: Path, lock_path: Path, force: bool, progress: ProgressCallback | None
+) -> StudyResult:
+    """The result with its report written; a report that cannot be written is a stage that failed."""
+    assert file.model.report is not None
+    path = folder / file.model.report.file
+    if progress is not None:
+        progress("report", 0, 1, "")
+    try:
+        from creepkit.reports.html import report_html
+
+        write_text(report_html(contents_of(file, result, lock_path)), path, StudyError)
+    except CreepkitError as error:
+        record = StageRecord("report", "report", "", "failed", "", " ".join(str(error).split()))
+        return replace(result, stages=(*result.stages, record))
+    if progress is not None:
+        progress("report", 1, 1, str(path))
+    return replace(result, stages=(*result.stages, StageRecord("report", "report", "", "made", "")), report=path)
+
+
+def contents_of(file: StudyFile, result: StudyResult, lock_path: Path | None = None) -> ReportContents:
+    """What the report of a study shows, and what it carries. lock_path : of the study.lock that it carries."""
+    rankings: Mapping[str, Any] = result.rankings
+    failed = {
+        one.group: one.sentence for one in result.stages if one.kind == "identification" and one.state == "failed"
+    }
+    groups = tuple(
+        ReportGroup(group.name, rankings.get(group.name), group.histories, failed.get(group.name, ""))
+        for group in result.groups
+    )
+    attached, notes = attachments_of(file, result, lock_path)
+    return ReportContents(
+        title=result.title,
+        groups=groups,
+        quality=result.quality,
+        exclusions=result.exclusions,
+        temperature=_titled(result.temperature),
+        forecasts=dict(result.forecasts),
+        design=_titled(result.designs),
+        rupture=_titled(result.rupture),
+        exports=result.exports,
+        failures=result.failures,
+        provenance=Provenance(
+            versions=versions_of(),
+            seed=file.model.study.seed,
+            settings=file.model.model_dump(exclude_none=True),
+            inputs={one.name: one.sha256 for one in result.files},
+            commands=(f"creepkit run {file.path.name}",),
+        ),
+        attachments=attached,
+        notes=notes,
+    )
+
+
+def _titled(by_group: Mapping[str, Any]) -> dict[str, Any]:
+    return {name or "all tests": value for name, value in by_group.items()}
+
+
+def attachments_of(
+    file: StudyFile, result: StudyResult, lock_path: Path | None
+) -> tuple[tuple[Attachment, ...], tuple[str, ...]]:
+    """Study, lock and data files; without the data, and a note, where they are larger than the study allows."""
+    assert file.model.report is not None
+    attached = [Attachment("study.toml", file.text.encode())]
+    if lock_path is not None:
+        attached.append(Attachment("study.lock", read_bytes(lock_path, DATA_FILE)))
+    allowed = file.model.report.attach_MB * 1e6
+    size = sum(one.path.stat().st_size for one in result.files)
+    if size > allowed:
+        note = (
+            f"the data files have {size / 1e6:.3g} MB, more than the {allowed / 1e6:g} MB that the study lets the "
+            "report carry; study.lock has their hashes"
+        )
+        return tuple(attached), (note,)
+    for one in result.files:
+        attached.append(Attachment(f"{CARRIED_FOLDER}/{one.name}", read_bytes(one.path, DATA_FILE)))
+    return tuple(attached), ()

@@ -1,0 +1,364 @@
+"""A commented study file for measured files: what they hold, laws that suit it, and stages that it allows."""
+
+from __future__ import annotations
+
+import json
+import os.path
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from creepkit.errors import CreepkitError, StudyError
+from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
+from creepkit.quality.flags import frame_ranges_text
+from creepkit.records import ZERO_CELSIUS, History, dimensions_of, load_unit
+from creepkit.studies.study_file import parse_study
+
+SECONDARY_LAWS = ("norton", "strain-hardening", "time-hardening")
+SEVERAL_STRESSES_LAW = "hyperbolic-sine"
+TERTIARY_LAWS = ("norton", "mpc-omega", "kachanov-rabotnov")
+"""Candidates, those of them that are installed."""
+
+
+TERTIARY_RATIO = 2.0
+"""Rate at the end of a test over its smallest, from which on it is called tertiary creep."""
+
+
+TERTIARY_SHARE = 0.3
+"""Of the tests with curves, from which on laws with tertiary creep are the candidates."""
+
+
+STRESS_RATIO = 1.5
+"""Largest over smallest load, from which laws with another dependence on stress can be told apart."""
+
+
+FEWEST_TEMPERATURES = 3
+FEWEST_RUPTURES = 5
+"""For forms of temperature, and for methods of rupture times."""
+
+
+SAME_TEMPERATURE = 5.0
+"""K."""
+
+
+MOST_REMARKS = 20
+"""Files that were not read, and flags, that the comments name."""
+
+
+@dataclass(frozen=True)
+class StudyProposal:
+    """The text of a study file, and what the files were found to hold, in lines."""
+
+    text: str
+    summary: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class DataSummary:
+    """What tests hold that decides which stages make sense.
+
+    loads : levels above zero that are held, of all tests. temperatures : K, of distinct levels. alloys, heats : that
+    are named. ruptured, tertiary : tests that ended by rupture, and those with tertiary creep.
+    """
+
+    tests: tuple[History, ...]
+    loads: tuple[float, ...]
+    temperatures: tuple[float, ...]
+    alloys: tuple[str, ...]
+    heats: tuple[str, ...]
+    ruptured: int
+    tertiary: int
+
+    @classmethod
+    def of(cls, tests: Sequence[History]) -> DataSummary:
+        """The summary of tests."""
+        levels: list[float] = []
+        for temperature in sorted(history.mean_temperature for history in tests):
+            if not levels or temperature > levels[-1] + SAME_TEMPERATURE:
+                levels.append(temperature)
+        return cls(
+            tuple(tests),
+            tuple(sorted({round(float(v), 6) for h in tests for v in _held_levels(h)})),
+            tuple(levels),
+            tuple(dict.fromkeys(h.alloy for h in tests if h.alloy)),
+            tuple(dict.fromkeys(h.labels["heat"] for h in tests if h.labels.get("heat"))),
+            sum(history.rupture_time is not None for history in tests),
+            sum(_is_tertiary(history) for history in tests),
+        )
+
+    @property
+    def framed(self) -> int:
+        """Tests with frames or a minimum rate, from which a law can be identified."""
+        return sum(bool(h.outputs) or h.minimum_rate is not None for h in self.tests)
+
+    @property
+    def lines(self) -> list[str]:
+        """It in sentences."""
+        low, high = self.temperatures[0] - ZERO_CELSIUS, self.temperatures[-1] - ZERO_CELSIUS
+        kinds = ", ".join(dict.fromkeys(history.specimen for history in self.tests))
+        at = f"{low:.0f} C" if high - low < 1 else f"{low:.0f} to {high:.0f} C ({len(self.temperatures)} levels)"
+        unit = load_unit(self.tests[0])
+        loads = f"{len(self.loads)} level{'s' if len(self.loads) > 1 else ''} of load"
+        if len({load_unit(history) for history in self.tests}) == 1:
+            loads += (
+                f", {self.loads[0]:g} to {self.loads[-1]:g} {unit}" if len(self.loads) > 1 else f", {self.loads[0]:g}"
+            )
+        count = f"{len(self.tests)} test{'s' if len(self.tests) > 1 else ''}"
+        return [
+            f"{count} ({kinds}), {self.framed} with curves or rates; {loads}; {at}",
+            f"ended by rupture: {self.ruptured}; with tertiary creep: {self.tertiary}",
+        ]
+
+
+def _held_levels(history: History) -> list[float]:
+    """Levels of the load above zero that last: those of a ramp are passed."""
+    program = history.loading.program()
+    values = program.values
+    held = [float(v) for v, later in pairwise((*values, values[-1])) if v == later and v > 0]
+    return held or [float(values.max())]
+
+
+def _is_tertiary(history: History) -> bool:
+    """Whether the rate of its first output rises at the end: the last tenth against the slowest tenth."""
+    if not history.outputs or history.used.sum() < 20:
+        return False
+    times, values = history.times[history.used], next(iter(history.outputs.values()))[history.used]
+    edges = np.unique(np.linspace(0, times.size - 1, 11).astype(int))
+    span = np.diff(times[edges])
+    rates = np.diff(values[edges])[span > 0] / span[span > 0]
+    slowest = rates[rates > 0].min(initial=np.inf)
+    steady = np.ptp(history.loading.program().values[1:]) == 0 if history.loading.program().values.size > 1 else True
+    return bool(
+        steady and np.isfinite(slowest) and rates[-1] > TERTIARY_RATIO * slowest and rates.argmin() < len(rates) - 1
+    )
+
+
+def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyProposal:
+    """The study file at `path` for the measured files of a folder; StudyError where none of them can be read."""
+    import creepkit as ck
+
+    if not folder.is_dir():
+        raise StudyError(f"{folder}: there is no such folder; name the one that holds the measured files")
+    names, tests, problems = _readable(folder, path, reader)
+    base = os.path.relpath(folder, path.absolute().parent).replace("\\", "/")
+    files = [name if base == "." else base if name == "." else f"{base}/{name}" for name in names]
+    quality = ck.check_data_quality([history for history in tests if history.outputs])
+    summary = DataSummary.of(tests)
+    text = _text(folder, files, reader, summary, quality, problems)
+    parse_study(path, text)  # what is written must be valid
+    return StudyProposal(text, (*summary.lines, *(f"not read: {line}" for line in problems[:MOST_REMARKS])))
+
+
+def _readable(folder: Path, path: Path, reader: str | None) -> tuple[list[str], list[History], list[str]]:
+    """Patterns of the files that hold tests, these tests, and a sentence for each other file."""
+    import creepkit as ck
+
+    try:
+        whole = ck.read_histories([folder], reader)
+        files = [one for one in sorted(folder.iterdir()) if one.is_file() and one != path]
+        sources = {Path(history.source.partition(" (")[0]).name for history in whole}
+        if not all(file.name in sources for file in files if file.suffix == _suffix(sources)):
+            return ["."], whole, []
+        return [f"*{_suffix(sources)}"] if _suffix(sources) else ["."], whole, []
+    except CreepkitError as error:
+        reason = str(error)
+    tests: list[History] = []
+    read: list[Path] = []
+    problems: list[str] = []
+    for file in sorted(one for one in folder.iterdir() if one.is_file() and one != path):
+        try:
+            found = ck.read_histories([file], reader)
+        except CreepkitError as error:
+            problems.append(" ".join(str(error).split()))
+            continue
+        read.append(file)
+        tests += found
+    if not tests:
+        raise StudyError(f"{folder}: none of its files holds a test that can be read: {reason}")
+    counts: dict[str, int] = {}
+    for history in tests:
+        counts[history.name] = counts.get(history.name, 0) + 1
+    if max(counts.values()) > 1:
+        tests = ck.read_histories(read, reader)
+    return [file.name for file in read], tests, problems
+
+
+def _suffix(names: Iterable[str]) -> str:
+    """The ending that all names share, "" where there are several."""
+    endings = {Path(name).suffix for name in names}
+    return endings.pop() if len(endings) == 1 else ""
+
+
+def candidate_laws(summary: DataSummary) -> list[str]:
+    """Names of laws that suit the tests, of those that are installed."""
+    import creepkit as ck
+
+    installed = ck.available("laws")
+    names = TERTIARY_LAWS if summary.tertiary > TERTIARY_SHARE * summary.framed else SECONDARY_LAWS
+    chosen = [name for name in names if name in installed]
+    several = len(summary.loads) > 2 and summary.loads[-1] > STRESS_RATIO * summary.loads[0]
+    if several and names is SECONDARY_LAWS and SEVERAL_STRESSES_LAW in installed:
+        chosen.append(SEVERAL_STRESSES_LAW)
+    return chosen if len(chosen) > 1 else [name for name in SECONDARY_LAWS if name in installed]
+
+
+# ---- the text ------------------------------------------------------------------------------------------------------
+
+
+def quoted(text: str) -> str:
+    """A text as TOML holds it."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _list(texts: Iterable[str]) -> str:
+    return f"[{', '.join(map(quoted, texts))}]"
+
+
+def _text(
+    folder: Path,
+    files: Sequence[str],
+    reader: str | None,
+    summary: DataSummary,
+    quality: DataQuality,
+    problems: Sequence[str],
+) -> str:
+    parts = [
+        [
+            "# A study: from measured files to a report. Carry it out: creepkit run study.toml",
+            "# Paths are relative to this file. All tables but [data] may be left out; units stand in names of keys.",
+            "",
+            "[study]",
+            f"title = {quoted(_one_line(folder.absolute().name) or 'creep study')}",
+            "seed = 0  # of all random draws",
+        ],
+        _data_part(files, reader, summary, problems),
+        _exclude_part(quality),
+    ]
+    if summary.framed:
+        parts += [_identification_part(summary), _temperature_part(summary)]
+    parts += [_rupture_part(summary)]
+    if summary.framed:
+        parts += [_forecast_part(summary), _design_part(), _export_part()]
+    parts.append(
+        ["[report]", 'file = "report.html"', "attach_MB = 3  # data files up to this size in all are put into it"]
+    )
+    return "\n\n".join("\n".join(lines) for lines in parts if lines) + "\n"
+
+
+def _one_line(text: str) -> str:
+    return "".join(character if character.isprintable() else "?" for character in text)[:200]
+
+
+def _comment(text: str) -> str:
+    return f"# {_one_line(text)}"
+
+
+def _data_part(files: Sequence[str], reader: str | None, summary: DataSummary, problems: Sequence[str]) -> list[str]:
+    lines = [*map(_comment, summary.lines), "[data]", f"files = {_list(files)}"]
+    lines += [f"reader = {quoted(reader)}"] if reader is not None else []
+    lines += ['# ignore = ["load_kN", "date"]  # columns that nobody needs']
+    if len(summary.temperatures) > 1:
+        lines.append(
+            f"# only = {{ temperature_C = [{summary.temperatures[0] - ZERO_CELSIUS:.0f}] }}  # these tests alone"
+        )
+    lines.append('suspect_frames = "exclude"  # frames that unload, fall or lie apart; or "keep"')
+    return [*lines, *(_comment(f"not read: {line}") for line in problems[:MOST_REMARKS])]
+
+
+def _exclude_part(quality: DataQuality) -> list[str]:
+    """Proposals for suspect tests, as comments; suspect frames are left out by [data] suspect_frames."""
+    lines = []
+    flags = [one for one in quality if len(one.tests) == 1 and one.kind not in FRAME_FLAG_KINDS]
+    for flag in flags[:MOST_REMARKS]:
+        lines += [_comment(str(flag)), "# [[exclude]]", f"# test = {quoted(_one_line(flag.history))}"]
+        if flag.frames:
+            text = frame_ranges_text(flag.frames).partition(" ")[2]
+            lines.append(f"# frames = {quoted(text)}")
+        lines += [f"# reason = {quoted(flag.kind)}", "#"]
+    if not lines:
+        return ["# [[exclude]]", '# test = "name of a test"', '# frames = "97-191, 193"', '# reason = "why"']
+    return lines[:-1]
+
+
+def _identification_part(summary: DataSummary) -> list[str]:
+    import creepkit as ck
+
+    laws = candidate_laws(summary)
+    lines = []
+    if len(summary.loads) == 1:
+        lines.append("# All tests are at one load: how rates depend on stress they do not say.")
+    lines += ["[identification]", f"laws = {_list(laws)}  # creepkit laws lists all"]
+    with_alpha = [name for name in laws if "alpha" in ck.law(name).names]
+    if with_alpha and not set(with_alpha) - set(TERTIARY_LAWS):
+        lines.append("fix = { alpha = 0 }  # tests under tension do not say how damage depends on the principal stress")
+    if len(summary.alloys) > 1:
+        lines.append('group_by = "alloy"  # each is identified by itself')
+    elif len(summary.heats) > 1:
+        lines.append('# group_by = "heat"  # each by itself; else their scatter is estimated')
+    else:
+        lines.append('# group_by = "alloy"  # or another label of the files')
+    lines.append('temperature = "auto"  # a factor of Arrhenius where tests are at several temperatures; or "none"')
+    lines += ["# starts = 8", "# bounds = { n = [1, 12] }"]
+    specimen = ck.available("specimens").get(summary.tests[0].specimen)
+    for length in dimensions_of(specimen):
+        if length.tolerance > 0:
+            name = length.alias or length.name
+            sd = length.tolerance * length.default
+            nuisance = f"# nuisances = [{{ kind = {quoted(name)}, sd_mm = {sd:.3g} }}]"
+            lines.append(f"{nuisance}  # the {length.long_name} differs a little")
+            break
+    selection = ["", "[selection]", 'by = "bic"  # or "aicc", "hold-out"']
+    selection.append("# sums = true  # try sums of two laws; by default where no law explains the tests")
+    return [*lines, *(selection if len(laws) > 1 else [])]
+
+
+def _temperature_part(summary: DataSummary) -> list[str]:
+    if len(summary.temperatures) < FEWEST_TEMPERATURES:
+        return [_comment(f"[temperature] needs {FEWEST_TEMPERATURES} temperatures or more.")]
+    return ["[temperature]", '# forms = { n = ["constant", "linear"] }', "within_K = 5  # tests so near are at one"]
+
+
+def _rupture_part(summary: DataSummary) -> list[str]:
+    if summary.ruptured < FEWEST_RUPTURES:
+        return []
+    return ["[rupture]", "times_h = [1000, 10000, 100000]  # at which strengths are stated"]
+
+
+def _forecast_part(summary: DataSummary) -> list[str]:
+    history = next(h for h in summary.tests if h.outputs or h.minimum_rate is not None)
+    quantity, unit = history.loading.quantity, load_unit(history)
+    level = float(history.loading.program().values.max())
+    celsius, hours = history.mean_temperature - ZERO_CELSIUS, 2 * float(history.times[-1]) / 3600
+    lines = [
+        "[[forecast]]",
+        'name = "longer test"',
+        f"specimen = {quoted(history.specimen)}",
+        f"load = {{ {quantity}_{unit} = {0.9 * level:.3g} }}",
+        f"temperature_C = {celsius:.0f}",
+        f"end_h = {hours:.3g}",
+    ]
+    if history.elastic is not None:
+        lines.append(f"modulus_GPa = {history.elastic.at(history.mean_temperature).E / 1e3:.4g}")
+    if len(summary.alloys) > 1:
+        lines.append(f"group = {quoted(summary.alloys[0])}")
+    return [f"# {line}" for line in lines]
+
+
+def _design_part() -> list[str]:
+    return [
+        f"# {line}" for line in ("[design]", 'goal = "law"  # or "parameters", "rate", "exponent"', "budget_h = 500")
+    ]
+
+
+def _export_part() -> list[str]:
+    lines = [
+        "[[export]]",
+        'target = "latex"  # creepkit export --to list names all',
+        "",
+        "[[export]]",
+        'target = "python"',
+    ]
+    return [*lines, "", "# [[export]]", '# target = "abaqus"', '# stress_unit = "MPa"', '# time_unit = "h"']

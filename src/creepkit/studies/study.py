@@ -1,0 +1,193 @@
+"""Study: a study file carried out; its result holds the ordinary records of every stage."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from creepkit.errors import StudyError, nearest
+from creepkit.files.writing import write_text
+from creepkit.studies import arguments
+from creepkit.studies.documents import ResultFolder
+from creepkit.studies.execution import Execution, running_alone
+from creepkit.studies.inputs import InputFile, input_files, read_inputs, resolve_paths
+from creepkit.studies.lock import differences, lock_if_any, lock_of, write_lock
+from creepkit.studies.page import write_page
+from creepkit.studies.result import StudyResult
+from creepkit.studies.stages import STAGE_KINDS, Stages, needed_stages
+from creepkit.studies.study_file import StudyFile, read_study_file
+
+if TYPE_CHECKING:
+    from creepkit.jobs.shard_progress import ProgressCallback
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study file that was read and checked.
+
+    file : its path, text and model. root : folder of the data that a report carried; None for those beside the file.
+    """
+
+    file: StudyFile
+    root: Path | None = None
+
+    @classmethod
+    def load(cls, path: str | Path, *, root: str | Path | None = None) -> Study:
+        """Read a study file and check what can be checked before data are read.
+
+        root : folder of the data that a report carried, as 'creepkit run report.html' extracts them.
+        StudyError, in one sentence with file and line, says what is wrong with the file.
+        """
+        study = cls(read_study_file(Path(path)), None if root is None else Path(root))
+        study.check()
+        return study
+
+    @property
+    def path(self) -> Path:
+        """The study file."""
+        return self.file.path
+
+    def check(self) -> None:
+        """StudyError for names of laws, readers, specimens, targets and files that there are not."""
+        import creepkit as ck
+
+        file, model = self.file, self.file.model
+        readers = ck.available("readers")
+        if model.data.reader is not None and model.data.reader not in readers:
+            raise file.error(
+                ("data", "reader"), f"there is no reader '{model.data.reader}'; {nearest(model.data.reader, readers)}"
+            )
+        arguments.predictor_of(file)
+        arguments.settings_of(file)
+        if model.identification is not None:
+            arguments.laws_of(file)
+        if model.temperature is not None and model.temperature.law is not None:
+            with file.at("temperature", "law"):
+                ck.law(model.temperature.law)
+        for k, part in enumerate(model.forecast):
+            arguments.check_forecast(file, k)
+            names = [one.name for one in model.forecast[:k]]
+            if part.name in names:
+                raise file.error(("forecast", k, "name"), f"two forecasts are called '{part.name}'; rename one of them")
+        if model.design is not None:
+            arguments.goal_of(file)
+        exporters = ck.available("exporters")
+        for k, export in enumerate(model.export):
+            if export.target not in exporters:
+                raise file.error(
+                    ("export", k, "target"),
+                    f"there is no target '{export.target}'; {nearest(export.target, exporters)}",
+                )
+            if export.file is not None:
+                _check_output(file, ("export", k, "file"), export.file)
+        if model.report is not None:
+            _check_output(file, ("report", "file"), model.report.file)
+        self.paths  # noqa: B018 - files that there are not
+
+    @cached_property
+    def paths(self) -> list[Path]:
+        """Files and folders of the tests."""
+        return resolve_paths(self.file, ("data", "files"), self.file.model.data.files, self.root)
+
+    def run(
+        self,
+        *,
+        to: str | Path | None = None,
+        only: str | Sequence[str] | None = None,
+        force: bool = False,
+        locked: bool = False,
+        progress: ProgressCallback | None = None,
+    ) -> StudyResult:
+        """Carry out the study; what was made before from the same inputs is read, not made again.
+
+        to : folder for results, lock, exports and report; by default that of the study file.
+        only : kinds of stages, such as "identification", which are carried out with those that they need.
+        force : make everything again. locked : StudyError where anything differs from the study.lock that is there.
+        progress : called as progress(task, done, total, note).
+
+        A stage that fails leaves the others; `failures` of the result, and the report, say what is missing.
+        """
+        kinds = STAGE_KINDS if only is None else [only] if isinstance(only, str) else list(only)
+        for kind in kinds:
+            if kind not in STAGE_KINDS:
+                raise StudyError(f"there is no stage '{kind}'; {nearest(str(kind), STAGE_KINDS)}")
+        folder = self.path.parent if to is None else Path(to)
+        kept = ResultFolder(folder / f"{self.path.stem}.results")
+        lock_path = folder / f"{self.path.stem}.lock"
+        with running_alone(kept.folder):
+            if force:
+                kept.clear()
+            return self._run(folder, kept, lock_path, kinds, force, locked, progress)
+
+    def _run(
+        self,
+        folder: Path,
+        kept: ResultFolder,
+        lock_path: Path,
+        kinds: Sequence[str],
+        force: bool,
+        locked: bool,
+        progress: ProgressCallback | None,
+    ) -> StudyResult:
+        before = lock_if_any(lock_path)
+        if progress is not None:
+            progress("reading", 0, 1, "")
+        files = self._input_files(folder, kept, lock_path)
+        inputs = read_inputs(self.file, self.paths)
+        if progress is not None:
+            progress("reading", 1, 1, f"{len(inputs.histories)} tests in {len(files)} files")
+        stages = Stages(self.file, inputs, self.root).all()
+        now = lock_of(self.file, self._hash, files, [])
+        changes = [] if before is None else differences(before, now)
+        if locked and (before is None or changes):
+            what = changes[0] if changes else "there is no lock"
+            raise StudyError(f"{lock_path}: the study cannot be repeated exactly: {what}; leave --locked out")
+        execution = Execution(kept, inputs.histories, progress, force)
+        execution.run(stages, needed_stages(stages, kinds))
+        write_lock(lock_of(self.file, self._hash, files, execution.records), lock_path)
+        result = StudyResult(
+            self.file.model.study.title,
+            inputs.groups,
+            inputs.exclusions,
+            tuple(execution.records),
+            tuple(files),
+            tuple(changes),
+            measured=inputs.measured,
+            results=execution.results,
+        )
+        for export in result.exports:
+            write_text(export.text, folder / export.name, StudyError)
+        if self.file.model.report is None or "report" not in kinds:
+            return result
+        return write_page(self.file, result, folder, lock_path, force, progress)
+
+    @cached_property
+    def _hash(self) -> str:
+        return hashlib.sha256(self.file.text.encode()).hexdigest()
+
+    def _input_files(self, folder: Path, kept: ResultFolder, lock_path: Path) -> list[InputFile]:
+        """All data files, those of forecasts included, without what the study itself writes."""
+        model = self.file.model
+        own = [self.path, kept.folder, lock_path]
+        own += [folder / one.file for one in model.export if one.file is not None]
+        own += [] if model.report is None else [folder / model.report.file]
+        paths = [*self.paths]
+        for k, part in enumerate(model.forecast):
+            paths += resolve_paths(self.file, ("forecast", k, "tests"), part.tests, self.root) if part.tests else []
+        if model.identification is not None and model.identification.predictor is not None:
+            beside = self.path.parent / model.identification.predictor
+            paths += [beside] if beside.is_file() else []
+        return input_files(self.file, paths, self.root, own)
+
+
+def _check_output(file: StudyFile, key: tuple[str | int, ...], name: str) -> None:
+    """StudyError for a file that would lie outside the folder of the study, or over what the study is."""
+    path = Path(name.replace("\\", "/"))
+    if path.is_absolute() or ".." in path.parts or len(path.parts) != 1 or name.startswith((".", "~")) or ":" in name:
+        raise file.error(key, f"'{name}' must be a plain name of a file, such as report.html")
+    if name in (file.path.name, f"{file.path.stem}.lock", f"{file.path.stem}.results"):
+        raise file.error(key, f"'{name}' is a file of the study itself; choose another name")

@@ -1,0 +1,209 @@
+"""Study files: TOML to a checked model; every mistake is one sentence with file and line, and the nearest valid key."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from creepkit.errors import CreepkitError, StudyError, nearest
+from creepkit.files.reading import FileKind, read_text
+from creepkit.studies.model import StudyModel
+from creepkit.studies.toml_lines import KeyPath, key_lines, line_of
+
+STUDY_FILE = FileKind(
+    "a study file", StudyError, "give a study.toml, which 'creepkit init FOLDER' writes", maximum_bytes=1_000_000
+)
+
+
+SHOWN = 40
+"""Signs of a value or a name that a message quotes."""
+
+
+@dataclass(frozen=True)
+class StudyFile:
+    """A study file that was read: its path, its text, and what it says."""
+
+    path: Path
+    text: str
+    model: StudyModel
+
+    @cached_property
+    def lines(self) -> Mapping[KeyPath, int]:
+        """{path of a key: its line}."""
+        return key_lines(self.text)
+
+    def error(self, key: KeyPath, sentence: str) -> StudyError:
+        """An error about what stands at a key."""
+        return StudyError(f"{self.path}:{line_of(key, self.lines)}: {place_text(key)}: {sentence}")
+
+    @contextmanager
+    def at(self, *key: str | int) -> Iterator[None]:
+        """Errors of what is done with the value of a key get its file, line and name in front."""
+        try:
+            yield
+        except StudyError:
+            raise
+        except CreepkitError as error:
+            raise self.error(key, str(error)) from None
+
+
+def read_study_file(path: Path) -> StudyFile:
+    """Read and check the layout of a study file; StudyError, in one sentence with the line, says what is wrong."""
+    return parse_study(path, read_text(path, STUDY_FILE))
+
+
+def parse_study(path: Path, text: str) -> StudyFile:
+    """The study file of a text; path : its name, for messages."""
+    try:
+        data = tomllib.loads(text)
+        lines = key_lines(text)
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(f"{path}:{_syntax_error(str(error), text)}") from None
+    except RecursionError:
+        raise StudyError(f"{path}: lists or tables nested too deep for a study file; {STUDY_FILE.advice}") from None
+    try:
+        model = StudyModel.model_validate(data)
+    except ValidationError as error:
+        raise StudyError(_sentence(path, error, lines)) from None
+    return StudyFile(path, text, model)
+
+
+def place_text(key: KeyPath) -> str:
+    """A key as people write it: [forecast 2] end_h."""
+    if not key:
+        return "the study"
+    words, numbers = [one for one in key if isinstance(one, str)], {}
+    for k, one in enumerate(key):
+        if isinstance(one, int):
+            numbers[sum(isinstance(e, str) for e in key[:k]) - 1] = one
+    shown = [f"{_short(word)}{f' {numbers[k] + 1}' if k in numbers else ''}" for k, word in enumerate(words)]
+    table = f"[{shown[0]}]"
+    return table if len(shown) == 1 else f"{table} {'.'.join(shown[1:])}"
+
+
+def _short(text: object) -> str:
+    shown = str(text).encode("ascii", "backslashreplace").decode() if not str(text).isprintable() else str(text)
+    return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}..."
+
+
+def _syntax_error(message: str, text: str) -> str:
+    """Line and reason of an error of tomllib, which names the line at the end."""
+    found = re.search(r" \(at line (\d+), column (\d+)\)$", message)
+    line, column = (found[1], f", column {found[2]}") if found else (str(text.count("\n") + 1), "")
+    reason = re.sub(r" \(at .*\)$", "", message)
+    reason = reason[:1].lower() + reason[1:]
+    return f"{line}: this is not TOML: {_short_reason(reason)}{column}; texts stand in quotes, and each key on a line"
+
+
+def _short_reason(reason: str) -> str:
+    printable = "".join(character if character.isprintable() else "?" for character in reason)
+    return printable if len(printable) <= 120 else f"{printable[:120]}..."
+
+
+# ---- what pydantic says, as a sentence -----------------------------------------------------------------------------
+
+
+def _sentence(path: Path, error: ValidationError, lines: Mapping[KeyPath, int]) -> str:
+    """The first mistake in the order of the file; first unknown keys, for they make others look missing."""
+    found = error.errors(include_url=False)
+    first = min(found, key=lambda one: (one["type"] != "extra_forbidden", line_of(_key(one), lines)))
+    key = _key(first)
+    more = len(found) - 1
+    others = f" ({more} more mistake{'s' if more > 1 else ''} in the file)" if more else ""
+    return f"{path}:{line_of(key, lines)}: {_problem(first, key)}{others}"
+
+
+def _key(error: Any) -> KeyPath:
+    """The path of a key in the file, without what pydantic adds for its own types."""
+    return tuple(part for part in error["loc"] if part != "[key]")
+
+
+def _problem(error: Any, key: KeyPath) -> str:
+    kind, given, context = error["type"], error["input"], error.get("ctx", {})
+    if kind == "extra_forbidden":
+        table = key[:-1]
+        known = known_keys(table)
+        where = f"in {place_text(table)}" if table else "at the top of a study"
+        what = f"[{_short(key[-1])}]" if not table else f"key '{_short(key[-1])}'"
+        return f"unknown {'table ' if not table else ''}{what} {where}; {nearest(str(key[-1])[:SHOWN], known)}"
+    if kind == "missing":
+        table = key[:-1]
+        example = f"; {EXAMPLES[str(key[-1])]}" if str(key[-1]) in EXAMPLES else ""
+        return f"{place_text(table) if table else 'the study'} has no '{key[-1]}', which it needs{example}"
+    return f"{place_text(key)} is {_shown(given)}, and {_needed(kind, given, context, error)}"
+
+
+EXAMPLES = {
+    "data": 'add the table [data] with files = ["*.csv"]',
+    "files": 'write files = ["*.csv"]',
+    "laws": 'write laws = ["norton"]',
+    "reason": 'write reason = "why it is left out"',
+    "target": 'write target = "latex"',
+}
+
+
+def _needed(kind: str, given: Any, context: Mapping[str, Any], error: Any) -> str:
+    """What would be right in the place of what was found."""
+    simple = {
+        "string_type": "must be a text in quotes",
+        "int_type": "must be a whole number",
+        "int_from_float": "must be a whole number",
+        "float_type": "must be a number",
+        "finite_number": "must be a finite number",
+        "bool_type": "must be true or false",
+        "list_type": "must be a list, such as [1, 2]",
+        "dict_type": "must be a table",
+        "model_type": "must be a table",
+        "model_attributes_type": "must be a table",
+        "string_too_short": "must not be empty",
+        "string_too_long": f"may have {context.get('max_length')} signs at most",
+        "string_pattern_mismatch": "must be a text of one line",
+        "too_short": f"needs {context.get('min_length')} or more entries",
+        "too_long": f"may have {context.get('max_length')} entries at most",
+    }
+    if kind in simple:
+        return simple[kind]
+    if kind == "literal_error":
+        words = re.findall(r"'([^']*)'", str(context.get("expected", "")))
+        return f"must be one of these: {nearest(str(given)[:SHOWN], words)}"
+    limits = {"greater_than": "above", "greater_than_equal": "at least", "less_than": "below"}
+    limits["less_than_equal"] = "at most"
+    if kind in limits:
+        bound = next(value for name, value in context.items() if name in ("gt", "ge", "lt", "le"))
+        return f"must be {limits[kind]} {bound:g}"
+    return str(error["msg"])
+
+
+def _shown(value: Any) -> str:
+    text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
+    return _short(text.replace("\n", " "))
+
+
+def known_keys(table: Iterable[str | int]) -> list[str]:
+    """Keys that a table of a study file may have."""
+    model: Any = StudyModel
+    named = False  # whether the next key is a name that the user chose
+    for part in table:
+        if isinstance(part, int) or named:
+            named = named and isinstance(part, int)
+            continue
+        annotation = model.model_fields[part].annotation if part in model.model_fields else None
+        model, named = next(_models_in(annotation), None), get_origin(annotation) is dict
+        if model is None:
+            return []
+    return list(model.model_fields)
+
+
+def _models_in(annotation: Any) -> Any:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _models_in(inner)
