@@ -8,8 +8,10 @@ without privileges. Counted are tracebacks (anything but an error of creepkit in
 hangs (more than 5 s of CPU), files that take more than 1 GB of memory, and wrong acceptances: a file whose mutation
 changes what it says (a column twice, another decimal sign, a unit removed, a name misspelt, no number in a cell, rows
 in another order, a row cut amid its columns) was read with other values than the sample's, and the reader did not say
-that it decided something. Swapped, lost or added digits make other numbers that no reader can tell; they are among the
-mutations, and only have to be read or refused. "read" counts files that gave a result, of all mutations.
+that it decided something. An emptied cell of an optional column is an unknown value: reading it as such is right where
+the reader states what it leaves unknown, and a wrong acceptance where it does not. Swapped, lost or added digits make
+other numbers that no reader can tell; they are among the mutations, and only have to be read or refused. "read" counts
+files that gave a result, of all mutations.
 """
 
 from __future__ import annotations

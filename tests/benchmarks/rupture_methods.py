@@ -49,13 +49,15 @@ SHARE = 1.0 / 3.0
 HOUR = 3600.0
 
 SMALL_CHANGES = (
-    "Without a primary stage (m = 0) this law fits the curves best where phi is at its bound and damage hardly speeds "
-    "creep up: most tests then break by their loss of section alone, as with Norton's law, and those few that damage "
+    "That loading strain is recognised in 7 of the fitted tests is not why this law predicts long lives too short. "
+    "Without a primary stage (m = 0) it fits the curves best where phi is at its bound, 30, and damage hardly speeds "
+    "creep up: most tests then break by their loss of section alone, as with Norton's law, and the few that damage "
     "breaks leave B, chi and Q_B badly determined. Least squares, in which a rupture time weighs as much as a curve, "
-    "and the likelihood, by which the best round is chosen, then differ; the rounds end before they agree, "
-    "and which of these solutions comes out, long lives right or too short, is decided by trifles. The band of a "
-    "single test knows of it (its half width above), the median does not: a law whose fit has not converged, and whose "
-    "damage is not determined, is no basis of an extrapolation."
+    "and the likelihood, by which the best round is chosen, then differ; the rounds end before they agree, and which "
+    "solution comes out is decided by trifles, such as a change of every strain by a millionth. The band of a single "
+    "test is wide enough, the median is not to be relied on: a law whose fit says that it has not converged, and that "
+    "phi is not determined, is no basis of an extrapolation. With phi given the likelihood is lower and damage is "
+    "determined up to about phi = 6."
 )
 """What the table of small changes shows."""
 
@@ -162,20 +164,27 @@ def by_law(name, title, fitted, predicted, options):
 def changed_slightly(tests):
     """{name: tests}: the same tests, but for what should make no difference to a law that they determine."""
 
-    def disturbed(seed):
+    def disturbed(tests, seed):
         draw = np.random.default_rng(seed)
         return [
             h.replace(outputs={"strain": h.outputs["strain"] * (1 + 1e-6 * draw.standard_normal(h.times.size))})
             for h in tests
         ]
 
-    without = [h.replace(includes_elastic=False, used=h.used | (h.times == 0.0)) for h in tests]
-    count = sum(h.includes_elastic for h in tests)
+    without = [h.replace(includes_elastic=False, used=_with_first_frames(h)) for h in tests]
+    name = f"loading strain of {sum(h.includes_elastic for h in tests)} tests not recognised"
+    changed = "strains changed by 1e-6 of themselves"
     return {
         "as read": tests,
-        f"loading strain of {count} tests not recognised": without,
-        **{f"every strain changed by 1e-6 of itself, seed {seed}": disturbed(seed) for seed in range(3)},
+        f"as read, {changed}": disturbed(tests, 0),
+        name: without,
+        **{f"{name}, {changed}, seed {seed}": disturbed(without, seed) for seed in (0, 1)},
     }
+
+
+def _with_first_frames(h):
+    """(frames,) used ones, with those before the end of loading where that was recognised."""
+    return h.used | (h.includes_elastic & (np.arange(h.used.size) < np.argmax(h.used)))
 
 
 def small_changes(page, fitted, predicted, options):
@@ -189,20 +198,18 @@ def small_changes(page, fitted, predicted, options):
     law = catalogue(fitted)["Kachanov-Rabotnov"]
     bare = [h.replace(minimum_rate=None) for h in fitted]
     cases = {name: (law, tests) for name, tests in changed_slightly(bare).items()}
-    cases |= {f"as read, phi = {phi} given": (law.fix(phi=phi), bare) for phi in (3, 6, 12)}
+    cases |= {f"as read, phi = {phi} given": (law.fix(phi=phi), bare) for phi in (3, 6, 10, 20)}
     for name, (given, tests) in cases.items():
         fit = ck.identify(given, tests, bar, starts=options.starts)
         stresses, temperatures = [stress_of(h) for h in predicted], [h.mean_temperature for h in predicted]
         times = np.array(fit.rupture_time(np.array(stresses), np.array(temperatures))).T
-        energy = next(e for e in fit.estimates if e.name == "Q_B")
         page.row(
             name,
             f"{fit.log_likelihood:.1f}",
             "yes" if fit.converged else "no",
             f"{fit.values.get('phi', np.nan):.3g}".replace("nan", "given"),
             f"{fit.values['chi']:.2f}",
-            f"{energy.value / 1e3:.0f}",
-            f"{energy.low / 1e3:.0f} to {energy.high / 1e3:.0f}",
+            f"{fit.values['Q_B'] / 1e3:.0f}",
             *errors(times, predicted)[:2],
         )
         progress(name)
@@ -252,10 +259,10 @@ def table_of(page, title, histories, options):
             continue
         page.row(f"law: {name}", *errors(values, predicted), f"{cpu:.0f}")
         progress(f"{title}, {name}: {cpu:.0f} CPU s")
-    if any(h.includes_elastic for h in fitted):
-        small_changes(page, fitted, predicted, options)
     page.paragraph("The assessment of the fitted tests, without the others as run-outs:")
     page.code(str(assessment))
+    if any(h.includes_elastic for h in fitted):
+        small_changes(page, fitted, predicted, options)
 
 
 def main():

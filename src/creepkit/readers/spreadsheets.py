@@ -25,7 +25,7 @@ from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.number_formats import number_text
 from creepkit.readers.spreadsheet_parts import check_sheet, checked_parts
 from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
-from creepkit.readers.text_tables import SourceText, TableRow
+from creepkit.readers.text_tables import SourceText, TableRow, unknown_text
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 
@@ -252,6 +252,8 @@ def _conditions_by_test(grid: CellGrid, vocabulary: HeaderVocabulary) -> dict[st
             for name, entry in table.entries(row).items()
             if name != table.columns[columns[0]]
         }
+        if empty := [name for name in table.empty_columns(row) if known.is_condition(name)]:
+            tests[test]["label assumed"] = SourceText(", ".join(map(unknown_text, empty)), place)
     return tests
 
 

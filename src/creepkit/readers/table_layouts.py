@@ -15,7 +15,7 @@ from creepkit.files.delimited_text import is_number
 from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.head_rows import entries_above, entries_of_blocks
-from creepkit.readers.text_tables import SourceText, TableRow, TextTable, check_columns
+from creepkit.readers.text_tables import SourceText, TableRow, TextTable, check_columns, unknown_text
 from creepkit.readers.vocabulary import HeaderVocabulary
 
 
@@ -331,7 +331,9 @@ def _rows_by_test(table: TextTable, entries: Mapping[str, SourceText], known: Kn
         _refuse_twice(own, entries, known)
         kept = [k for k in range(len(table.columns)) if k not in (*stated, *keys[:1])]
         cut = [TableRow(row.line, [row.cells[k] for k in kept]) for row in rows]
-        part = replace(table, columns=[table.columns[k] for k in kept], rows=cut)
+        empty = [table.columns[k] for k in stated if not rows[0].cells[k] and known.is_condition(table.columns[k])]
+        assumptions = (*table.assumptions, *map(unknown_text, empty))
+        part = replace(table, columns=[table.columns[k] for k in kept], rows=cut, assumptions=assumptions)
         tests.append(TabulatedTest(name, {**entries, **own}, part))
     return tests
 

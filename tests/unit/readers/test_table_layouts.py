@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.records import History
@@ -278,3 +279,15 @@ def test_text_files_are_tables_where_they_name_a_time(tmp_path: Path):
     (tmp_path / "readme.txt").write_text("Time and again, this was measured.\n")
     assert HISTORY_CSV.accepts(tmp_path / "a.txt")
     assert not HISTORY_CSV.accepts(tmp_path / "readme.txt")
+
+
+def test_what_empty_cells_of_conditions_leave_unknown_is_said(tmp_path):
+    path = tmp_path / "x.csv"
+    path.write_text(
+        "test,stress_MPa,temperature_C,modulus_GPa,heat,time_h,strain_pct\n"
+        "A,60,850,150,X7,0,0\nA,60,850,150,X7,1,0.1\nB,70,850,,,0,0\nB,70,850,,,1,0.1\n"
+    )
+    first, second = ck.read_histories(path)
+    assert "cell" not in first.labels["assumed"]
+    assert "modulus_GPa unknown (empty cell)" in second.labels["assumed"].split(", ")
+    assert "heat" not in second.labels
