@@ -43,7 +43,8 @@ def command(
     from creepkit.studies.extraction import study_of_report
     from creepkit.studies.study import Study
 
-    if study.suffix.lower() in REPORT_SUFFIXES:
+    from_report = study.suffix.lower() in REPORT_SUFFIXES
+    if from_report:
         folder = to if to is not None else study.parent / f"{study.stem}_study"
         loaded, target = study_of_report(study, folder), folder
     else:
@@ -56,6 +57,8 @@ def command(
         print_json(result_to_json(result))
     else:
         print_result(result)
+    if from_report and not result.changes:
+        typer.echo(f"all numbers are those of {study}", err=as_json)
     if result.failures:
         first = result.failures[0]
         others = f" ({len(result.failures) - 1} more)" if len(result.failures) > 1 else ""
