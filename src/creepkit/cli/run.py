@@ -69,7 +69,8 @@ def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, and where the report is."""
     print_table(result.title, ("stage", "state", ""), [(one.name, one.state, one.sentence) for one in result.stages])
     for exclusion in result.exclusions:
-        frames = f" {len(exclusion.frames)} frames" if exclusion.frames else ""
+        count = len(exclusion.frames)
+        frames = f", {count} frame{'s' if count > 1 else ''}" if count else ""
         typer.echo(f"left out: {exclusion.test}{frames}: {exclusion.reason}")
     for group, ranking in result.rankings.items():
         typer.echo(f"{group}: {ranking.verdict}" if group else ranking.verdict)
