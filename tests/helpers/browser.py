@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import pytest
+from helpers.compilers import BROWSER, compiler_or_skip
 
-COMMAND = "chromium"
 FLAGS = (
     *("--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"),
     *("--disable-component-update", "--disable-sync"),
@@ -18,12 +16,7 @@ FLAGS = (
 
 def chromium_or_skip() -> str:
     """The path of Chromium; the test that asks for it is skipped where there is none."""
-    from helpers.compilers import NOT_INSTALLED
-
-    path = shutil.which(COMMAND)
-    if path is None:
-        pytest.skip(NOT_INSTALLED.format(COMMAND))
-    return path
+    return compiler_or_skip(BROWSER)
 
 
 @contextmanager
