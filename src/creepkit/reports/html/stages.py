@@ -55,8 +55,8 @@ def data_section(contents: ReportContents) -> Section:
         blocks.append(_table_of_histories(histories))
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)
-    sections = [Section("exclusions", "Left out", _exclusion_blocks(contents.exclusions))]
-    return Section("data", "Data", blocks, [s for s in sections if histories or not s.empty])
+    left_out = _exclusion_blocks(contents.exclusions) if histories or contents.exclusions else []
+    return Section("data", "Data", blocks, [Section("exclusions", "Left out", left_out)])
 
 
 def _table_of_histories(histories: Sequence[History]) -> Table:
