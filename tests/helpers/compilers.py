@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-COMPILERS = ("gfortran", "gcc", "g++", "node")
+COMPILERS = ("gfortran", "gcc", "g++", "node", "chromium")
 NOT_INSTALLED = "{} is not installed"
 
 

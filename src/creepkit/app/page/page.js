@@ -71,6 +71,7 @@
     function changed(event) {
       if (settled && event !== null) { before = last; settled = false; }
       inputAt = event === null ? null : performance.now();
+      root.dataset.exact = "false";
       engine.quick(question());
     }
 
