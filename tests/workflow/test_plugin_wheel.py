@@ -159,6 +159,7 @@ STEPS = {
     "sweep": [["sweep", "set.h5", "--hidden", "4", "--layers", "1", "--epochs", "1", "--to", "sweep"]],
     "reduced-model": [],  # has no law
     "rupture": [],  # has no law
+    "app": [["app", "soft-steel", "--to", "page.html"]],
     "demo": [],  # has a law of its own
 }
 

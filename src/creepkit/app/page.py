@@ -43,7 +43,7 @@ def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") ->
         "policy": policy,
         "title": escaped(contents.title),
         "style": f"<style{mark}>\n{_part('style.css')}</style>",
-        "fragment": _fragment(contents_document(contents, models), {"endpoint": endpoint}),
+        "fragment": _fragment(contents_document(contents, models), endpoint),
         "scripts": ""
         if endpoint
         else f"<script>\n{runtime_script()}\n</script>\n<script>\n{law_scripts(contents)}\n{model_scripts(models)}</script>",
@@ -96,7 +96,7 @@ def page_fragment(contents: PageContents, *, style: bool = True, scripts: bool =
     parts = [f"<style>\n{page_style()}</style>"] if style else []
     parts += [f"<script>\n{runtime_script()}\n{model_scripts(models)}</script>"] if scripts else []
     parts.append(f"<script>\n{law_scripts(contents)}</script>")
-    parts.append(_fragment(contents_document(contents, models), {"endpoint": ""}))
+    parts.append(_fragment(contents_document(contents, models), kind="embedded"))
     parts += [f"<script>\n{page_scripts()}</script>"] if scripts else []
     return "\n".join(parts)
 
@@ -106,11 +106,11 @@ def shared_scripts(contents: PageContents) -> str:
     return "\n".join([runtime_script(), model_scripts(page_models(contents)), page_scripts()])
 
 
-def _fragment(document: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
-    data = embedded_json({**document, **settings})
+def _fragment(document: Mapping[str, Any], endpoint: str = "", kind: str = "") -> str:
+    data = embedded_json({**document, "endpoint": endpoint})
     note = "This part of the page needs scripts: it computes creep curves while its sliders are moved."
     return (
-        f'<div class="creepkit-page"><noscript><p>{note}</p></noscript>'
+        f'<div class="{f"creepkit-page {kind}".strip()}"><noscript><p>{note}</p></noscript>'
         f'<script type="application/json" class="creepkit-page-data">{data}</script></div>'
     )
 
