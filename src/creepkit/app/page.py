@@ -36,7 +36,7 @@ LARGEST_PAGE = 1_000_000
 
 def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") -> str:
     """A whole page. nonce : of the policy of a server. endpoint : where it asks for predictions."""
-    models = {} if endpoint else page_models(contents)
+    models = {} if endpoint else page_models(contents)  # a server has the models themselves
     policy = "" if endpoint else _POLICY_OF_A_FILE
     mark = f' nonce="{nonce}"' if nonce else ""
     replacements = {
@@ -44,9 +44,7 @@ def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") ->
         "title": escaped(contents.title),
         "style": f"<style{mark}>\n{_part('style.css')}</style>",
         "fragment": _fragment(contents_document(contents, models), endpoint),
-        "scripts": ""
-        if endpoint
-        else f"<script>\n{runtime_script()}\n</script>\n<script>\n{law_scripts(contents)}\n{model_scripts(models)}</script>",
+        "scripts": f"<script{mark}>\n{runtime_script()}\n{law_scripts(contents)}\n{model_scripts(models)}</script>",
         "page_scripts": f"<script{mark}>\n{page_scripts()}</script>",
     }
     text = _part("page.html")
