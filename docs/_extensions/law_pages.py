@@ -12,6 +12,8 @@ import numpy as np
 from sphinx.application import Sphinx
 
 import creepkit as ck
+from creepkit.app.contents import page_contents
+from creepkit.app.page import page_fragment, shared_scripts
 from creepkit.exporters.mathml import MathmlExporter, MathmlPrinter
 from creepkit.language.law_record import symbols_used
 from creepkit.language.symbols import POINT_VARIABLES
@@ -23,6 +25,13 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 PAGES = Path(__file__).parents[1] / "laws" / "pages"
+SHARED = "creepkit-page.js"
+"""What the interactive parts of all pages share, beside Sphinx's own static files."""
+SCRIPT = f'<script src="../../_static/{SHARED}"></script>'
+TRY_IT = (
+    "Curves follow the sliders; they are computed in this page. "
+    "[Explore a law](../../how-to/explore_a_law.md) says how to lay measured tests over them."
+)
 STRESSES = (100.0, 200.0, 300.0, 400.0)
 TEMPERATURE = 1100.0
 LARGEST_STRAIN = 0.05
@@ -42,6 +51,13 @@ def write_pages(app: Sphinx) -> None:
     table = "| law | name | package |\n| --- | --- | --- |\n" + "\n".join(rows)
     text = f"# All registered laws\n\n{table}\n\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"
     (PAGES / "index.md").write_text(text, encoding="utf-8")
+
+
+def write_shared_script(app: Sphinx, exception: Exception | None) -> None:
+    """Write what the interactive parts need into the static files of the built pages."""
+    if exception is None and app.builder.format == "html":
+        text = shared_scripts(page_contents(ck.law("norton")))
+        (Path(app.outdir) / "_static" / SHARED).write_text(text, encoding="utf-8")
 
 
 def _sorted(registered: dict[str, Any]) -> list[tuple[str, str, ck.CreepLaw]]:
@@ -64,6 +80,7 @@ def _page(law: ck.CreepLaw, origin: str, caption: str) -> str:
         relations = ", ".join(_math(relation) for relation in law.constraints)
         parts += [f"The law holds where {relations}."]
     parts += ["## Creep curve", f"![creep curve of {law.name}]({law.name}.png)", caption]
+    parts += ["## Try it", TRY_IT, f"```{{raw}} html\n{page_fragment(page_contents(law), scripts=False)}\n{SCRIPT}\n```"]
     parts += ["## References", "\n".join(f"- {reference}" for reference in law.references) or "None."]
     return "\n\n".join(parts) + "\n"
 
@@ -152,6 +169,7 @@ def _simulated(law: ck.CreepLaw, stress: float, times: np.ndarray) -> Run:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Write the pages before Sphinx looks for sources."""
+    """Write the pages before Sphinx looks for sources, and their scripts when all is built."""
     app.connect("builder-inited", write_pages, priority=600)
+    app.connect("build-finished", write_shared_script)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

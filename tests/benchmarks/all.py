@@ -37,6 +37,7 @@ class Benchmark:
 DATA = "measured data in ../shared/data"
 BENCHMARKS = {
     "import_time": Benchmark(0.1),
+    "page_latency": Benchmark(1, needs="Chromium and playwright"),
     "core_speed": Benchmark(2),
     "core_random_cases": Benchmark(4),
     "camera_reading": Benchmark(0.5),

@@ -160,6 +160,7 @@ STEPS = {
     "sweep": [["sweep", "set.h5", "--hidden", "4", "--layers", "1", "--epochs", "1", "--to", "sweep"]],
     "reduced-model": [],  # has no law
     "rupture": [],  # has no law
+    "app": [["app", "soft-steel", "--to", "page.html"]],
     "demo": [],  # has a law of its own
     "init": [["init", ".", "--to", "study.toml"]],
     "run": [["run", "study.toml", "--only", "quality", "--json"]],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from creepkit.reports.html import report_html
-from helpers.browser import chromium, chromium_or_skip
+from helpers.browser import browser
 from helpers.report_pages import contents
 
 WIDTHS = (1280, 390)
@@ -13,8 +13,7 @@ WIDTHS = (1280, 390)
 
 @pytest.fixture(scope="module")
 def browser():
-    chromium_or_skip()
-    with chromium() as opened:
+    with browser() as opened:
         yield opened
 
 

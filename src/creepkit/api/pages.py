@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 def interactive_page(
     source: PageSource,
-    to: str | Path,
+    to: str | Path = "page.html",
     *,
     tests: Sequence[History] = (),
     specimen: str | None = None,
     title: str = "",
-    force: bool = True,
+    force: bool = False,
 ) -> Path:
     """Write a page of HTML on which a law's parameters are moved by sliders, and return its path.
 
@@ -36,7 +36,7 @@ def interactive_page(
     return write_page(page_contents(source, tests, specimen=specimen, title=title), Path(to), force=force)
 
 
-def write_page(contents: PageContents, path: Path, *, force: bool = True) -> Path:
+def write_page(contents: PageContents, path: Path, *, force: bool = False) -> Path:
     """Write the page of some contents as one file."""
     from creepkit.app.page import LARGEST_PAGE, page_html
 

@@ -223,6 +223,7 @@ def test_document(history: History, contents: PageContents) -> dict[str, Any]:
         "temperature_program": [numbers(temperature.times), numbers(temperature.values)],
         "modulus": finite(getattr(history.elastic, "E", None)),
         "lengths": {name: float(value) for name, value in history.geometry.items()},
+        "nuisances": _has_nuisances(history, contents),
         "minimum_rate": history.minimum_rate,
         "rupture_time": history.rupture_time,
         "includes_elastic": history.includes_elastic,
@@ -248,6 +249,12 @@ def _noise(history: History, output: str, contents: PageContents) -> float | Non
 def _offsets(history: History, contents: PageContents) -> dict[str, float]:
     """{output: what was added to it before creep began, as loading strain is}, of the first law's identification."""
     return {o.output: float(o.offset) for one in _test_fits(history, contents) for o in one.outputs if o.offset}
+
+
+def _has_nuisances(history: History, contents: PageContents) -> bool:
+    """Whether a law on the page was identified with nuisances that change the simulation of a test."""
+    fits = [one.fit for one in contents.laws if one.fit is not None]
+    return any(np.any(values != 0.0) for fit in fits for values in fit.nuisance_values([history]).values())
 
 
 def _test_fits(history: History, contents: PageContents) -> list[Any]:

@@ -36,17 +36,15 @@ LARGEST_PAGE = 1_000_000
 
 def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") -> str:
     """A whole page. nonce : of the policy of a server. endpoint : where it asks for predictions."""
-    models = {} if endpoint else page_models(contents)
+    models = {} if endpoint else page_models(contents)  # a server has the models themselves
     policy = "" if endpoint else _POLICY_OF_A_FILE
     mark = f' nonce="{nonce}"' if nonce else ""
     replacements = {
         "policy": policy,
         "title": escaped(contents.title),
         "style": f"<style{mark}>\n{_part('style.css')}</style>",
-        "fragment": _fragment(contents_document(contents, models), {"endpoint": endpoint}),
-        "scripts": ""
-        if endpoint
-        else f"<script>\n{runtime_script()}\n</script>\n<script>\n{law_scripts(contents)}\n{model_scripts(models)}</script>",
+        "fragment": _fragment(contents_document(contents, models), endpoint),
+        "scripts": f"<script{mark}>\n{runtime_script()}\n{law_scripts(contents)}\n{model_scripts(models)}</script>",
         "page_scripts": f"<script{mark}>\n{page_scripts()}</script>",
     }
     text = _part("page.html")
@@ -96,7 +94,7 @@ def page_fragment(contents: PageContents, *, style: bool = True, scripts: bool =
     parts = [f"<style>\n{page_style()}</style>"] if style else []
     parts += [f"<script>\n{runtime_script()}\n{model_scripts(models)}</script>"] if scripts else []
     parts.append(f"<script>\n{law_scripts(contents)}</script>")
-    parts.append(_fragment(contents_document(contents, models), {"endpoint": ""}))
+    parts.append(_fragment(contents_document(contents, models), kind="embedded"))
     parts += [f"<script>\n{page_scripts()}</script>"] if scripts else []
     return "\n".join(parts)
 
@@ -106,11 +104,11 @@ def shared_scripts(contents: PageContents) -> str:
     return "\n".join([runtime_script(), model_scripts(page_models(contents)), page_scripts()])
 
 
-def _fragment(document: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
-    data = embedded_json({**document, **settings})
+def _fragment(document: Mapping[str, Any], endpoint: str = "", kind: str = "") -> str:
+    data = embedded_json({**document, "endpoint": endpoint})
     note = "This part of the page needs scripts: it computes creep curves while its sliders are moved."
     return (
-        f'<div class="creepkit-page"><noscript><p>{note}</p></noscript>'
+        f'<div class="{f"creepkit-page {kind}".strip()}"><noscript><p>{note}</p></noscript>'
         f'<script type="application/json" class="creepkit-page-data">{data}</script></div>'
     )
 

@@ -19,6 +19,7 @@ def command(
     ] = None,
     specimen: Annotated[str | None, typer.Option(help="Which is shown first; by default that of the tests.")] = None,
     to: Annotated[Path | None, typer.Option(help="Write the page as one file, and serve nothing.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Of the server; 0 takes any that is free.")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Whether to open a browser.")] = True,
 ) -> None:
@@ -32,7 +33,7 @@ def command(
     source, tests = _resolved(sources or [])
     contents = page_contents(source, tests, specimen=specimen)
     if to is not None:
-        typer.echo(f"wrote {write_page(contents, to)}")
+        typer.echo(f"wrote {write_page(contents, to, force=force)}")
         return
     _serve(contents, port, browser)
 
@@ -78,6 +79,7 @@ def _format(path: Path) -> str | None:
 
 
 def _serve(contents: PageContents, port: int, browser: bool) -> None:
+    import sys
     import threading
     import webbrowser
 
@@ -87,10 +89,11 @@ def _serve(contents: PageContents, port: int, browser: bool) -> None:
     try:
         server = PageServer(contents, port)
     except OSError as error:
-        raise FitError(f"--port {port} cannot be used: {error.strerror}; choose another, or 0 for any") from None
+        raise FitError(f"--port {port} cannot be used: {error.strerror}; give another, or 0 for any") from None
     with server:
         threading.Thread(target=server.answers.prepare, daemon=True).start()
         typer.echo(f"the page: {server.url}")
+        sys.stdout.flush()
         typer.echo("Ctrl-C ends it", err=True)
         if browser:
             webbrowser.open(server.url)

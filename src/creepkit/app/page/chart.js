@@ -68,11 +68,18 @@
     const still = svg("g"), inside = svg("svg", { overflow: "hidden" }), fixed = svg("g"), moving = svg("g");
     inside.append(fixed, moving);
     drawing.append(still, inside);
-    let stillKey = "";
+    let stillKey = "", width = 0;
+
+    // Asked for when the panel changes, not for each curve: every question makes the browser lay out the page anew.
+    function measure() {
+      const before = width;
+      width = Math.max(260, panel.clientWidth - 20 || 520);
+      return width !== before;
+    }
 
     function draw(content) {
       shown = content;
-      const width = Math.max(260, panel.clientWidth - 20 || 520);
+      if (width === 0) measure();
       const { series } = content;
       const x = page.scale(...rangeOf("x", series), axes.x.logarithmic);
       const y = page.scale(...rangeOf("y", series), axes.y.logarithmic);
@@ -149,7 +156,7 @@
       readout.textContent = outside ? "" : `${page.format(scales.x.value(u), 3)}, ${page.format(scales.y.value(v), 3)}`;
     });
     drawing.addEventListener("pointerleave", () => (readout.textContent = ""));
-    new ResizeObserver(() => draw(shown)).observe(panel);
+    new ResizeObserver(() => { if (measure()) draw(shown); }).observe(panel);
     return { panel, draw, heading };
   };
 })((globalThis.creepkitPage ??= {}));

@@ -68,8 +68,9 @@
       value = typed * factor;
       show(true);
       options.onInput?.(value, event);
+      options.onRelease?.(value);
     });
-    field.addEventListener("change", () => { show(); options.onRelease?.(value); });
+    field.addEventListener("change", () => show());
     value = options.value;
     window_(options.low, options.high);
     return {

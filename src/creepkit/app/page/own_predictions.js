@@ -3,6 +3,14 @@
 (function (page) {
   const FRAMES = 120, RATE_STRESSES = 60;
 
+  // Whether a question can be answered here: of specimens that the runtime knows, of their own lengths, and without
+  // what an identification says of single tests.
+  page.answersAlone = function (data, { program, tests }) {
+    const known = (name) => data.specimens.some((one) => one.name === name && page.predicts(data, one));
+    if (program !== null && !(known(program.specimen) && Object.keys(program.lengths).length === 0)) return false;
+    return tests.every((k) => known(data.tests[k].specimen) && !data.tests[k].nuisances && (data.tests[k].model !== null || data.specimens.find((one) => one.name === data.tests[k].specimen).runtime !== "dimple"));
+  };
+
   page.predicts = (data, specimen) => (specimen.runtime === "dimple" ? specimen.model !== null : specimen.runtime !== null) && globalThis.creepkit !== undefined;
 
   const lawOf = (data, position) => globalThis.creepkitLaws[data.laws[position].code];
@@ -53,8 +61,7 @@
   function section(run, model) {
     const { nodes, elements } = meshOf(model), last = run.status === "complete" ? run.times.at(-1) : run.endTime;
     const times = Array.from({ length: SECTION_TIMES }, (_, k) => (last * (k + 1)) / SECTION_TIMES);
-    const displacements = times.map((time) => run.placesAt(time).flat().map((place, k) => place - nodes[k]));
-    return { nodes, elements, times, displacements, stress: null };
+    return { nodes, elements, times, at: (k) => run.placesAt(times[k]).flat().map((place, n) => place - nodes[n]), stress: null };
   }
 
   function predicted(law, values, specimen, test) {

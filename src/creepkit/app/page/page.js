@@ -16,7 +16,7 @@
     const panels = element("div", { class: "panels" });
     let inputAt = null, charts = new Map(), rates = null, section = null, last = null, timer = null, before = null, settled = true;
 
-    const engine = data.endpoint ? page.serverEngine(data.endpoint, draw, complain) : page.ownEngine(data, draw, complain);
+    const engine = data.endpoint ? page.serverEngine(data, draw, complain) : page.ownEngine(data, draw, complain);
     data.specimens = data.specimens.filter((specimen) => engine.has(specimen));
 
     const laws = page.lawControls(data, state, { onInput: changed, onRelease: released, onLaw });
@@ -71,6 +71,7 @@
     function changed(event) {
       if (settled && event !== null) { before = last; settled = false; }
       inputAt = event === null ? null : performance.now();
+      root.dataset.exact = "false";
       engine.quick(question());
     }
 
@@ -126,7 +127,8 @@
       drawRates(answer.rate);
       if (answer.program?.section) {
         section.panel.hidden = false;
-        section.draw(answer.program.section);
+        const drawn = answer.program.section;
+        section.draw({ at: (k) => drawn.displacements[k], ...drawn });
       }
       const misfits = new Map(shown.map((one) => [one.test, page.misfit(data.tests[one.test], one.outputs)]));
       if (data.tests.length) tests.show(misfits);

@@ -5,6 +5,8 @@
   // viridis at nine places
   const COLOURS = [[68, 1, 84], [72, 40, 120], [62, 74, 137], [49, 104, 142], [38, 130, 142], [31, 158, 137], [53, 183, 121], [110, 206, 88], [253, 231, 37]];
 
+  const SHADES = 24;
+
   function colourOf(share) {
     const place = Math.min(Math.max(share, 0), 1) * (COLOURS.length - 1), k = Math.min(Math.floor(place), COLOURS.length - 2);
     return `rgb(${COLOURS[k].map((low, i) => Math.round(low + (place - k) * (COLOURS[k + 1][i] - low))).join(",")})`;
@@ -16,10 +18,13 @@
     const words = element("output", { class: "readout" });
     const legend = element("div", { class: "legend" });
     const panel = element("figure", { class: "panel" }, element("figcaption", {}, element("h3", {}, "Deformed section")), drawing, legend, element("label", { class: "row" }, "time ", moment, words));
-    let shown = null, colours = null;
+    let shown = null, colours = null, width = 0;
 
-    function outlinePath(data, place) {
-      // sides that belong to one element alone, but for the axis
+    // Sides that belong to one element alone, but for the axis; those of one mesh are found once.
+    let outlined = { text: "", sides: [] };
+    function outlineSides(data) {
+      const text = `${data.nodes.length} ${data.elements.length} ${data.nodes.slice(0, 8)}`;
+      if (outlined.text === text) return outlined.sides;
       const count = new Map();
       for (const sides of data.elements) {
         for (let k = 0; k < 8; k += 2) {
@@ -28,8 +33,10 @@
           count.set(key, count.has(key) ? null : [a, m, b]);
         }
       }
-      return [...count.values()].filter((side) => side !== null && !side.every((n) => Math.abs(data.nodes[2 * n]) < 1e-9)).map((side) => "M" + side.map((n) => place(n).join(" ")).join("L")).join("");
+      outlined = { text, sides: [...count.values()].filter((side) => side !== null && !side.every((n) => Math.abs(data.nodes[2 * n]) < 1e-9)) };
+      return outlined.sides;
     }
+    const outlinePath = (data, place) => outlineSides(data).map((side) => "M" + side.map((n) => place(n).join(" ")).join("L")).join("");
 
     function draw(data) {
       shown = data;
@@ -37,8 +44,8 @@
       const k = Math.min(Number(moment.value), data.times.length - 1);
       // a reduced-order model says nothing of stresses: the colours stay as they were
       if (data.stress !== null) colours = data.stress;
-      const moves = data.displacements[k], stress = colours?.[k]?.length === data.elements.length ? colours[k] : data.elements.map(() => 0);
-      const width = Math.max(260, panel.clientWidth - 20 || 520);
+      const moves = data.at(k), stress = colours?.[k]?.length === data.elements.length ? colours[k] : data.elements.map(() => 0);
+      if (width === 0) width = Math.max(260, panel.clientWidth - 20 || 520);
       let reach = 0, top = -Infinity, bottom = Infinity;
       for (let n = 0; n < data.nodes.length / 2; n++) {
         reach = Math.max(reach, data.nodes[2 * n] + Math.max(0, moves[2 * n]));
@@ -48,18 +55,23 @@
       size = Math.min(size, 320 / (top - bottom || 1));
       const height = (top - bottom) * size + 12, middle = width / 2;
       const low = Math.min(...stress), high = Math.max(...stress);
-      const parts = [];
+      const pieces = [], lines = [];
       for (const side of [1, -1]) {
         const rest = (n) => [(middle + side * size * data.nodes[2 * n]).toFixed(1), (6 + size * (top - data.nodes[2 * n + 1])).toFixed(1)];
         const moved = (n) => [(middle + side * size * (data.nodes[2 * n] + moves[2 * n])).toFixed(1), (6 + size * (top - data.nodes[2 * n + 1] - moves[2 * n + 1])).toFixed(1)];
         data.elements.forEach((sides, e) => {
-          const piece = svg("path", { d: "M" + sides.map((n) => moved(n).join(" ")).join("L") + "Z" });
-          piece.style.fill = piece.style.stroke = colours === null ? "var(--band)" : colourOf((stress[e] - low) / (high - low || 1));
-          parts.push(piece);
+          const shade = colours === null ? 0 : Math.round(((stress[e] - low) / (high - low || 1)) * SHADES);
+          pieces[shade] = (pieces[shade] ?? "") + "M" + sides.map((n) => moved(n).join(" ")).join("L") + "Z";
         });
-        parts.push(svg("path", { class: "rest", d: outlinePath(data, rest) }), svg("path", { class: "moved", d: outlinePath(data, moved) }));
+        lines.push(svg("path", { class: "rest", d: outlinePath(data, rest) }), svg("path", { class: "moved", d: outlinePath(data, moved) }));
       }
-      drawing.replaceChildren(...parts);
+      // elements of one shade as one path: fewer to draw while a slider moves
+      const filled = Object.entries(pieces).map(([shade, d]) => {
+        const piece = svg("path", { d });
+        piece.style.fill = piece.style.stroke = colours === null ? "var(--band)" : colourOf(shade / SHADES);
+        return piece;
+      });
+      drawing.replaceChildren(...filled, ...lines);
       drawing.setAttribute("width", width);
       drawing.setAttribute("height", height.toFixed(0));
       drawing.setAttribute("viewBox", `0 0 ${width} ${height.toFixed(0)}`);
@@ -71,7 +83,10 @@
     }
 
     moment.addEventListener("input", () => shown && draw(shown));
-    new ResizeObserver(() => shown && draw(shown)).observe(panel);
+    new ResizeObserver(() => {
+      width = 0;
+      if (shown) draw(shown);
+    }).observe(panel);
     return { panel, draw };
   };
 })((globalThis.creepkitPage ??= {}));
