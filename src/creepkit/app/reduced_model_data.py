@@ -26,8 +26,7 @@ def rom_data(predictor: BulgeReducedOrderModel) -> dict[str, Any]:
     model = predictor.reduced_model_of(setup)
     specimen, settings = predictor.specimen, solver_settings(predictor.specimen)
     return {
-        "name": specimen.name,
-        "title": specimen.title,
+        "title": predictor.title,
         "modes": len(model.basis.modes),
         "nodeCount": len(model.model.nodes),
         "points": int(model.basis.points.size),
