@@ -23,7 +23,7 @@ vm.runInThisContext(await readFile("runtime.js", "utf8"));
 async function main({ cases, data, then }) {
   return cases.map(([source, call, values, options]) => {
     try {
-      const given = call === "simulateDimple" ? [data, options] : [options];
+      const given = data === null ? [options] : [data, options];
       const found = creepkit[call](vm.runInThisContext(source), values, ...given);
       return then ? { ...found, ...vm.runInThisContext(then)(found) } : found;
     } catch (error) {
