@@ -11,7 +11,7 @@ from creepkit.registry import default_registry
 from helpers import source_tree
 
 PACKAGES = ("readers", "quality", "extraction", "inverse", "reports", "cli", "experiments", "forecasts")
-PACKAGES += ("screening", "discovery")
+PACKAGES += ("screening", "discovery", "studies")
 """No string, attribute or keyword of theirs is such a name; sentences may give one as an example."""
 
 

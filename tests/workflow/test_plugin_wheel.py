@@ -160,6 +160,8 @@ STEPS = {
     "reduced-model": [],  # has no law
     "rupture": [],  # has no law
     "demo": [],  # has a law of its own
+    "init": [["init", ".", "--to", "study.toml"]],
+    "run": [["run", "study.toml", "--only", "quality", "--json"]],
 }
 
 

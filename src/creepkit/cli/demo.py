@@ -1,4 +1,4 @@
-"""`creepkit demo`: identify laws from the curves that ship with the package, measured ones first, on one screen."""
+"""`creepkit demo`: the studies that ship with the package, measured creep curves first, on one screen."""
 
 from __future__ import annotations
 
@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.identify import file_stem, write_ranking
 from creepkit.reports.terminal import ProgressBar
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection import Ranking
-    from creepkit.language import CreepLaw
-    from creepkit.records import History
+    from creepkit.studies.result import StudyResult
 
 
 EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
@@ -35,72 +33,51 @@ PLANTED_BULGE = EXAMPLE_DATA / "planted_bulge_test"
 """A simulated bulge test of one dimple, and the truth behind it."""
 
 
-MEASURED_LAWS = ("norton", "mpc-omega", "kachanov-rabotnov")
-"""Norton's law comes with creepkit, the two with tertiary creep with its plugins."""
-
-
-UNIAXIAL_LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
-
-
-BULGE_LAWS = ("norton", "strain-hardening", "time-hardening")
-
-
 def command(
     to: Annotated[Path, typer.Option(help="Folder for results; made if needed.")] = Path("demo"),
     uniaxial: Annotated[bool, typer.Option("--uniaxial", help="Simulated creep curves instead of both.")] = False,
 ) -> None:
-    """Identify laws from measured curves, then a bulge test.
+    """Run the studies that ship: creep curves, a bulge test.
 
     Rupture times are printed beside the measured ones, the true law of the simulated test beside the identified one.
+    Each study leaves a report; 'creepkit run' carries out such a study of your own.
     """
     started = time.perf_counter()
     if uniaxial:
-        plots = _planted_creep_curves(to)
+        results = [_planted_creep_curves(to)]
     else:
-        plots = [*_measured_creep_curves(to / "creep_curves"), *_planted_bulge_test(to / "bulge_test")]
+        results = [_measured_creep_curves(to / "creep_curves"), _planted_bulge_test(to / "bulge_test")]
     typer.echo(f"\ntime: {time.perf_counter() - started:.0f} s")
-    typer.echo(f"results of every law as JSON, the best one as LaTeX and Python: {to}")
-    typer.echo(f"plots: {' '.join(map(str, plots))}")
+    typer.echo(f"results, the best law of each as LaTeX and Python, and the study files' locks: {to}")
+    typer.echo(f"reports: {' '.join(str(result.report) for result in results)}")
 
 
-def _measured_creep_curves(folder: Path) -> list[Path]:
-    """Laws of the CMSX-6 curves, and rupture as the best one has it; returns the plots."""
-    import creepkit as ck
-
-    tests = ck.read_histories(MEASURED)
+def _measured_creep_curves(folder: Path) -> StudyResult:
+    """Laws of the CMSX-6 curves, and rupture as the best one has it."""
     typer.echo(
-        f"MEASURED: {len(tests)} creep curves of CMSX-6 at 980 C, thinned; six tests ruptured, three were stopped\n"
+        "MEASURED: nine creep curves of CMSX-6 at 980 C, thinned; six tests ruptured, three were stopped\n"
         "(Federal Institute for Materials Research and Testing, doi 10.5281/zenodo.13937986, CC BY 4.0)"
     )
-    registered = ck.available("laws")
-    laws = [ck.law(name) for name in MEASURED_LAWS if name in registered]
-    if len(laws) == 1:
+    result = _run(MEASURED, folder)
+    ranking = result.rankings[""]
+    if len(ranking.laws) == 1:
         typer.echo("the plugins with tertiary creep are not installed: Norton's law breaks by loss of section alone")
-    # Tests under tension cannot determine how damage depends on the largest principal stress.
-    laws = [law.fix(alpha=0) if "alpha" in law.names else law for law in laws]
-    ranking = _identify("creep curves", laws, tests, starts=2)
     _print_ranking(ranking)
     _print_values(ranking.best)
     _print_rupture_times(ranking.best)
-    return _write(ranking, folder)
+    return result
 
 
-def _planted_creep_curves(folder: Path) -> list[Path]:
+def _planted_creep_curves(folder: Path) -> StudyResult:
+    typer.echo("SIMULATED: nine creep curves with noise, 750 to 850 C")
+    result = _run(PLANTED, folder)
+    _print_ranking(result.rankings[""])
+    _print_truth(PLANTED, result.rankings[""].best)
+    return result
+
+
+def _planted_bulge_test(folder: Path) -> StudyResult:
     import creepkit as ck
-    from creepkit.inverse.reference_conditions import with_arrhenius
-
-    tests = ck.read_histories(PLANTED)
-    typer.echo(f"SIMULATED: {len(tests)} creep curves with noise, 750 to 850 C")
-    laws = [with_arrhenius(ck.law(name), tests) for name in UNIAXIAL_LAWS]
-    ranking = _identify("creep curves", laws, tests)
-    _print_ranking(ranking)
-    _print_truth(PLANTED, ranking.best)
-    return _write(ranking, folder)
-
-
-def _planted_bulge_test(folder: Path) -> list[Path]:
-    import creepkit as ck
-    from creepkit.records import Nuisance
 
     (test,) = ck.read_histories(PLANTED_BULGE)
     pressures = " then ".join(dict.fromkeys(f"{value:g}" for value in test.loading.program().values if value > 0))
@@ -109,24 +86,30 @@ def _planted_bulge_test(folder: Path) -> list[Path]:
         f"\nSIMULATED: a bulge test with camera noise, {pressures} MPa, {test.times.size} frames to {hours:.0f} h,\n"
         f"top raised by {height:.2f} mm; every law is simulated by finite elements"
     )
-    laws = [ck.law(name) for name in BULGE_LAWS]
-    ranking = _identify("bulge test", laws, [test], starts=1, nuisances=[Nuisance("offset")])
-    _print_ranking(ranking)
-    _print_truth(PLANTED_BULGE, ranking.best)
-    plots = _write(ranking, folder)
-    return [*plots, _plot_section(ranking.best, test, folder)]
+    result = _run(PLANTED_BULGE, folder)
+    _print_ranking(result.rankings[""])
+    _print_truth(PLANTED_BULGE, result.rankings[""].best)
+    return result
 
 
-def _identify(task: str, laws: Sequence[CreepLaw], tests: list[History], **options: Any) -> Ranking:
-    """Identify each law from the tests and rank them, showing progress."""
+def _run(data: Path, folder: Path) -> StudyResult:
+    """Carry out the study of example data, with those of its laws that are installed; FitError where a stage fails."""
+    from dataclasses import replace
+
     import creepkit as ck
+    from creepkit.errors import FitError
+    from creepkit.studies.study_file import read_study_file
 
-    fits = []
+    file = read_study_file(data / "study.toml")
+    part = file.model.identification
+    assert part is not None
+    installed = part.model_copy(update={"laws": [name for name in part.laws if name in ck.available("laws")]})
+    study = ck.Study(replace(file, model=file.model.model_copy(update={"identification": installed})))
     with ProgressBar() as progress:
-        for number, law in enumerate(laws, start=1):
-            fits.append(ck.identify(law, tests, **options))
-            progress.tick(task, number, len(laws), law.name)
-    return ck.rank(fits)
+        result = study.run(to=folder, progress=progress.tick)
+    for failure in result.failures:
+        raise FitError(f"{failure.stage}: {failure.sentence}")
+    return result
 
 
 def _print_ranking(ranking: Ranking) -> None:
@@ -187,28 +170,3 @@ def _print_rows(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     widths = [max(len(row[k]) for row in (columns, *rows)) for k in range(len(columns))]
     for row in (columns, *rows):
         typer.echo("  " + "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())
-
-
-def _write(ranking: Ranking, folder: Path) -> list[Path]:
-    """Write the results; returns the plot of the best law."""
-    write_ranking(ranking, folder)
-    return [folder / f"{file_stem(ranking.best.law.name)}.png"]
-
-
-def _plot_section(fit: Identification, test: History, folder: Path) -> Path:
-    """Draw the section of the dimple at the end of the test, as the identified law has it."""
-    import creepkit as ck
-
-    run = ck.simulate(
-        fit.law,
-        "bulge",
-        fit.values,
-        loading=test.loading,
-        times=test.times,
-        temperature=test.temperature,
-        elastic=test.elastic,
-        name=f"{test.name}, {fit.law.name} as identified",
-    )
-    path = folder / f"{file_stem(fit.law.name)}-section.png"
-    run.section(path=path)  # type: ignore[attr-defined]
-    return path

@@ -180,10 +180,10 @@ class ResultFolder:
         """The file of a stage."""
         return self.folder / f"{file_name(stage)}.json"
 
-    def clear(self) -> None:
-        """Remove all results and identifications, those half written among them."""
+    def clear(self, *, everything: bool) -> None:
+        """Remove files that a process left half written when it died, or all results. No other process may write."""
         for folder in (self.folder, self.fits):
-            for path in (*folder.glob("*.json"), *folder.glob(".*.part")):
+            for path in (*folder.glob(".*.part"), *(folder.glob("*.json") if everything else ())):
                 path.unlink(missing_ok=True)
 
     def load(self, stage: str, key: str) -> Any:

@@ -85,14 +85,13 @@ def running_alone(folder: Path) -> Iterator[None]:
 class Execution:
     """One run over the stages of a study.
 
-    folder : of kept results. histories : the tests. force : whether everything is made again.
+    folder : of kept results. histories : the tests.
     progress : called as progress(task, done, total, note).
     """
 
     folder: ResultFolder
     histories: Sequence[History]
     progress: ProgressCallback | None = None
-    force: bool = False
     records: list[StageRecord] = field(default_factory=list)
     results: Any = field(default_factory=LazyResults)
 
@@ -113,7 +112,7 @@ class Execution:
                 self._record(stage, "failed", key, f"{failed[0]} failed, which it needs")
                 continue
             self._report(stage, 0, 1, f"stage {number} of {len(stages)}")
-            if not self.force and self._read(stage, key):
+            if self._read(stage, key):
                 self._record(stage, "kept", key)
                 self._report(stage, 1, 1, "kept from before")
                 continue

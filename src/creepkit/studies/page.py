@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +12,9 @@ from creepkit.errors import CreepkitError, StudyError
 from creepkit.files.reading import read_bytes
 from creepkit.files.writing import write_text
 from creepkit.reports.contents import Attachment, Provenance, ReportContents, ReportGroup
+from creepkit.studies.documents import ResultFolder, key_of
 from creepkit.studies.execution import StageRecord
-from creepkit.studies.inputs import DATA_FILE
+from creepkit.studies.inputs import DATA_FILE, sha256_of
 from creepkit.studies.lock import versions_of
 from creepkit.studies.result import StudyResult
 from creepkit.studies.study_file import StudyFile
@@ -25,11 +27,19 @@ CARRIED_FOLDER = "inputs"
 
 
 def write_page(
-    file: StudyFile, result: StudyResult, folder: Path, lock_path: Path, force: bool, progress: ProgressCallback | None
+    file: StudyFile, result: StudyResult, folder: Path, kept: ResultFolder, progress: ProgressCallback | None
 ) -> StudyResult:
-    """The result with its report written; a report that cannot be written is a stage that failed."""
+    """The result with its report written, unless the same one is there; one that cannot be is a stage that failed."""
     assert file.model.report is not None
-    path = folder / file.model.report.file
+    path, lock_path = folder / file.model.report.file, lock_path_of(file, folder)
+    parts = [(one.name, one.state == "failed", one.key, one.sentence) for one in result.stages]
+    exclusions = [(one.test, list(one.frames), one.reason) for one in result.exclusions]
+    hashes = [[one.name, one.sha256] for one in result.files] + [["lock", sha256_of(lock_path)]]
+    settings = [hashlib.sha256(file.text.encode()).hexdigest(), hashes, exclusions]
+    key = key_of({"kind": "report", "settings": settings, "needs": parts, "versions": versions_of()})
+    known = kept.load("report", key)
+    if known is not None and path.is_file() and known == {"sha256": sha256_of(path)}:
+        return replace(result, stages=(*result.stages, StageRecord("report", "report", "", "kept", key)), report=path)
     if progress is not None:
         progress("report", 0, 1, "")
     try:
@@ -37,11 +47,17 @@ def write_page(
 
         write_text(report_html(contents_of(file, result, lock_path)), path, StudyError)
     except CreepkitError as error:
-        record = StageRecord("report", "report", "", "failed", "", " ".join(str(error).split()))
+        record = StageRecord("report", "report", "", "failed", key, " ".join(str(error).split()))
         return replace(result, stages=(*result.stages, record))
+    kept.save("report", key, {"sha256": sha256_of(path)})
     if progress is not None:
         progress("report", 1, 1, str(path))
-    return replace(result, stages=(*result.stages, StageRecord("report", "report", "", "made", "")), report=path)
+    return replace(result, stages=(*result.stages, StageRecord("report", "report", "", "made", key)), report=path)
+
+
+def lock_path_of(file: StudyFile, folder: Path) -> Path:
+    """The lock of a study: its name with another ending."""
+    return folder / f"{file.path.stem}.lock"
 
 
 def contents_of(file: StudyFile, result: StudyResult, lock_path: Path | None = None) -> ReportContents:

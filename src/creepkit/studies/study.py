@@ -16,7 +16,7 @@ from creepkit.studies.documents import ResultFolder
 from creepkit.studies.execution import Execution, running_alone
 from creepkit.studies.inputs import InputFile, input_files, read_inputs, resolve_paths
 from creepkit.studies.lock import differences, lock_if_any, lock_of, write_lock
-from creepkit.studies.page import write_page
+from creepkit.studies.page import lock_path_of, write_page
 from creepkit.studies.result import StudyResult
 from creepkit.studies.stages import STAGE_KINDS, Stages, needed_stages
 from creepkit.studies.study_file import StudyFile, read_study_file
@@ -117,22 +117,14 @@ class Study:
                 raise StudyError(f"there is no stage '{kind}'; {nearest(str(kind), STAGE_KINDS)}")
         folder = self.path.parent if to is None else Path(to)
         kept = ResultFolder(folder / f"{self.path.stem}.results")
-        lock_path = folder / f"{self.path.stem}.lock"
         with running_alone(kept.folder):
-            if force:
-                kept.clear()
-            return self._run(folder, kept, lock_path, kinds, force, locked, progress)
+            kept.clear(everything=force)
+            return self._run(folder, kept, kinds, locked, progress)
 
     def _run(
-        self,
-        folder: Path,
-        kept: ResultFolder,
-        lock_path: Path,
-        kinds: Sequence[str],
-        force: bool,
-        locked: bool,
-        progress: ProgressCallback | None,
+        self, folder: Path, kept: ResultFolder, kinds: Sequence[str], locked: bool, progress: ProgressCallback | None
     ) -> StudyResult:
+        lock_path = lock_path_of(self.file, folder)
         before = lock_if_any(lock_path)
         if progress is not None:
             progress("reading", 0, 1, "")
@@ -146,7 +138,7 @@ class Study:
         if locked and (before is None or changes):
             what = changes[0] if changes else "there is no lock"
             raise StudyError(f"{lock_path}: the study cannot be repeated exactly: {what}; leave --locked out")
-        execution = Execution(kept, inputs.histories, progress, force)
+        execution = Execution(kept, inputs.histories, progress)
         execution.run(stages, needed_stages(stages, kinds))
         write_lock(lock_of(self.file, self._hash, files, execution.records), lock_path)
         result = StudyResult(
@@ -163,7 +155,7 @@ class Study:
             write_text(export.text, folder / export.name, StudyError)
         if self.file.model.report is None or "report" not in kinds:
             return result
-        return write_page(self.file, result, folder, lock_path, force, progress)
+        return write_page(self.file, result, folder, kept, progress)
 
     @cached_property
     def _hash(self) -> str:

@@ -35,11 +35,7 @@ def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -
             "methods",
             "Methods text",
             [
-                Verbatim(
-                    "To be copied into a paper and shortened",
-                    printable_lines(methods_text(contents, found)),
-                    prose=True,
-                )
+                Verbatim("To be copied into a paper and shortened", printable_lines(methods_text(contents, found)), prose=True)
             ]
             if found or contents.rupture
             else [],
@@ -55,9 +51,7 @@ def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -
 def _export_blocks(exports: Sequence[ExportedFile]) -> list[Block]:
     if not exports:
         return []
-    files = [
-        (file_name(one.name), _address(one.text), f"{printable(one.target, 80)}, {_size(one.text)}") for one in exports
-    ]
+    files = [(file_name(one.name), _address(one.text), f"{printable(one.target, 80)}, {_size(one.text)}") for one in exports]
     return [Paragraph("The page holds these files itself."), Downloads(files)]
 
 

@@ -27,4 +27,4 @@ class PageFigures:
         self.count += 1
         figure.suptitle("")
         svg = svg_text(figure, f"f{self.count}", title, description)
-        return Picture(Markup(svg), f"Figure {self.count}. {caption}")
+        return Picture(Markup(svg), f"Figure {self.count}. {caption}")  # noqa: S704

@@ -16,6 +16,7 @@ from creepkit.reports.html.elements import (
     Formula,
     Items,
     Paragraph,
+    Picture,
     Section,
     Table,
     number,
@@ -97,7 +98,7 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     if found.equivalents:
         blocks.append(Items([sentence(text) for text in found.equivalents]))
     blocks.append(Paragraph(f"{'The best law' if found.ranking else 'The law'}: {fit.law.title or fit.law.name}."))
-    blocks += [Formula(Markup(equation)) for equation in law_equations(fit.law)]
+    blocks += [Formula(Markup(equation)) for equation in law_equations(fit.law)]  # noqa: S704
     blocks += [_values(fit), _point(fit)]
     if fit.adequacy is not None and found.ranking is not None:
         blocks.append(Paragraph(sentence(f"the law {fit.adequacy}")))
@@ -131,7 +132,7 @@ def _values(fit: Identification) -> Table:
     table, symbols = fit.law.table, {str(symbol): symbol for symbol in fit.law.params}
     rows = [
         (
-            Markup(symbol_element(symbols[e.name])),
+            Markup(symbol_element(symbols[e.name])),  # noqa: S704
             table[e.name].meaning,
             number(e.value, 5),
             f"{number(e.low)} to {number(e.high)}",
@@ -324,7 +325,11 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
     """Noise and scatter as they were estimated, and explicit nuisance parameters."""
     fit = found.fit
     noise = [
-        (name.replace("_", " "), f"{number(one.noise, 2)}{_unit(name)}", f"{number(one.offset, 2)}{_unit(name)}")
+        (
+            name.replace("_", " "),
+            f"{number(one.noise, 2)}{_unit(name)}",
+            f"{number(one.offset, 2)}{_unit(name)}",
+        )
         for name, one in fit.noise_model.outputs.items()
     ]
     blocks: list[Block] = [

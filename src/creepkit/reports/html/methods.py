@@ -49,7 +49,11 @@ class References:
 def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
     """Paragraphs on identification, ranking and the other stages, then the references."""
     references = References()
-    paragraphs = [*_identification(found, references), *_stages(contents, references), _software(contents, found)]
+    paragraphs = [
+        *_identification(found, references),
+        *_stages(contents, references),
+        _software(contents, found),
+    ]
     listed = [f"[{k}] {citation}" for k, citation in enumerate(references.listed, start=1)]
     return "\n\n".join([*(" ".join(p) for p in paragraphs if p), "\n".join(listed)]).strip() + "\n"
 
@@ -129,9 +133,7 @@ def _stages(contents: ReportContents, references: References) -> list[list[str]]
     if contents.exclusions:
         tests = {one.test for one in contents.exclusions}
         paragraphs.append(
-            [
-                f"Frames of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons listed in the report."
-            ]
+            [f"Frames of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons listed in the report."]
         )
     if contents.temperature:
         paragraphs.append(
@@ -159,9 +161,7 @@ def _stages(contents: ReportContents, references: References) -> list[list[str]]
         )
     if contents.design:
         paragraphs.append(
-            [
-                f"Further tests were ranked by their expected information{references.cite('lindley')} per hour of the oven."
-            ]
+            [f"Further tests were ranked by their expected information{references.cite('lindley')} per hour of the oven."]
         )
     return paragraphs
 
@@ -170,9 +170,7 @@ def _software(contents: ReportContents, found: Sequence[GroupFindings]) -> list[
     versions = dict(contents.provenance.versions)
     if not versions and found:
         versions = {"creepkit": str(found[0].fit.provenance.get("creepkit", ""))}
-    named = _listed(
-        [f"{printable(name, 60)} {printable(version, 60)}" for name, version in versions.items() if version]
-    )
+    named = _listed([f"{printable(name, 60)} {printable(version, 60)}" for name, version in versions.items() if version])
     seed = "" if contents.provenance.seed is None else f", seed {contents.provenance.seed}"
     return [sentence(f"The work was done with {named}{seed}")] if named else []
 

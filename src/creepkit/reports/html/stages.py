@@ -168,13 +168,7 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
             )
         )
         rows = [
-            (
-                e.name,
-                number(e.value, 5),
-                f"{number(e.low)} to {number(e.high)}",
-                "" if e.unit == "1" else e.unit,
-                e.verdict,
-            )
+            (e.name, number(e.value, 5), f"{number(e.low)} to {number(e.high)}", "" if e.unit == "1" else e.unit, e.verdict)
             for e in law.estimates
         ]
         columns = ("parameter", "value", "95 % interval", "unit", "by these tests")

@@ -1,0 +1,273 @@
+"""Runs of studies: only what changed runs again, whatever kills a process; the lock; stages that fail; reports back."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import creepkit as ck
+from creepkit.errors import StudyError
+from creepkit.inverse.identification_document import identification_to_json
+from creepkit.studies.extraction import study_of_report
+from creepkit.studies.result import StudyResult
+
+STUDY = """\
+[study]
+title = "two laws"
+[data]
+files = ["data/*.csv"]
+[identification]
+laws = ["norton", "strain-hardening"]
+group_by = "alloy"
+starts = 1
+frames = 12
+[selection]
+sums = false
+further_laws = 0
+[[forecast]]
+name = "next"
+group = "A"
+load = { stress_MPa = 60 }
+end_h = 50
+draws = 50
+[[export]]
+target = "python"
+file = "law.py"
+"""
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """A study of two alloys, A at 750 C and B at 850 C."""
+    return study_in(tmp_path)
+
+
+def study_in(folder: Path, text: str = STUDY) -> Path:
+    (folder / "data").mkdir(parents=True)
+    for source in sorted(ck.example_data("planted creep curves").glob("*.csv")):
+        alloy = {"750": "A", "850": "B"}.get(source.name[8:11])
+        if alloy:
+            content = source.read_text()
+            (folder / "data" / source.name).write_text(f"# alloy: {alloy}\n{content}")
+    path = folder / "study.toml"
+    path.write_text(text)
+    return path
+
+
+def states(result: StudyResult) -> dict[str, str]:
+    return {one.name: one.state for one in result.stages}
+
+
+def made(result: StudyResult) -> set[str]:
+    return {name for name, state in states(result).items() if state == "made"}
+
+
+def numbers(result: StudyResult) -> Any:
+    """All numbers of the results, without the times at which they were made."""
+    laws = {}
+    for group, ranking in result.rankings.items():
+        for one in ranking.laws:
+            content = json.loads(json.dumps(identification_to_json(one.fit)))
+            content["provenance"].pop("when")
+            laws[group, one.fit.law.name] = (content, one.excess, one.weight, one.chi_square)
+    forecasts = {name: str(forecast) for name, forecast in result.forecasts.items()}
+    return laws, forecasts, {name: r.verdict for name, r in result.rankings.items()}
+
+
+def test_only_what_changed_runs_again(study: Path) -> None:
+    everything = {
+        "quality",
+        "identification of A",
+        "identification of B",
+        "forecast of next",
+        "export 1 of A: python",
+        "export 1 of B: python",
+    }
+    first = ck.Study.load(study).run()
+    assert made(first) == everything
+    assert made(ck.Study.load(study).run()) == set()
+
+    one = study.parent / "data" / "planted_850C_70MPa.csv"
+    one.write_text(one.read_text().replace(",", ", "))  # another file, the same data
+    again = ck.Study.load(study).run()
+    assert made(again) == set()
+    assert any("file data/planted_850C_70MPa.csv: changed" in change for change in again.changes)
+
+    lines = one.read_text().splitlines()
+    one.write_text("\n".join(lines[:-1]) + "\n")  # without the last frame
+    assert made(ck.Study.load(study).run()) == {"quality", "identification of B", "export 1 of B: python"}
+
+    study.write_text(STUDY.replace("end_h = 50", "end_h = 60"))
+    changed = ck.Study.load(study).run()
+    assert made(changed) == {"forecast of next"}
+    assert any("end_h" in change or "forecast" in change for change in changed.changes)
+
+    study.write_text(STUDY.replace("end_h = 50", "end_h = 60").replace('"python"', '"latex"'))
+    assert made(ck.Study.load(study).run()) == {"export 1 of A: latex", "export 1 of B: latex"}
+
+    study.write_text(STUDY.replace("starts = 1", "starts = 2"))
+    assert made(ck.Study.load(study).run()) == everything - {"quality"} - {"export 1 of A: python"} | {
+        "export 1 of A: python"
+    }
+    assert made(ck.Study.load(study).run(force=True)) == everything
+
+
+def test_a_law_that_is_added_leaves_the_fits_of_the_others(study: Path) -> None:
+    from creepkit.inverse.kept_fits import keep_fits
+
+    ck.Study.load(study).run(only="identification")
+    fits = study.parent / "study.results" / "fits"
+    before = set(fits.glob("*.json"))
+    study.write_text(STUDY.replace('"strain-hardening"]', '"strain-hardening", "time-hardening"]'))
+    ck.Study.load(study).run(only="identification")
+    assert len(set(fits.glob("*.json")) - before) == 2  # one for each alloy
+    assert before < set(fits.glob("*.json"))
+    with keep_fits(fits) as kept:  # and Python asks the same question
+        histories = ck.read_histories(study.parent / "data")
+        tests = [h for h in ck.exclude_suspect_frames(histories) if h.alloy == "A"]
+        ck.select(["norton", "strain-hardening"], tests, sums=False, starts=1, frames=12, further_laws=0)
+    assert (kept.made, kept.read) == (0, 2)
+
+
+def test_python_the_command_line_and_a_study_give_the_same_answer(study: Path) -> None:
+    result = ck.Study.load(study).run(only="identification")
+    tests = [h for h in ck.read_histories(study.parent / "data") if h.alloy == "B"]
+    ranking = ck.select(["norton", "strain-hardening"], tests, sums=False, starts=1, frames=12, further_laws=0)
+    assert ranking.verdict == result.rankings["B"].verdict
+    assert ranking.best.values == result.rankings["B"].best.values
+    assert [one.weight for one in ranking.laws] == [one.weight for one in result.rankings["B"].laws]
+
+
+def test_kept_results_are_the_records_that_were_made(study: Path) -> None:
+    first = ck.Study.load(study).run()
+    lock = (study.parent / "study.lock").read_bytes()
+    kept = ck.Study.load(study).run()
+    assert numbers(first) == numbers(kept)
+    assert (study.parent / "study.lock").read_bytes() == lock
+    assert kept.rankings["A"].equivalents() == first.rankings["A"].equivalents()
+    assert kept.rankings["A"].best.predict().values.tolist() == first.rankings["A"].best.predict().values.tolist()
+
+
+RUN = "import sys, creepkit as ck; ck.Study.load(sys.argv[1]).run()"
+
+
+def test_a_run_that_is_killed_anywhere_goes_on_to_the_same_result(tmp_path: Path) -> None:
+    expected = ck.Study.load(study_in(tmp_path / "whole")).run()
+    study = study_in(tmp_path / "killed")
+    seed = random.Random(3)
+    kills = 0
+    for _ in range(6):
+        process = subprocess.Popen([sys.executable, "-c", RUN, str(study)], start_new_session=True)
+        begun = time.monotonic()
+        files = len(list(study.parent.rglob("*.json")))
+        # until a random number of further files has been written, or begins to be
+        aim = files + seed.randint(0, 2)
+        while process.poll() is None and time.monotonic() - begun < 120:
+            if len(list(study.parent.rglob("*.json"))) >= aim and (study.parent / "study.results").exists():
+                time.sleep(seed.uniform(0.0, 0.05))
+                break
+            time.sleep(0.002)
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            kills += 1
+        process.wait()
+    assert kills >= 3
+    result = ck.Study.load(study).run()
+    assert numbers(result) == numbers(expected)
+    assert (study.parent / "study.lock").read_bytes() == (tmp_path / "whole" / "study.lock").read_bytes()
+    assert not list((study.parent / "study.results").rglob("*.part"))
+
+
+def test_damaged_results_are_made_again(study: Path) -> None:
+    first = ck.Study.load(study).run()
+    results = sorted((study.parent / "study.results").rglob("*.json"))
+    for k, path in enumerate(results):
+        text = path.read_text()
+        path.write_text([text[: len(text) // 2], "", text.replace("e", "3"), '{"format": 3}'][k % 4])
+    assert numbers(ck.Study.load(study).run()) == numbers(first)
+
+
+def test_two_processes_do_not_run_one_study_at_once(study: Path) -> None:
+    from creepkit.studies.execution import running_alone
+
+    with running_alone(study.parent / "study.results"), pytest.raises(StudyError, match="another process"):
+        ck.Study.load(study).run()
+    assert ck.Study.load(study).run(only="quality").failures == ()
+
+
+def test_the_lock_says_what_a_run_depends_on_and_refuses_another(study: Path) -> None:
+    with pytest.raises(StudyError, match="there is no lock"):
+        ck.Study.load(study).run(locked=True)
+    ck.Study.load(study).run(only="quality")
+    lock = json.loads((study.parent / "study.lock").read_text())
+    assert lock["versions"]["creepkit"] == ck.__version__
+    assert lock["settings"]["sobol_points"] == 64  # a default that the study does not name
+    assert len(lock["inputs"]) == 6
+    assert set(lock["laws"]) == {"norton", "strain-hardening"}
+    ck.Study.load(study).run(only="quality", locked=True)
+    study.write_text(STUDY.replace("frames = 12", "frames = 13"))
+    with pytest.raises(StudyError, match=r"frames.*changed from 12 to 13"):
+        ck.Study.load(study).run(locked=True)
+    path = study.parent / "study.lock"
+    path.write_text(path.read_text().replace('"numpy": "', '"numpy": "0.'))
+    study.write_text(STUDY)
+    changes = ck.Study.load(study).run(only="quality").changes
+    assert any(change.startswith("version of numpy: changed from 0.") for change in changes)
+    path.write_text("{}")
+    with pytest.raises(StudyError, match="not a study.lock"):
+        ck.Study.load(study).run()
+
+
+def test_a_stage_that_fails_leaves_the_others(study: Path) -> None:
+    """Two tests do not determine a law of temperature; whatever rests on it is missing, the rest is there."""
+    text = STUDY + '[temperature]\n[[export]]\ntarget = "latex"\nlaw = "temperature"\ngroup = "A"\n[report]\n'
+    study.write_text(text)
+    result = ck.Study.load(study).run()
+    assert states(result)["temperature of A"] == "failed"
+    assert states(result)["export 2 of A: latex"] == "failed"
+    assert "three temperatures" in " ".join(f.sentence for f in result.failures) or result.failures[0].sentence
+    assert set(result.rankings) == {"A", "B"}
+    assert result.report is not None
+    page = result.report.read_text()
+    assert "temperature of A" in page
+    again = ck.Study.load(study).run()
+    assert states(again)["report"] == "kept"
+    assert states(again)["temperature of A"] == "failed"
+
+
+def test_a_report_runs_again_from_what_it_carries(study: Path, tmp_path: Path) -> None:
+    study.write_text(STUDY.replace("data/*.csv", "../elsewhere/*.csv") + "[report]\n")
+    (study.parent / "data").rename(study.parent.parent / "elsewhere")
+    first = ck.Study.load(study).run()
+    assert first.report is not None
+    (study.parent.parent / "elsewhere").rename(tmp_path / "gone")
+    again = study_of_report(first.report, tmp_path / "again").run()
+    assert again.changes == ()
+    assert numbers(again) == numbers(first)
+    assert (tmp_path / "again" / "inputs" / "up" / "elsewhere").is_dir()
+    with pytest.raises(StudyError, match="differs from what"):
+        (tmp_path / "again" / "study.toml").write_text(STUDY)
+        study_of_report(first.report, tmp_path / "again")
+
+
+def test_a_report_of_large_data_carries_their_hashes(study: Path, tmp_path: Path) -> None:
+    study.write_text(STUDY + "[report]\nattach_MB = 0.001\n")
+    result = ck.Study.load(study).run()
+    assert result.report is not None
+    with pytest.raises(StudyError, match="hashes of its data alone"):
+        study_of_report(result.report, tmp_path / "again")
+    (study.parent / "data").rename(tmp_path / "again" / "inputs" / "data") if (
+        tmp_path / "again" / "inputs"
+    ).is_dir() else (tmp_path / "again" / "inputs").mkdir()
+    if (study.parent / "data").is_dir():
+        (study.parent / "data").rename(tmp_path / "again" / "inputs" / "data")
+    assert numbers(study_of_report(result.report, tmp_path / "again").run()) == numbers(result)
