@@ -24,7 +24,7 @@ TRUTH = {
 }
 THICKNESSES = (0.46, 0.48, 0.50, 0.52, 0.54)  # mm, at the apex
 LOADING = ck.PressureJump(P1=8, P2=10, Tj=3600.0)  # MPa, s
-TIMES = np.concatenate([np.arange(120.0, 3600.0, 240.0), np.arange(3600.0, 3 * 3600.0 + 1, 360.0)])
+TIMES = np.concatenate([np.arange(200.0, 3600.0, 400.0), np.arange(3600.0, 3 * 3600.0 + 1, 900.0)])
 TEMPERATURE, ELASTIC = 1073.15, ck.Elastic(E=150e3)
 NOISE, SEED = {"amplitude": 1.5e-3, "width": 0.02, "shape": 0.02}, 1
 
