@@ -43,7 +43,8 @@ def command(
     from creepkit.studies.extraction import study_of_report
     from creepkit.studies.study import Study
 
-    if study.suffix.lower() in REPORT_SUFFIXES:
+    from_report = study.suffix.lower() in REPORT_SUFFIXES
+    if from_report:
         folder = to if to is not None else study.parent / f"{study.stem}_study"
         loaded, target = study_of_report(study, folder), folder
     else:
@@ -56,6 +57,8 @@ def command(
         print_json(result_to_json(result))
     else:
         print_result(result)
+    if from_report and not result.changes:
+        typer.echo(f"all numbers are those of {study}", err=as_json)
     if result.failures:
         first = result.failures[0]
         others = f" ({len(result.failures) - 1} more)" if len(result.failures) > 1 else ""
@@ -66,7 +69,8 @@ def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, and where the report is."""
     print_table(result.title, ("stage", "state", ""), [(one.name, one.state, one.sentence) for one in result.stages])
     for exclusion in result.exclusions:
-        frames = f" {len(exclusion.frames)} frames" if exclusion.frames else ""
+        count = len(exclusion.frames)
+        frames = f", {count} frame{'s' if count > 1 else ''}" if count else ""
         typer.echo(f"left out: {exclusion.test}{frames}: {exclusion.reason}")
     for group, ranking in result.rankings.items():
         typer.echo(f"{group}: {ranking.verdict}" if group else ranking.verdict)

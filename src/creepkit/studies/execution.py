@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -17,6 +17,7 @@ from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_t
 from creepkit.records import History
 from creepkit.reports.contents import StageFailure
 from creepkit.studies.documents import ResultCodec, ResultFolder, key_of
+from creepkit.studies.numbers import numbers_of
 from creepkit.studies.stages import Stage
 
 LOCK_NAME = "running.lock"
@@ -27,7 +28,8 @@ class StageRecord:
     """How a stage of a run ended.
 
     name, kind, group : of the stage. state : "made", "kept" from an earlier run, "failed", or "left out" where it was
-    not asked for. key : hash of all that decides its result. sentence : why it failed.
+    not asked for. key : hash of all that decides its result. sentence : why it failed. numbers : of its result, which
+    study.lock records.
     """
 
     name: str
@@ -36,6 +38,7 @@ class StageRecord:
     state: Literal["made", "kept", "failed", "left out"]
     key: str
     sentence: str = ""
+    numbers: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 class LazyResults:
@@ -112,8 +115,9 @@ class Execution:
                 self._record(stage, "failed", key, f"{failed[0]} failed, which it needs")
                 continue
             self._report(stage, 0, 1, f"stage {number} of {len(stages)}")
-            if self._read(stage, key):
-                self._record(stage, "kept", key)
+            numbers = self._read(stage, key)
+            if numbers is not None:
+                self._record(stage, "kept", key, numbers=numbers)
                 self._report(stage, 1, 1, "kept from before")
                 continue
             self._make(stage, key)
@@ -124,8 +128,10 @@ class Execution:
         versions = {name: version(name) for name in COMPUTING}
         return key_of({"kind": stage.kind, "settings": stage.settings, "needs": needs, "versions": versions})
 
-    def _record(self, stage: Stage, state: Any, key: str, sentence: str = "") -> None:
-        self.records.append(StageRecord(stage.name, stage.kind, stage.group, state, key, sentence))
+    def _record(
+        self, stage: Stage, state: Any, key: str, sentence: str = "", numbers: Mapping[str, Any] | None = None
+    ) -> None:
+        self.records.append(StageRecord(stage.name, stage.kind, stage.group, state, key, sentence, numbers or {}))
 
     def _report(self, stage: Stage, done: int, total: int, note: str) -> None:
         if self.progress is not None:
@@ -134,19 +140,23 @@ class Execution:
     def _codec(self, stage: Stage) -> Any:
         return ResultCodec(self.histories, stage.predictor).codec
 
-    def _read(self, stage: Stage, key: str) -> bool:
-        """Whether a result of this key is there; it is read at once where it is a record, for a file may be damaged."""
+    def _read(self, stage: Stage, key: str) -> dict[str, Any] | None:
+        """The numbers of a result of this key, None where there is none.
+
+        A record is read at once, for its file may be damaged; what is no record is made again when it is asked for.
+        """
         data = self.folder.load(stage.name, key)
-        if data is None:
-            return False
+        if not isinstance(data, dict) or not isinstance(data.get("numbers"), dict):
+            return None
+        numbers: dict[str, Any] = data["numbers"]
         if stage.record is None:
             self.results.defer(stage.name, lambda: self._made(stage, _no_tick))
-            return True
+            return numbers
         try:
             self.results.set(stage.name, self._codec(stage).from_json(stage.record, data["record"]))
         except (CreepkitError, KeyError, TypeError, ValueError, AssertionError):
-            return False
-        return True
+            return None
+        return numbers
 
     def _make(self, stage: Stage, key: str) -> None:
         start = time.monotonic()
@@ -166,13 +176,13 @@ class Execution:
             self._report(stage, 1, 1, "failed")
             return
         self.results.set(stage.name, result)
-        self._record(stage, "made", key)
+        numbers = numbers_of(stage.kind, result)
+        self._record(stage, "made", key, numbers=numbers)
         try:
-            data = {} if stage.record is None else {"record": self._codec(stage).to_json(result)}
+            record = {} if stage.record is None else {"record": self._codec(stage).to_json(result)}
+            self.folder.save(stage.name, key, {"numbers": numbers, **record})
         except RecordError:  # of what a plugin brought; it is made again next time
-            data = None
-        if data is not None:
-            self.folder.save(stage.name, key, data)
+            pass
         self._report(stage, 1, 1, f"done in {duration_text(time.monotonic() - start)}")
 
     def _made(self, stage: Stage, tick: Callable[[str, int, int], None]) -> Any:

@@ -16,6 +16,7 @@ from creepkit.files.record_codec import record_to_json
 from creepkit.studies import arguments
 from creepkit.studies.execution import StageRecord
 from creepkit.studies.inputs import InputFile
+from creepkit.studies.numbers import changed_numbers
 from creepkit.studies.study_file import StudyFile
 
 STUDY_LOCK = DocumentFormat(
@@ -57,7 +58,7 @@ def lock_of(file: StudyFile, study_hash: str, files: Sequence[InputFile], record
         "declared": model.model_dump(),
         "settings": settings,
         "laws": laws,
-        "stages": {one.name: {"key": one.key, "state": _state(one)} for one in records},
+        "stages": {one.name: {"key": one.key, "state": _state(one), "numbers": dict(one.numbers)} for one in records},
     }
     return as_read_back({**STUDY_LOCK.heading, **content})
 
@@ -83,7 +84,7 @@ def read_lock(path: Path) -> dict[str, Any]:
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """What differs between two locks, one sentence each; stages are not compared, for they follow from the rest."""
+    """What differs between two locks, one sentence each; stages are not compared (see changed_results)."""
     found = []
     for name in ("versions", "inputs", "laws"):
         old, new = before[name], now[name]
@@ -101,6 +102,19 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     if before["seed"] != now["seed"]:
         found.append(f"seed: changed from {before['seed']} to {now['seed']}")
     return list(dict.fromkeys(found))
+
+
+def changed_results(before: Mapping[str, Any], records: Sequence[StageRecord]) -> list[str]:
+    """Numbers that a run gives otherwise than the lock has them, though all that decides them is the same."""
+    found = []
+    for one in records:
+        old = before["stages"].get(one.name)
+        if isinstance(old, dict) and old.get("key") == one.key and one.state in ("made", "kept"):
+            found += [
+                f"result of {one.name}: {name} was {_short(a)}, and is {_short(b)}"
+                for name, a, b in changed_numbers(old.get("numbers", {}), one.numbers)
+            ]
+    return found
 
 
 def _changes(old: Any, new: Any, place: str) -> list[tuple[str, str, str]]:

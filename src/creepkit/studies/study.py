@@ -15,7 +15,7 @@ from creepkit.studies import arguments
 from creepkit.studies.documents import ResultFolder
 from creepkit.studies.execution import Execution, running_alone
 from creepkit.studies.inputs import InputFile, input_files, read_inputs, resolve_paths
-from creepkit.studies.lock import differences, lock_if_any, lock_of, write_lock
+from creepkit.studies.lock import changed_results, differences, lock_if_any, lock_of, write_lock
 from creepkit.studies.page import lock_path_of, write_page
 from creepkit.studies.result import StudyResult
 from creepkit.studies.stages import STAGE_KINDS, Stages, needed_stages
@@ -141,6 +141,8 @@ class Study:
         execution = Execution(kept, inputs.histories, progress)
         execution.run(stages, needed_stages(stages, kinds))
         write_lock(lock_of(self.file, self._hash, files, execution.records), lock_path)
+        if before is not None:
+            changes += changed_results(before, execution.records)
         result = StudyResult(
             self.file.model.study.title,
             inputs.groups,

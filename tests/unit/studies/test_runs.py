@@ -46,16 +46,28 @@ file = "law.py"
 
 
 @pytest.fixture
+def plain_pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages with their attachments and failures alone: what else they show takes seconds."""
+    from creepkit.reports import html
+    from creepkit.reports.attachments import embed
+
+    def page(contents: Any) -> str:
+        return f"<p>{[one.stage for one in contents.failures]}</p>{embed(contents.attachments)}"
+
+    monkeypatch.setattr(html, "report_html", page)
+
+
+@pytest.fixture
 def study(tmp_path: Path) -> Path:
-    """A study of two alloys, A at 750 C and B at 850 C."""
+    """A study of two alloys, A at 750 C and B at 850 C, of two tests each."""
     return study_in(tmp_path)
 
 
 def study_in(folder: Path, text: str = STUDY) -> Path:
     (folder / "data").mkdir(parents=True)
-    for source in sorted(ck.example_data("planted creep curves").glob("*.csv")):
+    for source in sorted(ck.example_data("planted creep curves").glob("*MPa.csv")):
         alloy = {"750": "A", "850": "B"}.get(source.name[8:11])
-        if alloy:
+        if alloy and "_to_" not in source.name:
             content = source.read_text()
             (folder / "data" / source.name).write_text(f"# alloy: {alloy}\n{content}")
     path = folder / "study.toml"
@@ -115,9 +127,7 @@ def test_only_what_changed_runs_again(study: Path) -> None:
     assert made(ck.Study.load(study).run()) == {"export 1 of A: latex", "export 1 of B: latex"}
 
     study.write_text(STUDY.replace("starts = 1", "starts = 2"))
-    assert made(ck.Study.load(study).run()) == everything - {"quality"} - {"export 1 of A: python"} | {
-        "export 1 of A: python"
-    }
+    assert made(ck.Study.load(study).run()) == everything - {"quality"}
     assert made(ck.Study.load(study).run(force=True)) == everything
 
 
@@ -165,7 +175,7 @@ def test_a_run_that_is_killed_anywhere_goes_on_to_the_same_result(tmp_path: Path
     study = study_in(tmp_path / "killed")
     seed = random.Random(3)
     kills = 0
-    for _ in range(6):
+    for _ in range(4):
         process = subprocess.Popen([sys.executable, "-c", RUN, str(study)], start_new_session=True)
         begun = time.monotonic()
         files = len(list(study.parent.rglob("*.json")))
@@ -180,7 +190,7 @@ def test_a_run_that_is_killed_anywhere_goes_on_to_the_same_result(tmp_path: Path
             os.killpg(process.pid, signal.SIGKILL)
             kills += 1
         process.wait()
-    assert kills >= 3
+    assert kills >= 2
     result = ck.Study.load(study).run()
     assert numbers(result) == numbers(expected)
     assert (study.parent / "study.lock").read_bytes() == (tmp_path / "whole" / "study.lock").read_bytes()
@@ -211,7 +221,7 @@ def test_the_lock_says_what_a_run_depends_on_and_refuses_another(study: Path) ->
     lock = json.loads((study.parent / "study.lock").read_text())
     assert lock["versions"]["creepkit"] == ck.__version__
     assert lock["settings"]["sobol_points"] == 64  # a default that the study does not name
-    assert len(lock["inputs"]) == 6
+    assert len(lock["inputs"]) == 4
     assert set(lock["laws"]) == {"norton", "strain-hardening"}
     ck.Study.load(study).run(only="quality", locked=True)
     study.write_text(STUDY.replace("frames = 12", "frames = 13"))
@@ -227,7 +237,7 @@ def test_the_lock_says_what_a_run_depends_on_and_refuses_another(study: Path) ->
         ck.Study.load(study).run()
 
 
-def test_a_stage_that_fails_leaves_the_others(study: Path) -> None:
+def test_a_stage_that_fails_leaves_the_others(study: Path, plain_pages: None) -> None:
     """Two tests do not determine a law of temperature; whatever rests on it is missing, the rest is there."""
     text = STUDY + '[temperature]\n[[export]]\ntarget = "latex"\nlaw = "temperature"\ngroup = "A"\n[report]\n'
     study.write_text(text)
@@ -244,7 +254,7 @@ def test_a_stage_that_fails_leaves_the_others(study: Path) -> None:
     assert states(again)["temperature of A"] == "failed"
 
 
-def test_a_report_runs_again_from_what_it_carries(study: Path, tmp_path: Path) -> None:
+def test_a_report_runs_again_from_what_it_carries(study: Path, plain_pages: None, tmp_path: Path) -> None:
     study.write_text(STUDY.replace("data/*.csv", "../elsewhere/*.csv") + "[report]\n")
     (study.parent / "data").rename(study.parent.parent / "elsewhere")
     first = ck.Study.load(study).run()
@@ -253,21 +263,24 @@ def test_a_report_runs_again_from_what_it_carries(study: Path, tmp_path: Path) -
     again = study_of_report(first.report, tmp_path / "again").run()
     assert again.changes == ()
     assert numbers(again) == numbers(first)
+    lock = tmp_path / "again" / "study.lock"
+    content = json.loads(lock.read_text())
+    content["stages"]["identification of A"]["numbers"]["values"]["norton"]["n"] *= 1.001
+    lock.write_text(json.dumps(content))
+    (change,) = study_of_report(first.report, tmp_path / "again").run().changes
+    assert change.startswith("result of identification of A: values norton n was ")
     assert (tmp_path / "again" / "inputs" / "up" / "elsewhere").is_dir()
+    (tmp_path / "again" / "study.toml").write_text(STUDY)
     with pytest.raises(StudyError, match="differs from what"):
-        (tmp_path / "again" / "study.toml").write_text(STUDY)
         study_of_report(first.report, tmp_path / "again")
 
 
-def test_a_report_of_large_data_carries_their_hashes(study: Path, tmp_path: Path) -> None:
+def test_a_report_of_large_data_carries_their_hashes(study: Path, plain_pages: None, tmp_path: Path) -> None:
     study.write_text(STUDY + "[report]\nattach_MB = 0.001\n")
     result = ck.Study.load(study).run()
     assert result.report is not None
     with pytest.raises(StudyError, match="hashes of its data alone"):
         study_of_report(result.report, tmp_path / "again")
-    (study.parent / "data").rename(tmp_path / "again" / "inputs" / "data") if (
-        tmp_path / "again" / "inputs"
-    ).is_dir() else (tmp_path / "again" / "inputs").mkdir()
-    if (study.parent / "data").is_dir():
-        (study.parent / "data").rename(tmp_path / "again" / "inputs" / "data")
+    (tmp_path / "again" / "inputs").mkdir()
+    (study.parent / "data").rename(tmp_path / "again" / "inputs" / "data")
     assert numbers(study_of_report(result.report, tmp_path / "again").run()) == numbers(result)

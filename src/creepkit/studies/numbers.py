@@ -1,0 +1,58 @@
+"""Numbers of a stage's result that study.lock records, so that a run says whether it gives them again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from creepkit.files.record_codec import record_to_json
+from creepkit.studies.stages import StageKind
+
+SAME_NUMBER = 1e-6
+"""Relative difference up to which two numbers are taken as equal: other processors round otherwise."""
+
+
+def numbers_of(kind: StageKind, result: Any) -> dict[str, Any]:
+    """The numbers of a result by name, as JSON holds them."""
+    found: dict[str, Any]
+    if kind == "identification":
+        found = {"weights": {one.fit.law.name: one.weight for one in result.laws}}
+        found["values"] = {one.fit.law.name: one.fit.values for one in result.laws}
+    elif kind == "temperature":
+        found = {"forms": result.temperature_law.forms, "values": result.temperature_law.values}
+    elif kind == "rupture":
+        found = {
+            f"{one.method} {one.hours:g} h {one.temperature:g} K": one.value
+            for one in result.strengths
+            if one.value is not None
+        }
+    elif kind == "forecast":
+        found = {
+            test.name: {
+                **{name: float(output.value[-1]) for name, output in test.outputs.items()},
+                **{time.event: [time.value, time.low, time.high] for time in test.times},
+            }
+            for test in result.tests
+        }
+    elif kind == "design":
+        found = {"plan": [test.description for test in result.plan]}
+    else:
+        found = {}
+    numbers: dict[str, Any] = record_to_json(found)
+    return numbers
+
+
+def changed_numbers(old: Any, new: Any, place: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """(name, old, new) of numbers and texts that differ by more than rounding."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        for key in [*old, *(one for one in new if one not in old)]:
+            yield from changed_numbers(old.get(key), new.get(key), f"{place} {key}".strip())
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for first, second in zip(old, new, strict=True):
+            yield from changed_numbers(first, second, place)
+    elif isinstance(old, int | float) and isinstance(new, int | float):
+        if not math.isclose(old, new, rel_tol=SAME_NUMBER, abs_tol=1e-300):
+            yield place, old, new
+    elif old != new:
+        yield place, old, new

@@ -1,0 +1,105 @@
+"""`creepkit init` and `creepkit run` as a user: a folder of files to a report, and the report to the same numbers."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import creepkit as ck
+from creepkit.cli.app import app
+from helpers.paths import EXAMPLES, SHARED, needs_shared_data
+
+
+def creepkit(*words: object):
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Three creep curves, and a file that holds no test."""
+    folder = tmp_path / "measured"
+    folder.mkdir()
+    for source in ck.example_data("planted creep curves").glob("*850C*.csv"):
+        (folder / source.name).write_bytes(source.read_bytes())
+    (folder / "notes.txt").write_text("the furnace was opened on Tuesday\n")
+    return folder
+
+
+def test_a_folder_becomes_a_study_a_report_and_the_same_numbers_again(folder: Path, tmp_path: Path) -> None:
+    first = creepkit("init", folder)
+    assert first.exit_code == 0, first.output
+    study = folder / "study.toml"
+    text = study.read_text()
+    model = tomllib.loads(text)
+    assert model["identification"]["laws"] == ["norton", "strain-hardening", "time-hardening", "hyperbolic-sine"]
+    assert "temperature" not in model  # all tests are at one
+    assert "# [[forecast]]" in text
+    again = creepkit("init", folder)
+    assert again.exit_code == 1
+    assert "exists already" in again.output
+    assert study.read_text() == text
+
+    study.write_text(text.replace("# starts = 8", "starts = 1\nframes = 15").replace(', "hyperbolic-sine"', ""))
+    ran = creepkit("run", study, "--to", tmp_path / "made", "--json")
+    assert ran.exit_code == 0, ran.output
+    told = json.loads(ran.stdout)
+    assert {one["state"] for one in told["stages"]} == {"made"}
+    assert {"report.html", "study.lock", "law.tex", "law.py"} <= {path.name for path in (tmp_path / "made").iterdir()}
+    assert len(list(folder.iterdir())) == 5  # the data, the notes and the study
+
+    ran = creepkit("run", tmp_path / "made" / "report.html", "--to", tmp_path / "again", "--only", "identification")
+    assert ran.exit_code == 0, ran.output
+    assert "all numbers are those of" in ran.output
+
+
+def test_every_mistake_is_one_line_with_file_and_line(folder: Path) -> None:
+    study = folder / "study.toml"
+    study.write_text('[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["nortn"]\n')
+    ran = creepkit("run", study)
+    assert ran.exit_code == 1
+    (line,) = ran.stderr.splitlines()
+    assert line.startswith(f"creepkit: {study}:4: [identification] laws: ")
+    assert "did you mean 'norton'" in line
+    ran = creepkit("run", folder / "planted_850C_70MPa.csv")
+    assert ran.exit_code == 1
+    assert "this is not TOML" in ran.stderr
+    ran = creepkit("run", study, "--only", "identify")
+    assert ran.exit_code == 1
+    ran = creepkit("init", folder / "missing")
+    assert ran.exit_code == 1
+    assert "no such folder" in ran.stderr
+
+
+@needs_shared_data
+@pytest.mark.parametrize("name", ["cmsx6", "alloy617", "inconel625"])
+def test_the_studies_of_public_data_are_valid_and_their_tests_are_checked(name: str, tmp_path: Path) -> None:
+    """Their identifications are a benchmark program, tests/benchmarks/studies.py."""
+    text = (EXAMPLES / "studies" / f"{name}.toml").read_text()
+    data = Path(tomllib.loads(text)["data"]["files"][0]).relative_to("../../../shared/data")
+    (tmp_path / "data").symlink_to(SHARED, target_is_directory=True)
+    (tmp_path / "study.toml").write_text(text.replace("../../../shared/data", "data"))
+    result = ck.Study.load(tmp_path / "study.toml").run(only="quality")
+    assert len(result.measured) == len(
+        ck.read_histories(SHARED / data if data.suffix == "" else sorted(SHARED.glob(str(data))))
+    )
+    assert result.quality is not None
+
+
+@needs_shared_data
+def test_studies_of_public_folders_are_proposed_and_valid(tmp_path: Path) -> None:
+    for name, laws in (
+        ("uniaxial/cmsx6", "kachanov-rabotnov"),
+        ("uniaxial/alloy617", "mpc-omega"),
+        ("dabi/in625", "norton"),
+    ):
+        target = tmp_path / Path(name).name / "study.toml"
+        target.parent.mkdir()
+        (tmp_path / Path(name).name / "data").symlink_to(SHARED / name, target_is_directory=True)
+        ran = creepkit("init", target.parent / "data", "--to", target)
+        assert ran.exit_code == 0, ran.output
+        assert laws in tomllib.loads(target.read_text())["identification"]["laws"]
+        ck.Study.load(target)
