@@ -20,6 +20,7 @@ extensions = [
     "reference_pages",
     "docstrings",
     "gallery_sources",
+    "study_reports",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_extensions"]
@@ -27,10 +28,13 @@ templates_path: list[str] = []
 
 html_theme = "furo"
 html_title = "creepkit"
+html_extra_path = ["../build/site"]
 html_theme_options = {"navigation_with_keys": True}
 
 myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 3
+# Reports of studies, from a page in a folder of docs/: report:FOLDER/FILE without its suffix.
+myst_url_schemes = {"http": None, "https": None, "mailto": None, "report": {"url": "../reports/{{path}}.html"}}
 # Options of commands keep their two hyphens.
 smartquotes = False
 

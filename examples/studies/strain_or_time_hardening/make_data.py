@@ -17,9 +17,9 @@ HERE = Path(__file__).parent
 HOUR = 3600.0
 TRUTH = {"A": 2.5e-18, "n": 4.6, "m": -0.4}
 CONSTANT = {"CL-1": 120.0, "CL-2": 150.0, "CL-3": 180.0}  # MPa
-STEPPED = {"ST-1": ((0.0, 100.0), (13.5 * HOUR, 180.0))}  # s, MPa
+STEPPED = {"ST-1": ((0.0, 100.0), (24 * HOUR, 134.0))}  # s, MPa
 LONGEST, LARGEST_STRAIN, TEMPERATURE, MODULUS = 72 * HOUR, 0.02, 973.15, 150e3
-RATE_SCATTER, LOADING_STRAIN, NOISE, SEED = 0.05, 1e-4, 2e-5, 3
+RATE_SCATTER, LOADING_STRAIN, NOISE, SEED = 0.05, 1e-4, 2e-5, 5
 
 
 def main() -> None:

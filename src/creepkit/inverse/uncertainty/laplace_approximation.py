@@ -264,7 +264,8 @@ def cut_interval_notes(law: CreepLaw, estimates: Sequence[Estimate]) -> tuple[st
     """Intervals that a bound of the search cuts off, a sentence each: those of functions of the value are not cut."""
     sentences = []
     for (name, param), one in zip(law.table.items(), estimates, strict=True):
-        cut = [b for b, end in zip(param.bounds, (one.low, one.high), strict=True) if np.isclose(b, end, rtol=1e-9)]
+        ends = zip(param.bounds, (one.low, one.high), strict=True)
+        cut = [b for b, end in ends if np.isclose(b, end, rtol=1e-9, atol=0.0)]  # bounds of rates are far below 1e-8
         if one.verdict == "determined" and cut:
             sentences.append(
                 f"the interval of {name} ends at its bound, {cut[0]:.4g}, and not by the tests: intervals of rates and "
