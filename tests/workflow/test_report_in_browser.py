@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from creepkit.reports.html import report_html
-from helpers.browser import browser
+from helpers.browser import browser as chromium
 from helpers.report_pages import contents
 
 WIDTHS = (1280, 390)
@@ -13,7 +13,7 @@ WIDTHS = (1280, 390)
 
 @pytest.fixture(scope="module")
 def browser():
-    with browser() as opened:
+    with chromium() as opened:
         yield opened
 
 
