@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from functools import lru_cache
-from typing import Any
 
 from creepkit.app.contents import PageContents
 from creepkit.app.reduced_model_data import rom_data
