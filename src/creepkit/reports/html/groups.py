@@ -16,8 +16,8 @@ from creepkit.reports.html.elements import (
     Block,
     Formula,
     Items,
+    PageSection,
     Paragraph,
-    Section,
     Table,
     number,
     plural,
@@ -361,11 +361,11 @@ def _unit(output: str) -> str:
 
 def group_sections(
     found: GroupFindings, figures: PageFigures, prefix: str, *, most_tests: int, ranking_drawn: bool
-) -> Sequence[Section]:
+) -> Sequence[PageSection]:
     """The sections on what was found, but for the verdict."""
     return [
-        Section(f"{prefix}curves", "The law over the tests", curve_blocks(found, figures)),
-        Section(f"{prefix}tests", "Tests", test_blocks(found, figures, most_tests)),
-        Section(f"{prefix}ranking", "Laws tried", ranking_blocks(found, figures, drawn=ranking_drawn)),
-        Section(f"{prefix}nuisances", "Noise and nuisance parameters", nuisance_blocks(found)),
+        PageSection(f"{prefix}curves", "The law over the tests", curve_blocks(found, figures)),
+        PageSection(f"{prefix}tests", "Tests", test_blocks(found, figures, most_tests)),
+        PageSection(f"{prefix}ranking", "Laws tried", ranking_blocks(found, figures, drawn=ranking_drawn)),
+        PageSection(f"{prefix}nuisances", "Noise and nuisance parameters", nuisance_blocks(found)),
     ]
