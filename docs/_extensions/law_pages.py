@@ -80,7 +80,11 @@ def _page(law: ck.CreepLaw, origin: str, caption: str) -> str:
         relations = ", ".join(_math(relation) for relation in law.constraints)
         parts += [f"The law holds where {relations}."]
     parts += ["## Creep curve", f"![creep curve of {law.name}]({law.name}.png)", caption]
-    parts += ["## Try it", TRY_IT, f"```{{raw}} html\n{page_fragment(page_contents(law), scripts=False)}\n{SCRIPT}\n```"]
+    parts += [
+        "## Try it",
+        TRY_IT,
+        f"```{{raw}} html\n{page_fragment(page_contents(law), scripts=False)}\n{SCRIPT}\n```",
+    ]
     parts += ["## References", "\n".join(f"- {reference}" for reference in law.references) or "None."]
     return "\n\n".join(parts) + "\n"
 

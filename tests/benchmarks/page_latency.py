@@ -114,7 +114,9 @@ def main() -> None:
     parser.add_argument("--moves", type=int, default=MOVES, help="steps of the pointer in each case")
     options = parser.parse_args()
     page = Page("page_latency", __doc__)
-    page.table("page", "answered by", "answers drawn", "median, ms", "95th percentile, ms", "95th percentile over limit")
+    page.table(
+        "page", "answered by", "answers drawn", "median, ms", "95th percentile, ms", "95th percentile over limit"
+    )
     cases = [("a text alone", "empty"), *((name, how) for name in CASES for how in ("server", "file"))]
     with browser() as chromium, tempfile.TemporaryDirectory() as folder:
         for name, how in cases:

@@ -95,9 +95,7 @@ def test_another_host_is_refused_also_where_its_name_leads_here(server, host):
 
 def test_two_hosts_are_refused(server):
     port = server.server_address[1]
-    answer = send(
-        server, f"GET /{server.token}/ HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nHost: evil\r\n\r\n".encode()
-    )
+    answer = send(server, f"GET /{server.token}/ HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nHost: evil\r\n\r\n".encode())
     assert answer.status == 403
 
 

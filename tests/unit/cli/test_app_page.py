@@ -65,9 +65,7 @@ def test_a_port_that_is_taken(tmp_path):
 def test_it_prints_its_address_and_ctrl_c_ends_it():
     words = [sys.executable, "-c", PROGRAM, "app", "norton", "--no-browser"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])}
-    with subprocess.Popen(
-        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
-    ) as process:
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment) as process:
         try:
             ready, _, _ = select.select([process.stdout], [], [], 120.0)
             line = process.stdout.readline() if ready else ""
