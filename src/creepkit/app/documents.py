@@ -280,7 +280,14 @@ def _test_fits(history: History, contents: PageContents) -> list[Any]:
 
 def numbers(values: Floats) -> list[float | None]:
     """Numbers to six digits, which is finer than a screen; None in the place of those that are not finite."""
-    return [float(f"{v:.6g}") if math.isfinite(v) else None for v in np.asarray(values, float).ravel().tolist()]
+    given = np.asarray(values, float).ravel()
+    with np.errstate(all="ignore"):
+        scale = 10.0 ** (5.0 - np.floor(np.log10(np.abs(given))))
+        rounded = np.round(given * scale) / scale
+    rounded = np.where(np.isfinite(rounded), rounded, given)
+    if np.isfinite(rounded).all():
+        return list(rounded.tolist())
+    return [value if math.isfinite(value) else None for value in rounded.tolist()]
 
 
 def finite(value: Any) -> float | None:
