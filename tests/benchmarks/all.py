@@ -55,6 +55,7 @@ BENCHMARKS = {
     "calculix": Benchmark(6, (("N3", "N7", "TH", "c1", "c2", "c3"),), "CalculiX (ccx)"),
     "verify_export": Benchmark(20, needs="gcc, gfortran, make, the network for CalculiX's source; CalculiX is built"),
     "neml2_model": Benchmark(1, needs="NEML2 3.1, see the program"),
+    "javascript_runtime": Benchmark(5, needs="node"),
     "clock_alignment": Benchmark(15, (("--tests", "39"),), DATA),
     "dataset_generation_speed": Benchmark(6, (("--samples", "256"),)),
     "surrogate_accuracy": Benchmark(10, (("--samples", "150"),)),

@@ -12,6 +12,7 @@ import creepkit as ck
 from creepkit.app.model_data import law_data
 from creepkit.app.runtime_files import runtime_script
 from creepkit.errors import SolveError
+from creepkit.kernels.log_form import log_form
 from creepkit.language import CreepLaw
 from creepkit.records import Program
 from helpers.javascript import run_in_node
@@ -22,7 +23,7 @@ vm.runInThisContext(await readFile("runtime.js", "utf8"));
 async function main({ cases, data, then }) {
   return cases.map(([source, call, values, options]) => {
     try {
-      const given = call === "simulateDimple" ? [data, options] : [options];
+      const given = data === null ? [options] : [data, options];
       const found = creepkit[call](vm.runInThisContext(source), values, ...given);
       return then ? { ...found, ...vm.runInThisContext(then)(found) } : found;
     } catch (error) {
@@ -49,10 +50,11 @@ def in_page(folder: Path, cases: Sequence[Case], data: Any = None, then: str = "
 def values_that_creep(
     law: CreepLaw, stress: float, goal: float = 0.02, duration: float = 1e5, T: float = 1073.0
 ) -> dict[str, float]:
-    """The middle of the bounds, every rate multiplied so that the strain at `duration`, s, is about `goal`."""
+    """The middle of the bounds, every term multiplied so that the strain at `duration`, s, is about `goal`."""
     values = law.center()
-    coefficients = [n for n, p in law.table.items() if p.scale == "log" and p.unit == "1/s"]
-    for _ in range(25):
+    coefficients = {law.names[positions[0]] for positions in log_form(law).coefficients if positions}
+    coefficients |= {n for n, p in law.table.items() if p.scale == "log" and p.unit == "1/s"}  # of states too
+    for _ in range(40):
         loading = ck.constant_stress(stress)
         try:
             run = ck.simulate(law, "uniaxial", values, loading=loading, times=[duration], temperature=T)
@@ -62,7 +64,7 @@ def values_that_creep(
         if 0.2 * goal < found < 5 * goal or not coefficients:
             break
         factor = float(np.clip((goal / max(found, 1e-30)) ** 0.7, 1e-8, 1e8))
-        values |= {n: min(values[n] * factor, 1.0) for n in coefficients}
+        values |= {n: min(values[n] * factor, 1e40) for n in coefficients}
     return values
 
 

@@ -30,6 +30,9 @@ s, K.
     }) -> {times, outputs: {amplitude, width: mm, shape}, radii: mm, profileAt(time): u_z mm of the top at those radii,
            placesAt(time): [[r, z], ...] mm of the nodes, edges: [[first, middle, last node], ...] of the outline,
            status, endTime, ruptureTime, reason, steps}
+    creepkit.predictByNetwork(law, {}, network, {  // network : of network_data.network_data(surrogate)
+      load: program, times: [...], constants: {modulus: 150e3, temperature: 1073, ...},  // those of network.constants
+    }) -> {times, outputs: {name: array}, status, endTime, ruptureTime, reason}; of bars the logarithmic creep strain
 
 Mistakes in what is given are RangeErrors of one sentence. Programs, stresses and ends are those of the specimens
 `uniaxial`, `relaxation` and `bulge`, and the integrators are those of the core, step by step.

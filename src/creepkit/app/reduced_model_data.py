@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import base64
 from typing import Any
 
-import numpy as np
-
-from creepkit.arrays import Floats, Ints
+from creepkit.app.packed_arrays import packed
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import SIDES, outline
 from creepkit.fem.reduced_order_model import ReducedOrderModel, mode_gradients
@@ -24,10 +21,9 @@ def rom_data(predictor: BulgeReducedOrderModel) -> dict[str, Any]:
     """
     setup = predictor.own_setup()
     model = predictor.reduced_model_of(setup)
-    specimen, settings = predictor.specimen, solver_settings(predictor.specimen)
+    settings = solver_settings(predictor.specimen)
     return {
-        "name": specimen.name,
-        "title": specimen.title,
+        "title": predictor.title,
         "modes": len(model.basis.modes),
         "nodeCount": len(model.model.nodes),
         "points": int(model.basis.points.size),
@@ -52,14 +48,14 @@ def _arrays(model: ReducedOrderModel) -> dict[str, dict[str, str]]:
     sides = outline(mesh.elements)
     edges = mesh.elements[sides[:, 0, None], SIDES[sides[:, 1]]]
     return {
-        "modes": _packed(basis.modes, "float32"),
-        "gradients": _packed(mode_gradients(mesh, basis.modes, basis.points), "float32"),
-        "weights": _packed(mesh.weights.ravel()[basis.points] * basis.factors, "float64"),
-        "places": _packed(mesh.nodes, "float64"),
-        "top": _packed(mesh.top, "int32"),
-        "pressed": _packed(mesh.pressed, "int32"),
-        "elements": _packed(mesh.elements, "int32"),
-        "edges": _packed(edges, "int32"),
+        "modes": packed(basis.modes, "float32"),
+        "gradients": packed(mode_gradients(mesh, basis.modes, basis.points), "float32"),
+        "weights": packed(mesh.weights.ravel()[basis.points] * basis.factors, "float64"),
+        "places": packed(mesh.nodes, "float64"),
+        "top": packed(mesh.top, "int32"),
+        "pressed": packed(mesh.pressed, "int32"),
+        "elements": packed(mesh.elements, "int32"),
+        "edges": packed(edges, "int32"),
     }
 
 
@@ -69,15 +65,9 @@ def _observation_arrays(setup: BulgeSetup) -> dict[str, dict[str, str]]:
         raise SolveError("a page shows amplitude, width and shape of a dimple; observe a profile or a field, not rings")
     grid = fit.grid
     return {
-        "sampling": _packed(fit.nodes, "float64"),
+        "sampling": packed(fit.nodes, "float64"),
         **{
-            name: _packed(getattr(grid, name), "float64")
+            name: packed(getattr(grid, name), "float64")
             for name in ("log_radius", "radial", "log_cosine", "log_sine", "angular")
         },
     }
-
-
-def _packed(values: Floats | Ints, kind: str) -> dict[str, str]:
-    """An array of any shape, its last axis fastest, as base64."""
-    numbers = np.ascontiguousarray(values, dtype=np.dtype(kind).newbyteorder("<"))
-    return {"type": kind, "data": base64.b64encode(numbers.tobytes()).decode("ascii")}

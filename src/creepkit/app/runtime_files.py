@@ -19,6 +19,7 @@ RUNTIME_FILES = (
     "time_interpolation.js",
     "profile_fit.js",
     "dimple.js",
+    "network.js",
 )
 """Each needs those before it."""
 

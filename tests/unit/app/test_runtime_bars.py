@@ -1,5 +1,7 @@
 """The runtime of the page, run in node, gives the creep and relaxation of bars that the specimens give."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,9 @@ from creepkit.laws.norton import NORTON
 from creepkit.records import Program, RecordedLoading
 from creepkit.registry import default_registry
 from helpers.export_cases import LAWS
+from helpers.javascript import run_in_node
 from helpers.page_runtime import in_page, pairs, values_that_creep
+from helpers.paths import ROOT
 
 AGREEMENT = 1e-6
 """Relative; the integrator of the core errs by more itself, and this one takes its very steps."""
@@ -137,3 +141,23 @@ def test_mistakes_are_one_sentence(tmp_path):
         "RangeError: a relaxation test needs elastic data: elastic: {modulus: 150e3}, in MPa",
         "RangeError: the modulus changes with the temperature of the test; a relaxation test takes one modulus",
     ]
+
+
+def test_the_page_of_the_guide_computes(tmp_path):
+    """The second snippet of the guide, its scripts run one after another: the creep of Norton's law in closed form."""
+    text = (ROOT / "docs" / "how-to" / "use_laws_in_javascript.md").read_text(encoding="utf-8")
+    names: dict[str, object] = {}
+    for block in re.findall(r"```python\n(.*?)```", text, re.S):
+        exec(compile(block, "guide", "exec"), names)
+    program = """
+    import vm from "node:vm";
+    async function main(page) {
+      globalThis.document = {};
+      for (const [, script] of page.matchAll(/<script>([^]*?)<\\/script>/g)) vm.runInThisContext(script);
+      return document.title;
+    }
+    """
+    rate = 1e-16 * 100.0**5
+    assert float(run_in_node(tmp_path, program, names["page"])) == pytest.approx(
+        -np.log1p(-5 * rate * 36000) / 5, rel=1e-6
+    )

@@ -106,7 +106,7 @@ globalThis.creepkit = globalThis.creepkit || {};
       Object.prototype.hasOwnProperty.call(parameters, p.name) ? Number(parameters[p.name]) : p.value);
     const { rates, terms, update, leadingExponent } = kernel(values);
     return {
-      law, rates, terms, update, beta: leadingExponent,
+      law, values, rates, terms, update, beta: leadingExponent,
       names: law.states.map((s) => s.name),
       states: law.states.length,
       initial: law.states.map((s) => s.initial),

@@ -36,6 +36,8 @@
       this.moduli = new Float64Array(16);
       this.increment = this.byTrial = this.byPrincipal = this.byMean = 0.0;
       this.undefinedRate = false;
+      this.usesPrincipal = law.law.variables.includes("principal_stress");
+      this.usesMean = law.law.variables.includes("mean_stress");
       law.initial.forEach((initial, s) => {
         this.value.fill(initial, (EQUIVALENT + 1 + s) * count, (EQUIVALENT + 2 + s) * count);
         this.state.fill(initial, s * count, (s + 1) * count);
@@ -54,7 +56,7 @@
       const stiffness = (3.0 * stage.shear) / volume, trial = stiffness * equivalent;
       this.increment = this.byTrial = this.byPrincipal = this.byMean = 0.0;
       if (stage.weight > 0.0 && equivalent > 0.0) {
-        if (!this.creep(stage, k, trial, stiffness, equivalent, mean, top, tolerance)) return false;
+        if (!this.creep(stage, k, trial, stiffness, equivalent, mean, top, tolerance, stiff)) return false;
       }
       const increment = this.increment;
       this.increments[k] = increment;
@@ -119,7 +121,7 @@
     }
 
     /** The creep increment of point k and its derivatives; false where none is found. */
-    creep(stage, k, trial, stiffness, equivalent, mean, top, tolerance) {
+    creep(stage, k, trial, stiffness, equivalent, mean, top, tolerance, stiff) {
       const { solver, count } = this, { row, out, axes } = solver;
       let guess = this.increments[k];
       if (this.trials[k] >= 0.0) {
@@ -132,7 +134,9 @@
       row[creepkit.point.TIME] = stage.time;
       row[creepkit.point.TEMPERATURE] = stage.temperature;
       const strain = this.base[EQUIVALENT * count + k];
-      if (this.law.states > 0) return this.creepWithStates(stage, k, trial, stiffness, strain, guess, tolerance);
+      if (this.law.states > 0) {
+        return this.creepWithStates(stage, k, trial, stiffness, strain, guess, tolerance, stiff);
+      }
       let share = Math.min(guess / equivalent, 0.9999), settled = false;
       if (!(share > 1e-280)) share = 1e-6;
       for (let iteration = 0; iteration < ITERATIONS && !settled; iteration += 1) {
@@ -171,7 +175,7 @@
       return true;
     }
 
-    creepWithStates(stage, k, trial, stiffness, strain, guess, tolerance) {
+    creepWithStates(stage, k, trial, stiffness, strain, guess, tolerance, stiff) {
       const { solver, count, history, law } = this, { row, out } = solver, first = EQUIVALENT + 1;
       for (let i = 0; i < law.states; i += 1) {
         row[POINT + i] = this.state[i * count + k];
@@ -184,22 +188,22 @@
       }
       this.increment = solver.increment;
       for (let i = 0; i < law.states; i += 1) this.state[i * count + k] = row[POINT + i];
-      if (!(this.increment > 0.0)) return true;
-      this.byTrial = this.stateResponse(stage, (start) => solver.byStress(start), stiffness);
-      this.byPrincipal = this.stateResponse(stage, (start) => out[start + PRINCIPAL], stiffness);
-      this.byMean = this.stateResponse(stage, (start) => out[start + MEAN], stiffness);
+      if (!(this.increment > 0.0) || !stiff) return true;
+      this.byTrial = this.stateResponse(stage, -1, stiffness);
+      if (this.usesPrincipal) this.byPrincipal = this.stateResponse(stage, PRINCIPAL, stiffness);
+      if (this.usesMean) this.byMean = this.stateResponse(stage, MEAN, stiffness);
       return true;
     }
 
-    /** Derivative of D to an input of the stage, from the derivatives of [ln f, g] to it that begin at `start`. */
-    stateResponse(stage, along, stiffness) {
+    /** Derivative of D to the trial stress (variable -1), or to a shift of a variable of the point. */
+    stateResponse(stage, variable, stiffness) {
       const { solver, matrix, right, increment } = this, { size, width, out } = solver;
       for (let i = 0; i < size; i += 1) {
         const start = size + i * width, factor = i === 0 ? increment : stage.weight;
         matrix[i * size] = factor * (-out[start + 1] + solver.byStress(start) * stiffness);
         for (let j = 1; j < size; j += 1) matrix[i * size + j] = -factor * out[start + POINT + j - 1];
         matrix[i * size + i] += 1.0;
-        right[i] = factor * along(start);
+        right[i] = factor * (variable < 0 ? solver.byStress(start) : out[start + variable]);
       }
       return creepkit.solveDense(matrix, right, size) ? right[0] : 0.0;
     }

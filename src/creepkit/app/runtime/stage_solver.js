@@ -13,6 +13,12 @@
 
   const UNIAXIAL = Object.freeze({ principal: 0.0, principalSlope: 1.0, mean: 0.0, meanSlope: 1.0 / 3.0 });
 
+  function swap(numbers, i, j) {
+    const kept = numbers[i];
+    numbers[i] = numbers[j];
+    numbers[j] = kept;
+  }
+
   /** Solve matrix x = right in place (rows of `size` numbers); false when it is singular. */
   function solveDense(matrix, right, size) {
     for (let k = 0; k < size; k += 1) {
@@ -23,10 +29,8 @@
       const pivot = matrix[best * size + k];
       if (!(Math.abs(pivot) > 0.0)) return false;
       if (best !== k) {
-        for (let j = 0; j < size; j += 1) {
-          [matrix[k * size + j], matrix[best * size + j]] = [matrix[best * size + j], matrix[k * size + j]];
-        }
-        [right[k], right[best]] = [right[best], right[k]];
+        for (let j = 0; j < size; j += 1) swap(matrix, k * size + j, best * size + j);
+        swap(right, k, best);
       }
       for (let i = k + 1; i < size; i += 1) {
         const factor = matrix[i * size + k] / pivot;

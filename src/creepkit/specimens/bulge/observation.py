@@ -199,7 +199,7 @@ class Observation:
         return _chain(derivatives, -(frames @ sampling.nodes.slopes.T) * moved)
 
     def sampling(self, radii: ArrayLike) -> ProfileSampling:
-        """Where the operator observes a surface whose nodes have these radii at rest, (nodes,) mm."""
+        """Where the operator observes a surface; radii : (nodes,) mm, of its nodes at rest."""
         return _sampling_of(self, np.asarray(radii, dtype=float).tobytes())
 
 

@@ -1,0 +1,181 @@
+"""Laws in JavaScript and the runtime of the page: accuracy against 50 digits and the core, processor time and size.
+
+    python tests/benchmarks/javascript_runtime.py [--points 512] [--write]
+
+Needs node. Kernels: the largest relative difference of the rate, of rates of internal variables and of all derivatives
+to the point from 50-digit arithmetic, at Sobol points of the full bounds and of the ranges of creep tests; where a
+result cancels, up to what the last bits of the inputs make.
+
+Simulations: values of a law are the middle of its bounds, its rates multiplied so that a bar creeps by about 2 % (for
+dimples 1 %) at 100 MPa. The bar is under steps of true stress with heating, the relaxation test under two steps of
+total strain, the dimple under a jump of pressure; compared are strain, stress, and amplitude, width and shape with
+those of the specimens `uniaxial` and `relaxation` and of `ck.surrogate("dimple")`, relatively, up to the earlier end.
+
+Processor times are those of one prediction in node after 20 others, in ms; "fast" is the coarse model while dragging.
+"""
+
+import json
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from measured import Page, arguments, progress
+
+import creepkit as ck
+from creepkit.app.model_data import embedded_json, law_data
+from creepkit.app.reduced_model_data import rom_data
+from creepkit.app.runtime_files import runtime_script
+from creepkit.exporters.javascript import JavaScriptExporter
+from creepkit.kernels.multiprecision import MultiprecisionLaw
+from creepkit.language import CreepLaw
+from creepkit.records import LawWithValues, Program, RecordedLoading
+from creepkit.registry import default_registry
+from creepkit.testing import LawSamples, draw_samples
+from creepkit.testing.parity import MultiprecisionReference
+from helpers.export_cases import Case
+from helpers.javascript import run_in_node
+from helpers.page_runtime import pairs, values_that_creep
+
+TIMES = [0.0, 1.0, 60.0, 900.0, 7200.0, 1.4e4, 1.6e4, 3e4, 4.32e4]
+TEMPERATURE = 1073.0
+HEATED = Program(np.array([0.0, 2e4, 2.2e4]), np.array([1063.0, 1063.0, 1083.0]))
+STEPS = RecordedLoading(Program.steps([(0.0, 90.0), (1.5e4, 120.0), (3e4, 60.0)]), "stress", "stress")
+STRAINS = ck.StrainSteps(((0.0, 8e-4), (1.5e4, 1.2e-3)), ramp=60.0)
+JUMP = ck.PressureJump(P1=7.0, P2=8.5, Tj=14400.0)
+ELASTIC = ck.Elastic(150e3)
+
+PROGRAM = """
+import vm from "node:vm";
+vm.runInThisContext(await readFile("runtime.js", "utf8"));
+const WARM = 20, TIMED = 20;
+function timed(call) {
+  for (let k = 0; k < WARM; k += 1) call();
+  const start = process.cpuUsage().user;
+  for (let k = 0; k < TIMED; k += 1) call();
+  return (process.cpuUsage().user - start) / (1e3 * TIMED);
+}
+function kernelRows(law, points, sets) {
+  const size = 1 + law.law.states.length, width = points[0].length;
+  return points.map((point, k) => {
+    const rates = new Float64Array(size), update = new Float64Array(size * (1 + width)), own = law.kernel(sets[k]);
+    own.rates(point, rates);
+    own.update(point, update);
+    return { rates, update };
+  });
+}
+async function main({ rom, laws }) {
+  return laws.map(({ source, points, sets, bar, relaxation, dimple }) => {
+    const law = vm.runInThisContext(source);
+    const creep = (o) => creepkit.simulateCreep(law, bar.values, o);
+    const bulge = (o) => creepkit.simulateDimple(law, dimple.values, rom, o);
+    const fast = { ...dimple.options, fast: true };
+    return {
+      kernel: kernelRows(law, points, sets),
+      creep: creep(bar.options), relaxation: creepkit.simulateRelaxation(law, bar.values, relaxation),
+      dimple: bulge(dimple.options), fast: bulge(fast),
+      times: [timed(() => creep(bar.options)), timed(() => bulge(dimple.options)), timed(() => bulge(fast))],
+    };
+  });
+}
+"""
+
+
+def judged(law: CreepLaw, count: int) -> Case:
+    """The law at Sobol points, with own values at each, in 50 digits."""
+    drawn = draw_samples(law, count, seed=5)
+    sets = [{n: p.from_internal(t) for (n, p), t in zip(law.table.items(), row, strict=True)} for row in drawn.theta]
+    again = np.array([[p.to_internal(values[n]) for n, p in law.table.items()] for values in sets])
+    samples = LawSamples(drawn.points, again.reshape(len(sets), -1))
+    return Case(law, samples, sets, MultiprecisionReference(MultiprecisionLaw(law), samples))
+
+
+def options(**more: Any) -> dict[str, Any]:
+    return {"times": TIMES, "elastic": {"modulus": 150e3, "poisson": 0.3}, **more}
+
+
+def given_of(law: CreepLaw, case: Case) -> dict[str, Any]:
+    values = values_that_creep(law, 100.0, duration=4e4)
+    soft = values_that_creep(law, 100.0, goal=0.01, duration=4e4)
+    stress = {"stress": pairs(STEPS.program()), "control": "stress", "temperature": pairs(HEATED)}
+    strain = {"strain": pairs(STRAINS.program()), "temperature": TEMPERATURE}
+    pressure = {"pressure": pairs(JUMP.program()), "temperature": TEMPERATURE}
+    return {
+        "source": law_data(law)["source"],
+        "points": case.drawn.points.tolist(),
+        "sets": [[*values.values()] for values in case.sets],
+        "bar": {"values": values, "options": options(**stress)},
+        "relaxation": options(**strain),
+        "dimple": {"values": soft, "options": options(**pressure)},
+    }
+
+
+def kernel_difference(case: Case, found: list[dict[str, Any]]) -> float:
+    rates, update = (np.array([each[part] for each in found], float) for part in ("rates", "update"))
+    size, width = rates.shape[1], case.drawn.points.shape[1]
+    slopes = update[:, size:].reshape(len(rates), size, width)
+    with np.errstate(over="ignore", invalid="ignore"):
+        slopes[:, 0] *= rates[:, :1]
+    return case.worst(np.concatenate([rates[:, :, None], slopes], axis=2), update[:, 0])[1]
+
+
+def largest(found: Any, exact: Any) -> float:
+    """The largest relative difference up to the earlier end, where the exact number is not zero."""
+    shown, truth = np.array(found, float)[: len(exact)], np.array(exact, float)
+    matters = (truth != 0.0) & np.isfinite(shown)
+    return float(np.max(np.abs(shown[matters] / truth[matters] - 1.0), initial=0.0))
+
+
+def main() -> None:
+    parser = arguments(__doc__)
+    parser.add_argument("--points", type=int, default=512)
+    chosen = parser.parse_args()
+    page = Page("javascript_runtime", __doc__)
+    model = ck.surrogate("dimple")
+    rom = rom_data(model)
+    laws = {name: entry.value for name, entry in default_registry().laws().items()}
+    cases = {}
+    for name, law in laws.items():
+        cases[name] = judged(law, chosen.points)
+        progress(f"{name}: {len(cases[name].sets)} points")
+    given = {"rom": rom, "laws": [given_of(law, cases[name]) for name, law in laws.items()]}
+    with tempfile.TemporaryDirectory() as folder:
+        results = run_in_node(Path(folder), PROGRAM, given, {"runtime.js": runtime_script()})
+    found = dict(zip(laws, results, strict=True))
+
+    page.heading("Kernels")
+    page.table("law", "points", "largest difference from 50 digits", "module, bytes", "law in a page, bytes")
+    for name, law in laws.items():
+        text = JavaScriptExporter().text(LawWithValues(law, law.center()))
+        difference = kernel_difference(cases[name], found[name]["kernel"])
+        page.row(name, len(cases[name].sets), f"{difference:.1e}", len(text), len(embedded_json(law_data(law))))
+
+    page.heading("Simulations")
+    heads = ("creep", "relaxation", "dimple", "dimple, fast", "creep, ms", "dimple, ms", "dimple, fast, ms")
+    page.table("law", *heads)
+    for name, (law, own) in zip(laws, zip(laws.values(), given["laws"], strict=True), strict=True):
+        told, values, soft = found[name], own["bar"]["values"], own["dimple"]["values"]
+        common: dict[str, Any] = {"times": TIMES, "elastic": ELASTIC}
+        bar = ck.simulate(law, "uniaxial", values, loading=STEPS, temperature=HEATED, **common)
+        held = ck.simulate(law, "relaxation", values, loading=STRAINS, temperature=TEMPERATURE, **common)
+        dome = ck.simulate(law, model, soft, loading=JUMP, temperature=TEMPERATURE, **common)
+        worst = {
+            kind: max(largest(told[kind]["outputs"][output], dome.outputs[output]) for output in dome.outputs)
+            for kind in ("dimple", "fast")
+        }
+        page.row(
+            name, f"{largest(told['creep']['strain'], bar.outputs['strain']):.1e}",
+            f"{largest(told['relaxation']['stress'], held.outputs['stress']):.1e}",
+            f"{worst['dimple']:.1e}", f"{worst['fast']:.1e}", *(f"{time:.2f}" for time in told["times"]),
+        )  # fmt: skip
+
+    page.heading("Sizes")
+    page.table("part", "bytes")
+    page.row("runtime, as it is written", len(runtime_script()))
+    page.row(f"reduced-order model: {rom['modes']} modes, {rom['points']} points", len(json.dumps(rom)))
+    if chosen.write:
+        page.write()
+
+
+if __name__ == "__main__":
+    main()

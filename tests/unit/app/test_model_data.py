@@ -1,0 +1,115 @@
+"""What a page knows of a law: plain JSON with names, bounds, equations and code, that ends no script element."""
+
+import json
+import re
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.app.model_data import embedded_json, law_data
+from creepkit.app.runtime_files import RUNTIME_FILES, runtime_files, runtime_script
+from creepkit.language import CreepLaw, Param, parameters, stress
+from creepkit.laws.norton import NORTON
+from creepkit.records import LawWithValues
+from creepkit.registry import default_registry
+
+
+def test_a_law_alone_has_the_middle_of_its_bounds_and_no_intervals():
+    data = law_data(NORTON)
+    A, n = data["parameters"]
+    assert (A["name"], A["unit"], A["scale"], A["low"], A["high"]) == ("A", "1/s", "log", 1e-40, 1e-5)
+    assert (n["unit"], n["scale"], n["value"], n["title"]) == ("", "linear", 4.5, "stress exponent")
+    assert [p["interval"] for p in data["parameters"]] == [None, None]
+    assert data["directions"] == []
+    assert data["variables"] == ["stress"]
+
+
+@pytest.mark.parametrize("name", sorted(default_registry().laws()))
+def test_every_law_is_json_and_its_equations_are_well_formed(name):
+    data = law_data(default_registry().law(name))
+    again = json.loads(embedded_json(data))
+    assert again == data
+    symbols = [p["symbol"] for p in [*data["parameters"], *data["states"]]]
+    for text in [*data["equations"], *symbols, *(term["formula"] for term in data["terms"])]:
+        assert ElementTree.fromstring(text).tag.endswith("math")
+
+
+def planted_fit():
+    """Norton with A = 1e-16, n = 5 from two exact tests."""
+    tests = [
+        ck.simulate(
+            NORTON, "uniaxial", {"A": 1e-16, "n": 5.0}, loading=ck.constant_stress(s), times=np.linspace(0, 1e4, 12),
+            temperature=1073.0, name=f"{s} MPa",
+        )
+        for s in (60.0, 90.0, 120.0)
+    ]  # fmt: skip
+    return ck.identify(NORTON, tests, using="uniaxial")
+
+
+def test_a_fit_brings_its_values_intervals_and_likely_directions():
+    """The steps along the directions make the covariance of (ln A, n), and the longest is where they trade off."""
+    from creepkit.inverse.uncertainty.correlation import correlation
+
+    fit = planted_fit()
+    data = law_data(fit)
+    rows = {p["name"]: p for p in data["parameters"]}
+    assert rows["n"]["value"] == pytest.approx(5.0, rel=1e-2)
+    for row in rows.values():
+        low, high = row["interval"]
+        assert low <= row["value"] <= high
+        assert row["verdict"] in ("determined", "at its bound", "not determined")
+    steps = np.array([[step[name] for name in fit.law.names] for step in data["directions"]])
+    known = correlation(fit)
+    np.testing.assert_allclose(steps.T @ steps, known.matrix * np.outer(known.sd, known.sd), rtol=1e-6)
+    lengths = np.linalg.norm(steps / known.sd, axis=1)
+    assert (np.diff(lengths) <= 0).all()
+    assert steps[0, 0] * steps[0, 1] < 0  # a larger exponent goes with a smaller coefficient
+    assert data["ranges"]["stress"] == [pytest.approx(60.0), pytest.approx(120.0, rel=0.1)]
+
+
+def test_values_of_a_law_with_values_stay():
+    data = law_data(LawWithValues(NORTON, {"A": 0.0, "n": 3.0}))
+    assert [p["value"] for p in data["parameters"]] == [0.0, 3.0]
+
+
+class Elements(HTMLParser):
+    """Names of the elements of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.names = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.names.append(tag)
+
+
+def test_nothing_of_a_hostile_law_leaves_its_script_element():
+    words = parameters("k __proto__")
+    law = CreepLaw(
+        "</script><b>",
+        {"</script><i>": words[0] * stress ** words[1]},
+        {words[0]: Param("</script><u>", (1e-9, 1.0), "</script>", "log"), words[1]: Param("<!--", (1, 8))},
+        title="</script><img src=x onerror=alert(1)>",
+        references=("</script><s>",),
+    )
+    data = law_data(law)
+    page = f"<p></p><script>x = {embedded_json(data)};</script><script>y = {data['source']};</script><em></em>"
+    assert Elements(page).names == ["p", "script", "script", "em"]
+
+
+def test_the_runtime_is_strict_small_and_ends_no_script_element():
+    files = runtime_files()
+    assert tuple(files) == RUNTIME_FILES
+    for name, text in files.items():
+        assert re.search(r'^"use strict";$', text, re.MULTILINE), name
+        assert len(text.splitlines()) <= 400, name
+        assert max(map(len, text.splitlines())) <= 140, name
+    script = runtime_script()
+    assert len(script) < 150_000
+    assert "</script" not in script.lower()
+    assert not re.search(r"\b(eval|Function|import|require|fetch|XMLHttpRequest|document|window)\s*\(", script)
