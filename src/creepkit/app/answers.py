@@ -109,7 +109,7 @@ class PageAnswers:
             answer["tests"] = []
             for k in request.tests:
                 check()
-                answer["tests"].append({"test": k, **self._test_document(page_law, theta, k, request.exact)})
+                answer["tests"].append({"test": k, **self._test_or_problem(page_law, theta, k, request.exact)})
             check()
             return answer
 
@@ -149,6 +149,13 @@ class PageAnswers:
                 return {**_run_document(run), "section": section_document(run)}
         prediction = predict(predictor, page_law.law, theta, [plan])
         return _prediction_document(prediction, plan)
+
+    def _test_or_problem(self, page_law: PageLaw, theta: Floats, k: int, exact: bool) -> dict[str, Any]:
+        """A test that cannot be predicted leaves the others as they are."""
+        try:
+            return self._test_document(page_law, theta, k, exact)
+        except CreepkitError as error:
+            return {"outputs": {}, "ended": "", "end": None, "problem": " ".join(str(error).split())}
 
     def _test_document(self, page_law: PageLaw, theta: Floats, k: int, exact: bool) -> dict[str, Any]:
         """A measured test at its own frames, with the nuisances and the offsets of the identification."""

@@ -135,7 +135,7 @@ def _example_values(law: CreepLaw) -> dict[str, float]:
         theta = coordinates.theta(u)
     low, high = law.internal_bounds
     inside = np.where(np.isfinite(theta), np.clip(theta, low, high), law.internal_bounds.mean(axis=0))
-    return {name: float(value) for name, value in law.from_internal(inside).items()}
+    return {name: float(np.clip(value, *law.table[name].bounds)) for name, value in law.from_internal(inside).items()}
 
 
 def _specimens(histories: Sequence[History], first: str | None) -> tuple[Specimen, ...]:

@@ -19,6 +19,7 @@ from creepkit.records import (
     History,
     LawWithValues,
     Load,
+    Program,
     Specimen,
     dimensions_of,
     loads_of,
@@ -39,6 +40,10 @@ if TYPE_CHECKING:
 
 MOST_FRAMES = 300
 """Frames of a test that a page draws and compares; of a longer one, as many evenly spread over its frames."""
+
+
+MOST_BREAKPOINTS = 400
+"""Rows of a recorded load or temperature that a page has."""
 
 
 def contents_document(contents: PageContents, models: Collection[str] = ()) -> dict[str, Any]:
@@ -218,10 +223,10 @@ def test_document(history: History, contents: PageContents) -> dict[str, Any]:
         "offset": _offsets(history, contents),
         "load": history.loading.quantity,
         "control": getattr(history.loading, "control", "load"),
-        "program": [numbers(program.times), numbers(program.values)],
+        "program": _thinned(program),
         "temperature": float(np.mean(temperature.values)),
-        "temperature_program": [numbers(temperature.times), numbers(temperature.values)],
-        "modulus": finite(getattr(history.elastic, "E", None)),
+        "temperature_program": _thinned(temperature),
+        "modulus": None if history.elastic is None else finite(history.elastic.at(history.mean_temperature).E),
         "lengths": {name: float(value) for name, value in history.geometry.items()},
         "nuisances": _has_nuisances(history, contents),
         "minimum_rate": history.minimum_rate,
@@ -229,6 +234,14 @@ def test_document(history: History, contents: PageContents) -> dict[str, Any]:
         "includes_elastic": history.includes_elastic,
         "measure": history.strain_measure,
     }
+
+
+def _thinned(program: Program) -> list[list[float | None]]:
+    """Times and values of a program; of a recorded one of many rows, as many evenly spread over them."""
+    kept = np.arange(program.times.size)
+    if kept.size > MOST_BREAKPOINTS:
+        kept = np.unique(np.linspace(0, kept.size - 1, MOST_BREAKPOINTS).round().astype(int))
+    return [numbers(program.times[kept]), numbers(program.values[kept])]
 
 
 def _noise(history: History, output: str, contents: PageContents) -> float | None:
@@ -267,7 +280,14 @@ def _test_fits(history: History, contents: PageContents) -> list[Any]:
 
 def numbers(values: Floats) -> list[float | None]:
     """Numbers to six digits, which is finer than a screen; None in the place of those that are not finite."""
-    return [float(f"{v:.6g}") if math.isfinite(v) else None for v in np.asarray(values, float).ravel().tolist()]
+    given = np.asarray(values, float).ravel()
+    with np.errstate(all="ignore"):
+        scale = 10.0 ** (5.0 - np.floor(np.log10(np.abs(given))))
+        rounded = np.round(given * scale) / scale
+    rounded = np.where(np.isfinite(rounded), rounded, given)
+    if np.isfinite(rounded).all():
+        return list(rounded.tolist())
+    return [value if math.isfinite(value) else None for value in rounded.tolist()]
 
 
 def finite(value: Any) -> float | None:

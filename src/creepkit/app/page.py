@@ -36,7 +36,7 @@ LARGEST_PAGE = 1_000_000
 
 def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") -> str:
     """A whole page. nonce : of the policy of a server. endpoint : where it asks for predictions."""
-    models = {} if endpoint else page_models(contents)  # a server has the models themselves
+    models = page_models(contents, shown_first=bool(endpoint))
     policy = "" if endpoint else _POLICY_OF_A_FILE
     mark = f' nonce="{nonce}"' if nonce else ""
     replacements = {

@@ -1,4 +1,4 @@
-"""Reduced-order models that a page brings along: of the first piece of each specimen, and of the pieces of its tests."""
+"""Reduced-order models that a page brings along: of its specimens, and of the pieces of its tests."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ MOST_MODELS = 4
 """Of one page, some 150 kB each; tests of further pieces are shown without a curve."""
 
 
-def page_models(contents: PageContents) -> dict[str, str]:
-    """{name: data as JSON} of the models of a page that stands alone."""
+def page_models(contents: PageContents, *, shown_first: bool = False) -> dict[str, str]:
+    """{name: data as JSON} of the models of a page; shown_first : only of what it begins with, as a server needs."""
     models: dict[str, str] = {}
-    for specimen in contents.specimens:
+    for specimen in contents.specimens[: 1 if shown_first else None]:
         models |= model_of(specimen)
     for history in contents.histories:
         found = model_of(contents.specimen(history.specimen), history)
@@ -30,7 +30,7 @@ def page_models(contents: PageContents) -> dict[str, str]:
 
 
 def model_of(specimen: Specimen, history: History | None = None) -> dict[str, str]:
-    """{name: data} of the model of a specimen, or of the piece and the observation of a test; {} where there is none."""
+    """{name: data} of the model of a specimen, or of the piece and the observation of a test; {} for no model."""
     if not isinstance(specimen, Bulge):
         return {}
     if history is not None:

@@ -87,9 +87,18 @@
     return { test: k, ...made };
   }
 
+  // A test that cannot be predicted leaves the others as they are.
+  function orProblem(k, predict) {
+    try {
+      return predict();
+    } catch (error) {
+      return { test: k, outputs: {}, ended: "", end: null, problem: String(error.message ?? error) };
+    }
+  }
+
   page.predict = function (data, question) {
     const law = lawOf(data, question.law), { values } = question;
-    const answer = { tests: question.tests.map((k) => ofTest(law, values, data, k, question.exact)) };
+    const answer = { tests: question.tests.map((k) => orProblem(k, () => ofTest(law, values, data, k, question.exact))) };
     if (question.program !== null) answer.program = ofProgram(law, values, data, question);
     const point = data.laws[question.law].rate_point, [low, high] = point.stress;
     const stresses = Array.from({ length: RATE_STRESSES }, (_, k) => low * (high / low) ** (k / (RATE_STRESSES - 1)));

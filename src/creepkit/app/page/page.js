@@ -107,7 +107,9 @@
 
     function draw(answer) {
       const started = inputAt;
-      problem.hidden = true;
+      const failed = (answer.tests ?? []).find((one) => one.problem);
+      problem.hidden = !failed;
+      if (failed) complain(`${data.tests[failed.test].name}: ${failed.problem}`);
       const shown = (answer.tests ?? []).filter((one) => state.tests[one.test]);
       const ends = [...shown.map((one) => data.tests[one.test].times.at(-1)), ...(answer.program ? [state.end] : [])];
       const unit = page.timeUnit(Math.max(...ends, 1e-30));

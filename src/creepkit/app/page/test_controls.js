@@ -62,7 +62,7 @@
         const { low, high } = specimen.modulus;
         parts.push(page.slider({ name: "Young's modulus", unit: "GPa", factor: 1e3, log: true, low, high, value: state.modulus, accepts: (v) => v > 0, ...changed, onInput: (v, event) => { state.modulus = v; handlers.onInput(event); } }).row);
       }
-      if (specimen.dimensions.length && specimen.model === null) { // a model that comes with the page has its lengths
+      if (specimen.dimensions.length && (data.endpoint || specimen.model === null)) { // a model that comes with a file has its lengths
         const rows = specimen.dimensions.map((d) => {
           const low = Math.max(d.low, d.value / 2), high = Math.min(d.high, d.value * 2);
           return page.slider({ name: d.title, unit: "mm", log: true, low, high, value: state.lengths[d.name] ?? d.value, accepts: (v) => v >= d.low && v <= d.high, ...changed, onInput: (v, event) => { state.lengths = { ...state.lengths, [d.name]: v }; handlers.onInput(event); } }).row;

@@ -1,0 +1,120 @@
+"""What a page gets to show: laws of every kind of source, specimens by their records, tests with noise and offsets."""
+
+import json
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.app.contents import MOST_TESTS, page_contents
+from creepkit.app.documents import MOST_FRAMES, contents_document
+from creepkit.app.page import page_fragment, page_html, shared_scripts
+from creepkit.errors import ExportError, FitError
+from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from helpers.planted_bars import SPL, bars
+
+
+@pytest.fixture(scope="module")
+def histories():
+    loadings = [ck.constant_stress(s) for s in (40.0, 50.0, 60.0)]
+    return bars(ck.law("strain-hardening"), SPL, loadings, seed=1)
+
+
+@pytest.fixture(scope="module")
+def fit(histories):
+    return ck.identify("strain-hardening", histories, starts=1)
+
+
+def document(*arguments, **options):
+    """As the scripts read it."""
+    return json.loads(json.dumps(contents_document(page_contents(*arguments, **options)), allow_nan=False))
+
+
+@pytest.mark.parametrize("name", sorted(ck.available("laws")))
+def test_every_law_has_a_page_and_a_first_curve(name):
+    shown = document(name)
+    (law,) = shown["laws"]
+    for p in law["parameters"]:
+        assert p["low"] <= p["value"] <= p["high"]
+    assert 0.0 < law["end"] < 1e22
+    assert law["equations"][0].startswith("<math")
+    assert " style=" not in "".join(law["equations"])
+
+
+def test_an_identification_brings_its_tests_intervals_and_covariance(fit, histories):
+    shown = document(fit)
+    (law,) = shown["laws"]
+    assert [test["name"] for test in shown["tests"]] == [h.name for h in histories]
+    for p, estimate in zip(law["parameters"], fit.estimates, strict=True):
+        assert p["value"] == estimate.value
+        assert p["interval"] == [estimate.low, estimate.high]
+    sd = np.sqrt(np.diag(law["covariance"]))
+    assert sd == pytest.approx(fit.correlation().sd, rel=1e-9)
+    assert shown["tests"][0]["noise"]["strain"] == pytest.approx(2e-5)
+
+
+def test_a_ranking_brings_its_laws_by_weight(fit, histories):
+    other = ck.identify("norton", histories, starts=1)
+    shown = document(ModelAverage((other, fit), (0.1, 0.9)), histories)
+    assert [law["name"] for law in shown["laws"]] == ["strain-hardening", "norton"]
+    assert [law["weight"] for law in shown["laws"]] == [0.9, 0.1]
+
+
+def test_a_law_with_values_begins_there():
+    shown = document(ck.law_with_values("norton", {"A": 2e-17, "n": 5.5}))
+    assert [p["value"] for p in shown["laws"][0]["parameters"]] == [2e-17, 5.5]
+
+
+def test_specimens_are_described_by_their_records():
+    shown = {one["name"]: one for one in document("norton")["specimens"]}
+    for name, specimen in ck.available("specimens").items():
+        if name == "point":  # components are no single load
+            assert name not in shown
+            continue
+        one = shown[name]
+        assert [o["name"] for o in one["outputs"]] == list(specimen.outputs)
+        assert [(o["title"], o["unit"]) for o in one["outputs"]] == [(o.long_name, o.unit) for o in specimen.outputs]
+        assert [(load["title"], load["unit"]) for load in one["loads"]] == [
+            (load.long_name, load.unit) for load in specimen.loads
+        ]
+        assert [d["name"] for d in one["dimensions"]] == [
+            d.name for d in getattr(specimen, "dimensions", ()) if d.of_piece
+        ]
+
+
+def test_a_long_test_is_thinned_and_unused_frames_are_left_out(histories):
+    times = np.linspace(1.0, 1e5, 5000)
+    used = np.arange(5000) != 17
+    long = ck.History("long", times, {"strain": 1e-8 * times}, histories[0].loading, 1000.0, used=used)
+    (test,) = document("norton", [long])["tests"]
+    assert len(test["times"]) == len(test["outputs"]["strain"]) == MOST_FRAMES
+    assert test["times"][0] == 1.0
+    assert test["times"][-1] == 1e5
+
+
+def test_what_cannot_be_shown_is_one_sentence(histories, tmp_path):
+    with pytest.raises(FitError, match=f"at most {MOST_TESTS} tests"):
+        page_contents("norton", histories * 50)
+    with pytest.raises(FitError, match="'bulg'"):
+        page_contents("norton", specimen="bulg")
+    ck.interactive_page("norton", tmp_path / "page.html")
+    with pytest.raises(ExportError, match="exists already"):
+        ck.interactive_page("norton", tmp_path / "page.html")
+
+
+def test_fragments_share_their_scripts():
+    contents = page_contents("norton")
+    alone, part = page_fragment(contents), page_fragment(contents, style=False, scripts=False)
+    assert "<style>" in alone
+    assert "<style>" not in part
+    assert len(part) < 0.3 * len(alone)
+    assert "simulateDimple" in shared_scripts(contents)
+    assert "simulateDimple" not in part
+
+
+def test_a_page_names_no_other_address():
+    """Neither of a network nor of this machine; names of XML are not fetched."""
+    text = page_html(page_contents("norton"))
+    text = text.replace("http://www.w3.org/1998/Math/MathML", "").replace("http://www.w3.org/2000/svg", "")
+    for word in ("http:", "https:", "//cdn", "src=", "@import", "url("):
+        assert word not in text
