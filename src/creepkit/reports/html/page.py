@@ -52,8 +52,8 @@ def report_html(contents: ReportContents) -> str:
         title=printable(contents.title, 200) or "Report",
         summary=_summary(contents, found),
         sections=shown,
-        style=Markup(_resource("style.css")),  # noqa: S704
-        attachments=Markup(embed(contents.attachments)),  # noqa: S704
+        style=Markup(_resource("style.css")),
+        attachments=Markup(embed(contents.attachments)),
         version=version("creepkit"),
     )
 
@@ -99,7 +99,9 @@ def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) 
     if missing:
         listed = ", ".join(missing[:12]) + (f" and {len(missing) - 12} more" if len(missing) > 12 else "")
         warning.append(
-            Paragraph(f"This report is not complete. Failed: {listed}. The reasons stand in the last section.", "warning")
+            Paragraph(
+                f"This report is not complete. Failed: {listed}. The reasons stand in the last section.", "warning"
+            )
         )
     if len(found) == 1:
         return Section("findings", "Findings", [*warning, *verdict_blocks(found[0])])
@@ -141,7 +143,15 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
                 f"{exponent[0]} ({exponent[1]} to {exponent[2]})",
             )
         )
-    columns = ("material", "best law", "weight", "explains the tests", "at MPa", "creep rate there, 1/s", "local exponent")
+    columns = (
+        "material",
+        "best law",
+        "weight",
+        "explains the tests",
+        "at MPa",
+        "creep rate there, 1/s",
+        "local exponent",
+    )
     return Table("Materials, with 95 % intervals", columns, rows, numeric=(2, 4, 5, 6))
 
 

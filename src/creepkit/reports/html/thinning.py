@@ -45,7 +45,7 @@ def thin_figure(figure: Figure) -> None:
     for band in figure.findobj(PolyCollection):
         _thin_band(band, scale)
     for marks in figure.findobj(PathCollection):
-        if len(marks.get_offsets()) > MOST_MARKS:  # type: ignore[attr-defined]
+        if np.size(marks.get_offsets()) > 2 * MOST_MARKS:
             marks.set_rasterized(True)
 
 
@@ -63,7 +63,7 @@ def _thin_line(line: Any, scale: float) -> None:
 def _thin_band(band: Any, scale: float) -> None:
     typed: PolyCollection = band
     paths = typed.get_paths()
-    if not any(len(path.vertices) > FEW_POINTS for path in paths):
+    if not any(np.shape(path.vertices)[0] > FEW_POINTS for path in paths):
         return
     kept = []
     for path in paths:
