@@ -1,6 +1,7 @@
 """The documentation as it stands in the tree: its links, its snippets, and the files and names that it mentions."""
 
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,13 @@ def exists_after_build(path: Path) -> bool:
     return path.stem == "index" or (ROOT / "examples" / f"{path.stem}.py").is_file()
 
 
+@cache
+def reports_of_studies() -> set[str]:
+    """{folder/name} of the reports that `make docs` has studies write."""
+    studies = [(path, ck.Study.load(path).file.model.report) for path in ROOT.glob("examples/studies/*/*.toml")]
+    return {f"{path.parent.name}/{report.file.removesuffix('.html')}" for path, report in studies if report}
+
+
 def test_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 200
 
@@ -46,6 +54,9 @@ def test_links_lead_somewhere_inside_the_project(page):
     text = re.sub(r"```.*?```|`[^`]*`", "", page.read_text(encoding="utf-8"), flags=re.S)
     for link in re.findall(r"\]\(([^)\s]+)\)", text):
         if re.match(r"https?://|#", link):
+            continue
+        if link.startswith("report:"):
+            assert link.removeprefix("report:") in reports_of_studies(), f"no study writes {link}"
             continue
         target = (page.parent / link.partition("#")[0]).resolve()
         assert target.is_relative_to(ROOT), f"{link} leaves the project"

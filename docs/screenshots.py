@@ -1,0 +1,75 @@
+"""Takes the pictures of reports that the tutorials show, in Chromium and without a network, into docs/pictures/studies.
+
+`make docs` builds the reports first; the pictures are committed, so that the documentation is built without a browser.
+To take them anew, with Chromium on PATH and the Python package playwright::
+
+    make docs
+    .venv/bin/python docs/screenshots.py
+"""
+
+import io
+import os
+import shutil
+from pathlib import Path
+
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+DOCS = Path(__file__).parent
+REPORTS = DOCS.parent / "build" / "site" / "reports"
+TARGET = DOCS / "pictures" / "studies"
+
+SHOTS = {
+    "hardening_findings": ("strain_or_time_hardening/constant_loads", "#findings"),
+    "hardening_design": ("strain_or_time_hardening/constant_loads", "#design"),
+    "hardening_decided": ("strain_or_time_hardening/with_step", "#findings"),
+    "spreadsheet_findings": ("spreadsheet_to_abaqus/report", "#findings"),
+    "spreadsheet_forecast": ("spreadsheet_to_abaqus/report", "#forecasts"),
+    "plate_findings": ("plate_of_dimples/report", "#findings"),
+    "plate_alloy": ("plate_of_dimples/report", "#m1-curves"),
+}
+"""{picture: (report, element)}."""
+
+
+WIDTH, MOST_HEIGHT, COLOURS, MOST_BYTES = 860, 900, 128, 150_000
+"""Pixels of the window and of the highest picture; colours of a picture; bytes of the largest."""
+
+FLAGS = [
+    *("--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"),
+    *("--disable-component-update", "--disable-sync"),
+    *(["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []),
+]
+
+
+def main() -> None:
+    """Write every picture; an error where a report, or a part of it, is missing."""
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        raise SystemExit("there is no chromium on PATH; the committed pictures stay as they are")
+    TARGET.mkdir(parents=True, exist_ok=True)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        page = browser.new_context(
+            viewport={"width": WIDTH, "height": MOST_HEIGHT}, color_scheme="light", offline=True
+        ).new_page()
+        for name, (report, element) in SHOTS.items():
+            path = TARGET / f"{name}.png"
+            page.goto((REPORTS / f"{report}.html").as_uri())
+            path.write_bytes(reduced(page.locator(element).screenshot()))
+            print(f"{path.relative_to(DOCS.parent)}: {path.stat().st_size / 1000:.0f} kB")
+        browser.close()
+
+
+def reduced(png: bytes) -> bytes:
+    """The upper part of a picture, in few colours."""
+    picture = Image.open(io.BytesIO(png)).convert("RGB")
+    picture = picture.crop((0, 0, picture.width, min(picture.height, MOST_HEIGHT))).quantize(COLOURS, dither=0)
+    stream = io.BytesIO()
+    picture.save(stream, "PNG", optimize=True)
+    if stream.tell() > MOST_BYTES:
+        raise ValueError(f"a picture has {stream.tell()} bytes, more than {MOST_BYTES}; choose a smaller part")
+    return stream.getvalue()
+
+
+if __name__ == "__main__":
+    main()
