@@ -62,7 +62,7 @@ def test_every_mistake_is_one_line_with_file_and_line(folder: Path) -> None:
     ran = creepkit("run", study)
     assert ran.exit_code == 1
     (line,) = ran.stderr.splitlines()
-    assert line.startswith(f"creepkit: {study}:4: [identification] laws: ")
+    assert line.startswith(f"creepkit: {study}:4: [identification] laws 1: ")
     assert "did you mean 'norton'" in line
     ran = creepkit("run", folder / "planted_850C_70MPa.csv")
     assert ran.exit_code == 1

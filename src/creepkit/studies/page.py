@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.files.reading import read_bytes
-from creepkit.files.writing import write_text
+from creepkit.files.writing import write_bytes
 from creepkit.reports.contents import Attachment, Provenance, ReportContents, ReportGroup
 from creepkit.studies.documents import ResultFolder, key_of
 from creepkit.studies.execution import StageRecord
@@ -45,7 +45,7 @@ def write_page(
     try:
         from creepkit.reports.html import report_html
 
-        write_text(report_html(contents_of(file, result, lock_path)), path, StudyError)
+        write_own(kept, path, report_html(contents_of(file, result, lock_path)))
     except CreepkitError as error:
         record = StageRecord("report", "report", "", "failed", key, " ".join(str(error).split()))
         return replace(result, stages=(*result.stages, record))
@@ -53,6 +53,22 @@ def write_page(
     if progress is not None:
         progress("report", 1, 1, str(path))
     return replace(result, stages=(*result.stages, StageRecord("report", "report", "", "made", key)), report=path)
+
+
+def write_own(kept: ResultFolder, path: Path, text: str) -> None:
+    """Write a file beside the study; StudyError for one that exists and that the study has not written.
+
+    It is noted as the study's own before it is written, so that a process that dies in between leaves nothing foreign.
+    """
+    content = text.encode()
+    foreign = path.exists() and path.name not in kept.outputs and not kept.overwrite
+    if foreign and not (path.is_file() and sha256_of(path) == hashlib.sha256(content).hexdigest()):
+        raise StudyError(
+            f"{path}: exists, and this study has not written it; choose another name in the study file, or overwrite "
+            "it by --force"
+        )
+    kept.add_output(path.name)
+    write_bytes(content, path, StudyError)
 
 
 def lock_path_of(file: StudyFile, folder: Path) -> Path:

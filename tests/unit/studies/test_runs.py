@@ -197,6 +197,34 @@ def test_a_run_that_is_killed_anywhere_goes_on_to_the_same_result(tmp_path: Path
     assert not list((study.parent / "study.results").rglob("*.part"))
 
 
+def test_files_that_a_study_has_not_written_stay(study: Path, tmp_path: Path) -> None:
+    own = tmp_path / "law_A.py"
+    own.write_text("mine")
+    with pytest.raises(StudyError, match="this study has not written it"):
+        ck.Study.load(study).run()
+    assert own.read_text() == "mine"
+    own.unlink()
+    ck.Study.load(study).run()
+    text = own.read_text()
+    assert "def " in text
+    own.write_text("changed")
+    assert made(ck.Study.load(study).run()) == set()
+    assert own.read_text() == text
+
+
+def test_any_error_of_a_stage_leaves_the_others(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also one that is no error of creepkit's, as of a plugin."""
+    import creepkit.api.identification as api
+
+    def fails(*_: Any, **__: Any) -> None:
+        raise ZeroDivisionError("of a plugin")
+
+    monkeypatch.setattr(api, "exported_text", fails)
+    result = ck.Study.load(study).run()
+    assert {one.sentence for one in result.failures} == {"ZeroDivisionError: of a plugin"}
+    assert set(result.rankings) == {"A", "B"}
+
+
 def test_damaged_results_are_made_again(study: Path) -> None:
     first = ck.Study.load(study).run()
     results = sorted((study.parent / "study.results").rglob("*.json"))
