@@ -18,6 +18,7 @@ from .api.objects import load_ranking as load_ranking
 from .api.objects import load_rupture_assessment as load_rupture_assessment
 from .api.objects import specimen as specimen
 from .api.objects import surrogate as surrogate
+from .api.report import report as report
 from .api.simulation import check_data_quality as check_data_quality
 from .api.simulation import exclude_suspect_frames as exclude_suspect_frames
 from .api.simulation import generate as generate

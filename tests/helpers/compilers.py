@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 COMPILERS = ("gfortran", "gcc", "g++")
+BROWSER = "chromium"
 NOT_INSTALLED = "{} is not installed"
 
 
@@ -35,7 +36,7 @@ def skipped_without_need(reasons: Sequence[str]) -> list[str]:
     """Those reasons of skipped tests that do not hold here: the compiler is installed, the data are there."""
     from helpers.paths import NO_SHARED_DATA, SHARED
 
-    hold = {NOT_INSTALLED.format(command) for command in COMPILERS if shutil.which(command) is None}
+    hold = {NOT_INSTALLED.format(command) for command in (*COMPILERS, BROWSER) if shutil.which(command) is None}
     if not SHARED.is_dir():
         hold.add(NO_SHARED_DATA)
     return [reason for reason in reasons if reason.removeprefix("Skipped: ") not in hold]

@@ -116,6 +116,7 @@ STEPS = {
     ],
     "identify": [["identify", *(f"curve_{s}.csv" for s in CURVES), "--law", "soft-steel", "--starts", "2", "--json"]],
     "confirm": [["confirm", "identified/soft-steel.json", *(f"curve_{s}.csv" for s in CURVES), "--json"]],
+    "report": [["report", "identified/ranking.json", "--tests", *(f"curve_{s}.csv" for s in CURVES)]],
     "predict": [["predict", "identified/ranking.json", "curve_80.csv"]],
     "design": [
         [

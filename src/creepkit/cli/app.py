@@ -34,6 +34,7 @@ from creepkit.cli import (
     predict,
     read,
     reduced_model,
+    report,
     run,
     rupture,
     screen,
@@ -137,6 +138,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "design": design.command,
     "rupture": rupture.command,
     "export": export.command,
+    "report": report.command,
     "demo": demo.command,
 }
 

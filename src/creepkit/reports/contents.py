@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from creepkit.discovery.discover import TemperatureStudy
@@ -69,11 +69,12 @@ class ExportedFile:
 
 
 @dataclass(frozen=True)
-class Provenance:
+class ReportProvenance:
     """What is needed to repeat the work.
 
     versions : {package: version}. seed : of all draws, None where nothing was drawn. settings : {name: value}, values
-    that JSON can hold. inputs : {file: sha256 of its content}. commands : of a shell, in their order, that repeat it.
+    that JSON can hold. inputs : {file: sha256 of its content}. commands : lines, of a shell or of Python, that repeat
+    it.
     """
 
     versions: Mapping[str, str] = field(default_factory=dict)
@@ -118,12 +119,20 @@ class ReportContents:
     extractions: Mapping[str, Extraction] = field(default_factory=dict)
     exports: tuple[ExportedFile, ...] = ()
     failures: tuple[StageFailure, ...] = ()
-    provenance: Provenance = field(default_factory=Provenance)
+    provenance: ReportProvenance = field(default_factory=ReportProvenance)
     attachments: tuple[Attachment, ...] = ()
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         _freeze(self, "temperature", "forecasts", "design", "rupture", "extractions")
+
+
+class ReportSource(Protocol):
+    """What has a report of its own, such as a study that was run."""
+
+    def report_contents(self) -> ReportContents:
+        """Everything that its report shows."""
+        ...
 
 
 def _freeze(record: object, *names: str) -> None:

@@ -45,6 +45,7 @@ def explanation(fit: Identification) -> str:
 
 
 def equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
+    """Pairs of credible laws that the tests do not separate; none where the tests were not given."""
     names = {r.fit.law.name for r in ranking.credible}
     if any(r.fit.predictor is None or not r.fit.histories for r in ranking.laws):
         return []
@@ -79,6 +80,7 @@ def _is_logarithmic(output: str) -> bool:
 
 
 def misfit_columns(fit: Identification) -> tuple[str, ...]:
+    """Heads of the columns of misfit_cells."""
     if not fit.errors:
         return _single_value_misfit(fit)[0], "test to test"
     output = next(iter(fit.errors))
@@ -86,6 +88,7 @@ def misfit_columns(fit: Identification) -> tuple[str, ...]:
 
 
 def misfit_cells(fit: Identification) -> tuple[str, ...]:
+    """The misfit of the first output, and the scatter of rates between tests."""
     if not fit.errors:
         return _single_value_misfit(fit)[1], f"{100 * fit.noise_model.rate:.0f} %"
     output = next(iter(fit.errors))

@@ -74,6 +74,6 @@ def _end_text(curve: TestCurve, unit: str) -> str:
     with_unit = f" {unit}" if unit else ""
     return (
         f"{curve.hours.size} frames; at {curve.hours[last]:.3g} h measured {curve.measured[last]:.3g}{with_unit}, "
-        f"identified {curve.identified[last]:.3g}{with_unit}, 95 % band {low[last]:.3g} to {high[last]:.3g}{with_unit}; "
+        f"identified {curve.identified[last]:.3g}{with_unit}, 95 % band {low[last]:.3g} to {high[last]:.3g}; "
         f"residuals have a root mean square of {rms:.2g} {measure}"
     )

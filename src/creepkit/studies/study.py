@@ -22,6 +22,7 @@ from creepkit.studies.study_file import StudyFile, read_study_file
 
 if TYPE_CHECKING:
     from creepkit.jobs.shard_progress import ProgressCallback
+    from creepkit.reports.contents import ReportContents
 
 
 @dataclass(frozen=True)
@@ -137,6 +138,10 @@ class Study:
             kept.clear(everything=force)
             return self._run(folder, kept, kinds, locked, progress)
 
+    def report_contents(self) -> ReportContents:
+        """What ck.report(study) shows: the study is carried out, or read where nothing changed."""
+        return self.run().report_contents()
+
     def _run(
         self, folder: Path, kept: ResultFolder, kinds: Sequence[str], locked: bool, progress: ProgressCallback | None
     ) -> StudyResult:
@@ -168,6 +173,8 @@ class Study:
             tuple(changes),
             measured=inputs.measured,
             results=execution.results,
+            file=self.file,
+            lock_path=lock_path,
         )
         for export in result.exports:
             write_own(kept, folder / export.name, export.text)

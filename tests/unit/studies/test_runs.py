@@ -290,6 +290,7 @@ def test_a_report_runs_again_from_what_it_carries(study: Path, plain_pages: None
     first = ck.Study.load(study).run()
     assert first.report is not None
     (study.parent.parent / "elsewhere").rename(tmp_path / "gone")
+    assert ck.report(ck.Study.load(study), tmp_path / "other.html").read_bytes() == first.report.read_bytes()
     again = study_of_report(first.report, tmp_path / "again").run()
     assert again.changes == ()
     assert numbers(again) == numbers(first)

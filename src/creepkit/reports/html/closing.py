@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from creepkit.reports.attachments import problem_of_name
 from creepkit.reports.html.elements import (
     Block,
     Downloads,
     Items,
+    PageSection,
     Paragraph,
-    Section,
     Table,
     Verbatim,
+    plural,
     printable,
     printable_lines,
     sentence,
@@ -27,21 +28,25 @@ if TYPE_CHECKING:
     from creepkit.reports.html.groups import GroupFindings
 
 
-def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -> list[Section]:
+def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -> list[PageSection]:
     """Exports, methods, provenance, and what is missing."""
     return [
-        Section("exports", "Files to download", _export_blocks(contents.exports)),
-        Section(
+        PageSection("exports", "Files to download", _export_blocks(contents.exports)),
+        PageSection(
             "methods",
             "Methods text",
             [
-                Verbatim("To be copied into a paper and shortened", printable_lines(methods_text(contents, found)), prose=True)
+                Verbatim(
+                    "To be copied into a paper and shortened",
+                    printable_lines(methods_text(contents, found)),
+                    prose=True,
+                )
             ]
             if found or contents.rupture
             else [],
         ),
-        Section("provenance", "Provenance, and how to repeat", _provenance_blocks(contents)),
-        Section("missing", "What is missing", _missing_blocks(contents)),
+        PageSection("provenance", "Provenance, and how to repeat", _provenance_blocks(contents)),
+        PageSection("missing", "What is missing", _missing_blocks(contents)),
     ]
 
 
@@ -51,7 +56,9 @@ def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -
 def _export_blocks(exports: Sequence[ExportedFile]) -> list[Block]:
     if not exports:
         return []
-    files = [(file_name(one.name), _address(one.text), f"{printable(one.target, 80)}, {_size(one.text)}") for one in exports]
+    files = [
+        (file_name(one.name), _address(one.text), f"{printable(one.target, 80)}, {_size(one.text)}") for one in exports
+    ]
     return [Paragraph("The page holds these files itself."), Downloads(files)]
 
 
@@ -80,14 +87,18 @@ def _provenance_blocks(contents: ReportContents) -> list[Block]:
         total = sum(len(one.content) for one in contents.attachments)
         blocks.append(
             Paragraph(
-                f"This page carries {len(contents.attachments)} files of the study ({total / 1e6:.3g} MB): with the page "
-                "alone, 'creepkit run' and the name of its file repeat the study and compare the numbers."
+                f"This page carries {plural(len(contents.attachments), 'file')} of the study ({total / 1e6:.3g} MB): "
+                "'creepkit run' with the name of this page repeats the study from them."
             )
         )
     if provenance.commands:
         blocks.append(Verbatim("Commands that repeat the work", printable_lines("\n".join(provenance.commands))))
     settings = {"seed": provenance.seed} if provenance.seed is not None else {}
-    rows = [(printable(k, 120), printable(v, 400)) for k, v in {**settings, **provenance.settings}.items()]
+    rows = [
+        (printable(k, 120), printable(v, 400))
+        for k, v in _flat({**settings, **provenance.settings})
+        if v not in ("", None)
+    ]
     if rows:
         blocks.append(Table("Settings", ("setting", "value"), rows))
     if provenance.versions:
@@ -101,6 +112,19 @@ def _provenance_blocks(contents: ReportContents) -> list[Block]:
         blocks.append(Paragraph("Files that the page carries:"))
         blocks.append(Items([printable(name, 200) for name in carried]))
     return blocks
+
+
+def _flat(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Nested settings under names with dots; lists of numbers and words on one line."""
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}.")
+        elif isinstance(value, list | tuple) and any(isinstance(one, Mapping) for one in value):
+            for k, one in enumerate(value, start=1):
+                inner = one if isinstance(one, Mapping) else {"": one}
+                yield from _flat(inner, f"{prefix}{name}[{k}].")
+        else:
+            yield f"{prefix}{name}", ", ".join(map(str, value)) if isinstance(value, list | tuple) else value
 
 
 def _missing_blocks(contents: ReportContents) -> list[Block]:

@@ -188,7 +188,7 @@ def _join_neighbours(parent: Element) -> None:
 
 
 def relative_path(path: str) -> str:
-    """A path of absolute M, L, z and of h, l with positions in tenths, each from the point before; others as they are."""
+    """A path of absolute M, L, z and of h, l in tenths, each position from the one before; other paths as they are."""
     tokens = re.findall(r"[A-Za-z]|-?\d*\.?\d+", path)
     if set(re.findall("[A-Za-z]", path)) - set("MLzhl"):
         return path

@@ -82,13 +82,13 @@ Block: TypeAlias = Paragraph | Items | Table | Picture | Formula | Verbatim | Do
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A part of the page with its heading; identifier : letters, digits and hyphens, of its own in the page."""
 
     identifier: str
     title: str
     blocks: Sequence[Block] = ()
-    sections: Sequence[Section] = field(default=())
+    sections: Sequence[PageSection] = field(default=())
 
     @property
     def empty(self) -> bool:
@@ -97,7 +97,7 @@ class Section:
 
 
 def printable(text: object, longest: int = LONGEST_TEXT) -> str:
-    """A text on one line, without characters that cannot be seen or turn the direction of writing, of bounded length."""
+    """A text on one line of bounded length, without characters that are invisible or turn the direction of writing."""
     shown = "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in str(text))
     return shown if len(shown) <= longest else f"{shown[: longest - 1]}…"
 

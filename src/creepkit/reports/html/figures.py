@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from creepkit.reports.html.elements import Picture
+from creepkit.errors import CreepkitError
+from creepkit.reports.html.elements import Paragraph, Picture
 from creepkit.reports.html.svg import svg_text
 
 if TYPE_CHECKING:
@@ -19,12 +21,17 @@ class PageFigures:
     def __init__(self) -> None:
         self.count = 0
 
-    def picture(self, figure: Figure, title: str, description: str, caption: str) -> Picture:
-        """A figure with its alternative text (title and description) and a caption, which gets its number.
+    def picture(self, draw: Callable[[], Figure], title: str, description: str, caption: str) -> Picture | Paragraph:
+        """What `draw` draws with its alternative text (title and description) and a caption, which gets its number.
 
-        Its own heading is left out: the page says the same above it.
+        Its own heading is left out: the page says the same above it. A figure that cannot be drawn is a paragraph that
+        says why.
         """
+        try:
+            figure = draw()
+        except CreepkitError as error:
+            return Paragraph(f"{title}: no figure, for {error}", "note")
         self.count += 1
         figure.suptitle("")
         svg = svg_text(figure, f"f{self.count}", title, description)
-        return Picture(Markup(svg), f"Figure {self.count}. {caption}")  # noqa: S704
+        return Picture(Markup(svg), f"Figure {self.count}. {caption}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,9 +16,8 @@ from creepkit.reports.html.elements import (
     Block,
     Formula,
     Items,
+    PageSection,
     Paragraph,
-    Picture,
-    Section,
     Table,
     number,
     plural,
@@ -98,7 +98,7 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     if found.equivalents:
         blocks.append(Items([sentence(text) for text in found.equivalents]))
     blocks.append(Paragraph(f"{'The best law' if found.ranking else 'The law'}: {fit.law.title or fit.law.name}."))
-    blocks += [Formula(Markup(equation)) for equation in law_equations(fit.law)]  # noqa: S704
+    blocks += [Formula(Markup(equation)) for equation in law_equations(fit.law)]
     blocks += [_values(fit), _point(fit)]
     if fit.adequacy is not None and found.ranking is not None:
         blocks.append(Paragraph(sentence(f"the law {fit.adequacy}")))
@@ -108,7 +108,7 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     else:
         blocks.append(Paragraph("The tests determine every parameter of the law."))
     unmodelled = [
-        sentence(f"{effect.description} in a test, which changes its rate by {_change(effect.rate_change)}")
+        sentence(f"{effect.description}, which changes the rate by {_change(effect.rate_change)}")
         for effect in fit.unmodelled
     ]
     if unmodelled:
@@ -132,7 +132,7 @@ def _values(fit: Identification) -> Table:
     table, symbols = fit.law.table, {str(symbol): symbol for symbol in fit.law.params}
     rows = [
         (
-            Markup(symbol_element(symbols[e.name])),  # noqa: S704
+            Markup(symbol_element(symbols[e.name])),
             table[e.name].meaning,
             number(e.value, 5),
             f"{number(e.low)} to {number(e.high)}",
@@ -169,7 +169,7 @@ def curve_blocks(found: GroupFindings, figures: PageFigures) -> list[Block]:
         return [Paragraph("No curves are drawn: the tests were not given with this identification.", "note")]
     return [
         figures.picture(
-            identification_figure(fit),
+            lambda: identification_figure(fit),
             f"Identified law and tests{_of(found)}",
             f"Curves of {plural(len(fit.histories), 'test')} over time with the law's 95 % bands, residuals, and creep "
             f"rates over stress. {sentence(found.verdict)} The table of tests holds the numbers.",
@@ -197,7 +197,7 @@ def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[B
         name = printable(fit.tests[k].name, 120)
         blocks.append(
             figures.picture(
-                fitted_test_figure(fit, curves, k),
+                partial(fitted_test_figure, fit, curves, k),
                 f"Test {name}",
                 fitted_test_text(fit, curves, k),
                 f"{name}: measured (dots), identified with 95 % band of the law, and measured less identified; grey: "
@@ -286,7 +286,7 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
     if drawn and ranking.best.tests:
         blocks.append(
             figures.picture(
-                ranking_figure(ranking),
+                lambda: ranking_figure(ranking),
                 f"Misfit of each law in each test{_of(found)}",
                 f"Mean square deviation over noise of {plural(len(ranking.laws), 'law')} in "
                 f"{plural(len(ranking.best.tests), 'test')}, the weights of the laws, and the curves of the credible "
@@ -325,17 +325,13 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
     """Noise and scatter as they were estimated, and explicit nuisance parameters."""
     fit = found.fit
     noise = [
-        (
-            name.replace("_", " "),
-            f"{number(one.noise, 2)}{_unit(name)}",
-            f"{number(one.offset, 2)}{_unit(name)}",
-        )
+        (name.replace("_", " "), f"{number(one.noise, 2)}{_unit(name)}", f"{number(one.offset, 2)}{_unit(name)}")
         for name, one in fit.noise_model.outputs.items()
     ]
     blocks: list[Block] = [
         Paragraph(
-            f"The creep rates of single tests scatter by {number(100 * fit.noise_model.rate, 3)} % (one standard deviation "
-            "of their logarithm) about the law."
+            f"The creep rates of single tests scatter by {number(100 * fit.noise_model.rate, 3)} % about the law (one "
+            "standard deviation of their logarithm)."
         )
     ]
     if noise:
@@ -365,11 +361,11 @@ def _unit(output: str) -> str:
 
 def group_sections(
     found: GroupFindings, figures: PageFigures, prefix: str, *, most_tests: int, ranking_drawn: bool
-) -> Sequence[Section]:
+) -> Sequence[PageSection]:
     """The sections on what was found, but for the verdict."""
     return [
-        Section(f"{prefix}curves", "The law over the tests", curve_blocks(found, figures)),
-        Section(f"{prefix}tests", "Tests", test_blocks(found, figures, most_tests)),
-        Section(f"{prefix}ranking", "Laws tried", ranking_blocks(found, figures, drawn=ranking_drawn)),
-        Section(f"{prefix}nuisances", "Noise and nuisance parameters", nuisance_blocks(found)),
+        PageSection(f"{prefix}curves", "The law over the tests", curve_blocks(found, figures)),
+        PageSection(f"{prefix}tests", "Tests", test_blocks(found, figures, most_tests)),
+        PageSection(f"{prefix}ranking", "Laws tried", ranking_blocks(found, figures, drawn=ranking_drawn)),
+        PageSection(f"{prefix}nuisances", "Noise and nuisance parameters", nuisance_blocks(found)),
     ]

@@ -49,11 +49,7 @@ class References:
 def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
     """Paragraphs on identification, ranking and the other stages, then the references."""
     references = References()
-    paragraphs = [
-        *_identification(found, references),
-        *_stages(contents, references),
-        _software(contents, found),
-    ]
+    paragraphs = [*_identification(found, references), *_stages(contents, references), _software(contents, found)]
     listed = [f"[{k}] {citation}" for k, citation in enumerate(references.listed, start=1)]
     return "\n\n".join([*(" ".join(p) for p in paragraphs if p), "\n".join(listed)]).strip() + "\n"
 
@@ -76,10 +72,7 @@ def _identification(found: Sequence[GroupFindings], references: References) -> l
     if ranking is not None:
         sentences.append(
             "The laws were compared under a common covariance by the "
-            + {
-                "bic": f"Bayesian information criterion{references.cite('bic')} over independent frames",
-                "aicc": f"corrected information criterion of Akaike{references.cite('aicc')} over independent frames",
-            }.get(ranking.criterion, "error of tests that were held out")
+            + _criterion(ranking.criterion, references)
             + "; weights are exp(-difference / 2) over their sum."
         )
     sentences.append(
@@ -87,6 +80,14 @@ def _identification(found: Sequence[GroupFindings], references: References) -> l
         "frames and not from its own misfit, has a probability of at least 0.3 %."
     )
     return [sentences]
+
+
+def _criterion(name: str, references: References) -> str:
+    if name == "bic":
+        return f"Bayesian information criterion{references.cite('bic')} over independent frames"
+    if name == "aicc":
+        return f"corrected information criterion of Akaike{references.cite('aicc')} over independent frames"
+    return "error of tests that were held out"
 
 
 def _fits(found: GroupFindings) -> list[Identification]:
@@ -99,8 +100,8 @@ def _estimation(fit: Identification, references: References) -> list[str]:
     sentences = [
         f"The tests were predicted by the model of the specimen '{printable(specimen, 80)}'." if specimen else "",
         f"Parameters were sought by bounded least squares from {plural(settings.starts, 'start')} out of "
-        f"{settings.sobol_points} points of a Sobol' sequence{references.cite('sobol')} (seed {settings.seed}), refined "
-        f"by the Levenberg-Marquardt method{references.cite('levenberg')}.",
+        f"{settings.sobol_points} points of a Sobol' sequence{references.cite('sobol')} (seed {settings.seed}), "
+        f"refined by the Levenberg-Marquardt method{references.cite('levenberg')}.",
     ]
     if settings.weights == "likelihood":
         sentences.append(
@@ -133,7 +134,10 @@ def _stages(contents: ReportContents, references: References) -> list[list[str]]
     if contents.exclusions:
         tests = {one.test for one in contents.exclusions}
         paragraphs.append(
-            [f"Frames of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons listed in the report."]
+            [
+                f"Frames of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons that the "
+                "report lists."
+            ]
         )
     if contents.temperature:
         paragraphs.append(
@@ -161,7 +165,10 @@ def _stages(contents: ReportContents, references: References) -> list[list[str]]
         )
     if contents.design:
         paragraphs.append(
-            [f"Further tests were ranked by their expected information{references.cite('lindley')} per hour of the oven."]
+            [
+                f"Further tests were ranked by their expected information{references.cite('lindley')} for each hour of "
+                "the oven."
+            ]
         )
     return paragraphs
 
@@ -170,7 +177,9 @@ def _software(contents: ReportContents, found: Sequence[GroupFindings]) -> list[
     versions = dict(contents.provenance.versions)
     if not versions and found:
         versions = {"creepkit": str(found[0].fit.provenance.get("creepkit", ""))}
-    named = _listed([f"{printable(name, 60)} {printable(version, 60)}" for name, version in versions.items() if version])
+    named = _listed(
+        [f"{printable(name, 60)} {printable(version, 60)}" for name, version in versions.items() if version]
+    )
     seed = "" if contents.provenance.seed is None else f", seed {contents.provenance.seed}"
     return [sentence(f"The work was done with {named}{seed}")] if named else []
 

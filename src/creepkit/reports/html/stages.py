@@ -1,4 +1,4 @@
-"""The sections on the other stages of a study: data, exclusions, extraction, temperature, rupture, forecasts, design."""
+"""The sections on the other stages of a study: data, extraction, temperature, rupture, forecasts, further tests."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from creepkit.reports.forecast_plot import forecast_figure
 from creepkit.reports.html.elements import (
     Block,
     Items,
+    PageSection,
     Paragraph,
-    Section,
     Table,
     Verbatim,
     number,
@@ -47,7 +47,7 @@ MOST_DESIGNS = 8
 """Planned tests that are listed."""
 
 
-def data_section(contents: ReportContents) -> Section:
+def data_section(contents: ReportContents) -> PageSection:
     """The tests as measured, what is suspect in them, and what was left out and why."""
     histories = [h for group in contents.groups for h in group.histories]
     blocks: list[Block] = []
@@ -55,8 +55,8 @@ def data_section(contents: ReportContents) -> Section:
         blocks.append(_table_of_histories(histories))
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)
-    sections = [Section("exclusions", "Left out", _exclusion_blocks(contents.exclusions))]
-    return Section("data", "Data", blocks, [s for s in sections if histories or not s.empty])
+    left_out = _exclusion_blocks(contents.exclusions) if histories or contents.exclusions else []
+    return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)])
 
 
 def _table_of_histories(histories: Sequence[History]) -> Table:
@@ -116,7 +116,7 @@ def _exclusion_blocks(exclusions: Sequence[Exclusion]) -> list[Block]:
     return [Table("Left out of the identification", ("test", "what", "reason"), rows)]
 
 
-def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[Section]:
+def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[PageSection]:
     """Extraction, temperature, rupture, forecasts and further tests, where there are such results."""
     stages: tuple[tuple[str, str, Mapping[str, Any], Callable[[str, Any, PageFigures], list[Block]]], ...] = (
         ("extraction", "Extraction from camera frames", contents.extractions, _extraction_blocks),
@@ -128,13 +128,13 @@ def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[S
     for identifier, title, results, blocks_of in stages:
         if len(results) == 1:
             (name, result), *_ = results.items()
-            yield Section(identifier, title, blocks_of(name, result, figures))
+            yield PageSection(identifier, title, blocks_of(name, result, figures))
         elif results:
             inner = [
-                Section(f"{identifier}-{k}", printable(name, 120) or "All tests", blocks_of(name, result, figures))
+                PageSection(f"{identifier}-{k}", printable(name, 120) or "All tests", blocks_of(name, result, figures))
                 for k, (name, result) in enumerate(results.items(), start=1)
             ]
-            yield Section(identifier, title, (), inner)
+            yield PageSection(identifier, title, (), inner)
 
 
 def _of(name: str) -> str:
@@ -145,7 +145,7 @@ def _extraction_blocks(name: str, extraction: Extraction, figures: PageFigures) 
     used = int(extraction.used.sum())
     outputs = ", ".join(output.replace("_", " ") for output in extraction.outputs)
     picture = figures.picture(
-        extraction_figure(extraction),
+        lambda: extraction_figure(extraction),
         f"Extraction{_of(name)}",
         f"Maps of height of some frames, and over time {outputs}, rigid motion and residuals; {used} of "
         f"{extraction.times.size} frames were used, {plural(len(extraction.flags), 'flag')}.",
@@ -168,17 +168,24 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
             )
         )
         rows = [
-            (e.name, number(e.value, 5), f"{number(e.low)} to {number(e.high)}", "" if e.unit == "1" else e.unit, e.verdict)
+            (
+                e.name,
+                number(e.value, 5),
+                f"{number(e.low)} to {number(e.high)}",
+                "" if e.unit == "1" else e.unit,
+                e.verdict,
+            )
             for e in law.estimates
         ]
         columns = ("parameter", "value", "95 % interval", "unit", "by these tests")
         blocks.append(Table("Values of the temperature law", columns, rows, numeric=(1, 2)))
         blocks.append(
             figures.picture(
-                plot_temperature_law(law),
+                lambda: plot_temperature_law(law),
                 f"Parameters over temperature{_of(name)}",
-                f"Isothermal estimates with 95 % intervals at {law.isothermal_estimates.temperatures.size} temperatures "
-                f"from {low:.0f} to {high:.0f} K, and the curves of the forms that remain. Best forms: {forms}.",
+                f"Isothermal estimates with 95 % intervals at {law.isothermal_estimates.temperatures.size} "
+                f"temperatures from {low:.0f} to {high:.0f} K, and the curves of the forms that remain. "
+                f"Best forms: {forms}.",
                 "Parameters at each temperature with 95 % intervals, and the forms that remain with their weights.",
             )
         )
@@ -188,7 +195,7 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
 
 def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigures) -> list[Block]:
     picture = figures.picture(
-        rupture_figure(assessment),
+        lambda: rupture_figure(assessment),
         f"Rupture assessment{_of(name)}",
         f"Isotherms of stress over rupture time with tests and bounds, the master curve, and predicted over measured "
         f"times of {plural(len(assessment.tests), 'test')}. {sentence(assessment.verdict)}",
@@ -206,20 +213,34 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> lis
             f"By {laws}: bands and intervals hold a measured value of a single test with a probability of "
             f"{100 * forecast.level:g} %."
         ),
-        Table("Forecasts", FORECAST_COLUMNS, [tuple(map(printable, row)) for row in forecast_rows(forecast)]),
+        Table("Forecasts of single tests", FORECAST_COLUMNS, _forecast_cells(forecast)),
     ]
     if any(test.outputs for test in forecast.tests):
-        ends = " ".join(f"{printable(row[0], 80)}: {printable(row[2], 200)}." for row in forecast_rows(forecast)[:12])
+        ends = " ".join(f"{printable(row[0], 80)}: {printable(row[2], 200)}." for row in _forecast_cells(forecast)[:12])
         blocks.append(
             figures.picture(
-                forecast_figure(forecast),
+                lambda: forecast_figure(forecast),
                 f"Forecasts{_of(name)}",
-                f"Forecast curves over time with pointwise and simultaneous bands, and what the variance is made of. {ends}",
+                "Forecast curves over time with pointwise and simultaneous bands, and what the variance is made of. "
+                f"{ends}",
                 f"Forecast with bands of {100 * forecast.level:g} %, and below it what the variance is made of.",
             )
         )
-    remarks = [sentence(f"{test.name}: {note}") for test in forecast.tests for note in test.notes]
-    return [*blocks, Items(remarks)] if remarks else blocks
+    remarks: dict[str, list[str]] = {}
+    for test in forecast.tests:
+        for note in test.notes:
+            remarks.setdefault(note, []).append(printable(test.name, 80))
+    listed = [sentence(f"{note} ({', '.join(tests)})") for note, tests in remarks.items()]
+    return [*blocks, Items(listed)] if listed else blocks
+
+
+def _forecast_cells(forecast: Forecast) -> list[tuple[str, ...]]:
+    """Rows of the table; what stands on lines of its own in a terminal is parted by semicolons."""
+    rows = []
+    for test, condition, end, *cells in forecast_rows(forecast):
+        parted = ["; ".join(cell.splitlines()) for cell in cells]
+        rows.append(tuple(map(printable, (test, condition, end, *parted))))
+    return rows
 
 
 def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Block]:
@@ -239,11 +260,11 @@ def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Bloc
         blocks.append(Table(caption, columns, rows, numeric=(1, 2, 3)))
         blocks.append(
             figures.picture(
-                design_figure(design),
+                lambda: design_figure(design),
                 f"What further tests tell{_of(name)}",
                 "Map of the expected information for an hour of the oven over the first load and the duration, left of "
                 f"constant loads, right of loads that change. {sentence(design.sentence)}",
-                "Expected information for an hour of the oven, over the first load and the duration; the plan is marked.",
+                "Expected information for an hour of the oven over first load and duration; the plan is marked.",
             )
         )
     lines = [line.strip() for line in direction_lines(design) if line.strip()]

@@ -6,7 +6,9 @@ The ground of a figure is transparent; its colours are those of a figure on whit
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from creepkit.reports.figures import POWER_OF_TEN, save_figure
@@ -21,7 +23,12 @@ LONGEST_LABEL = 160
 """Characters of one line of text in a figure."""
 
 
-_SETTINGS = {"svg.fonttype": "none", "svg.hashsalt": "creepkit", "path.simplify": False, "svg.image_inline": True}
+_SETTINGS: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "creepkit",
+    "path.simplify": False,
+    "svg.image_inline": True,
+}
 _FONTS = "system-ui, 'DejaVu Sans', Verdana, sans-serif"
 
 
@@ -38,14 +45,16 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
     figure.patch.set_alpha(0.0)
     save_figure(figure, None)  # a dollar in a name is a dollar
     _shorten_texts(figure)
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        engine.execute(figure)  # axes have their places and ranges from here on
-        figure.set_layout_engine("none")
-    thin_figure(figure)
     buffer = io.StringIO()
-    with matplotlib.rc_context(_SETTINGS):
-        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+    with warnings.catch_warnings(), matplotlib.rc_context(_SETTINGS):
+        warnings.filterwarnings("ignore", "Glyph", UserWarning)  # the browser has other fonts
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            engine.execute(figure)  # axes have their places and ranges from here on
+            figure.set_layout_engine("none")
+        thin_figure(figure)
+        canvas: Any = FigureCanvasSVG(figure)
+        canvas.print_svg(buffer, metadata={"Date": None})
     root = ElementTree.fromstring(buffer.getvalue())
     width = float(str(root.get("viewBox")).split()[2])
     compact(root, identifier)
@@ -70,15 +79,27 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
 def _shorten_texts(figure: Figure) -> None:
     """Names in labels and legends on a line of bounded length, without characters that cannot be seen."""
     from matplotlib.text import Text
-    from matplotlib.ticker import FixedFormatter
+    from matplotlib.ticker import FixedFormatter, FuncFormatter
 
     for text in figure.findobj(Text):
-        content: str = text.get_text()  # type: ignore[attr-defined]
+        content: str = text.get_text()
         if content and not POWER_OF_TEN.fullmatch(content):
             lines = [printable(line, LONGEST_LABEL) for line in content.split("\n")]
-            text.set_text("\n".join(lines))  # type: ignore[attr-defined]
+            text.set_text("\n".join(lines))
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             formatter = axis.get_major_formatter()
-            if isinstance(formatter, FixedFormatter):
+            if isinstance(formatter, FuncFormatter):  # which stands for labels that are given
+                formatter.func = _printable_labels(formatter.func)
+            elif isinstance(formatter, FixedFormatter):
                 formatter.seq = [printable(label, LONGEST_LABEL // 2) for label in formatter.seq]
+
+
+def _printable_labels(label_of: Callable[..., str]) -> Callable[..., str]:
+    """The same labels without characters that cannot be seen."""
+
+    def label(*place: Any) -> str:
+        text = label_of(*place)
+        return text if POWER_OF_TEN.fullmatch(text) else printable(text, LONGEST_LABEL // 2)
+
+    return label

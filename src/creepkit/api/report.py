@@ -1,0 +1,347 @@
+"""A page that a colleague can read, from results as they are: identifications, rankings, plates, forecasts, designs."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, fields
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from creepkit.api.identification import export, rank
+from creepkit.errors import CreepkitError, ReportError
+
+if TYPE_CHECKING:
+    from creepkit.discovery.discover import TemperatureStudy
+    from creepkit.discovery.temperature_law import TemperatureLaw
+    from creepkit.experiments.planned_design import Design
+    from creepkit.extraction.extraction import Extraction
+    from creepkit.forecasts.forecast import Forecast
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+    from creepkit.records import History
+    from creepkit.reports.contents import (
+        Exclusion,
+        ExportedFile,
+        ReportContents,
+        ReportGroup,
+        ReportProvenance,
+        ReportSource,
+    )
+    from creepkit.rupture_assessment.assessment import RuptureAssessment
+    from creepkit.screening.results import AlloyResult, ScreeningResult
+
+    Reported: TypeAlias = (
+        Identification
+        | Ranking
+        | ModelAverage
+        | AlloyResult
+        | ScreeningResult
+        | TemperatureStudy
+        | TemperatureLaw
+        | Forecast
+        | Design
+        | RuptureAssessment
+        | Extraction
+    )
+
+EXPORT_TARGETS = ("json", "python", "latex", "abaqus")
+"""Of the best law of each material, to download."""
+
+
+MOST_EXPORTED_GROUPS = 6
+"""Materials up to which each has its files; of more the results of one call are too many to be picked from a list."""
+
+
+PACKAGES = ("creepkit", "numpy", "scipy", "sympy", "torch", "matplotlib")
+"""Whose versions are stated."""
+
+
+def report(
+    source: Reported | ReportSource | ReportContents | Iterable[Reported],
+    to: str | Path = "report.html",
+    *,
+    title: str = "",
+    force: bool = False,
+) -> Path:
+    """Write results as one page of HTML that a colleague can read without creepkit, and return its path.
+
+    source : a ranking, an identification, a plate, a study that was run, or several results: identifications of the
+        same tests are ranked, others stand one below the other, and forecasts, designs, temperature laws, rupture
+        assessments and extractions have sections of their own. Curves are drawn of identifications that have their
+        histories.
+    to : file of the page. title : of the page. force : whether a file that exists may be replaced.
+
+    The page runs no script and loads nothing. It holds figures, tables, laws to download, methods text and provenance.
+    """
+    from creepkit.files.writing import check_target, write_text
+    from creepkit.reports.html import report_html
+
+    path = Path(to)
+    check_target(path, ReportError, force=force)
+    return write_text(report_html(report_contents(source, title=title)), path, ReportError)
+
+
+def report_contents(
+    source: Reported | ReportSource | ReportContents | Iterable[Reported], *, title: str = ""
+) -> ReportContents:
+    """What report() shows of results: groups by material, data quality, exclusions, exports and provenance."""
+    from dataclasses import replace
+
+    from creepkit.reports.contents import ReportContents
+
+    if hasattr(source, "report_contents"):
+        source = source.report_contents()
+    if isinstance(source, ReportContents):
+        return replace(source, title=title) if title else source
+    results = _Results()
+    for one in [*source] if isinstance(source, Iterable) and not hasattr(source, "__dataclass_fields__") else [source]:
+        results.add(one)
+    if not results.any:
+        raise ReportError("there is nothing to report: give identifications, rankings, a plate or what follows them")
+    groups = results.groups()
+    histories = [h for group in groups for h in group.histories]
+    exports, notes = _exports(groups)
+    return ReportContents(
+        title=title or _title(groups),
+        groups=groups,
+        quality=_quality(histories),
+        exclusions=tuple(_exclusions(histories)),
+        temperature=results.temperature,
+        forecasts=results.forecasts,
+        design=results.design,
+        rupture=results.rupture,
+        extractions=results.extractions,
+        exports=exports,
+        provenance=_provenance(groups, histories),
+        notes=notes,
+    )
+
+
+@dataclass
+class _Results:
+    """Results sorted by what they are."""
+
+    ranked: list[ReportGroup] = field(default_factory=list)
+    fits: list[Identification] = field(default_factory=list)
+    temperature: dict[str, TemperatureStudy | TemperatureLaw] = field(default_factory=dict)
+    forecasts: dict[str, Forecast] = field(default_factory=dict)
+    design: dict[str, Design] = field(default_factory=dict)
+    rupture: dict[str, RuptureAssessment] = field(default_factory=dict)
+    extractions: dict[str, Extraction] = field(default_factory=dict)
+
+    @property
+    def any(self) -> bool:
+        """Whether there is one."""
+        return any(getattr(self, one.name) for one in fields(self))
+
+    def add(self, one: Any) -> None:
+        """Sort one result in; ReportError for anything else."""
+        from creepkit.discovery.discover import TemperatureStudy
+        from creepkit.discovery.temperature_law import TemperatureLaw
+        from creepkit.experiments.planned_design import Design
+        from creepkit.extraction.extraction import Extraction
+        from creepkit.forecasts.forecast import Forecast
+        from creepkit.inverse.identification import Identification
+        from creepkit.inverse.selection.ranking import Ranking
+        from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+        from creepkit.reports.contents import ReportGroup
+        from creepkit.rupture_assessment.assessment import RuptureAssessment
+        from creepkit.screening.results import AlloyResult, ScreeningResult
+
+        if isinstance(one, Identification):
+            self.fits.append(one)
+        elif isinstance(one, ModelAverage):
+            self.fits += one.fits
+        elif isinstance(one, Ranking):
+            self.ranked.append(ReportGroup(_material(one.best), one, one.best.histories))
+        elif isinstance(one, AlloyResult):
+            self.ranked.append(ReportGroup(one.alloy, one, failure=one.failure))
+        elif isinstance(one, ScreeningResult):
+            self.ranked += [ReportGroup(r.alloy, r, tuple(one.histories[r.alloy]), r.failure) for r in one.results]
+        elif isinstance(one, TemperatureStudy | TemperatureLaw):
+            _add_titled(self.temperature, getattr(getattr(one, "temperature_law", one), "law", None), one)
+        elif isinstance(one, Forecast):
+            _add_titled(self.forecasts, None, one)
+        elif isinstance(one, Design):
+            _add_titled(self.design, None, one)
+        elif isinstance(one, RuptureAssessment):
+            _add_titled(self.rupture, None, one)
+        elif isinstance(one, Extraction):
+            _add_titled(self.extractions, one, one)
+        else:
+            raise ReportError(
+                f"a report takes identifications, rankings, plates, forecasts, designs, temperature laws, rupture "
+                f"assessments, extractions or a study, found {type(one).__name__}"
+            )
+
+    def groups(self) -> tuple[ReportGroup, ...]:
+        """Rankings and alloys, then identifications: those of the same tests as one ranking."""
+        from creepkit.reports.contents import ReportGroup
+
+        same_tests: dict[object, list[Identification]] = {}
+        for fit in self.fits:
+            same_tests.setdefault(fit.provenance.get("data", id(fit)), []).append(fit)
+        groups = [
+            ReportGroup(_material(fits[0]), fits[0] if len(fits) == 1 else rank(fits), fits[0].histories)
+            for fits in same_tests.values()
+        ]
+        return (*self.ranked, *groups)
+
+
+def _add_titled(results: dict[str, Any], named: Any, one: Any) -> None:
+    title = str(getattr(named, "name", "") or "")
+    while title in results:
+        title = f"{title} ({len(results) + 1})" if title else f"No. {len(results) + 1}"
+    results[title] = one
+
+
+def _material(fit: Identification) -> str:
+    """The alloy of the tests, where they are of one; else the test, where it is alone."""
+    alloys = {h.alloy for h in fit.histories}
+    if len(alloys) == 1 and (alloy := alloys.pop()):
+        return alloy
+    return fit.tests[0].name if len(fit.tests) == 1 else ""
+
+
+def _title(groups: Sequence[ReportGroup]) -> str:
+    names = [group.name for group in groups if group.name]
+    if not groups or not names:
+        return "Creep laws"
+    return f"Creep law of {names[0]}" if len(groups) == 1 else f"Creep laws of {len(groups)} materials"
+
+
+def _quality(histories: Sequence[History]) -> Any:
+    from creepkit.api.simulation import check_data_quality
+
+    try:
+        return check_data_quality(histories) if histories else None
+    except CreepkitError:  # of tests that only a fit can take, such as plans
+        return None
+
+
+def _exclusions(histories: Sequence[History]) -> Iterator[Exclusion]:
+    """Frames that are marked as not used, with what is known of the reason."""
+    import numpy as np
+
+    from creepkit.reports.contents import Exclusion
+
+    for history in histories:
+        frames = tuple(int(k) for k in np.flatnonzero(~np.asarray(history.used)))
+        if frames:
+            reason = history.labels.get("suspect", "marked as not used where the test was read")
+            yield Exclusion(history.name, frames, reason)
+
+
+def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], tuple[str, ...]]:
+    """The best law of each material for some targets, and the identification; and what cannot be written."""
+    from creepkit.files.json_documents import json_text
+    from creepkit.inverse.identification_document import identification_to_json
+    from creepkit.registry import default_registry
+    from creepkit.reports.contents import ExportedFile
+    from creepkit.reports.html.groups import findings_of
+
+    found = [one for one in map(findings_of, groups) if one is not None]
+    if not 0 < len(found) <= MOST_EXPORTED_GROUPS:
+        return (), ()
+    files: list[ExportedFile] = []
+    notes: list[str] = []
+    for one in found:
+        stem = "_".join(part for part in (one.name if len(found) > 1 else "", one.fit.law.name) if part)
+        document = json_text(identification_to_json(one.fit))
+        files.append(ExportedFile(f"{stem}_identification.json", "identification, read by ck.load", document))
+        for target in EXPORT_TARGETS:
+            exporter = default_registry().exporter(target)
+            try:
+                text = export(one.fit, target)
+            except CreepkitError as error:
+                notes.append(f"the law {one.fit.law.name} is not written as {target}: {error}")
+            else:
+                files.append(ExportedFile(f"{stem}_law{exporter.suffix}", exporter.title, text))
+    return tuple(files), tuple(notes)
+
+
+# ---- provenance ------------------------------------------------------------------------------------------------------
+
+
+def _provenance(groups: Sequence[ReportGroup], histories: Sequence[History]) -> ReportProvenance:
+    from creepkit.reports.contents import ReportProvenance
+    from creepkit.reports.html.groups import findings_of
+
+    found = [one for one in map(findings_of, groups) if one is not None]
+    if not found:
+        return ReportProvenance(versions=_versions())
+    fit = found[0].fit
+    stated = {k: v for k, v in fit.provenance.items() if k in ("specimen", "origin", "when")}
+    if len(found) == 1:
+        stated |= {k: v for k, v in fit.provenance.items() if k in ("fingerprint", "data", "evaluations")}
+    settings = {one.name: getattr(fit.settings, one.name) for one in fields(fit.settings) if one.name != "nuisances"}
+    settings["nuisances"] = ", ".join(str(n.kind) for n in fit.settings.nuisances)
+    return ReportProvenance(
+        versions=_versions(),
+        seed=fit.settings.seed,
+        settings={**{k: v for k, v in settings.items() if k != "seed"}, **stated},
+        inputs=dict(_inputs(histories)),
+        commands=tuple(_commands(groups[0], histories)) if len(groups) == 1 else (),
+    )
+
+
+MOST_NAMED_FILES = 12
+"""Of the command that reads tests; more are a folder."""
+
+
+def _commands(group: ReportGroup, histories: Sequence[History]) -> Iterator[str]:
+    """Lines of Python that repeat an identification, where names and settings alone determine it."""
+    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.settings import IdentificationSettings
+    from creepkit.registry.arguments import resolve_law
+    from creepkit.reports.html.groups import findings_of
+
+    found = findings_of(group)
+    files = list(dict.fromkeys(Path(h.source).name for h in histories if h.source and Path(h.source).is_file()))
+    if found is None or not files or found.fit.sparsity is not None:
+        return
+    fits = [one.fit for one in group.result.laws] if isinstance(group.result, Ranking) else [found.fit]
+    try:
+        known = all(resolve_law(fit.law.name).fingerprint == fit.law.fingerprint for fit in fits)
+    except CreepkitError:
+        known = False
+    defaults = IdentificationSettings(weights="likelihood") if len(fits) > 1 else IdentificationSettings()
+    changed = {
+        one.name: getattr(found.fit.settings, one.name)
+        for one in fields(defaults)
+        if getattr(found.fit.settings, one.name) != getattr(defaults, one.name)
+    }
+    if not known or "nuisances" in changed:
+        return
+    changes = "".join(f", {name}={value!r}" for name, value in changed.items())
+    verb, laws = ("select", [fit.law.name for fit in fits]) if len(fits) > 1 else ("identify", fits[0].law.name)
+    yield "import creepkit as ck"
+    yield f"tests = ck.read_histories({files if len(files) <= MOST_NAMED_FILES else 'FOLDER'})"
+    yield f"ck.report(ck.{verb}({laws!r}, tests{changes}), 'report.html')"
+
+
+def _versions() -> dict[str, str]:
+    versions = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return versions
+
+
+def _inputs(histories: Sequence[History]) -> Iterator[tuple[str, str]]:
+    """(file, sha256) of the files of histories that are still there."""
+    from creepkit.files.reading import FileKind, read_bytes
+
+    kind = FileKind("a test", ReportError, "", maximum_bytes=500_000_000)
+    for source in dict.fromkeys(h.source for h in histories if h.source):
+        path = Path(source)
+        try:
+            yield path.name, hashlib.sha256(read_bytes(path, kind)).hexdigest()
+        except ReportError:
+            continue

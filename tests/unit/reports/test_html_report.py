@@ -1,0 +1,220 @@
+"""The page of a report: structure, text alternatives, files within it, and names that must stay text."""
+
+from __future__ import annotations
+
+import base64
+import re
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import html5lib
+import pytest
+
+import creepkit as ck
+from creepkit.errors import ReportError
+from creepkit.reports.attachments import read_attachments
+from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
+from creepkit.reports.html import report_html
+from helpers.report_pages import HOSTILE, contents, ranking
+
+TAGS = """
+html head meta title style body a header h1 h2 h3 h4 p nav ol ul li main section div table caption thead tbody tr th td
+figure figcaption pre span footer script math mrow mi mn mo mtext msub msup msubsup mfrac mfenced mtable mtr mtd mover
+mstyle msqrt mroot svg desc g path text tspan use defs clipPath rect image
+"""
+"""Elements that a page may have."""
+
+
+def parsed(html: str) -> Element:
+    """The page by a parser that accepts no error of syntax."""
+    return html5lib.HTMLParser(strict=True, namespaceHTMLElements=False).parse(html)
+
+
+def tag(element: Element) -> str:
+    return re.sub(r"\{[^}]*\}", "", str(element.tag))
+
+
+def elements(root: Element) -> list[Element]:
+    return [element for element in root.iter() if isinstance(element.tag, str)]
+
+
+@cache
+def page_of(hostile: bool) -> str:
+    return report_html(contents(hostile))
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["plain names", "hostile names"])
+def page(request: pytest.FixtureRequest) -> str:
+    return page_of(request.param)
+
+
+def test_it_is_html_of_known_elements_alone(page: str) -> None:
+    found = elements(parsed(page))
+    assert {tag(e) for e in found} <= set(TAGS.split())
+    assert not [name for e in found for name in e.attrib if str(name).startswith("on")]
+    scripts = [e.get("type") for e in found if tag(e) == "script"]
+    assert set(scripts) == {"application/json", "application/x-creepkit-attachment"}  # data, which no browser runs
+
+
+def test_it_loads_nothing(page: str) -> None:
+    for element in elements(parsed(page)):
+        for name, value in element.attrib.items():
+            if str(name).endswith(("href", "src")):
+                assert value.startswith(("#", "data:"))
+            assert "url(" not in value.replace("url(#", "")
+    assert not re.search(r"@import|url\(\s*['\"]?(?!#)", page[: page.index("<body>")])
+
+
+def test_identifiers_are_unique_and_found(page: str) -> None:
+    found = elements(parsed(page))
+    identifiers = [e.get("id") for e in found if e.get("id")]
+    assert len(identifiers) == len(set(identifiers))
+    references = [v[1:] for e in found for k, v in e.attrib.items() if str(k).endswith("href") and v.startswith("#")]
+    references += [word for e in found for word in e.get("aria-labelledby", "").split()]
+    references += [name for e in found for v in e.attrib.values() for name in re.findall(r"url\(#([^)]*)\)", v)]
+    assert set(references) <= set(identifiers)
+
+
+def test_headings_descend_one_by_one(page: str) -> None:
+    levels = [int(tag(e)[1]) for e in elements(parsed(page)) if re.fullmatch("h[1-6]", tag(e))]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(b - a <= 1 for a, b in pairwise(levels))
+
+
+def test_every_figure_has_words_for_those_who_do_not_see_it(page: str) -> None:
+    figures = [e for e in elements(parsed(page)) if tag(e) == "svg"]
+    assert len(figures) == 5  # curves, two tests, laws tried, forecast
+    for figure in figures:
+        title, description = (next(e for e in figure if tag(e) == kind) for kind in ("title", "desc"))
+        assert figure.get("role") == "img"
+        assert figure.get("aria-labelledby") == f"{title.get('id')} {description.get('id')}"
+        assert len(title.text or "") > 5
+        assert len(description.text or "") > 40
+        assert any(tag(e) == "text" and e.text for e in figure.iter())  # letters, not outlines of letters
+
+
+def test_every_table_has_a_caption_and_heads(page: str) -> None:
+    for table in (e for e in elements(parsed(page)) if tag(e) == "table"):
+        assert "".join(table[0].itertext()).strip()
+        assert tag(table[0]) == "caption"
+        heads = [e for e in table.iter() if tag(e) == "th"]
+        assert {e.get("scope") for e in heads} == {"col", "row"}
+        rows = [len(row) for row in table.iter() if tag(row) == "tr"]
+        assert len(set(rows)) == 1
+
+
+def test_the_same_contents_are_the_same_page() -> None:
+    assert report_html(contents()) == page_of(False)
+
+
+def test_findings_come_first_and_say_what_was_found() -> None:
+    html, best = page_of(False), ranking().best
+    assert best.law.name == "strain-hardening"
+    body = html[html.index("<main") :]
+    first = body[: body.index('id="curves"')]
+    assert "<math" in first
+    assert "explains the tests" in first
+    for estimate in best.estimates:
+        assert f"{estimate.value:.5g}".split("e")[0].replace("-", "−") in first
+    order = re.findall(r'<section id="([a-z]+)"', body)
+    assert order == [
+        *("findings", "curves", "tests", "ranking", "nuisances", "data", "exclusions", "forecasts", "exports"),
+        *("methods", "provenance", "missing"),
+    ]
+
+
+def test_hostile_names_are_shown_as_text() -> None:
+    html = page_of(True)
+    words = "".join(parsed(html).itertext())
+    assert "<script>alert(1)</script>" in words
+    assert "onerror=alert(1)>]]></style></svg><!--" in words
+    assert "{{ 7 * 7 }} &amp;" in words
+    assert "\u202e" not in html
+    assert "\x07" not in html
+    assert "\x00" not in html
+    assert max(map(len, words.splitlines())) < 5000
+    names = [e.get("download", "") for e in elements(parsed(html)) if tag(e) == "a" and e.get("download")]
+    assert names
+    assert all(re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]*", name) for name in names)
+
+
+def test_files_within_the_page(tmp_path: Path) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(page_of(True), encoding="utf-8")
+    assert read_attachments(path) == {"study.toml": HOSTILE[1].encode()}
+    (address,) = re.findall(r'href="data:text/plain;charset=utf-8;base64,([^"]*)"', path.read_text(encoding="utf-8"))
+    assert base64.b64decode(address.replace("&#43;", "+")).decode() == f"# {HOSTILE[1]}\nx = 1\n"
+
+
+def test_what_failed_is_said_and_the_rest_is_there() -> None:
+    laws_alone = replace(ranking().best, histories=(), predictor=None)  # as from a file: nothing is drawn
+    groups = (ReportGroup("good", laws_alone), ReportGroup("bad", None, (), "no frames are left"))
+    html = report_html(ReportContents("T", groups, failures=(StageFailure("forecast", "no test 'x'"),)))
+    first = html[: html.index('id="curves"')]
+    assert "This report is not complete. Failed: forecast, identification of bad." in first
+    last = html[html.index('id="missing"') :]
+    assert "No frames are left." in last
+    assert "strain-hardening" in first.lower().replace(" ", "-")
+    assert "<svg" not in html
+
+
+def test_an_empty_report_is_a_page() -> None:
+    html = report_html(ReportContents("Nothing yet", failures=(StageFailure("data", "no files"),)))
+    assert [tag(e) for e in elements(parsed(html))].count("h2") == 2
+
+
+def test_contrast_is_that_of_wcag_aa() -> None:
+    """4.5 for text on every ground, in both schemes; luminance as WCAG 2.2 defines it."""
+    style = report_html(ReportContents("T"))
+    schemes = [
+        dict(re.findall(r"--([a-z-]+): (#[0-9a-f]{6})", part)) for part in re.findall(r":root \{([^}]*)\}", style)
+    ]
+    assert len(schemes) == 3
+    for colours in schemes:
+        for text, grounds in {
+            "text": ("ground", "shade", "lead"),
+            "soft": ("ground",),
+            "accent": ("ground",),
+            "warning": ("warning-ground",),
+        }.items():
+            for ground in grounds:
+                assert contrast(colours[text], colours[ground]) >= 4.5
+
+
+def contrast(first: str, second: str) -> float:
+    high, low = sorted((luminance(first), luminance(second)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+def luminance(colour: str) -> float:
+    channels = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return sum(w * c for w, c in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+
+# ---- ck.report -------------------------------------------------------------------------------------------------------
+
+
+def test_the_verb_takes_results_and_keeps_existing_files(tmp_path: Path) -> None:
+    path = ck.report(ranking(), tmp_path / "page.html", title="Bars & rods")
+    html = path.read_text(encoding="utf-8")
+    assert "<title>Bars &amp; rods</title>" in html
+    assert 'download="strain-hardening_law.f"' in html
+    with pytest.raises(ReportError, match="exists already"):
+        ck.report(ranking(), path)
+    with pytest.raises(ReportError, match="found int"):
+        ck.report(3, tmp_path / "other.html")
+    with pytest.raises(ReportError, match="nothing to report"):
+        ck.report([], tmp_path / "other.html")
+
+
+def test_identifications_of_the_same_tests_are_ranked() -> None:
+    from creepkit.api.report import report_contents
+
+    fits = [one.fit for one in ranking().laws]
+    (group,) = report_contents(fits).groups
+    assert {r.fit.law.name for r in group.result.laws} == {"norton", "strain-hardening"}
