@@ -9,8 +9,8 @@ that shows a single text. `creepkit app` has a page that answers bars, and dimpl
 itself while a slider moves, and asks its server for all else: "by the server" is a dimple of another thickness, whose
 reduced-order model answers and sends the deformed section as JSON. The page in one file computes all in JavaScript.
 The limit is 50 ms for the 95th percentile with the reduced-order model. Browser, server and this program share the
-cores of the machine; on one that does other work start it as `chrt -f 10 python tests/benchmarks/page_latency.py`, which
-is how the table below was made.
+cores of the machine; on one that does other work start it as `chrt -f 10 python tests/benchmarks/page_latency.py`,
+which is how the table below was made.
 """
 
 from __future__ import annotations
