@@ -10,9 +10,13 @@ import pytest
 import creepkit as ck
 from creepkit.app.contents import page_contents
 from creepkit.app.page import page_fragment
+from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.recipe import Training
+from creepkit.surrogates.training import train
 from helpers.browser import browser, tab
 from helpers.command_line import creepkit
 from helpers.http_requests import serving
+from helpers.planted_datasets import bars
 
 A, N = 1e-16, 4.5
 HOSTILE = "</script><img src=x onerror='window.harmed=1'><script>window.harmed=1</script>"
@@ -204,6 +208,43 @@ def test_a_dimple_in_a_page_of_one_file(chromium, tmp_path):
         titles = one.page.locator("h3").all_inner_texts()
         assert titles[:4] == ["Amplitude", "Width", "Shape", "Deformed section"]
         assert one.problems == []
+
+
+def test_a_trained_network_answers_while_a_slider_moves(chromium, tmp_path):
+    data = bars(48)
+    network = train(data, ParameterGru(6, 1, training=Training(epochs=2, batch=32, rate=1e-2)))
+    values, plan = data.values_of(0), data.planned_test(0)
+    end = float(plan.times[-1])
+    stress = float(plan.loading.program().values[0])
+    path = ck.interactive_page(ck.law_with_values(data.law, values), tmp_path / "page.html", surrogate=network)
+    with tab(chromium) as one:
+        one.open(path.as_uri())
+        quick, exact = (
+            one.page.evaluate(
+                """([end, stress, exact]) => {
+                    const data = JSON.parse(window.given), values = {};
+                    for (const p of data.laws[0].parameters) values[p.name] = p.value;
+                    const program = { specimen: "uniaxial", load: "stress", steps: [[0, stress]], control: "load", ramp: 0,
+                                      end, temperature: 1073, modulus: null, lengths: {} };
+                    const question = { law: 0, values, program, tests: [], rate_temperature: 1073, exact };
+                    return creepkitPage.predict(data, question).program;
+                }""".replace("window.given", json.dumps(json.dumps(page_data(path)))),
+                [end, stress, e],
+            )
+            for e in (False, True)
+        )
+        assert one.problems == []
+    held = plan.replace(loading=ck.constant_stress(stress))
+    for answer, model in ((quick, network), (exact, ck.specimen("uniaxial"))):
+        at = held.replace(times=np.array(answer["times"]))
+        expected = model.predict(data.law, data.law.to_internal(values), [at]).of(0)[:, 0]
+        np.testing.assert_allclose(answer["outputs"]["strain"], expected, atol=1e-4 * np.abs(expected).max())
+
+
+def page_data(path):
+    """What the scripts of a page read."""
+    text = path.read_text(encoding="utf-8").partition('class="creepkit-page-data">')[2]
+    return json.loads(text.partition("</script>")[0])
 
 
 def test_a_specimen_that_nobody_registered(chromium):

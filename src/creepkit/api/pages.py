@@ -11,7 +11,7 @@ from creepkit.files.writing import check_target, write_text
 
 if TYPE_CHECKING:
     from creepkit.app.contents import PageContents, PageSource
-    from creepkit.records import History
+    from creepkit.records import History, Predictor
 
 
 def interactive_page(
@@ -21,6 +21,7 @@ def interactive_page(
     tests: Sequence[History] = (),
     specimen: str | None = None,
     title: str = "",
+    surrogate: Predictor | None = None,
     force: bool = False,
 ) -> Path:
     """Write a page of HTML on which a law's parameters are moved by sliders, and return its path.
@@ -29,11 +30,14 @@ def interactive_page(
 
     source : a law or its name, a law with values, an identification or a ranking.
     tests : measured ones that are laid over; by default those that an identification holds.
-    specimen : which is shown first. title : of the page. force : whether a file that exists may be replaced.
+    specimen : which is shown first. title : of the page. surrogate : a trained network, which answers for its specimen
+    while a slider moves. force : whether a file that exists may be replaced.
     """
     from creepkit.app.contents import page_contents
 
-    return write_page(page_contents(source, tests, specimen=specimen, title=title), Path(to), force=force)
+    return write_page(
+        page_contents(source, tests, specimen=specimen, title=title, surrogate=surrogate), Path(to), force=force
+    )
 
 
 def write_page(contents: PageContents, path: Path, *, force: bool = False) -> Path:

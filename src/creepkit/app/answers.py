@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from creepkit import kernels
-from creepkit.app.contents import PageContents, PageLaw
+from creepkit.app.contents import PageContents, PageLaw, specimen_name
 from creepkit.app.documents import compared_frames, finite, numbers, rate_point
 from creepkit.app.requests import PredictRequest, ProgramRequest, RequestError
 from creepkit.app.sections import section_document
@@ -79,7 +79,9 @@ class PageAnswers:
 
     def train(self, name: str) -> None:
         """Have the reduced-order model of a specimen ready, where it has one."""
-        specimen = self.contents.specimen(name)
+        specimen, surrogate = self.contents.specimen(name), self.contents.surrogate
+        if surrogate is not None and specimen_name(surrogate) == name:
+            self._reduced[name] = surrogate
         if name in self._reduced or not isinstance(specimen, SupportsReducedOrderModel):
             return
         reduced = specimen.reduced_order_model()

@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.reference_conditions import ReferencePoint
-from creepkit.records import History, LawWithValues, Specimen, known_specimens, predict_with
+from creepkit.records import History, LawWithValues, Predictor, Specimen, known_specimens, predict_with
 from creepkit.registry.arguments import check_histories, resolve_law
 
 if TYPE_CHECKING:
@@ -67,7 +67,8 @@ class PageLaw:
 class PageContents:
     """Laws, specimens and measured tests of a page; the first law and the first specimen are shown first.
 
-    title : of the page. temperature : K, where the sliders start.
+    title : of the page. temperature : K, where the sliders start. surrogate : answers for its specimen while a slider
+    moves, in the place of the reduced-order model.
     """
 
     title: str
@@ -75,6 +76,7 @@ class PageContents:
     specimens: tuple[Specimen, ...]
     histories: tuple[History, ...]
     temperature: float = USUAL_TEMPERATURE
+    surrogate: Predictor | None = None
 
     def specimen(self, name: str) -> Specimen:
         """The specimen of this name; FitError where the page has none."""
@@ -85,12 +87,18 @@ class PageContents:
 
 
 def page_contents(
-    source: PageSource, tests: Sequence[History] = (), *, specimen: str | None = None, title: str = ""
+    source: PageSource,
+    tests: Sequence[History] = (),
+    *,
+    specimen: str | None = None,
+    title: str = "",
+    surrogate: Predictor | None = None,
 ) -> PageContents:
     """Resolve what a page is to show.
 
     source : a law or its name, a law with values, an identification or a ranking. tests : measured ones that are laid
     over; by default those that an identification holds. specimen : which is shown first; by default that of the tests.
+    surrogate : a trained network of the first law, which answers while a slider moves.
     """
     laws = _page_laws(source)
     fit = laws[0].fit
@@ -101,10 +109,24 @@ def page_contents(
     return PageContents(
         title or law.title or law.name,
         laws,
-        _specimens(histories, specimen),
+        _specimens(histories, specimen or (specimen_name(surrogate) if not histories else None)),
         histories,
         _first_temperature(histories, fit),
+        None if surrogate is None else _checked_surrogate(surrogate, law),
     )
+
+
+def specimen_name(surrogate: Any) -> str | None:
+    """The name of the specimen that a surrogate stands for."""
+    return getattr(getattr(surrogate, "specimen", None), "name", None)
+
+
+def _checked_surrogate(surrogate: Any, law: CreepLaw) -> Predictor:
+    """The surrogate, unless it does not know the law."""
+    problem = surrogate.outside_class(law) if hasattr(surrogate, "outside_class") else ""
+    if problem:
+        raise FitError(f"the surrogate cannot answer for law '{law.name}': {problem}")
+    return cast("Predictor", surrogate)
 
 
 def _page_laws(source: PageSource) -> tuple[PageLaw, ...]:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.app.contents import RATE_STRAIN, RATE_TIME, USUAL_STRESS, PageContents, PageLaw, usual_end
+from creepkit.app.contents import RATE_STRAIN, RATE_TIME, USUAL_STRESS, PageContents, PageLaw, specimen_name, usual_end
 from creepkit.app.model_data import law_data
-from creepkit.app.page_models import model_of
+from creepkit.app.page_models import model_of, network_of
 from creepkit.errors import CreepkitError
 from creepkit.exporters.latex import latex_unit
 from creepkit.language.printing import LatexLawPrinter, latex_equations
@@ -56,7 +56,12 @@ def contents_document(contents: PageContents, models: Collection[str] = ()) -> d
         own = [name for name in (model_of(specimen, history) if models else ()) if name in models]
         return {**document, "model": own[0] if own else None}
 
-    specimens = [with_model(specimen_document(one), one) for one in contents.specimens]
+    networks = [name for name in network_of(contents) if name in models]
+    specimens = [
+        with_model(specimen_document(one), one)
+        | {"network": networks[0] if networks and specimen_name(contents.surrogate) == one.name else None}
+        for one in contents.specimens
+    ]
     stress = specimens[0]["loads"][0]["stress"]
     return {
         "title": contents.title,

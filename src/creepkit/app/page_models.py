@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from functools import lru_cache
+from typing import Any
 
 from creepkit.app.contents import PageContents
+from creepkit.app.network_data import network_data
 from creepkit.app.reduced_model_data import rom_data
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, SurrogateError
 from creepkit.records import History, Specimen
 from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
 from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.surrogates.parameter_surrogate import ParameterSurrogate
 
 MOST_MODELS = 4
 """Of one page, some 150 kB each; tests of further pieces are shown without a curve."""
@@ -26,7 +30,17 @@ def page_models(contents: PageContents, *, shown_first: bool = False) -> dict[st
         found = model_of(contents.specimen(history.specimen), history)
         if len(models) < MOST_MODELS:
             models |= found
-    return models
+    return models | network_of(contents)
+
+
+def network_of(contents: PageContents) -> dict[str, str]:
+    """{name: data} of the page's surrogate where it is a network that a page can have; else {}."""
+    if not isinstance(contents.surrogate, ParameterSurrogate):
+        return {}
+    try:
+        return dict([_named("network", network_data(contents.surrogate))])
+    except SurrogateError:  # one that corrects another model
+        return {}
 
 
 def model_of(specimen: Specimen, history: History | None = None) -> dict[str, str]:
@@ -44,5 +58,10 @@ def model_of(specimen: Specimen, history: History | None = None) -> dict[str, st
 
 @lru_cache(maxsize=16)
 def _packed(specimen: Bulge) -> tuple[str, str]:
-    text = json.dumps(rom_data(BulgeReducedOrderModel(specimen)), allow_nan=False, separators=(",", ":"))
-    return f"dimple-{hashlib.sha256(text.encode()).hexdigest()[:12]}", text
+    return _named("dimple", rom_data(BulgeReducedOrderModel(specimen)))
+
+
+def _named(kind: str, data: Mapping[str, Any]) -> tuple[str, str]:
+    """A name that follows from the content, so that several pages in one document may share it, and the JSON."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return f"{kind}-{hashlib.sha256(text.encode()).hexdigest()[:12]}", text

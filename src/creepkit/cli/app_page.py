@@ -18,6 +18,7 @@ def command(
         typer.Argument(metavar="[LAW|FIT.json|TESTS]...", help="A law, an identification or a ranking, and tests."),
     ] = None,
     specimen: Annotated[str | None, typer.Option(help="Which is shown first; by default that of the tests.")] = None,
+    surrogate: Annotated[Path | None, typer.Option(help="A trained network, for while a slider moves.")] = None,
     to: Annotated[Path | None, typer.Option(help="Write the page as one file, and serve nothing.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Of the server; 0 takes any that is free.")] = 0,
@@ -27,11 +28,13 @@ def command(
 
     Measured tests are laid over. The page is served on this machine alone until Ctrl-C, or written as one file.
     """
+    import creepkit as ck
     from creepkit.api.pages import write_page
     from creepkit.app.contents import page_contents
 
     source, tests = _resolved(sources or [])
-    contents = page_contents(source, tests, specimen=specimen)
+    network = None if surrogate is None else ck.surrogate(surrogate)
+    contents = page_contents(source, tests, specimen=specimen, surrogate=network)
     if to is not None:
         typer.echo(f"wrote {write_page(contents, to, force=force)}")
         return

@@ -11,7 +11,7 @@
     return tests.every((k) => known(data.tests[k].specimen) && !data.tests[k].nuisances && (data.tests[k].model !== null || data.specimens.find((one) => one.name === data.tests[k].specimen).runtime !== "dimple"));
   };
 
-  page.predicts = (data, specimen) => (specimen.runtime === "dimple" ? specimen.model !== null : specimen.runtime !== null) && globalThis.creepkit !== undefined;
+  page.predicts = (data, specimen) => specimen.network !== null || (specimen.runtime === "dimple" ? specimen.model !== null : specimen.runtime !== null) && globalThis.creepkit !== undefined;
 
   const lawOf = (data, position) => globalThis.creepkitLaws[data.laws[position].code];
   const plain = (values) => Array.from(values, (v) => (Number.isFinite(v) ? v : null));
@@ -25,6 +25,12 @@
   }
 
   const KINDS = {
+    network: (law, values, test) => {
+      const constants = { ...test.lengths, temperature: test.temperature, ...(test.elastic ?? {}) };
+      if (typeof constants.temperature !== "number") constants.temperature = test.temperature.at(-1)[1];
+      const run = creepkit.predictByNetwork(law, values, globalThis.creepkitModels[test.network], { load: test.stress, times: test.times, constants });
+      return { outputs: Object.fromEntries(Object.entries(run.outputs).map(([name, column]) => [name, plain(column)])), run };
+    },
     creep: (law, values, test) => {
       const run = creepkit.simulateCreep(law, values, test);
       return { outputs: { [test.output]: plain(run.strain) }, run };
@@ -64,8 +70,13 @@
     return { nodes, elements, times, at: (k) => run.placesAt(times[k]).flat().map((place, n) => place - nodes[n]), stress: null };
   }
 
+  // A network answers while a slider moves, and always for a specimen that the runtime does not know itself.
+  function kindOf(specimen, test) {
+    return specimen.network !== null && (test.fast || specimen.runtime === null) ? "network" : specimen.runtime;
+  }
+
   function predicted(law, values, specimen, test) {
-    const { outputs, run, section: drawn } = KINDS[specimen.runtime](law, values, { ...test, output: specimen.outputs[0].name });
+    const { outputs, run, section: drawn } = KINDS[kindOf(specimen, test)](law, values, { ...test, network: specimen.network, output: specimen.outputs[0].name });
     const ended = run.status !== "complete";
     const shape = test.planned && drawn ? { section: drawn() } : {};
     return { ...shape, times: plain(run.times), outputs, ended: ended ? run.reason || run.status : "", end: ended ? run.endTime : null };
@@ -74,8 +85,8 @@
   function ofProgram(law, values, data, question) {
     const { program } = question;
     const specimen = data.specimens.find((one) => one.name === program.specimen);
-    const elastic = specimen.modulus.needed ? { modulus: program.modulus } : undefined;
-    return predicted(law, values, specimen, { planned: true, fast: !question.exact, model: specimen.model, times: plannedTimes(program), stress: creepkit.steps(program.steps, program.ramp), temperature: program.temperature, control: program.control, elastic });
+    const elastic = specimen.modulus.needed ? { modulus: program.modulus } : undefined, { lengths } = program;
+    return predicted(law, values, specimen, { planned: true, fast: !question.exact, model: specimen.model, times: plannedTimes(program), stress: creepkit.steps(program.steps, program.ramp), temperature: program.temperature, control: program.control, elastic, lengths });
   }
 
   function ofTest(law, values, data, k, exact) {
@@ -83,7 +94,7 @@
     if (specimen === undefined || (specimen.runtime === "dimple" && test.model === null)) return { test: k, outputs: {}, ended: "", end: null };
     const pairs = ([times, numbers]) => times.map((t, i) => [t, numbers[i]]);
     const elastic = (test.includes_elastic || specimen.modulus.needed) && test.modulus !== null ? { modulus: test.modulus } : undefined;
-    const made = predicted(law, values, specimen, { fast: !exact, model: test.model, times: test.times, stress: pairs(test.program), temperature: pairs(test.temperature_program), control: test.control, elastic, strainMeasure: test.measure });
+    const made = predicted(law, values, specimen, { fast: !exact, model: test.model, times: test.times, stress: pairs(test.program), temperature: pairs(test.temperature_program), control: test.control, elastic, strainMeasure: test.measure, lengths: test.lengths });
     return { test: k, ...made };
   }
 

@@ -157,7 +157,7 @@
     }
 
     function say(answer) {
-      const how = answer.exact ? "" : state.specimen.reduced && state.planned ? (data.endpoint ? "Reduced-order model; finite elements when you let go. " : "Reduced-order model in few modes; all modes when you let go. ") : "";
+      const how = answer.exact ? "" : state.specimen.network !== null && state.planned ? "The network that was trained for it; more exact when you let go. " : state.specimen.reduced && state.planned ? (data.endpoint ? "Reduced-order model; finite elements when you let go. " : "Reduced-order model in few modes; all modes when you let go. ") : "";
       const ended = answer.program?.ended ? `The planned test ended after ${page.duration(answer.program.end)}: ${answer.program.ended}.` : "";
       status.textContent = how + ended;
       root.dataset.exact = String(answer.exact);
