@@ -20,19 +20,20 @@ REPORTS = DOCS.parent / "build" / "site" / "reports"
 TARGET = DOCS / "pictures" / "studies"
 
 SHOTS = {
-    "hardening_findings": ("strain_or_time_hardening/constant_loads", "#findings"),
-    "hardening_design": ("strain_or_time_hardening/constant_loads", "#design"),
-    "hardening_decided": ("strain_or_time_hardening/with_step", "#findings"),
-    "spreadsheet_findings": ("spreadsheet_to_abaqus/report", "#findings"),
-    "spreadsheet_forecast": ("spreadsheet_to_abaqus/report", "#forecasts"),
-    "plate_findings": ("plate_of_dimples/report", "#findings"),
-    "plate_alloy": ("plate_of_dimples/report", "#m1-curves"),
+    "hardening_findings": ("strain_or_time_hardening/constant_loads", "#findings", 640),
+    "hardening_design": ("strain_or_time_hardening/constant_loads", "#design", 730),
+    "hardening_map": ("strain_or_time_hardening/constant_loads", "#design figure", 900),
+    "hardening_decided": ("strain_or_time_hardening/with_step", "#findings", 560),
+    "spreadsheet_findings": ("spreadsheet_to_abaqus/report", "#findings", 900),
+    "spreadsheet_forecast": ("spreadsheet_to_abaqus/report", "#forecasts", 1100),
+    "plate_findings": ("plate_of_dimples/report", "#findings", 1100),
+    "plate_alloy": ("plate_of_dimples/report", "#m1-curves", 1100),
 }
-"""{picture: (report, element)}."""
+"""{picture: (report, element, the most of its height in pixels)}."""
 
 
-WIDTH, MOST_HEIGHT, COLOURS, MOST_BYTES = 860, 900, 128, 150_000
-"""Pixels of the window and of the highest picture; colours of a picture; bytes of the largest."""
+WIDTH, MARGIN, COLOURS, MOST_BYTES = 860, 16, 128, 150_000
+"""Pixels of the window and around an element; colours of a picture; bytes of the largest."""
 
 FLAGS = [
     *("--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"),
@@ -50,20 +51,26 @@ def main() -> None:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         page = browser.new_context(
-            viewport={"width": WIDTH, "height": MOST_HEIGHT}, color_scheme="light", offline=True
+            viewport={"width": WIDTH, "height": WIDTH}, color_scheme="light", offline=True
         ).new_page()
-        for name, (report, element) in SHOTS.items():
+        for name, (report, element, most) in SHOTS.items():
             path = TARGET / f"{name}.png"
             page.goto((REPORTS / f"{report}.html").as_uri())
-            path.write_bytes(reduced(page.locator(element).screenshot()))
+            place = page.locator(element).first.bounding_box()
+            clip = {
+                "x": max(place["x"] - MARGIN, 0),
+                "y": place["y"],
+                "width": min(place["width"] + 2 * MARGIN, WIDTH),
+                "height": min(place["height"] + MARGIN, most),
+            }
+            path.write_bytes(reduced(page.screenshot(clip=clip, full_page=True)))
             print(f"{path.relative_to(DOCS.parent)}: {path.stat().st_size / 1000:.0f} kB")
         browser.close()
 
 
 def reduced(png: bytes) -> bytes:
-    """The upper part of a picture, in few colours."""
-    picture = Image.open(io.BytesIO(png)).convert("RGB")
-    picture = picture.crop((0, 0, picture.width, min(picture.height, MOST_HEIGHT))).quantize(COLOURS, dither=0)
+    """A picture in few colours."""
+    picture = Image.open(io.BytesIO(png)).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
     stream = io.BytesIO()
     picture.save(stream, "PNG", optimize=True)
     if stream.tell() > MOST_BYTES:
