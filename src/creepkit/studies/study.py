@@ -161,7 +161,7 @@ class Study:
             raise StudyError(f"{lock_path}: the study cannot be repeated exactly: {what}; leave --locked out")
         execution = Execution(kept, inputs.histories, progress)
         execution.run(stages, needed_stages(stages, kinds))
-        write_lock(lock_of(self.file, self._hash, files, execution.records), lock_path)
+        write_lock(lock_of(self.file, self._hash, files, execution.records, before), lock_path)
         if before is not None:
             changes += changed_results(before, execution.records)
         result = StudyResult(
