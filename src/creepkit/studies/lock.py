@@ -65,7 +65,7 @@ def lock_of(
         "declared": model.model_dump(),
         "settings": settings,
         "laws": laws,
-        "stages": {one.name: {"key": one.key, "state": _state(one), "numbers": dict(one.numbers)} for one in records},
+        "stages": {one.name: _stage(one, known.get(one.name)) for one in records},
     }
     return as_read_back({**STUDY_LOCK.heading, **content})
 
