@@ -68,6 +68,7 @@ class Study:
         if model.temperature is not None and model.temperature.law is not None:
             with file.at("temperature", "law"):
                 ck.law(model.temperature.law)
+        arguments.check_names(file)
         for k, part in enumerate(model.forecast):
             arguments.check_forecast(file, k)
             names = [one.name for one in model.forecast[:k]]
