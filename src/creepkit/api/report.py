@@ -242,7 +242,7 @@ def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], t
     from creepkit.inverse.identification_document import identification_to_json
     from creepkit.registry import default_registry
     from creepkit.reports.contents import ExportedFile
-    from creepkit.reports.html.groups import findings_of
+    from creepkit.reports.html.findings import findings_of
 
     found = [one for one in map(findings_of, groups) if one is not None]
     if not 0 < len(found) <= MOST_EXPORTED_GROUPS:
@@ -269,7 +269,7 @@ def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], t
 
 def _provenance(groups: Sequence[ReportGroup], histories: Sequence[History]) -> ReportProvenance:
     from creepkit.reports.contents import ReportProvenance
-    from creepkit.reports.html.groups import findings_of
+    from creepkit.reports.html.findings import findings_of
 
     found = [one for one in map(findings_of, groups) if one is not None]
     if not found:
@@ -298,7 +298,7 @@ def _commands(group: ReportGroup, histories: Sequence[History]) -> Iterator[str]
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.registry.arguments import resolve_law
-    from creepkit.reports.html.groups import findings_of
+    from creepkit.reports.html.findings import findings_of
 
     found = findings_of(group)
     files = list(dict.fromkeys(Path(h.source).name for h in histories if h.source and Path(h.source).is_file()))

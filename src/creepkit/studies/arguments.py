@@ -347,3 +347,33 @@ def tolerances_of(file: StudyFile, number: int) -> dict[str, float]:
             raise file.error(("forecast", number, "tolerances", key), f"is not known; {nearest(key, spelt)}")
         tolerances[spelt[key]] = value
     return tolerances
+
+
+def check_names(file: StudyFile) -> None:
+    """StudyError for methods of rupture times, forms of temperature and parameters that there are not."""
+    import creepkit as ck
+    from creepkit.discovery.forms import CONSTANT
+    from creepkit.registry import default_registry
+    from creepkit.rupture_assessment.methods import METHODS, MINIMUM_RATE
+
+    rupture, temperature = file.model.rupture, file.model.temperature
+    methods = [name for name in METHODS if name != MINIMUM_RATE.name]
+    for k, name in enumerate((rupture.methods or []) if rupture is not None else []):
+        if name not in methods:
+            raise file.error(("rupture", "methods", k), f"there is no method '{name}'; {nearest(name, methods)}")
+    if temperature is None:
+        return
+    laws = laws_of(file) if file.model.identification is not None else []
+    if temperature.law is not None:
+        with file.at("temperature", "law"):
+            laws = [ck.law(temperature.law)]
+    known = {name for law in laws for name in law.names}
+    for table in ("forms", "prior_odds"):
+        for parameter, names in getattr(temperature, table).items():
+            if known and parameter not in known:
+                what = f"no law has a parameter '{parameter}'"
+                raise file.error(("temperature", table, parameter), f"{what}; {nearest(parameter, known)}")
+            for name in names:
+                if name != CONSTANT:
+                    with file.at("temperature", table, parameter):
+                        default_registry().temperature_form(name)

@@ -68,6 +68,7 @@ class Study:
         if model.temperature is not None and model.temperature.law is not None:
             with file.at("temperature", "law"):
                 ck.law(model.temperature.law)
+        arguments.check_names(file)
         for k, part in enumerate(model.forecast):
             arguments.check_forecast(file, k)
             names = [one.name for one in model.forecast[:k]]
@@ -161,7 +162,7 @@ class Study:
             raise StudyError(f"{lock_path}: the study cannot be repeated exactly: {what}; leave --locked out")
         execution = Execution(kept, inputs.histories, progress)
         execution.run(stages, needed_stages(stages, kinds))
-        write_lock(lock_of(self.file, self._hash, files, execution.records), lock_path)
+        write_lock(lock_of(self.file, self._hash, files, execution.records, before), lock_path)
         if before is not None:
             changes += changed_results(before, execution.records)
         result = StudyResult(

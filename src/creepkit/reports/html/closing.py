@@ -25,7 +25,7 @@ from creepkit.reports.html.methods import methods_text
 
 if TYPE_CHECKING:
     from creepkit.reports.contents import ExportedFile, ReportContents
-    from creepkit.reports.html.groups import GroupFindings
+    from creepkit.reports.html.findings import GroupFindings
 
 
 def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -> list[PageSection]:

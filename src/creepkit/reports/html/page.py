@@ -23,7 +23,8 @@ from creepkit.reports.html.elements import (
     printable_lines,
 )
 from creepkit.reports.html.figures import PageFigures
-from creepkit.reports.html.groups import GroupFindings, findings_of, group_sections, verdict_blocks, with_histories
+from creepkit.reports.html.findings import GroupFindings, findings_of, verdict_blocks, with_histories
+from creepkit.reports.html.groups import group_sections
 from creepkit.reports.html.stages import data_section, stage_sections
 
 if TYPE_CHECKING:
