@@ -27,6 +27,7 @@ s, K.
       pressure: [[0, 0], [5, 8], [14400, 8], [14405, 10]],          // MPa, a program as above
       elastic: {modulus: 150e3, poisson: 0.3}, temperature: 1073, times: [...],
       fast: true,                               // 16 modes and longer steps, as in a global search: while dragging
+      maxSteps: 1000,                           // with rejected ones; caps the cost of a dimple that bursts at once
     }) -> {times, outputs: {amplitude, width: mm, shape}, radii: mm, profileAt(time): u_z mm of the top at those radii,
            placesAt(time): [[r, z], ...] mm of the nodes, edges: [[first, middle, last node], ...] of the outline,
            status, endTime, ruptureTime, reason, steps}

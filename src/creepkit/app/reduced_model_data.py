@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from creepkit.app.packed_arrays import packed
@@ -11,15 +13,19 @@ from creepkit.fem.reduced_order_model import ReducedOrderModel, mode_gradients
 from creepkit.specimens.bulge.finite_elements import solver_settings
 from creepkit.specimens.bulge.gaussian_fit import GaussianFit
 from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
-from creepkit.specimens.bulge.setup import BulgeSetup
+from creepkit.specimens.bulge.setup import BulgeSetup, model_of_specimen
 
 
-def rom_data(predictor: BulgeReducedOrderModel) -> dict[str, Any]:
-    """Return the model of the specimen's own dimple as JSON values; modes and gradients in single precision.
+def rom_data(predictor: BulgeReducedOrderModel, lengths: Mapping[str, float] | None = None) -> dict[str, Any]:
+    """Return the model of the specimen's dimple as JSON values; modes and gradients in single precision.
 
+    lengths : {name: mm} of another dimple, such as {"apex_thickness": 0.53}, as a history may state them.
     Trains the model where that has not been done. SolveError where rings are observed, which have no fit.
     """
     setup = predictor.own_setup()
+    if lengths:
+        geometry = setup.geometry.replace(**lengths)
+        setup = replace(setup, model=model_of_specimen(predictor.specimen, geometry), geometry=geometry)
     model = predictor.reduced_model_of(setup)
     settings = solver_settings(predictor.specimen)
     return {

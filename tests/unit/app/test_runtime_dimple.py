@@ -103,6 +103,31 @@ def test_the_coarse_model_is_near_and_the_section_is_that_of_the_modes(model, da
     assert {node for edge in full["edges"] for node in edge} >= {int(node) for node in mesh.top}
 
 
+def test_a_dimple_of_another_thickness(model, tmp_path):
+    values, thickness = {"A": 1e-17, "n": 5.0, "m": -0.3}, 0.53
+    case = (STRAIN_HARDENING, "simulateDimple", values, options(JUMP))
+    (found,) = in_page(tmp_path, [case], rom_data(model, {"apex_thickness": thickness}))
+    test = ck.History(
+        "thicker", np.array(TIMES), {}, JUMP, temperature=1073.0, specimen="bulge", elastic=ck.Elastic(150e3),
+        geometry={"apex_thickness": thickness},
+    )  # fmt: skip
+    theta = STRAIN_HARDENING.to_internal(values)
+    exact = model.predict(STRAIN_HARDENING, theta, [test]).of(0)
+    for k, name in enumerate(("amplitude", "width", "shape")):
+        np.testing.assert_allclose(found["outputs"][name], exact[:, k], rtol=AGREEMENT, atol=1e-9, err_msg=name)
+
+
+def test_numbers_that_make_no_sense_end_a_simulation_and_raise_nothing(data, tmp_path):
+    bar = {"stress": 100.0, "times": TIMES}
+    values = [{"A": "NaN"}, {"A": 0.0}, {"A": 1e300, "n": 5.0}, {"A": 1e-17, "n": 1e6}, {"A": -1.0, "n": 5.0}]
+    cases = [(NORTON, "simulateDimple", each, options(JUMP, fast=True, maxSteps=60)) for each in values]
+    for found in in_page(tmp_path, cases, data):
+        assert found["status"] in ("complete", "ruptured", "not converged"), found
+        assert found["steps"] <= 60
+    for found in in_page(tmp_path, [(NORTON, "simulateCreep", each, bar) for each in values]):
+        assert found["status"] in ("complete", "ruptured", "not converged"), found
+
+
 def test_mistakes_are_one_sentence(data, tmp_path):
     good = options(JUMP)
     found = in_page(

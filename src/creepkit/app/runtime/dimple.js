@@ -33,6 +33,7 @@
     };
     const model = unpacked(data, options.fast ? SEARCH.modes : data.modes);
     const settings = { ...data.settings, ...(options.fast ? SEARCH.settings : {}) };
+    if (options.maxSteps) settings.maxSteps = options.maxSteps;
     const run = new creepkit.BodyIntegration(model, law, loading, settings).run();
     return results(run, model, times, law);
   }
