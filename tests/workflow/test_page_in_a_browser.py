@@ -224,8 +224,8 @@ def test_a_trained_network_answers_while_a_slider_moves(chromium, tmp_path):
                 """([end, stress, exact]) => {
                     const data = JSON.parse(window.given), values = {};
                     for (const p of data.laws[0].parameters) values[p.name] = p.value;
-                    const program = { specimen: "uniaxial", load: "stress", steps: [[0, stress]], control: "load", ramp: 0,
-                                      end, temperature: 1073, modulus: null, lengths: {} };
+                    const program = { specimen: "uniaxial", load: "stress", steps: [[0, stress]], control: "load",
+                                      ramp: 0, end, temperature: 1073, modulus: null, lengths: {} };
                     const question = { law: 0, values, program, tests: [], rate_temperature: 1073, exact };
                     return creepkitPage.predict(data, question).program;
                 }""".replace("window.given", json.dumps(json.dumps(page_data(path)))),

@@ -284,7 +284,10 @@ def _test_fits(history: History, contents: PageContents) -> list[Any]:
 
 
 def numbers(values: Floats) -> list[float | None]:
-    """Numbers to six digits, which is finer than a screen; None in the place of those that are not finite."""
+    """Numbers to six digits, which is finer than a screen; None in the place of those that are not finite.
+
+    values : (...,), returned one after another.
+    """
     given = np.asarray(values, float).ravel()
     with np.errstate(all="ignore"):
         scale = 10.0 ** (5.0 - np.floor(np.log10(np.abs(given))))
