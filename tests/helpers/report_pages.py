@@ -3,7 +3,7 @@
 from functools import cache
 
 import creepkit as ck
-from creepkit.reports.contents import Attachment, Exclusion, ExportedFile, Provenance, ReportContents, ReportGroup
+from creepkit.reports.contents import Attachment, Exclusion, ExportedFile, ReportContents, ReportGroup, ReportProvenance
 from creepkit.reports.contents import StageFailure as Failure
 from helpers.planted_bars import SPL, bars
 
@@ -39,7 +39,9 @@ def contents(hostile: bool = False) -> ReportContents:
         forecasts={name: result.forecast(result.best.histories[0])},
         exports=(ExportedFile(f"{name}/law.py", name, f"# {name}\nx = 1\n"),),
         failures=(Failure(f"design {name}", f"no test '{name}' is there"),),
-        provenance=Provenance({name: "1"}, 7, {name: {name: [name, 1]}}, {name: "0" * 64}, (f"creepkit run {name}",)),
+        provenance=ReportProvenance(
+            {name: "1"}, 7, {name: {name: [name, 1]}}, {name: "0" * 64}, (f"creepkit run {name}",)
+        ),
         attachments=(Attachment("study.toml", name.encode()),),
         notes=(f"a note on {name}",),
     )

@@ -1,4 +1,4 @@
-"""A report as a colleague opens it: from a file, in Chromium, without network, with and without scripts, and on paper."""
+"""A report as a colleague opens it: a file in Chromium, without network, with and without scripts, and on paper."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_the_keyboard_reaches_everything(browser, address) -> None:
     page.keyboard.press("Enter")
     assert page.evaluate("location.hash") == "#main"
     beyond = page.evaluate(
-        "[...document.querySelectorAll('a, .scroll, pre')].filter(e => e.tabIndex < 0).map(e => e.outerHTML.slice(0, 80))"
+        "[...document.querySelectorAll('a, .scroll, pre')].filter(e => e.tabIndex < 0).map(e => e.className)"
     )
     assert beyond == []
     page.context.close()

@@ -23,7 +23,14 @@ if TYPE_CHECKING:
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.records import History
-    from creepkit.reports.contents import Exclusion, ExportedFile, Provenance, ReportContents, ReportGroup, ReportSource
+    from creepkit.reports.contents import (
+        Exclusion,
+        ExportedFile,
+        ReportContents,
+        ReportGroup,
+        ReportProvenance,
+        ReportSource,
+    )
     from creepkit.rupture_assessment.assessment import RuptureAssessment
     from creepkit.screening.results import AlloyResult, ScreeningResult
 
@@ -235,7 +242,7 @@ def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], t
     from creepkit.inverse.identification_document import identification_to_json
     from creepkit.registry import default_registry
     from creepkit.reports.contents import ExportedFile
-    from creepkit.reports.html.groups import findings_of
+    from creepkit.reports.html.findings import findings_of
 
     found = [one for one in map(findings_of, groups) if one is not None]
     if not 0 < len(found) <= MOST_EXPORTED_GROUPS:
@@ -260,20 +267,20 @@ def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], t
 # ---- provenance ------------------------------------------------------------------------------------------------------
 
 
-def _provenance(groups: Sequence[ReportGroup], histories: Sequence[History]) -> Provenance:
-    from creepkit.reports.contents import Provenance
-    from creepkit.reports.html.groups import findings_of
+def _provenance(groups: Sequence[ReportGroup], histories: Sequence[History]) -> ReportProvenance:
+    from creepkit.reports.contents import ReportProvenance
+    from creepkit.reports.html.findings import findings_of
 
     found = [one for one in map(findings_of, groups) if one is not None]
     if not found:
-        return Provenance(versions=_versions())
+        return ReportProvenance(versions=_versions())
     fit = found[0].fit
     stated = {k: v for k, v in fit.provenance.items() if k in ("specimen", "origin", "when")}
     if len(found) == 1:
         stated |= {k: v for k, v in fit.provenance.items() if k in ("fingerprint", "data", "evaluations")}
     settings = {one.name: getattr(fit.settings, one.name) for one in fields(fit.settings) if one.name != "nuisances"}
     settings["nuisances"] = ", ".join(str(n.kind) for n in fit.settings.nuisances)
-    return Provenance(
+    return ReportProvenance(
         versions=_versions(),
         seed=fit.settings.seed,
         settings={**{k: v for k, v in settings.items() if k != "seed"}, **stated},
@@ -291,7 +298,7 @@ def _commands(group: ReportGroup, histories: Sequence[History]) -> Iterator[str]
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.registry.arguments import resolve_law
-    from creepkit.reports.html.groups import findings_of
+    from creepkit.reports.html.findings import findings_of
 
     found = findings_of(group)
     files = list(dict.fromkeys(Path(h.source).name for h in histories if h.source and Path(h.source).is_file()))

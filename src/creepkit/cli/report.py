@@ -44,13 +44,16 @@ def command(
 def _read(path: Path, histories: list[History]) -> Identification | ModelAverage | RuptureAssessment:
     """What a file holds, with the tests that it was made from where they are given."""
     import creepkit as ck
+    from creepkit.errors import ReportError
     from creepkit.files.json_documents import read_json
+    from creepkit.files.reading import FileKind
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.ranking_document import read_fit_or_ranking
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.rupture_assessment.assessment_document import ASSESSMENT
 
-    data = read_json(path, ASSESSMENT.kind)
+    advice = "give an identification, a ranking.json or a rupture assessment that creepkit wrote"
+    data = read_json(path, FileKind("a result", ReportError, advice))
     if isinstance(data, dict) and data.get("format") == ASSESSMENT.name:
         return ck.load_rupture_assessment(path)
     found = read_fit_or_ranking(path)

@@ -69,7 +69,7 @@ class ExportedFile:
 
 
 @dataclass(frozen=True)
-class Provenance:
+class ReportProvenance:
     """What is needed to repeat the work.
 
     versions : {package: version}. seed : of all draws, None where nothing was drawn. settings : {name: value}, values
@@ -119,7 +119,7 @@ class ReportContents:
     extractions: Mapping[str, Extraction] = field(default_factory=dict)
     exports: tuple[ExportedFile, ...] = ()
     failures: tuple[StageFailure, ...] = ()
-    provenance: Provenance = field(default_factory=Provenance)
+    provenance: ReportProvenance = field(default_factory=ReportProvenance)
     attachments: tuple[Attachment, ...] = ()
     notes: tuple[str, ...] = ()
 

@@ -12,8 +12,8 @@ from creepkit.reports.html.elements import (
     Block,
     Downloads,
     Items,
+    PageSection,
     Paragraph,
-    Section,
     Table,
     Verbatim,
     plural,
@@ -25,14 +25,14 @@ from creepkit.reports.html.methods import methods_text
 
 if TYPE_CHECKING:
     from creepkit.reports.contents import ExportedFile, ReportContents
-    from creepkit.reports.html.groups import GroupFindings
+    from creepkit.reports.html.findings import GroupFindings
 
 
-def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -> list[Section]:
+def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -> list[PageSection]:
     """Exports, methods, provenance, and what is missing."""
     return [
-        Section("exports", "Files to download", _export_blocks(contents.exports)),
-        Section(
+        PageSection("exports", "Files to download", _export_blocks(contents.exports)),
+        PageSection(
             "methods",
             "Methods text",
             [
@@ -45,8 +45,8 @@ def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -
             if found or contents.rupture
             else [],
         ),
-        Section("provenance", "Provenance, and how to repeat", _provenance_blocks(contents)),
-        Section("missing", "What is missing", _missing_blocks(contents)),
+        PageSection("provenance", "Provenance, and how to repeat", _provenance_blocks(contents)),
+        PageSection("missing", "What is missing", _missing_blocks(contents)),
     ]
 
 

@@ -82,13 +82,13 @@ Block: TypeAlias = Paragraph | Items | Table | Picture | Formula | Verbatim | Do
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A part of the page with its heading; identifier : letters, digits and hyphens, of its own in the page."""
 
     identifier: str
     title: str
     blocks: Sequence[Block] = ()
-    sections: Sequence[Section] = field(default=())
+    sections: Sequence[PageSection] = field(default=())
 
     @property
     def empty(self) -> bool:

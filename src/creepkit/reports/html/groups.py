@@ -1,23 +1,19 @@
-"""The sections on one material: verdict and values, curves, tests, ranking of laws, nuisance parameters."""
+"""The sections on one material: curves, tests, ranking of laws, noise and nuisance parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from markupsafe import Markup
 
-from creepkit.exporters.mathml import law_equations, symbol_element
 from creepkit.records import output_unit
 from creepkit.reports.html.elements import (
     Block,
-    Formula,
     Items,
+    PageSection,
     Paragraph,
-    Section,
     Table,
     number,
     plural,
@@ -25,138 +21,18 @@ from creepkit.reports.html.elements import (
     sentence,
 )
 from creepkit.reports.html.figures import PageFigures
+from creepkit.reports.html.findings import GroupFindings
 from creepkit.reports.identification_plot import identification_figure
 from creepkit.reports.identification_text import rupture_rows
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.prediction_bands import fitted_curves
-from creepkit.reports.ranking import equivalents_among_remaining, explanation, misfit_cells, misfit_columns
+from creepkit.reports.ranking import explanation, misfit_cells, misfit_columns
 from creepkit.reports.ranking_plot import misfit_of, ranking_figure
 from creepkit.reports.test_figure import fitted_test_figure, fitted_test_text
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
-    from creepkit.reports.contents import ReportGroup
-
-
-LARGEST_PER_CENT = 0.4
-"""Of a logarithm, from which its change is given as a factor."""
-
-
-@dataclass(frozen=True)
-class GroupFindings:
-    """What was found of one material, whatever it was found by.
-
-    fit : the best law. ranking : of all laws, None where one law alone was identified. verdict : in a sentence.
-    equivalents : pairs of laws that the tests do not separate. remarks : further sentences.
-    """
-
-    name: str
-    fit: Identification
-    ranking: Ranking | None
-    verdict: str
-    equivalents: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
-
-
-def findings_of(group: ReportGroup) -> GroupFindings | None:
-    """What was found of a group; None where nothing was."""
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection.ranking import RankedLaw, Ranking
-    from creepkit.screening.results import AlloyResult
-
-    result = group.result
-    if isinstance(result, AlloyResult):
-        if not result.identified:
-            return None
-        laws = tuple(RankedLaw(w.fit, w.bic_difference, w.weight) for w in result.laws)
-        ranking = Ranking(laws, failed=result.failed_laws) if len(laws) > 1 else None
-        return GroupFindings(group.name, result.best, ranking, result.verdict, result.equivalents, result.notes)
-    if isinstance(result, Ranking):
-        equivalents = () if result.decisive else tuple(map(str, equivalents_among_remaining(result)))
-        return GroupFindings(group.name, result.best, result, result.verdict, equivalents)
-    if isinstance(result, Identification):
-        adequacy = "was identified; whether it explains the tests is not known"
-        adequacy = adequacy if result.adequacy is None else str(result.adequacy)
-        return GroupFindings(group.name, result, None, f"the law '{result.law.name}' {adequacy}")
-    return None
-
-
-def with_histories(group: ReportGroup) -> ReportGroup:
-    """The group with its histories taken from its result where it states none."""
-    found = findings_of(group)
-    return group if group.histories or found is None else replace(group, histories=found.fit.histories)
-
-
-# ---- verdict and values ----------------------------------------------------------------------------------------------
-
-
-def verdict_blocks(found: GroupFindings) -> list[Block]:
-    """The verdict, the law as a formula, its values with intervals, adequacy, and what is not determined."""
-    fit = found.fit
-    blocks: list[Block] = [Paragraph(sentence(found.verdict), "lead")]
-    if found.equivalents:
-        blocks.append(Items([sentence(text) for text in found.equivalents]))
-    blocks.append(Paragraph(f"{'The best law' if found.ranking else 'The law'}: {fit.law.title or fit.law.name}."))
-    blocks += [Formula(Markup(equation)) for equation in law_equations(fit.law)]
-    blocks += [_values(fit), _point(fit)]
-    if fit.adequacy is not None and found.ranking is not None:
-        blocks.append(Paragraph(sentence(f"the law {fit.adequacy}")))
-    undetermined = _undetermined(fit)
-    if undetermined:
-        blocks += [Paragraph("What these tests do not determine:"), Items(undetermined)]
-    else:
-        blocks.append(Paragraph("The tests determine every parameter of the law."))
-    unmodelled = [
-        sentence(f"{effect.description}, which changes the rate by {_change(effect.rate_change)}")
-        for effect in fit.unmodelled
-    ]
-    if unmodelled:
-        blocks += [Paragraph("The intervals do not include:"), Items(unmodelled)]
-    remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *fit.notes])))
-    return [*blocks, Paragraph("Remarks:"), Items(remarks)] if remarks else blocks
-
-
-def _change(log_factor: float) -> str:
-    """A change of a logarithm in words."""
-    if abs(log_factor) < LARGEST_PER_CENT:
-        return f"{number(100 * float(np.expm1(log_factor)), 2)} %"
-    return f"a factor of {number(float(np.exp(log_factor)), 2)}"
-
-
-def _undetermined(fit: Identification) -> list[str]:
-    return [sentence(text) for text in fit.undetermined()]
-
-
-def _values(fit: Identification) -> Table:
-    table, symbols = fit.law.table, {str(symbol): symbol for symbol in fit.law.params}
-    rows = [
-        (
-            Markup(symbol_element(symbols[e.name])),
-            table[e.name].meaning,
-            number(e.value, 5),
-            f"{number(e.low)} to {number(e.high)}",
-            "" if e.unit == "1" else e.unit,
-            e.verdict,
-        )
-        for e in fit.estimates
-    ]
-    columns = ("parameter", "meaning", "value", "95 % interval", "unit", "by these tests")
-    caption = "Values for stress in MPa as a ratio to 1 MPa, and time in s as a ratio to 1 s"
-    return Table(caption, columns, rows, numeric=(2, 3))
-
-
-def _point(fit: Identification) -> Paragraph:
-    """Rate and local exponent at the reference point."""
-    r = fit.reference
-    rate = [number(float(v), 3) for v in fit.rate(r.stress, warn=False)]
-    exponent = [number(float(v), 3) for v in fit.local_exponent(r.stress, warn=False)]
-    virgin = " of virgin material" if fit.law.states else ""
-    return Paragraph(
-        f"Amid the tests, at {number(r.stress)} MPa, {r.temperature:.0f} K, a strain of {number(r.strain, 2)} and "
-        f"{number(r.time / SECONDS_PER_HOUR, 3)} h, the creep rate{virgin} is {rate[0]} per second (95 % interval "
-        f"{rate[1]} to {rate[2]}) and the local stress exponent is {exponent[0]} ({exponent[1]} to {exponent[2]})."
-    )
 
 
 # ---- curves and tests ------------------------------------------------------------------------------------------------
@@ -361,11 +237,11 @@ def _unit(output: str) -> str:
 
 def group_sections(
     found: GroupFindings, figures: PageFigures, prefix: str, *, most_tests: int, ranking_drawn: bool
-) -> Sequence[Section]:
+) -> Sequence[PageSection]:
     """The sections on what was found, but for the verdict."""
     return [
-        Section(f"{prefix}curves", "The law over the tests", curve_blocks(found, figures)),
-        Section(f"{prefix}tests", "Tests", test_blocks(found, figures, most_tests)),
-        Section(f"{prefix}ranking", "Laws tried", ranking_blocks(found, figures, drawn=ranking_drawn)),
-        Section(f"{prefix}nuisances", "Noise and nuisance parameters", nuisance_blocks(found)),
+        PageSection(f"{prefix}curves", "The law over the tests", curve_blocks(found, figures)),
+        PageSection(f"{prefix}tests", "Tests", test_blocks(found, figures, most_tests)),
+        PageSection(f"{prefix}ranking", "Laws tried", ranking_blocks(found, figures, drawn=ranking_drawn)),
+        PageSection(f"{prefix}nuisances", "Noise and nuisance parameters", nuisance_blocks(found)),
     ]

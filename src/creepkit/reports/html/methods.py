@@ -10,7 +10,7 @@ from creepkit.reports.html.elements import plural, printable, sentence
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.reports.contents import ReportContents
-    from creepkit.reports.html.groups import GroupFindings
+    from creepkit.reports.html.findings import GroupFindings
 
 CITATIONS = {
     "sobol": "I. M. Sobol' (1967), USSR Comput. Math. Math. Phys. 7(4), 86-112",

@@ -12,9 +12,19 @@ from markupsafe import Markup
 
 from creepkit.reports.attachments import embed
 from creepkit.reports.html.closing import closing_sections
-from creepkit.reports.html.elements import Block, Paragraph, Section, Table, number, plural, printable, printable_lines
+from creepkit.reports.html.elements import (
+    Block,
+    PageSection,
+    Paragraph,
+    Table,
+    number,
+    plural,
+    printable,
+    printable_lines,
+)
 from creepkit.reports.html.figures import PageFigures
-from creepkit.reports.html.groups import GroupFindings, findings_of, group_sections, verdict_blocks, with_histories
+from creepkit.reports.html.findings import GroupFindings, findings_of, verdict_blocks, with_histories
+from creepkit.reports.html.groups import group_sections
 from creepkit.reports.html.stages import data_section, stage_sections
 
 if TYPE_CHECKING:
@@ -72,9 +82,9 @@ def _resource(name: str) -> str:
     return files("creepkit.reports.html").joinpath("templates", name).read_text("utf-8")
 
 
-def _without_empty(section: Section) -> Section:
+def _without_empty(section: PageSection) -> PageSection:
     inner = [one for one in map(_without_empty, section.sections) if not one.empty]
-    return Section(section.identifier, section.title, section.blocks, inner)
+    return PageSection(section.identifier, section.title, section.blocks, inner)
 
 
 def _summary(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
@@ -91,7 +101,7 @@ def _summary(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
 # ---- findings --------------------------------------------------------------------------------------------------------
 
 
-def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) -> Section:
+def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) -> PageSection:
     """The verdict of each group; of several groups a table, and their verdicts in sections of their own."""
     missing = [printable(one.stage, 80) for one in contents.failures]
     missing += [f"identification of {printable(g.name, 80)}" for g in contents.groups if g.failure]
@@ -104,12 +114,12 @@ def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) 
             )
         )
     if len(found) == 1:
-        return Section("findings", "Findings", [*warning, *verdict_blocks(found[0])])
+        return PageSection("findings", "Findings", [*warning, *verdict_blocks(found[0])])
     if not found:
         text = "No law was identified."
-        return Section("findings", "Findings", [*warning, *([Paragraph(text, "lead")] if contents.groups else [])])
+        return PageSection("findings", "Findings", [*warning, *([Paragraph(text, "lead")] if contents.groups else [])])
     blocks = [*warning, Paragraph(_overview(contents, found), "lead"), _table_of_groups(found)]
-    return Section("findings", "Findings", blocks)
+    return PageSection("findings", "Findings", blocks)
 
 
 def _overview(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
@@ -155,7 +165,7 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
     return Table("Materials, with 95 % intervals", columns, rows, numeric=(2, 4, 5, 6))
 
 
-def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> list[Section]:
+def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> list[PageSection]:
     drawn = len(found) <= MOST_RANKINGS_DRAWN
     most = _figures_of_tests(found)
     if len(found) == 1:
@@ -164,7 +174,7 @@ def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> lis
     for k, one in enumerate(found, start=1):
         inner = group_sections(one, figures, f"m{k}-", most_tests=most, ranking_drawn=drawn)
         title = printable(one.name, 120) or f"Material {k}"
-        sections.append(Section(f"m{k}", title, verdict_blocks(one), inner))
+        sections.append(PageSection(f"m{k}", title, verdict_blocks(one), inner))
     return sections
 
 

@@ -15,8 +15,8 @@ from creepkit.reports.forecast_plot import forecast_figure
 from creepkit.reports.html.elements import (
     Block,
     Items,
+    PageSection,
     Paragraph,
-    Section,
     Table,
     Verbatim,
     number,
@@ -47,7 +47,7 @@ MOST_DESIGNS = 8
 """Planned tests that are listed."""
 
 
-def data_section(contents: ReportContents) -> Section:
+def data_section(contents: ReportContents) -> PageSection:
     """The tests as measured, what is suspect in them, and what was left out and why."""
     histories = [h for group in contents.groups for h in group.histories]
     blocks: list[Block] = []
@@ -56,7 +56,7 @@ def data_section(contents: ReportContents) -> Section:
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)
     left_out = _exclusion_blocks(contents.exclusions) if histories or contents.exclusions else []
-    return Section("data", "Data", blocks, [Section("exclusions", "Left out", left_out)])
+    return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)])
 
 
 def _table_of_histories(histories: Sequence[History]) -> Table:
@@ -116,7 +116,7 @@ def _exclusion_blocks(exclusions: Sequence[Exclusion]) -> list[Block]:
     return [Table("Left out of the identification", ("test", "what", "reason"), rows)]
 
 
-def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[Section]:
+def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[PageSection]:
     """Extraction, temperature, rupture, forecasts and further tests, where there are such results."""
     stages: tuple[tuple[str, str, Mapping[str, Any], Callable[[str, Any, PageFigures], list[Block]]], ...] = (
         ("extraction", "Extraction from camera frames", contents.extractions, _extraction_blocks),
@@ -128,13 +128,13 @@ def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[S
     for identifier, title, results, blocks_of in stages:
         if len(results) == 1:
             (name, result), *_ = results.items()
-            yield Section(identifier, title, blocks_of(name, result, figures))
+            yield PageSection(identifier, title, blocks_of(name, result, figures))
         elif results:
             inner = [
-                Section(f"{identifier}-{k}", printable(name, 120) or "All tests", blocks_of(name, result, figures))
+                PageSection(f"{identifier}-{k}", printable(name, 120) or "All tests", blocks_of(name, result, figures))
                 for k, (name, result) in enumerate(results.items(), start=1)
             ]
-            yield Section(identifier, title, (), inner)
+            yield PageSection(identifier, title, (), inner)
 
 
 def _of(name: str) -> str:

@@ -80,7 +80,7 @@ def _shown_points(artist: Any, data: Floats, scale: float) -> Floats:
 
 
 def kept_dots(points: Floats, size: float) -> Bools:
-    """(points,) which dots to draw: the first in each cell of so many points width and height."""
+    """(points,) which dots to draw: the first in each square cell of side `size`. points : (points, 2) 1/72 inch."""
     keep = np.zeros(len(points), bool)
     shown = np.flatnonzero(np.isfinite(points).all(axis=1))
     _, first = np.unique(np.floor(points[shown] / size), axis=0, return_index=True)
@@ -89,7 +89,7 @@ def kept_dots(points: Floats, size: float) -> Bools:
 
 
 def kept_points(points: Floats, tolerance: float = TOLERANCE) -> Bools:
-    """(points,) which of the points (points, 2) of a line to draw; gaps (NaN) stay, one point each."""
+    """(points,) which points of a line to draw; gaps (NaN) stay, one point each. points : (points, 2) 1/72 inch."""
     keep = np.zeros(len(points), bool)
     finite = np.isfinite(points).all(axis=1)
     starts = np.flatnonzero(np.diff(np.concatenate([[False], finite])) & finite)
