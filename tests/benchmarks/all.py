@@ -42,6 +42,7 @@ BENCHMARKS = {
     "camera_reading": Benchmark(0.5),
     "rendered_speckle": Benchmark(1, needs="pyvale 2026.10, here or in the Python of the option --python"),
     "user_costs": Benchmark(2, needs=DATA),
+    "studies": Benchmark(4, needs=DATA),
     "kernel_speed": Benchmark(1, ((), ("1000",)), "numba, for the hand-written code beside ours"),
     "kernel_start": Benchmark(1),
     "uniaxial_speed": Benchmark(1),

@@ -67,7 +67,8 @@ def command(
 
 def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, and where the report is."""
-    print_table(result.title, ("stage", "state", ""), [(one.name, one.state, one.sentence) for one in result.stages])
+    typer.echo(result.title)
+    print_table("", ("stage", "state", ""), [(one.name, one.state, one.sentence) for one in result.stages])
     for exclusion in result.exclusions:
         count = len(exclusion.frames)
         frames = f", {count} frame{'s' if count > 1 else ''}" if count else ""

@@ -167,9 +167,13 @@ def key_of(parts: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class ResultFolder:
-    """The folder in which results of stages are kept, one file each."""
+    """The folder in which results of stages are kept, one file each.
+
+    overwrite : whether files beside the study that it has not written may be replaced.
+    """
 
     folder: Path
+    overwrite: bool = False
 
     @property
     def fits(self) -> Path:
@@ -185,6 +189,17 @@ class ResultFolder:
         for folder in (self.folder, self.fits):
             for path in (*folder.glob(".*.part"), *(folder.glob("*.json") if everything else ())):
                 path.unlink(missing_ok=True)
+
+    @property
+    def outputs(self) -> list[str]:
+        """Names of exports and reports beside the study that it has written, or began to."""
+        found = self.load("outputs", "outputs")
+        return [str(name) for name in found] if isinstance(found, list) else []
+
+    def add_output(self, name: str) -> None:
+        """Note that a file beside the study is the study's own."""
+        if name not in self.outputs:
+            self.save("outputs", "outputs", [*self.outputs, name])
 
     def load(self, stage: str, key: str) -> Any:
         """The data of a stage; None where there are none, or of another key."""
@@ -206,4 +221,4 @@ class ResultFolder:
 def file_name(text: str) -> str:
     """A name as part of a file's; with the beginning of a hash where signs were lost."""
     plain = re.sub(r"[^A-Za-z0-9.=+-]+", "-", text).strip("-.")[:80]
-    return plain if plain == text.replace(" ", "-") and plain else f"{plain or 'x'}_{short_hash(text.encode())[:6]}"
+    return plain if plain == text and plain else f"{plain or 'x'}_{short_hash(text.encode())[:6]}"

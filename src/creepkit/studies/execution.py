@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,6 +22,9 @@ from creepkit.studies.numbers import numbers_of
 from creepkit.studies.stages import Stage
 
 LOCK_NAME = "running.lock"
+
+
+_log = logging.getLogger("creepkit.studies")
 
 
 @dataclass(frozen=True)
@@ -171,10 +175,14 @@ class Execution:
 
         try:
             result = self._made(stage, tick)
-        except CreepkitError as error:
-            self._record(stage, "failed", key, " ".join(str(error).split()))
+        except Exception as error:  # of a plugin, too: the other stages go on
+            what = str(error) if isinstance(error, CreepkitError) else f"{type(error).__name__}: {error}"
+            _log.debug("%s failed", stage.name, exc_info=error)
+            self._record(stage, "failed", key, " ".join(what.split()))
             self._report(stage, 1, 1, "failed")
             return
+        if getattr(result, "interrupted", False):  # by Ctrl-C, with the best so far, which is not the result
+            raise KeyboardInterrupt
         self.results.set(stage.name, result)
         numbers = numbers_of(stage.kind, result)
         self._record(stage, "made", key, numbers=numbers)

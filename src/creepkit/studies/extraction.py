@@ -9,7 +9,7 @@ from creepkit.files.reading import read_bytes
 from creepkit.files.writing import write_bytes
 from creepkit.reports.attachments import read_attachments
 from creepkit.studies.inputs import DATA_FILE
-from creepkit.studies.page import CARRIED_FOLDER
+from creepkit.studies.result import CARRIED_FOLDER
 from creepkit.studies.study import Study
 
 STUDY_NAME, LOCK_NAME = "study.toml", "study.lock"

@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -82,6 +83,8 @@ def resolve_paths(file: StudyFile, key: tuple[str | int, ...], texts: Sequence[s
         pattern = PurePosixPath(text.replace("\\", "/"))
         if pattern.is_absolute() or text.startswith("~") or re.match(r"^[A-Za-z]:", text):
             raise file.error(place, f"'{text}' is absolute; write it relative to the study file, such as data/*.csv")
+        if "**" in pattern.parts:
+            raise file.error(place, f"'{text}' goes through folders of any depth; name the folders")
         base, relative = (file.path.parent, pattern) if root is None else (root, PurePosixPath(carried_name(pattern)))
         path = base / relative
         matches = [path] if path.exists() else _matches(base, relative)
@@ -98,7 +101,8 @@ def _matches(base: Path, pattern: PurePosixPath) -> list[Path]:
     if first is None:
         return []
     try:
-        return sorted((base.joinpath(*parts[:first])).glob(str(PurePosixPath(*parts[first:]))))[: MOST_FILES + 1]
+        found = base.joinpath(*parts[:first]).glob(str(PurePosixPath(*parts[first:])))
+        return sorted(islice(found, MOST_FILES + 1))
     except (ValueError, NotImplementedError, OSError):
         return []
 
@@ -113,7 +117,7 @@ def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_
     base = file.path.parent if root is None else root
     files: dict[Path, None] = {}
     for path in paths:
-        for one in sorted(path.rglob("*")) if path.is_dir() else [path]:
+        for one in sorted(islice(path.rglob("*"), 2 * MOST_FILES)) if path.is_dir() else [path]:
             if one.is_file() and not any(one == own or own in one.parents for own in left_out):
                 files[one] = None
             if len(files) > MOST_FILES:
@@ -188,6 +192,8 @@ def _excluded(file: StudyFile, histories: Sequence[History]) -> tuple[list[Histo
     """The histories without what the study excludes."""
     remaining, exclusions = list(histories), []
     for k, part in enumerate(file.model.exclude):
+        if part.from_h is not None and part.to_h is not None and not part.from_h < part.to_h:
+            raise file.error(("exclude", k, "to_h"), f"{part.to_h:g} h does not lie after from_h, {part.from_h:g} h")
         named = [h for h in histories if fnmatchcase(h.name, part.test)]
         if not named:
             names = [h.name for h in histories]

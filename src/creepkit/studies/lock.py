@@ -45,8 +45,15 @@ def versions_of() -> dict[str, str]:
     return found
 
 
-def lock_of(file: StudyFile, study_hash: str, files: Sequence[InputFile], records: Sequence[StageRecord]) -> Any:
-    """The content of study.lock; the same for the same run."""
+def lock_of(
+    file: StudyFile,
+    study_hash: str,
+    files: Sequence[InputFile],
+    records: Sequence[StageRecord],
+    before: Mapping[str, Any] | None = None,
+) -> Any:
+    """The content of study.lock; the same for the same run. before : the lock, whose stages that are left out stay."""
+    known = {} if before is None else before["stages"]
     model = file.model
     settings = record_to_json(asdict(arguments.settings_of(file)))
     laws = {} if model.identification is None else {law.name: law.fingerprint for law in arguments.laws_of(file)}
@@ -58,13 +65,16 @@ def lock_of(file: StudyFile, study_hash: str, files: Sequence[InputFile], record
         "declared": model.model_dump(),
         "settings": settings,
         "laws": laws,
-        "stages": {one.name: {"key": one.key, "state": _state(one), "numbers": dict(one.numbers)} for one in records},
+        "stages": {one.name: _stage(one, known.get(one.name)) for one in records},
     }
     return as_read_back({**STUDY_LOCK.heading, **content})
 
 
-def _state(record: StageRecord) -> str:
-    return {"failed": "failed", "left out": "left out"}.get(record.state, "done")
+def _stage(record: StageRecord, known: Any) -> Any:
+    if record.state == "left out" and isinstance(known, dict) and known.get("key") == record.key:
+        return known
+    state = {"failed": "failed", "left out": "left out"}.get(record.state, "done")
+    return {"key": record.key, "state": state, "numbers": dict(record.numbers)}
 
 
 def write_lock(content: Any, path: Path) -> Path:

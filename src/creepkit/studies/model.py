@@ -7,14 +7,20 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
 MOST_ITEMS = 1000
 """In a list of a study file."""
 
 
-Text = Annotated[str, StringConstraints(min_length=1, max_length=500, pattern=r"^[^\x00-\x1f\x7f]*$")]
+def _printable(text: str) -> str:
+    if text.isprintable():
+        return text
+    raise PydanticCustomError("misfit", "must be a text of one line, without signs that cannot be seen")
+
+
+Text = Annotated[str, StringConstraints(min_length=1, max_length=500), AfterValidator(_printable)]
 """Without line breaks, and without signs that steer a terminal."""
 
 

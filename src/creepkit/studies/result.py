@@ -7,9 +7,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from creepkit.reports.contents import Exclusion, ExportedFile, StageFailure
+from creepkit.files.reading import read_bytes
+from creepkit.reports.contents import (
+    Attachment,
+    Exclusion,
+    ExportedFile,
+    ReportContents,
+    ReportGroup,
+    ReportProvenance,
+    StageFailure,
+)
 from creepkit.studies.execution import StageRecord
-from creepkit.studies.inputs import InputFile, TestGroup
+from creepkit.studies.inputs import DATA_FILE, InputFile, TestGroup
+from creepkit.studies.lock import versions_of
+from creepkit.studies.model import ReportPart
+from creepkit.studies.study_file import StudyFile
+
+CARRIED_FOLDER = "inputs"
+"""Of the data files that a report carries."""
+
 
 if TYPE_CHECKING:
     from creepkit.discovery.discover import TemperatureStudy
@@ -28,6 +44,7 @@ class StudyResult:
     title : of the study. groups : of the tests that were used; "" names the only one. exclusions : what was left out.
     stages : how each ended. exports : laws as text. report : the page, where one was asked for.
     changes : what differs from the study.lock that was there, one sentence each. files : that were read.
+    measured : all tests as the files hold them. file, lock_path : the study, and the lock of this run.
     """
 
     title: str
@@ -39,6 +56,8 @@ class StudyResult:
     report: Path | None = None
     measured: tuple[History, ...] = ()
     results: Any = field(default_factory=dict, repr=False)
+    file: StudyFile | None = field(default=None, repr=False)
+    lock_path: Path | None = None
 
     @property
     def histories(self) -> tuple[History, ...]:
@@ -91,3 +110,67 @@ class StudyResult:
 
     def _by_group(self, kind: str) -> dict[str, Any]:
         return {group: self.results[name] for name, group in self._names(kind)}
+
+    def report_contents(self) -> ReportContents:
+        """What the report of the study shows, and what it carries."""
+        return contents_of(self)
+
+
+def contents_of(result: StudyResult) -> ReportContents:
+    """What the report of a study shows, and what it carries."""
+    file = result.file
+    assert file is not None
+    rankings: Mapping[str, Any] = result.rankings
+    failed = {
+        one.group: one.sentence for one in result.stages if one.kind == "identification" and one.state == "failed"
+    }
+    groups = tuple(
+        ReportGroup(group.name, rankings.get(group.name), group.histories, failed.get(group.name, ""))
+        for group in result.groups
+    )
+    attached, notes = attachments_of(result)
+    return ReportContents(
+        title=result.title,
+        groups=groups,
+        quality=result.quality,
+        exclusions=result.exclusions,
+        temperature=_titled(result.temperature),
+        forecasts=dict(result.forecasts),
+        design=_titled(result.designs),
+        rupture=_titled(result.rupture),
+        exports=result.exports,
+        failures=result.failures,
+        provenance=ReportProvenance(
+            versions=versions_of(),
+            seed=file.model.study.seed,
+            settings=file.model.model_dump(exclude_none=True),
+            inputs={one.name: one.sha256 for one in result.files},
+            commands=(f"creepkit run {file.path.name}",),
+        ),
+        attachments=attached,
+        notes=notes,
+    )
+
+
+def _titled(by_group: Mapping[str, Any]) -> dict[str, Any]:
+    return {name or "all tests": value for name, value in by_group.items()}
+
+
+def attachments_of(result: StudyResult) -> tuple[tuple[Attachment, ...], tuple[str, ...]]:
+    """Study, lock and data files; without the data, and a note, where they are larger than the study allows."""
+    file = result.file
+    assert file is not None
+    attached = [Attachment("study.toml", file.text.encode())]
+    if result.lock_path is not None:
+        attached.append(Attachment("study.lock", read_bytes(result.lock_path, DATA_FILE)))
+    allowed = (file.model.report or ReportPart()).attach_MB * 1e6
+    size = sum(one.path.stat().st_size for one in result.files)
+    if size > allowed:
+        note = (
+            f"the data files have {size / 1e6:.3g} MB, more than the {allowed / 1e6:g} MB that the study lets the "
+            "report carry; study.lock has their hashes"
+        )
+        return tuple(attached), (note,)
+    for one in result.files:
+        attached.append(Attachment(f"{CARRIED_FOLDER}/{one.name}", read_bytes(one.path, DATA_FILE)))
+    return tuple(attached), ()

@@ -6,23 +6,23 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 from creepkit.errors import StudyError, nearest
-from creepkit.files.writing import write_text
 from creepkit.studies import arguments
 from creepkit.studies.documents import ResultFolder
 from creepkit.studies.execution import Execution, running_alone
 from creepkit.studies.inputs import InputFile, input_files, read_inputs, resolve_paths
 from creepkit.studies.lock import changed_results, differences, lock_if_any, lock_of, write_lock
-from creepkit.studies.page import lock_path_of, write_page
+from creepkit.studies.page import lock_path_of, write_own, write_page
 from creepkit.studies.result import StudyResult
 from creepkit.studies.stages import STAGE_KINDS, Stages, needed_stages
 from creepkit.studies.study_file import StudyFile, read_study_file
 
 if TYPE_CHECKING:
     from creepkit.jobs.shard_progress import ProgressCallback
+    from creepkit.reports.contents import ReportContents
 
 
 @dataclass(frozen=True)
@@ -82,11 +82,27 @@ class Study:
                     ("export", k, "target"),
                     f"there is no target '{export.target}'; {nearest(export.target, exporters)}",
                 )
-            if export.file is not None:
-                _check_output(file, ("export", k, "file"), export.file)
-        if model.report is not None:
-            _check_output(file, ("report", "file"), model.report.file)
-        self.paths  # noqa: B018 - files that there are not
+        self._check_outputs()
+
+    def _check_outputs(self) -> None:
+        """StudyError for data files that there are not, and for files that would replace data or be written twice."""
+        import creepkit as ck
+
+        file, model, data = self.file, self.file.model, self.paths
+        places: list[tuple[tuple[str | int, ...], str]] = [
+            (("export", k, "file"), one.file or f"law{ck.available('exporters')[one.target].suffix}")
+            for k, one in enumerate(model.export)
+        ]
+        places += [] if model.report is None else [(("report", "file"), model.report.file)]
+        names: list[str] = []
+        for key, name in places:
+            _check_output(file, key, name)
+            if name.lower() in names:
+                raise file.error(key, f"'{name}' is written by another table already; give file = another name")
+            names.append(name.lower())
+            read = any(PurePosixPath(name).match(pattern) for pattern in model.data.files if "/" not in pattern)
+            if read or file.path.parent / name in data:
+                raise file.error(key, f"'{name}' would be among the data files; give file = another name")
 
     @cached_property
     def paths(self) -> list[Path]:
@@ -106,7 +122,8 @@ class Study:
 
         to : folder for results, lock, exports and report; by default that of the study file.
         only : kinds of stages, such as "identification", which are carried out with those that they need.
-        force : make everything again. locked : StudyError where anything differs from the study.lock that is there.
+        force : make everything again, and overwrite files of the names of exports and report. locked : StudyError where
+        anything differs from the study.lock that is there.
         progress : called as progress(task, done, total, note).
 
         A stage that fails leaves the others; `failures` of the result, and the report, say what is missing.
@@ -116,10 +133,14 @@ class Study:
             if kind not in STAGE_KINDS:
                 raise StudyError(f"there is no stage '{kind}'; {nearest(str(kind), STAGE_KINDS)}")
         folder = self.path.parent if to is None else Path(to)
-        kept = ResultFolder(folder / f"{self.path.stem}.results")
+        kept = ResultFolder(folder / f"{self.path.stem}.results", overwrite=force)
         with running_alone(kept.folder):
             kept.clear(everything=force)
             return self._run(folder, kept, kinds, locked, progress)
+
+    def report_contents(self) -> ReportContents:
+        """What ck.report(study) shows: the study is carried out, or read where nothing changed."""
+        return self.run().report_contents()
 
     def _run(
         self, folder: Path, kept: ResultFolder, kinds: Sequence[str], locked: bool, progress: ProgressCallback | None
@@ -140,7 +161,7 @@ class Study:
             raise StudyError(f"{lock_path}: the study cannot be repeated exactly: {what}; leave --locked out")
         execution = Execution(kept, inputs.histories, progress)
         execution.run(stages, needed_stages(stages, kinds))
-        write_lock(lock_of(self.file, self._hash, files, execution.records), lock_path)
+        write_lock(lock_of(self.file, self._hash, files, execution.records, before), lock_path)
         if before is not None:
             changes += changed_results(before, execution.records)
         result = StudyResult(
@@ -152,9 +173,11 @@ class Study:
             tuple(changes),
             measured=inputs.measured,
             results=execution.results,
+            file=self.file,
+            lock_path=lock_path,
         )
         for export in result.exports:
-            write_text(export.text, folder / export.name, StudyError)
+            write_own(kept, folder / export.name, export.text)
         if self.file.model.report is None or "report" not in kinds:
             return result
         return write_page(self.file, result, folder, kept, progress)

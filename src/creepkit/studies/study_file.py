@@ -165,7 +165,6 @@ def _needed(kind: str, given: Any, context: Mapping[str, Any], error: Any) -> st
         "model_attributes_type": "must be a table",
         "string_too_short": "must not be empty",
         "string_too_long": f"may have {context.get('max_length')} signs at most",
-        "string_pattern_mismatch": "must be a text of one line",
         "too_short": f"needs {context.get('min_length')} or more entries",
         "too_long": f"may have {context.get('max_length')} entries at most",
     }

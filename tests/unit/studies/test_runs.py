@@ -171,11 +171,13 @@ RUN = "import sys, creepkit as ck; ck.Study.load(sys.argv[1]).run()"
 
 
 def test_a_run_that_is_killed_anywhere_goes_on_to_the_same_result(tmp_path: Path) -> None:
-    expected = ck.Study.load(study_in(tmp_path / "whole")).run()
-    study = study_in(tmp_path / "killed")
+    text = STUDY.replace('group = "A"\n', "").replace('group_by = "alloy"', 'group_by = "none"\ntemperature = "none"')
+    text = text.replace('["data/*.csv"]', '["data/*850C*.csv"]')
+    expected = ck.Study.load(study_in(tmp_path / "whole", text)).run()
+    study = study_in(tmp_path / "killed", text)
     seed = random.Random(3)
     kills = 0
-    for _ in range(4):
+    for _ in range(3):
         process = subprocess.Popen([sys.executable, "-c", RUN, str(study)], start_new_session=True)
         begun = time.monotonic()
         files = len(list(study.parent.rglob("*.json")))
@@ -195,6 +197,34 @@ def test_a_run_that_is_killed_anywhere_goes_on_to_the_same_result(tmp_path: Path
     assert numbers(result) == numbers(expected)
     assert (study.parent / "study.lock").read_bytes() == (tmp_path / "whole" / "study.lock").read_bytes()
     assert not list((study.parent / "study.results").rglob("*.part"))
+
+
+def test_files_that_a_study_has_not_written_stay(study: Path, tmp_path: Path) -> None:
+    own = tmp_path / "law_A.py"
+    own.write_text("mine")
+    with pytest.raises(StudyError, match="this study has not written it"):
+        ck.Study.load(study).run()
+    assert own.read_text() == "mine"
+    own.unlink()
+    ck.Study.load(study).run()
+    text = own.read_text()
+    assert "def " in text
+    own.write_text("changed")
+    assert made(ck.Study.load(study).run()) == set()
+    assert own.read_text() == text
+
+
+def test_any_error_of_a_stage_leaves_the_others(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also one that is no error of creepkit's, as of a plugin."""
+    import creepkit.api.identification as api
+
+    def fails(*_: Any, **__: Any) -> None:
+        raise ZeroDivisionError("of a plugin")
+
+    monkeypatch.setattr(api, "exported_text", fails)
+    result = ck.Study.load(study).run()
+    assert {one.sentence for one in result.failures} == {"ZeroDivisionError: of a plugin"}
+    assert set(result.rankings) == {"A", "B"}
 
 
 def test_damaged_results_are_made_again(study: Path) -> None:
@@ -259,6 +289,7 @@ def test_a_report_runs_again_from_what_it_carries(study: Path, plain_pages: None
     (study.parent / "data").rename(study.parent.parent / "elsewhere")
     first = ck.Study.load(study).run()
     assert first.report is not None
+    assert ck.report(ck.Study.load(study), tmp_path / "other.html").read_bytes() == first.report.read_bytes()
     (study.parent.parent / "elsewhere").rename(tmp_path / "gone")
     again = study_of_report(first.report, tmp_path / "again").run()
     assert again.changes == ()
