@@ -73,7 +73,7 @@ BENCHMARKS = {
         12, (("--specimens", "2", "--penalties", "L2", "GroupL2", "Sqrt", "Subsets", "paper"),)
     ),
     "plate_of_alloys": Benchmark(8),
-    "report_size": Benchmark(6),
+    "report_size": Benchmark(18),
     "temperature_forms": Benchmark(10, (("--through", "uniaxial", "--specimens", "2", "--max-forms", "2"),)),
     "inconel_event": Benchmark(15, needs=DATA),
     "inconel_temperature": Benchmark(4, needs=DATA),
