@@ -3,10 +3,10 @@
     python tests/benchmarks/report_size.py [--alloys 47] [--write]
 
 A planted plate (creepkit.screening.planted: one dimple for each alloy, three outputs, a frame a minute for 4 h) is
-screened with the four laws of Table 1 of Chen et al. by the reduced-order model, and reported. Then one planted creep test of a bar is reported
-with more and more frames: its figures are thinned to what a screen shows, so that the page hardly grows. Columns: bytes
-of the page and of its figures; points of all lines, bands and dots in them; CPU time of the page, without that of the
-identification. The goal is 5 MB for a plate of 47 alloys.
+screened with the four laws of Table 1 of Chen et al. by the reduced-order model, and reported. Then one planted creep
+test of a bar is reported with more and more frames: its figures are thinned to what a screen shows, so that the page
+hardly grows. Columns: bytes of the page and of its figures; points of all lines, bands and dots in them; CPU time of
+the page, without that of the identification. The goal is 5 MB for a plate of 47 alloys.
 """
 
 import re
@@ -65,7 +65,7 @@ def main():
     progress("screening the plate")
     screened = ck.screen(
         plate.histories, LAWS, using=ck.surrogate("dimple"), compositions=plate.compositions, workers=1,
-        options=ck.ScreeningOptions(dense=None, confirm="never"),
+        options=ck.ScreeningOptions(dense=None, confirm=False),
     )  # fmt: skip
     page.table("report", "tests", "page", "figures", "of them", "points", "CPU time")
     row(page, f"plate of {options.alloys} alloys", options.alloys, screened)

@@ -78,7 +78,15 @@ class Downloads:
     files: Sequence[tuple[str, str, str]]
 
 
-Block: TypeAlias = Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads
+@dataclass(frozen=True)
+class Fragment:
+    """Markup of our own with scripts in it, which the policy of the page names by their hashes; not printed."""
+
+    kind: ClassVar[str] = "fragment"
+    markup: Markup
+
+
+Block: TypeAlias = Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads | Fragment
 
 
 @dataclass(frozen=True)

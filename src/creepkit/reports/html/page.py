@@ -25,6 +25,7 @@ from creepkit.reports.html.elements import (
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings, findings_of, verdict_blocks, with_histories
 from creepkit.reports.html.groups import group_sections
+from creepkit.reports.html.sliders import script_policy, slider_sections
 from creepkit.reports.html.stages import data_section, stage_sections
 
 if TYPE_CHECKING:
@@ -43,7 +44,8 @@ MOST_RANKINGS_DRAWN = 12
 def report_html(contents: ReportContents) -> str:
     """The page: findings first, then curves, tests, laws tried, data, other stages, files, methods and provenance.
 
-    It holds everything itself, runs no script, loads nothing, and is the same text for the same contents.
+    It holds everything itself, loads nothing, and is the same text for the same contents. Only the sliders need
+    scripts, and no others run.
     """
     import dataclasses
 
@@ -53,6 +55,7 @@ def report_html(contents: ReportContents) -> str:
     sections = [
         _findings_section(contents, found),
         *_group_sections(found, figures),
+        *slider_sections(found),
         data_section(contents),
         *stage_sections(contents, figures),
         *closing_sections(contents, found),
@@ -61,6 +64,7 @@ def report_html(contents: ReportContents) -> str:
     return _template().render(
         title=printable(contents.title, 200) or "Report",
         summary=_summary(contents, found),
+        script_policy=Markup(script_policy(shown)),
         sections=shown,
         style=Markup(_resource("style.css")),
         attachments=Markup(embed(contents.attachments)),
