@@ -66,11 +66,11 @@ def test_readme_blocks_run_in_order(tmp_path, monkeypatch, capsys):
 
 
 def test_readme_commands_run_in_order(tmp_path, monkeypatch, capsys):
-    """In a folder with tests in `curves`, `bulge` and `ruptures`, and what the first snippet writes."""
+    """In a folder with tests in `curves`, `bulge` and `ruptures`, and what the first two snippets write."""
     monkeypatch.chdir(tmp_path)
     for name, folder in (("planted creep curves", "curves"), ("planted bulge test", "bulge"), ("cmsx6", "ruptures")):
         shutil.copytree(ck.example_data(name), folder)
-    exec(compile(readme_blocks("python")[0], "README.md", "exec"), {})
+    exec(compile("".join(readme_blocks("python")[:2]), "README.md", "exec"), {})
     for line in "".join(readme_blocks("sh")).splitlines():
         program, *words = shlex.split(line)
         assert program == "creepkit"

@@ -116,7 +116,7 @@ STEPS = {
     ],
     "identify": [["identify", *(f"curve_{s}.csv" for s in CURVES), "--law", "soft-steel", "--starts", "2", "--json"]],
     "confirm": [["confirm", "identified/soft-steel.json", *(f"curve_{s}.csv" for s in CURVES), "--json"]],
-    "report": [["report", "identified/ranking.json", "--tests", *(f"curve_{s}.csv" for s in CURVES)]],
+    "report": [["report", "identified/ranking.json", *(w for s in CURVES for w in ("--tests", f"curve_{s}.csv"))]],
     "predict": [["predict", "identified/ranking.json", "curve_80.csv"]],
     "design": [
         [
