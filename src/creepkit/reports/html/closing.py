@@ -132,7 +132,9 @@ def _in_words(value: Any) -> Any:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list | tuple):
-        return ", ".join(f"({_in_words(one)})" if isinstance(one, list | tuple) else str(_in_words(one)) for one in value)
+        return ", ".join(
+            f"({_in_words(one)})" if isinstance(one, list | tuple) else str(_in_words(one)) for one in value
+        )
     return value
 
 
