@@ -2,7 +2,8 @@
 
 Every function that identifies, through whatever verb it is called, looks there first; so that work that was interrupted
 goes on where it was, with the same result. A file is known by a hash of all that decides the identification: the law,
-the data, what predicts them, the settings, where it begins, the versions of what computes, and the code of this package.
+the data, what predicts them, the settings, where it begins, the versions of what computes, and the code of this
+package.
 """
 
 from __future__ import annotations

@@ -182,8 +182,8 @@ def _readable(folder: Path, path: Path, reader: str | None) -> tuple[list[str], 
         if below:
             named = " or ".join(f"'{one}'" for one in below)
             raise StudyError(
-                f"{folder}: none of its files holds a test, but those of {named} do: run 'creepkit init {below[0]}', or "
-                f"'creepkit init {below[0]} --to {path}' to keep the study file here"
+                f"{folder}: none of its files holds a test, but those of {named} do: run 'creepkit init {below[0]}', "
+                f"or 'creepkit init {below[0]} --to {path}' to keep the study file here"
             )
         raise StudyError(f"{folder}: none of its files holds a test that can be read: {reason}")
     counts: dict[str, int] = {}
@@ -239,7 +239,7 @@ def _text(
             "# Paths are relative to this file. All tables but [data] may be left out; units stand in names of keys.",
             "",
             "[study]",
-            f"title = {quoted(_one_line(folder.absolute().name) or 'creep study')}  # the name of the folder: say what this is",
+            f"title = {quoted(_one_line(folder.absolute().name) or 'creep study')}  # say what it is about",
             "seed = 0  # of all random draws",
         ],
         _data_part(files, reader, summary, problems),
