@@ -329,7 +329,7 @@ def _predictor_lines(summary: DataSummary) -> list[str]:
     from creepkit.surrogates.loading import reduced_order_models
 
     names = {history.specimen for history in summary.tests}
-    fits = [name for name, one in reduced_order_models().items() if {one.name} == names]
+    fits = [name for name, one in reduced_order_models().items() if {getattr(one, "name", name)} == names]
     return [
         f"# predictor = {quoted(name)}  # its reduced-order model alone: far quicker, less accurate" for name in fits
     ]
