@@ -164,7 +164,7 @@ def test_findings_come_first_and_say_what_was_found() -> None:
 
 def test_hostile_names_are_shown_as_text() -> None:
     html = page_of(True)
-    words = "".join(e.text or "" for e in elements(parsed(html)) if tag(e) not in ("script", "style"))
+    words = "\n".join(e.text or "" for e in elements(parsed(html)) if tag(e) not in ("script", "style"))
     assert "<script>alert(1)</script>" in words
     assert "onerror=alert(1)>]]></style></svg><!--" in words
     assert "{{ 7 * 7 }} &amp;" in words
