@@ -35,6 +35,9 @@ SHOTS = {
 WIDTH, MARGIN, COLOURS, MOST_BYTES = 860, 16, 128, 150_000
 """Pixels of the window and around an element; colours of a picture; bytes of the largest."""
 
+WIDE = {"plate_findings": 1280}
+"""Pixels of the window of pictures whose tables are wider."""
+
 FLAGS = [
     *("--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"),
     *("--disable-component-update", "--disable-sync"),
@@ -55,12 +58,14 @@ def main() -> None:
         ).new_page()
         for name, (report, element, most) in SHOTS.items():
             path = TARGET / f"{name}.png"
+            width = WIDE.get(name, WIDTH)
+            page.set_viewport_size({"width": width, "height": WIDTH})
             page.goto((REPORTS / f"{report}.html").as_uri())
             place = page.locator(element).first.bounding_box()
             clip = {
                 "x": max(place["x"] - MARGIN, 0),
                 "y": place["y"],
-                "width": min(place["width"] + 2 * MARGIN, WIDTH),
+                "width": min(place["width"] + 2 * MARGIN, width),
                 "height": min(place["height"] + MARGIN, most),
             }
             path.write_bytes(reduced(page.screenshot(clip=clip, full_page=True)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from creepkit.reports.html import report_html
+from helpers.browser import SETTLED
 from helpers.browser import browser as chromium
 from helpers.report_pages import contents
 
@@ -42,8 +43,8 @@ def test_it_opens_from_a_file_and_is_whole(browser, address, scripts) -> None:
     assert [url for url in asked if not url.startswith("data:")] == [address]
     assert said == []
     assert page.get_by_role("heading", level=1).inner_text().startswith("Creep of")
-    assert page.locator("figure svg").count() == 5
-    for figure in page.get_by_role("img").all():
+    assert page.locator("figure.drawing svg").count() == 5
+    for figure in page.locator("figure.drawing").get_by_role("img").all():
         box = figure.bounding_box()
         assert box is not None
         assert box["width"] > 300
@@ -51,6 +52,43 @@ def test_it_opens_from_a_file_and_is_whole(browser, address, scripts) -> None:
     for heading in ("Findings", "The law over the tests", "Laws tried", "Data", "Methods text", "What is missing"):
         assert page.get_by_role("heading", name=heading, exact=True).is_visible()
     assert page.locator("math").first.is_visible()
+    page.context.close()
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_law_answers_to_its_sliders(browser, address, width) -> None:
+    page, _, said = opened(browser, address, viewport={"width": width, "height": 900})
+    assert page.locator("#sliders h2").count() == page.locator("h1").count() == 1
+    curves = "[...document.querySelectorAll('#sliders path.line')].map(path => path.getAttribute('d')).join()"
+    for _ in range(500):
+        if page.evaluate(SETTLED) and page.evaluate(curves):
+            break
+        page.wait_for_timeout(20)
+    before = page.evaluate(curves)
+    assert before
+    for drawing in page.locator("#sliders .panel svg").all():  # not cut by what surrounds it
+        if not drawing.is_visible():
+            continue
+        inner, outer = drawing.bounding_box(), drawing.locator("xpath=ancestor::figure").bounding_box()
+        assert inner["x"] + inner["width"] <= outer["x"] + outer["width"] + 1
+    page.locator("#sliders input[type=range]").first.focus()
+    for _ in range(20):
+        page.keyboard.press("ArrowRight")
+    for _ in range(500):
+        if page.evaluate(curves) != before:
+            break
+        page.wait_for_timeout(20)
+    assert page.evaluate(curves) != before
+    assert said == []
+    page.context.close()
+
+
+def test_without_scripts_the_sliders_say_that_they_need_them_and_paper_has_none(browser, address) -> None:
+    page, _, _ = opened(browser, address, java_script_enabled=False)
+    assert "needs scripts" in page.locator("#sliders noscript").inner_text()
+    page.emulate_media(media="print")
+    assert not page.locator("#sliders").is_visible()
+    assert page.locator("#findings").is_visible()
     page.context.close()
 
 

@@ -69,6 +69,22 @@ def test_every_mistake_is_one_line_with_file_and_line(folder: Path) -> None:
     ran = creepkit("init", folder / "missing")
     assert ran.exit_code == 1
     assert "no such folder" in ran.stderr
+    (folder.parent / "other").mkdir()
+    ran = creepkit("init", folder.parent)
+    assert ran.exit_code == 1
+    (line,) = ran.stderr.splitlines()
+    assert f"creepkit init {folder}" in line  # the sub-folder that holds tests
+    assert "other" not in line
+
+
+def test_a_dimple_is_offered_its_reduced_order_model(tmp_path: Path) -> None:
+    (source,) = (path for path in ck.example_data("planted bulge test").glob("*.csv"))
+    (tmp_path / source.name).write_bytes(source.read_bytes())
+    assert creepkit("init", tmp_path).exit_code == 0
+    text = (tmp_path / "study.toml").read_text()
+    assert '# predictor = "dimple"' in text
+    (tmp_path / "study.toml").write_text(text.replace("# predictor", "predictor"))
+    assert ck.Study.load(tmp_path / "study.toml").file.model.identification.predictor == "dimple"
 
 
 @needs_shared_data

@@ -2,12 +2,15 @@
 
 Every function that identifies, through whatever verb it is called, looks there first; so that work that was interrupted
 goes on where it was, with the same result. A file is known by a hash of all that decides the identification: the law,
-the data, what predicts them, the settings, where it begins, and the versions of what computes.
+the data, what predicts them, the settings, where it begins, the versions of what computes, and the code of this
+package.
 """
 
 from __future__ import annotations
 
 import functools
+import hashlib
+import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -46,6 +49,22 @@ KEPT_FIT = DocumentFormat(
 
 COMPUTING = ("creepkit", "numpy", "scipy")
 """Packages whose versions may change the last digits."""
+
+
+CODE_SUFFIXES = (".py", ".so", ".dll", ".dylib", ".js", ".css", ".html")
+
+
+@functools.cache
+def code_fingerprint() -> str:
+    """Hash of the files of this package: a checkout that is being worked on changes under the same version."""
+    root = Path(__file__).parent.parent
+    files = (Path(folder) / name for folder, _, names in os.walk(root) for name in names)
+    digest = hashlib.sha256()
+    for path in sorted(file for file in files if file.suffix in CODE_SUFFIXES):
+        content = path.read_bytes()  # files of the package itself, not of a user
+        digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode())
+        digest.update(content)
+    return digest.hexdigest()[:16]
 
 
 LINEARISED_CODEC = RecordCodec(default_range=ANY_NUMBER)
@@ -149,6 +168,7 @@ def _key(kind: str, law: Any, histories: Any, predictor: Predictor, how: Mapping
     parts = {
         "kind": kind,
         "versions": {name: version(name) for name in COMPUTING},
+        "code": code_fingerprint(),
         "law": [law.name, law.fingerprint, [(name, repr(p.bounds), repr(p.off)) for name, p in law.table.items()]],
         "histories": [history_digest(history) for history in histories],
         "predictor": predictor_fingerprint(predictor),

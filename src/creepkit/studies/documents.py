@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError, Va
 from creepkit.inverse.fingerprints import short_hash
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
-from creepkit.inverse.kept_fits import LINEARISED_CODEC, history_digest
+from creepkit.inverse.kept_fits import LINEARISED_CODEC, code_fingerprint, history_digest
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import CreepLaw, Elastic
 from creepkit.records import (
@@ -43,6 +43,10 @@ STAGE_RESULT = DocumentFormat(
     FileKind("a result of a stage", StudyError, "remove it: it is made again", maximum_bytes=500_000_000),
     remedy="remove it: it is made again",
 )
+
+
+OUTPUTS = "outputs"
+"""Under which names of files that a study has written are kept, whatever code wrote them."""
 
 
 LOADINGS: Mapping[str, type[Any]] = {
@@ -193,16 +197,30 @@ class ResultFolder:
     @property
     def outputs(self) -> list[str]:
         """Names of exports and reports beside the study that it has written, or began to."""
-        found = self.load("outputs", "outputs")
+        found = self._load(OUTPUTS, OUTPUTS)
         return [str(name) for name in found] if isinstance(found, list) else []
 
     def add_output(self, name: str) -> None:
         """Note that a file beside the study is the study's own."""
         if name not in self.outputs:
-            self.save("outputs", "outputs", [*self.outputs, name])
+            self._save(OUTPUTS, OUTPUTS, [*self.outputs, name])
+
+    def prune_fits(self, asked: Collection[str]) -> int:
+        """Remove the identifications but those of these keys; how many were removed."""
+        gone = [path for path in self.fits.glob("*.json") if path.stem not in asked]
+        for path in gone:
+            path.unlink(missing_ok=True)
+        return len(gone)
 
     def load(self, stage: str, key: str) -> Any:
-        """The data of a stage; None where there are none, or of another key."""
+        """The data of a stage; None where there are none, of another key, or made by other code of this package."""
+        return self._load(stage, f"{key} {code_fingerprint()}")
+
+    def save(self, stage: str, key: str, result: Any) -> None:
+        """Write the data of a stage, whole or not at all."""
+        self._save(stage, f"{key} {code_fingerprint()}", result)
+
+    def _load(self, stage: str, key: str) -> Any:
         try:
             content = check_heading(read_json(self.path(stage), STAGE_RESULT.kind), str(self.path(stage)), STAGE_RESULT)
         except StudyError:
@@ -211,8 +229,7 @@ class ResultFolder:
             return None
         return content["result"]
 
-    def save(self, stage: str, key: str, result: Any) -> None:
-        """Write the data of a stage, whole or not at all."""
+    def _save(self, stage: str, key: str, result: Any) -> None:
         self.folder.mkdir(parents=True, exist_ok=True)
         content = {**STAGE_RESULT.heading, "stage": stage, "key": key, "result": result}
         write_json(content, self.path(stage), STAGE_RESULT.kind)

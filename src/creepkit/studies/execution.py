@@ -32,7 +32,8 @@ class StageRecord:
     """How a stage of a run ended.
 
     name, kind, group : of the stage. state : "made", "kept" from an earlier run, "failed", or "left out" where it was
-    not asked for. key : hash of all that decides its result. sentence : why it failed. numbers : of its result, which
+    not asked for. key : hash of all that decides its result. sentence : why it failed, or
+    cannot be kept. numbers : of its result, which
     study.lock records.
     """
 
@@ -92,13 +93,14 @@ def running_alone(folder: Path) -> Iterator[None]:
 class Execution:
     """One run over the stages of a study.
 
-    folder : of kept results. histories : the tests.
+    folder : of kept results. histories : the tests. asked : keys of the identifications that the stages rest on.
     progress : called as progress(task, done, total, note).
     """
 
     folder: ResultFolder
     histories: Sequence[History]
     progress: ProgressCallback | None = None
+    asked: set[str] = field(default_factory=set)
     records: list[StageRecord] = field(default_factory=list)
     results: Any = field(default_factory=LazyResults)
 
@@ -113,6 +115,7 @@ class Execution:
             key = self._key(stage)
             if stage.name not in wanted:
                 self._record(stage, "left out", key)
+                self._note_fits(self.folder.load(stage.name, key))
                 continue
             failed = [name for name in stage.needs if name not in self.results]
             if failed:
@@ -153,6 +156,7 @@ class Execution:
         if not isinstance(data, dict) or not isinstance(data.get("numbers"), dict):
             return None
         numbers: dict[str, Any] = data["numbers"]
+        self._note_fits(data)
         if stage.record is None:
             self.results.defer(stage.name, lambda: self._made(stage, _no_tick))
             return numbers
@@ -161,6 +165,11 @@ class Execution:
         except (CreepkitError, KeyError, TypeError, ValueError, AssertionError):
             return None
         return numbers
+
+    def _note_fits(self, data: Any) -> None:
+        """Note the identifications that a kept result was made from."""
+        keys = data.get("fits") if isinstance(data, dict) else None
+        self.asked.update(str(key) for key in (keys if isinstance(keys, list) else ()))
 
     def _make(self, stage: Stage, key: str) -> None:
         start = time.monotonic()
@@ -173,8 +182,9 @@ class Execution:
             )
             self._report(stage, min(done, total), total, f"{task}{left}")
 
+        fits: list[str] = []
         try:
-            result = self._made(stage, tick)
+            result = self._made(stage, tick, fits)
         except Exception as error:  # of a plugin, too: the other stages go on
             what = str(error) if isinstance(error, CreepkitError) else f"{type(error).__name__}: {error}"
             _log.debug("%s failed", stage.name, exc_info=error)
@@ -185,17 +195,25 @@ class Execution:
             raise KeyboardInterrupt
         self.results.set(stage.name, result)
         numbers = numbers_of(stage.kind, result)
-        self._record(stage, "made", key, numbers=numbers)
+        remark = ""
         try:
             record = {} if stage.record is None else {"record": self._codec(stage).to_json(result)}
-            self.folder.save(stage.name, key, {"numbers": numbers, **record})
-        except RecordError:  # of what a plugin brought; it is made again next time
-            pass
+            self.folder.save(stage.name, key, {"numbers": numbers, "fits": fits, **record})
+        except RecordError as error:  # of what a plugin brought
+            remark = f"is made again in each run, for it cannot be stored: {' '.join(str(error).split())}"
+        self._record(stage, "made", key, remark, numbers)
         self._report(stage, 1, 1, f"done in {duration_text(time.monotonic() - start)}")
 
-    def _made(self, stage: Stage, tick: Callable[[str, int, int], None]) -> Any:
-        with keep_fits(self.folder.fits):
-            return stage.make(self.results, tick)
+    def _made(self, stage: Stage, tick: Callable[[str, int, int], None], fits: list[str] | None = None) -> Any:
+        """The result. fits : to which the keys of the identifications that it rests on are added."""
+        with keep_fits(self.folder.fits) as kept:
+            try:
+                return stage.make(self.results, tick)
+            finally:
+                keys = list(dict.fromkeys(kept.keys))
+                self.asked.update(keys)
+                if fits is not None:
+                    fits += keys
 
 
 def _no_tick(task: str, done: int, total: int) -> None:

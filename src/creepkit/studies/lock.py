@@ -16,7 +16,7 @@ from creepkit.files.record_codec import record_to_json
 from creepkit.studies import arguments
 from creepkit.studies.execution import StageRecord
 from creepkit.studies.inputs import InputFile
-from creepkit.studies.numbers import changed_numbers
+from creepkit.studies.numbers import MISSING, changed_numbers
 from creepkit.studies.study_file import StudyFile
 
 STUDY_LOCK = DocumentFormat(
@@ -121,10 +121,18 @@ def changed_results(before: Mapping[str, Any], records: Sequence[StageRecord]) -
         old = before["stages"].get(one.name)
         if isinstance(old, dict) and old.get("key") == one.key and one.state in ("made", "kept"):
             found += [
-                f"result of {one.name}: {name} was {_short(a)}, and is {_short(b)}"
+                f"result of {one.name}: {_change_of(name, a, b)}"
                 for name, a, b in changed_numbers(old.get("numbers", {}), one.numbers)
             ]
     return found
+
+
+def _change_of(name: str, old: Any, new: Any) -> str:
+    if old is MISSING:
+        return f"the lock had no {name}, which it records from now on"
+    if new is MISSING:
+        return f"{name} stood in the lock, and is not among the numbers any more"
+    return f"{name} was {_short(old)}, and is {_short(new)}"
 
 
 def _changes(old: Any, new: Any, place: str) -> list[tuple[str, str, str]]:

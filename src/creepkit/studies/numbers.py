@@ -13,6 +13,13 @@ SAME_NUMBER = 1e-6
 """Relative difference up to which two numbers are taken as equal: other processors round otherwise."""
 
 
+class Missing:
+    """Stands for a number that one side does not have."""
+
+
+MISSING = Missing()
+
+
 def numbers_of(kind: StageKind, result: Any) -> dict[str, Any]:
     """The numbers of a result by name, as JSON holds them."""
     found: dict[str, Any]
@@ -44,10 +51,10 @@ def numbers_of(kind: StageKind, result: Any) -> dict[str, Any]:
 
 
 def changed_numbers(old: Any, new: Any, place: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """(name, old, new) of numbers and texts that differ by more than rounding."""
+    """(name, old, new) of numbers and texts that differ by more than rounding; MISSING where there is none."""
     if isinstance(old, Mapping) and isinstance(new, Mapping):
         for key in [*old, *(one for one in new if one not in old)]:
-            yield from changed_numbers(old.get(key), new.get(key), f"{place} {key}".strip())
+            yield from changed_numbers(old.get(key, MISSING), new.get(key, MISSING), f"{place} {key}".strip())
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         for first, second in zip(old, new, strict=True):
             yield from changed_numbers(first, second, place)

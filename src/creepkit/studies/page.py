@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.files.writing import write_bytes
+from creepkit.reports.attachments import read_attachments
 from creepkit.studies.documents import ResultFolder, key_of
 from creepkit.studies.execution import StageRecord
 from creepkit.studies.inputs import sha256_of
@@ -39,6 +40,8 @@ def write_page(
     try:
         from creepkit.reports.html import report_html
 
+        if _is_report_of(path, file.text):
+            kept.add_output(path.name)
         write_own(kept, path, report_html(result.report_contents()))
     except Exception as error:  # what was found is there without a page
         what = str(error) if isinstance(error, CreepkitError) else f"{type(error).__name__}: {error}"
@@ -64,6 +67,14 @@ def write_own(kept: ResultFolder, path: Path, text: str) -> None:
         )
     kept.add_output(path.name)
     write_bytes(content, path, StudyError)
+
+
+def _is_report_of(path: Path, text: str) -> bool:
+    """Whether a file is a report that carries this study file: the list of what was written may be lost."""
+    try:
+        return path.is_file() and read_attachments(path).get("study.toml") == text.encode()
+    except CreepkitError:
+        return False
 
 
 def lock_path_of(file: StudyFile, folder: Path) -> Path:

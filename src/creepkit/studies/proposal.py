@@ -15,6 +15,7 @@ from creepkit.errors import CreepkitError, StudyError
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import ZERO_CELSIUS, History, dimensions_of, load_unit
+from creepkit.studies.folders import folders_with_tests
 from creepkit.studies.study_file import parse_study
 
 SECONDARY_LAWS = ("norton", "strain-hardening", "time-hardening")
@@ -177,6 +178,13 @@ def _readable(folder: Path, path: Path, reader: str | None) -> tuple[list[str], 
         read.append(file)
         tests += found
     if not tests:
+        below = folders_with_tests(folder, reader)
+        if below:
+            named = " or ".join(f"'{one}'" for one in below)
+            raise StudyError(
+                f"{folder}: none of its files holds a test, but those of {named} do: run 'creepkit init {below[0]}', "
+                f"or 'creepkit init {below[0]} --to {path}' to keep the study file here"
+            )
         raise StudyError(f"{folder}: none of its files holds a test that can be read: {reason}")
     counts: dict[str, int] = {}
     for history in tests:
@@ -231,7 +239,7 @@ def _text(
             "# Paths are relative to this file. All tables but [data] may be left out; units stand in names of keys.",
             "",
             "[study]",
-            f"title = {quoted(_one_line(folder.absolute().name) or 'creep study')}",
+            f"title = {quoted(_one_line(folder.absolute().name) or 'creep study')}  # say what it is about",
             "seed = 0  # of all random draws",
         ],
         _data_part(files, reader, summary, problems),
@@ -301,6 +309,7 @@ def _identification_part(summary: DataSummary) -> list[str]:
     else:
         lines.append('# group_by = "alloy"  # or another label of the files')
     lines.append('temperature = "auto"  # a factor of Arrhenius where tests are at several temperatures; or "none"')
+    lines += _predictor_lines(summary)
     lines += ["# starts = 8", "# bounds = { n = [1, 12] }"]
     specimen = ck.available("specimens").get(summary.tests[0].specimen)
     for length in dimensions_of(specimen):
@@ -313,6 +322,17 @@ def _identification_part(summary: DataSummary) -> list[str]:
     selection = ["", "[selection]", 'by = "bic"  # or "aicc", "hold-out"']
     selection.append("# sums = true  # try sums of two laws; by default where no law explains the tests")
     return [*lines, *(selection if len(laws) > 1 else [])]
+
+
+def _predictor_lines(summary: DataSummary) -> list[str]:
+    """A comment on the reduced-order model of the tests' specimen, where it has one."""
+    from creepkit.surrogates.loading import reduced_order_models
+
+    names = {history.specimen for history in summary.tests}
+    fits = [name for name, one in reduced_order_models().items() if {getattr(one, "name", name)} == names]
+    return [
+        f"# predictor = {quoted(name)}  # its reduced-order model alone: far quicker, less accurate" for name in fits
+    ]
 
 
 def _temperature_part(summary: DataSummary) -> list[str]:

@@ -45,6 +45,7 @@ class StudyResult:
     stages : how each ended. exports : laws as text. report : the page, where one was asked for.
     changes : what differs from the study.lock that was there, one sentence each. files : that were read.
     measured : all tests as the files hold them. file, lock_path : the study, and the lock of this run.
+    asked : keys of the identifications that the stages rest on. pruned : how many others were removed.
     """
 
     title: str
@@ -58,6 +59,8 @@ class StudyResult:
     results: Any = field(default_factory=dict, repr=False)
     file: StudyFile | None = field(default=None, repr=False)
     lock_path: Path | None = None
+    asked: frozenset[str] = field(default=frozenset(), repr=False)
+    pruned: int = 0
 
     @property
     def histories(self) -> tuple[History, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
@@ -117,6 +117,7 @@ class Study:
         only: str | Sequence[str] | None = None,
         force: bool = False,
         locked: bool = False,
+        prune: bool = False,
         progress: ProgressCallback | None = None,
     ) -> StudyResult:
         """Carry out the study; what was made before from the same inputs is read, not made again.
@@ -124,7 +125,8 @@ class Study:
         to : folder for results, lock, exports and report; by default that of the study file.
         only : kinds of stages, such as "identification", which are carried out with those that they need.
         force : make everything again, and overwrite files of the names of exports and report. locked : StudyError where
-        anything differs from the study.lock that is there.
+        anything differs from the study.lock that is there. prune : remove kept identifications that no stage of the
+        study, as it is now, rests on.
         progress : called as progress(task, done, total, note).
 
         A stage that fails leaves the others; `failures` of the result, and the report, say what is missing.
@@ -137,7 +139,8 @@ class Study:
         kept = ResultFolder(folder / f"{self.path.stem}.results", overwrite=force)
         with running_alone(kept.folder):
             kept.clear(everything=force)
-            return self._run(folder, kept, kinds, locked, progress)
+            result = self._run(folder, kept, kinds, locked, progress)
+            return replace(result, pruned=kept.prune_fits(result.asked)) if prune else result
 
     def report_contents(self) -> ReportContents:
         """What ck.report(study) shows: the study is carried out, or read where nothing changed."""
@@ -176,6 +179,7 @@ class Study:
             results=execution.results,
             file=self.file,
             lock_path=lock_path,
+            asked=frozenset(execution.asked),
         )
         for export in result.exports:
             write_own(kept, folder / export.name, export.text)

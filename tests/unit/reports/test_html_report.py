@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import re
 from dataclasses import replace
 from functools import cache
@@ -18,12 +19,13 @@ from creepkit.errors import ReportError
 from creepkit.reports.attachments import read_attachments
 from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
 from creepkit.reports.html import report_html
+from creepkit.reports.html.elements import sentence
 from helpers.report_pages import HOSTILE, contents, ranking
 
 TAGS = """
 html head meta title style body a header h1 h2 h3 h4 p nav ol ul li main section div table caption thead tbody tr th td
 figure figcaption pre span footer script math mrow mi mn mo mtext msub msup msubsup mfrac mfenced mtable mtr mtd mover
-mstyle msqrt mroot svg desc g path text tspan use defs clipPath rect image
+mstyle msqrt mroot noscript svg desc g path text tspan use defs clipPath rect image
 """
 """Elements that a page may have."""
 
@@ -56,7 +58,29 @@ def test_it_is_html_of_known_elements_alone(page: str) -> None:
     assert {tag(e) for e in found} <= set(TAGS.split())
     assert not [name for e in found for name in e.attrib if str(name).startswith("on")]
     scripts = [e.get("type") for e in found if tag(e) == "script"]
-    assert set(scripts) == {"application/json", "application/x-creepkit-attachment"}  # data, which no browser runs
+    assert set(scripts) == {None, "application/json", "application/x-creepkit-attachment"}
+
+
+def test_the_policy_names_each_script_that_is_run_and_no_other(page: str) -> None:
+    found = elements(parsed(page))
+    (policy,) = (e.get("content") for e in found if e.get("http-equiv") == "Content-Security-Policy")
+    run = [e.text or "" for e in found if tag(e) == "script" and e.get("type") is None]
+    hashes = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in run]
+    (stated,) = re.findall(r"script-src ([^;]*);", policy)
+    assert stated.split() == [f"'sha256-{one}'" for one in hashes]
+    assert "default-src 'none'" in policy
+
+
+def test_without_a_law_no_script_is_run() -> None:
+    page = report_html(ReportContents(title="nothing", notes=("a note",)))
+    assert "script-src" not in page
+    assert not [e for e in elements(parsed(page)) if tag(e) == "script" and e.get("type") is None]
+
+
+def test_sentences_have_powers_of_ten_and_signs_as_they_are_printed() -> None:
+    assert sentence("p < 1e-12, 4.2e-05 +- 3e-07 of test-1e-05.csv") == (
+        "P < 10⁻¹², 4.2 × 10⁻⁵ ± 3 × 10⁻⁷ of test-1e-05.csv."
+    )
 
 
 def test_it_loads_nothing(page: str) -> None:
@@ -122,14 +146,25 @@ def test_findings_come_first_and_say_what_was_found() -> None:
         assert f"{estimate.value:.5g}".split("e")[0].replace("-", "−") in first
     order = re.findall(r'<section id="([a-z]+)"', body)
     assert order == [
-        *("findings", "curves", "tests", "ranking", "nuisances", "data", "exclusions", "forecasts", "exports"),
+        *(
+            "findings",
+            "curves",
+            "tests",
+            "ranking",
+            "nuisances",
+            "sliders",
+            "data",
+            "exclusions",
+            "forecasts",
+            "exports",
+        ),
         *("methods", "provenance", "missing"),
     ]
 
 
 def test_hostile_names_are_shown_as_text() -> None:
     html = page_of(True)
-    words = "".join(parsed(html).itertext())
+    words = "\n".join(e.text or "" for e in elements(parsed(html)) if tag(e) not in ("script", "style"))
     assert "<script>alert(1)</script>" in words
     assert "onerror=alert(1)>]]></style></svg><!--" in words
     assert "{{ 7 * 7 }} &amp;" in words

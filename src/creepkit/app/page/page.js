@@ -28,7 +28,7 @@
     if (data.tests.length) planned.group.insertBefore(showRow, planned.group.children[1]);
 
     root.replaceChildren(
-      element("header", {}, element("h2", {}, data.title), status),
+      element("header", {}, element(root.classList.contains("embedded") ? "p" : "h2", { class: "title" }, data.title), status),
       problem,
       element("div", { class: "columns" },
         element("form", { class: "controls", onsubmit: (event) => event.preventDefault() }, laws.group, data.tests.length ? tests.group : null, planned.group, page.copies(() => ({ state, law: data.laws[state.law] }))),

@@ -21,7 +21,7 @@
     });
     const all = element("button", { type: "button", class: "small", onclick: () => set(true) }, "show all");
     const none = element("button", { type: "button", class: "small", onclick: () => set(false) }, "show none");
-    const group = element("fieldset", {}, element("legend", {}, "Measured tests"), total, element("div", { class: "buttons" }, all, none), element("div", { class: "scroll" }, table));
+    const group = element("fieldset", {}, element("legend", {}, "Measured tests"), total, element("div", { class: "buttons" }, all, none), element("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Measured tests" }, table));
 
     function set(wanted) {
       state.tests.fill(wanted);

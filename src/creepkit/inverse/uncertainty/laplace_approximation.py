@@ -262,16 +262,22 @@ def parameter_estimates(
 
 def cut_interval_notes(law: CreepLaw, estimates: Sequence[Estimate]) -> tuple[str, ...]:
     """Intervals that a bound of the search cuts off, a sentence each: those of functions of the value are not cut."""
-    sentences = []
-    for (name, param), one in zip(law.table.items(), estimates, strict=True):
-        ends = zip(param.bounds, (one.low, one.high), strict=True)
+    return tuple(
+        f"the interval of {name} ends at its bound, {bound:.4g}, and not by the tests: intervals of rates and of the "
+        "local exponent do not know this bound and may reach beyond it"
+        for name, bound in cut_intervals(law, estimates).items()
+    )
+
+
+def cut_intervals(law: CreepLaw, estimates: Sequence[Estimate]) -> dict[str, float]:
+    """{parameter that the tests determine: bound at which its interval ends}."""
+    found = {}
+    for one in estimates:
+        ends = zip(law.table[one.name].bounds, (one.low, one.high), strict=True)
         cut = [b for b, end in ends if np.isclose(b, end, rtol=1e-9, atol=0.0)]  # bounds of rates are far below 1e-8
         if one.verdict == "determined" and cut:
-            sentences.append(
-                f"the interval of {name} ends at its bound, {cut[0]:.4g}, and not by the tests: intervals of rates and "
-                "of the local exponent do not know this bound and may reach beyond it"
-            )
-    return tuple(sentences)
+            found[one.name] = cut[0]
+    return found
 
 
 def _verdict(value: float, half: float, low: float, high: float) -> str:

@@ -5,6 +5,7 @@ Strings are text, which the template escapes; Markup is what is HTML already.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, TypeAlias
@@ -116,8 +117,8 @@ def printable_lines(text: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """A text with a capital and a full stop."""
-    text = printable(text).strip()
+    """A text with a capital and a full stop, powers of ten and signs as they are printed."""
+    text = _POWER.sub(lambda found: _with_power(found[1], found[2]), printable(text).strip()).replace(" +- ", " ± ")
     return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?', ':', '…')) else '.'}"
 
 
@@ -133,8 +134,14 @@ def number(value: float, digits: int = 4) -> str:
     if value in (float("inf"), float("-inf")):
         return "∞" if value > 0 else "−∞"
     mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
+    return _with_power(mantissa, exponent) if exponent else mantissa.replace("-", "−")
+
+
+_POWER = re.compile(r"(?<![\w.+-])(-?\d+(?:\.\d+)?)e([+-]\d\d+)(?![\w.])", re.ASCII)
+"""A number as programs print it, such as 4.2e-05."""
+
+
+def _with_power(mantissa: str, exponent: str) -> str:
     mantissa = mantissa.replace("-", "−")
-    if not exponent:
-        return mantissa
     power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"10{power}" if mantissa == "1" else f"{mantissa} × 10{power}"

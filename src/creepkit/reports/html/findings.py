@@ -9,6 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from creepkit.exporters.mathml import law_equations, symbol_element
+from creepkit.inverse.uncertainty.laplace_approximation import cut_intervals
 from creepkit.reports.html.elements import Block, Formula, Items, Paragraph, Table, number, sentence
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.ranking import equivalents_among_remaining
@@ -28,7 +29,8 @@ class GroupFindings:
     """What was found of one material, whatever it was found by.
 
     fit : the best law. ranking : of all laws, None where one law alone was identified. verdict : in a sentence.
-    equivalents : pairs of laws that the tests do not separate. remarks : further sentences.
+    equivalents : pairs of laws that the tests do not separate. remarks : further sentences. decisive : whether the
+    verdict is that this law is the one, None where no laws were compared.
     """
 
     name: str
@@ -37,6 +39,7 @@ class GroupFindings:
     verdict: str
     equivalents: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    decisive: bool | None = None
 
 
 def findings_of(group: ReportGroup) -> GroupFindings | None:
@@ -51,10 +54,13 @@ def findings_of(group: ReportGroup) -> GroupFindings | None:
             return None
         laws = tuple(RankedLaw(w.fit, w.bic_difference, w.weight) for w in result.laws)
         ranking = Ranking(laws, failed=result.failed_laws) if len(laws) > 1 else None
-        return GroupFindings(group.name, result.best, ranking, result.verdict, result.equivalents, result.notes)
+        decisive = None if ranking is None else result.decisive
+        return GroupFindings(
+            group.name, result.best, ranking, result.verdict, result.equivalents, result.notes, decisive
+        )
     if isinstance(result, Ranking):
         equivalents = () if result.decisive else tuple(map(str, equivalents_among_remaining(result)))
-        return GroupFindings(group.name, result.best, result, result.verdict, equivalents)
+        return GroupFindings(group.name, result.best, result, result.verdict, equivalents, (), result.decisive)
     if isinstance(result, Identification):
         adequacy = "was identified; whether it explains the tests is not known"
         adequacy = adequacy if result.adequacy is None else str(result.adequacy)
@@ -110,6 +116,7 @@ def _undetermined(fit: Identification) -> list[str]:
 
 def _values(fit: Identification) -> Table:
     table, symbols = fit.law.table, {str(symbol): symbol for symbol in fit.law.params}
+    cut = cut_intervals(fit.law, fit.estimates)
     rows = [
         (
             Markup(symbol_element(symbols[e.name])),
@@ -117,7 +124,7 @@ def _values(fit: Identification) -> Table:
             number(e.value, 5),
             f"{number(e.low)} to {number(e.high)}",
             "" if e.unit == "1" else e.unit,
-            e.verdict,
+            "determined; interval ends at its bound" if e.name in cut else e.verdict,
         )
         for e in fit.estimates
     ]

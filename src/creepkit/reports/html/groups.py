@@ -100,10 +100,14 @@ def _table_of_tests(fit: Identification) -> Table:
                 number(test.weight, 2),
             )
         )
-    columns = ("test", "condition", "frames", "reduced χ²", "relative squared error", "offset", "rate × law", "weight")
+    columns = (
+        *("test", "condition", "frames", "χ² without own rate", "relative squared error", "offset", "rate × law"),
+        "weight",
+    )
     caption = (
-        "Tests: misfit of the law over the noise of a frame (1: noise alone), error of the first output, its offset, "
-        "and the test's own factor on the rate"
+        "Tests: mean square misfit over the noise of a frame (1: noise alone) with the same rates for all tests; error "
+        "of the first output, and its offset; the test's own factor on the rate, which the misfit leaves out. Whether "
+        "the law explains the tests is judged with that factor, so that its chi-square is the smaller one"
     )
     return Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6, 7))
 
@@ -169,7 +173,8 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
                 f"ones. {' '.join(_separation(ranking))} Weights: "
                 + ", ".join(f"{printable(r.fit.law.name, 60)} {r.weight:.3f}" for r in ranking.laws)
                 + ".",
-                "Where the laws differ: misfit of each law in each test over the noise, and weights.",
+                "Where the laws differ: mean square misfit of each law in each test over the noise of a frame, without "
+                "the tests' own factors on the rate, and weights.",
             )
         )
     return blocks
@@ -189,8 +194,9 @@ def _separation(ranking: Ranking) -> Iterator[str]:
     first, other = misfit_of(best.tests[k]), misfit_of(second.tests[k])
     yield (
         f"What separates {second.law.name} from {best.law.name} most is test {printable(best.tests[k].name, 120)} "
-        f"({printable(best.tests[k].condition, 200)}): there the reduced chi-square is {number(other, 3)} with "
-        f"{second.law.name} and {number(first, 3)} with {best.law.name}."
+        f"({printable(best.tests[k].condition, 200)}): there the mean square misfit over the noise of a frame, without "
+        f"the test's own factor on the rate, is {number(other, 3)} with {second.law.name} and {number(first, 3)} with "
+        f"{best.law.name}."
     )
 
 

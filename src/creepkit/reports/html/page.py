@@ -25,7 +25,7 @@ from creepkit.reports.html.elements import (
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings, findings_of, verdict_blocks, with_histories
 from creepkit.reports.html.groups import group_sections
-from creepkit.reports.html.sliders import script_policy, slider_sections
+from creepkit.reports.html.sliders import fragment_style, script_policy, slider_sections
 from creepkit.reports.html.stages import data_section, stage_sections
 
 if TYPE_CHECKING:
@@ -67,6 +67,7 @@ def report_html(contents: ReportContents) -> str:
         script_policy=Markup(script_policy(shown)),
         sections=shown,
         style=Markup(_resource("style.css")),
+        fragment_style=Markup(fragment_style(shown)),
         attachments=Markup(embed(contents.attachments)),
         version=version("creepkit"),
     )
@@ -131,9 +132,12 @@ def _overview(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
     laws = [one.fit.law.name for one in found]
     counts = sorted({name: laws.count(name) for name in laws}.items(), key=lambda pair: (-pair[1], pair[0]))
     named = ", ".join(f"{printable(name, 60)} in {count}" for name, count in counts[:8])
+    compared = [one for one in found if one.decisive is not None]
+    decisive = sum(one.decisive is True for one in compared)
+    decided = f" The choice of the law is decisive in {decisive} of {len(compared)}." if compared else ""
     return (
         f"Laws were identified of {len(found)} of {plural(len(contents.groups), 'material')}. The best law is {named}. "
-        f"It explains the tests to their noise in {explained} of {len(found)}."
+        f"It explains the tests to their noise in {explained} of {len(found)}.{decided}"
     )
 
 
@@ -152,6 +156,7 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
                 printable(fit.law.name, 120),
                 weight,
                 adequacy,
+                "–" if one.decisive is None else "yes" if one.decisive else "no",
                 number(r.stress, 3),
                 f"{rate[0]} ({rate[1]} to {rate[2]})",
                 f"{exponent[0]} ({exponent[1]} to {exponent[2]})",
@@ -162,11 +167,16 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
         "best law",
         "weight",
         "explains the tests",
+        "decisive",
         "at MPa",
         "creep rate there, 1/s",
         "local exponent",
     )
-    return Table("Materials, with 95 % intervals", columns, rows, numeric=(2, 4, 5, 6))
+    caption = (
+        "Materials, with 95 % intervals. Decisive: one law has more than 95 % of the weight, explains the tests, and "
+        "no other law or effect that was tried does so too; the verdict of each material says what is missing"
+    )
+    return Table(caption, columns, rows, numeric=(2, 5, 6, 7))
 
 
 def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> list[PageSection]:

@@ -33,13 +33,22 @@ def slider_sections(found: Sequence[GroupFindings]) -> list[PageSection]:
 
     one = found[0]
     try:
-        fragment = page_fragment(page_contents(one.ranking or one.fit, one.fit.histories))
+        fragment = page_fragment(page_contents(one.ranking or one.fit, one.fit.histories), style=False)
     except CreepkitError:
         return []
     if len(fragment.encode()) > LARGEST_FRAGMENT:
         return []
     text = "What the law does when its parameters are changed, over the tests; curves are computed in the browser."
     return [PageSection("sliders", "The law under sliders", [Paragraph(text), Fragment(Markup(fragment))])]
+
+
+def fragment_style(sections: Sequence[PageSection]) -> str:
+    """The style of fragments, which stands in the head of the page; "" for none."""
+    if not any(isinstance(block, Fragment) for section in sections for block in section.blocks):
+        return ""
+    from creepkit.app.page import page_style
+
+    return page_style()
 
 
 def script_policy(sections: Sequence[PageSection]) -> str:

@@ -213,7 +213,7 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> lis
             f"By {laws}: bands and intervals hold a measured value of a single test with a probability of "
             f"{100 * forecast.level:g} %."
         ),
-        Table("Forecasts of single tests", FORECAST_COLUMNS, _forecast_cells(forecast)),
+        _forecast_table(forecast),
     ]
     if any(test.outputs for test in forecast.tests):
         ends = " ".join(f"{printable(row[0], 80)}: {printable(row[2], 200)}." for row in _forecast_cells(forecast)[:12])
@@ -232,6 +232,14 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> lis
             remarks.setdefault(note, []).append(printable(test.name, 80))
     listed = [sentence(f"{note} ({', '.join(tests)})") for note, tests in remarks.items()]
     return [*blocks, Items(listed)] if listed else blocks
+
+
+def _forecast_table(forecast: Forecast) -> Table:
+    """A table of tests without the columns that are empty."""
+    rows = _forecast_cells(forecast)
+    kept = [k for k in range(len(FORECAST_COLUMNS)) if any(row[k] for row in rows)]
+    columns = [FORECAST_COLUMNS[k] for k in kept]
+    return Table("Forecasts of single tests", columns, [[row[k] for k in kept] for row in rows])
 
 
 def _forecast_cells(forecast: Forecast) -> list[tuple[str, ...]]:
