@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
 from markupsafe import Markup
 
 from creepkit.exporters.mathml import law_equations, symbol_element
+from creepkit.inverse.unmodelled_effects import TAKEN_FOR_GRANTED
 from creepkit.reports.html.elements import Block, Formula, Items, Paragraph, Table, number, sentence
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.ranking import equivalents_among_remaining
@@ -17,10 +17,6 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.reports.contents import ReportGroup
-
-
-LARGEST_PER_CENT = 0.4
-"""Of a logarithm, from which its change is given as a factor."""
 
 
 @dataclass(frozen=True)
@@ -88,20 +84,13 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     else:
         blocks.append(Paragraph("The tests determine every parameter of the law."))
     unmodelled = [
-        sentence(f"{effect.description}, which changes the rate by {_change(effect.rate_change)}")
-        for effect in fit.unmodelled
+        sentence(f"{effect.description}, which changes the rate by {effect.change_text}") for effect in fit.unmodelled
     ]
     if unmodelled:
         blocks += [Paragraph("The intervals do not include:"), Items(unmodelled)]
-    remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *fit.notes])))
+    notes = [note for note in fit.notes if not (fit.unmodelled and note.startswith(TAKEN_FOR_GRANTED))]  # said above
+    remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *notes])))
     return [*blocks, Paragraph("Remarks:"), Items(remarks)] if remarks else blocks
-
-
-def _change(log_factor: float) -> str:
-    """A change of a logarithm in words."""
-    if abs(log_factor) < LARGEST_PER_CENT:
-        return f"{number(100 * float(np.expm1(log_factor)), 2)} %"
-    return f"a factor of {number(float(np.exp(log_factor)), 2)}"
 
 
 def _undetermined(fit: Identification) -> list[str]:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.records import output_unit
+from creepkit.reports.html.compared_values import compared_values
 from creepkit.reports.html.elements import (
     Block,
     Items,
@@ -85,6 +87,7 @@ def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[B
 
 def _table_of_tests(fit: Identification) -> Table:
     rows = []
+    compared = compared_values(fit)
     for test in fit.tests:
         first = test.outputs[0] if test.outputs else None
         unit = f" {output_unit(first.output)}" if first is not None and output_unit(first.output) else ""
@@ -92,7 +95,7 @@ def _table_of_tests(fit: Identification) -> Table:
             (
                 printable(test.name, 120),
                 printable(test.condition, 200),
-                str(test.frames),
+                "not known" if compared is None else str(compared.by_test.get(test.name, 0)),
                 "–" if first is None else number(misfit_of(test), 3),
                 "–" if first is None else number(first.errors.relative_squared_error, 2),
                 "–" if first is None else f"{number(first.offset, 2)}{unit}",
@@ -100,7 +103,16 @@ def _table_of_tests(fit: Identification) -> Table:
                 number(test.weight, 2),
             )
         )
-    columns = ("test", "condition", "frames", "reduced χ²", "relative squared error", "offset", "rate × law", "weight")
+    columns = (
+        "test",
+        "condition",
+        "values compared",
+        "reduced χ²",
+        "relative squared error",
+        "offset",
+        "rate × law",
+        "weight",
+    )
     caption = (
         "Tests: misfit of the law over the noise of a frame (1: noise alone), error of the first output, its offset, "
         "and the test's own factor on the rate"
@@ -204,12 +216,7 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
         (name.replace("_", " "), f"{number(one.noise, 2)}{_unit(name)}", f"{number(one.offset, 2)}{_unit(name)}")
         for name, one in fit.noise_model.outputs.items()
     ]
-    blocks: list[Block] = [
-        Paragraph(
-            f"The creep rates of single tests scatter by {number(100 * fit.noise_model.rate, 3)} % about the law (one "
-            "standard deviation of their logarithm)."
-        )
-    ]
+    blocks: list[Block] = [Paragraph(_scatter_of_rates(fit))]
     if noise:
         blocks.append(
             Table("Noise as it was estimated, one standard deviation", ("output", "frame", "offset of a test"), noise)
@@ -228,6 +235,21 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
         columns = ("nuisance parameter", "of", "estimate", "prior", "deviation, sd")
         blocks.append(Table("Nuisance parameters estimated beside the law", columns, rows, numeric=(2, 3, 4)))
     return blocks
+
+
+def _scatter_of_rates(fit: Identification) -> str:
+    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
+    if not rates:
+        return "No scatter of creep rates between tests was allowed: every test follows the law's own rate."
+    size = f"{number(100 * fit.noise_model.rate, 3)} % about the law (one standard deviation of their logarithm)"
+    if rates[0].sd is not None:
+        return f"The creep rates of single tests were taken to scatter by {size}, as was given."
+    if len(fit.tests) < MINIMUM_TESTS and fit.settings.weights != "likelihood":
+        return (
+            f"The creep rates of single tests were assumed to scatter by {size}: {plural(len(fit.tests), 'test')} "
+            "cannot show it."
+        )
+    return f"The creep rates of single tests scatter by {size}, as was estimated."
 
 
 def _unit(output: str) -> str:
