@@ -14,6 +14,7 @@ from creepkit.inverse.observation_vector import (
     MINIMUM_RATE_OUTPUT,
     RUPTURE_OUTPUT,
     ObservationVector,
+    frames_with_data,
     selected_frames,
     thinned_history,
 )
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FrameCounts:
-    """Frames of tests: as measured, those that a fit may use, and those that were selected for it."""
+    """Frames of tests: as measured, those of them that a fit may use, and those that were selected for it."""
 
     measured: int
     usable: int
@@ -38,7 +39,7 @@ class FrameCounts:
 def frame_counts(histories: Sequence[History], frames: int) -> FrameCounts:
     """The frames of tests with outputs; frames : at most so many were selected in each test."""
     tests = [h for h in histories if h.outputs]
-    usable = sum(int((h.used & (h.times > 0)).sum()) for h in tests)
+    usable = sum(int((h.used & (h.times > 0) & frames_with_data(h)).sum()) for h in tests)
     fitted = sum(int(selected_frames(h, frames).size) for h in tests)
     return FrameCounts(sum(h.times.size for h in tests), usable, fitted)
 
@@ -101,4 +102,4 @@ def selection_sentence(counts: FrameCounts, most: int) -> str:
     text = f"{counts.fitted} of {plural(counts.measured, 'measured frame')} were selected for the fit"
     if counts.fitted < counts.usable:
         return f"{text}: at most {most} of a test, half of them spread evenly in time and half in its logarithm."
-    return f"{text}: frames at time zero are not compared."
+    return f"{text}: frames at time zero, and those without values, are not compared."

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creepkit.errors import CreepkitError
 from creepkit.inverse.noise_model import MINIMUM_TESTS
+from creepkit.inverse.selection.discrimination import chi_square_by_test
 from creepkit.records import output_unit
 from creepkit.reports.html.compared_values import compared_values
 from creepkit.reports.html.elements import (
@@ -163,7 +165,8 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
         *("law", "parameters", *misfit_columns(ranking.best), f"{criterion} − best", "weight", "explains the tests"),
     )
     blocks: list[Block] = [Table("Laws tried, the best first", columns, rows, numeric=(1, 2, 3, 4, 5))]
-    blocks += [Paragraph(text) for text in _separation(ranking)]
+    separation = _separation(ranking)
+    blocks += [Paragraph(text) for text in separation]
     if ranking.challenges:
         blocks += [
             Paragraph("What the tests allow beside the best law:"),
@@ -178,7 +181,7 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
                 f"Misfit of each law in each test{_of(found)}",
                 f"Mean square deviation over noise of {plural(len(ranking.laws), 'law')} in "
                 f"{plural(len(ranking.best.tests), 'test')}, the weights of the laws, and the curves of the credible "
-                f"ones. {' '.join(_separation(ranking))} Weights: "
+                f"ones. {' '.join(separation)} Weights: "
                 + ", ".join(f"{printable(r.fit.law.name, 60)} {r.weight:.3f}" for r in ranking.laws)
                 + ".",
                 "Where the laws differ: misfit of each law in each test over the noise, and weights.",
@@ -187,23 +190,29 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
     return blocks
 
 
-def _separation(ranking: Ranking) -> Iterator[str]:
-    """In which test the second law is farthest behind the best one."""
-    if len(ranking.laws) < 2:
-        return
+def _separation(ranking: Ranking) -> list[str]:
+    """The test that speaks most for the best law against the second, by its share of what is compared."""
+    if len(ranking.laws) < 2 or ranking.criterion == "hold-out":
+        return []
     best, second = ranking.laws[0].fit, ranking.laws[1].fit
-    differences = np.array(
-        [misfit_of(b) - misfit_of(a) for a, b in zip(best.tests, second.tests, strict=False)], dtype=float
-    )
-    if not np.isfinite(differences).any():
-        return
-    k = int(np.nanargmax(differences))
-    first, other = misfit_of(best.tests[k]), misfit_of(second.tests[k])
-    yield (
+    at_hand = all(f.linearised is not None or (f.histories and f.predictor is not None) for f in (best, second))
+    if not at_hand:
+        return []
+    try:
+        chi_square = chi_square_by_test(best, second)
+    except CreepkitError:
+        return []
+    differences = chi_square[1] - chi_square[0]
+    if not np.isfinite(differences).all() or differences.max() <= 0.0:
+        return []
+    k = int(np.argmax(differences))
+    total = float(differences.sum())
+    of_all = f", of {number(total, 3)} in all tests together" if len(best.tests) > 1 else ""
+    return [
         f"What separates {second.law.name} from {best.law.name} most is test {printable(best.tests[k].name, 120)} "
-        f"({printable(best.tests[k].condition, 200)}): there the reduced chi-square is {number(other, 3)} with "
-        f"{second.law.name} and {number(first, 3)} with {best.law.name}."
-    )
+        f"({printable(best.tests[k].condition, 200)}): its chi-square, under one covariance for both laws, is "
+        f"{number(float(differences[k]), 3)} larger with {second.law.name}{of_all}."
+    ]
 
 
 # ---- nuisance parameters ---------------------------------------------------------------------------------------------
