@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.errors import CreepkitError
-from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.selection.discrimination import chi_square_by_test
 from creepkit.records import output_unit
 from creepkit.reports.html.compared_values import compared_values
@@ -26,6 +25,7 @@ from creepkit.reports.html.elements import (
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings
+from creepkit.reports.html.methods_identification import rate_scatter_sentence
 from creepkit.reports.identification_plot import identification_figure
 from creepkit.reports.identification_text import rupture_rows
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
@@ -225,7 +225,7 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
         (name.replace("_", " "), f"{number(one.noise, 2)}{_unit(name)}", f"{number(one.offset, 2)}{_unit(name)}")
         for name, one in fit.noise_model.outputs.items()
     ]
-    blocks: list[Block] = [Paragraph(_scatter_of_rates(fit))]
+    blocks: list[Block] = [Paragraph(rate_scatter_sentence(fit))]
     if noise:
         blocks.append(
             Table("Noise as it was estimated, one standard deviation", ("output", "frame", "offset of a test"), noise)
@@ -244,21 +244,6 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
         columns = ("nuisance parameter", "of", "estimate", "prior", "deviation, sd")
         blocks.append(Table("Nuisance parameters estimated beside the law", columns, rows, numeric=(2, 3, 4)))
     return blocks
-
-
-def _scatter_of_rates(fit: Identification) -> str:
-    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
-    if not rates:
-        return "No scatter of creep rates between tests was allowed: every test follows the law's own rate."
-    size = f"{number(100 * fit.noise_model.rate, 3)} % about the law (one standard deviation of their logarithm)"
-    if rates[0].sd is not None:
-        return f"The creep rates of single tests were taken to scatter by {size}, as was given."
-    if len(fit.tests) < MINIMUM_TESTS and fit.settings.weights != "likelihood":
-        return (
-            f"The creep rates of single tests were assumed to scatter by {size}: {plural(len(fit.tests), 'test')} "
-            "cannot show it."
-        )
-    return f"The creep rates of single tests scatter by {size}, as was estimated."
 
 
 def _unit(output: str) -> str:
