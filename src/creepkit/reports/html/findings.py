@@ -10,6 +10,7 @@ from markupsafe import Markup
 from creepkit.exporters.mathml import law_equations, symbol_element
 from creepkit.inverse.unmodelled_effects import TAKEN_FOR_GRANTED
 from creepkit.reports.html.elements import Block, Formula, Items, Paragraph, Table, number, sentence
+from creepkit.reports.html.law_tables import credible_values
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.ranking import equivalents_among_remaining
 
@@ -80,9 +81,10 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
         blocks.append(Paragraph(sentence(f"the law {fit.adequacy}")))
     undetermined = _undetermined(fit)
     if undetermined:
-        blocks += [Paragraph("What these tests do not determine:"), Items(undetermined)]
+        blocks += [Paragraph("What these tests do not determine, given this law:"), Items(undetermined)]
     else:
-        blocks.append(Paragraph("The tests determine every parameter of the law."))
+        blocks.append(Paragraph("The tests determine every parameter, given this law."))
+    blocks += credible_values(found.ranking)
     unmodelled = [
         sentence(f"{effect.description}, which changes the rate by {effect.change_text}") for effect in fit.unmodelled
     ]
@@ -110,7 +112,7 @@ def _values(fit: Identification) -> Table:
         )
         for e in fit.estimates
     ]
-    columns = ("parameter", "meaning", "value", "95 % interval", "unit", "by these tests")
+    columns = ("parameter", "meaning", "value", "95 % interval", "unit", "by these tests, given this law")
     caption = "Values for stress in MPa as a ratio to 1 MPa, and time in s as a ratio to 1 s"
     return Table(caption, columns, rows, numeric=(2, 3))
 

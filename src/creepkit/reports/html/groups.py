@@ -25,6 +25,7 @@ from creepkit.reports.html.elements import (
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings
+from creepkit.reports.html.law_tables import correlation_table
 from creepkit.reports.html.methods_identification import rate_scatter_sentence
 from creepkit.reports.identification_plot import identification_figure
 from creepkit.reports.identification_text import rupture_rows
@@ -243,7 +244,7 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
     if rows:
         columns = ("nuisance parameter", "of", "estimate", "prior", "deviation, sd")
         blocks.append(Table("Nuisance parameters estimated beside the law", columns, rows, numeric=(2, 3, 4)))
-    return blocks
+    return [*blocks, *correlation_table(fit)]
 
 
 def _unit(output: str) -> str:
@@ -259,5 +260,5 @@ def group_sections(
         PageSection(f"{prefix}curves", "The law over the tests", curve_blocks(found, figures)),
         PageSection(f"{prefix}tests", "Tests", test_blocks(found, figures, most_tests)),
         PageSection(f"{prefix}ranking", "Laws tried", ranking_blocks(found, figures, drawn=ranking_drawn)),
-        PageSection(f"{prefix}nuisances", "Noise and nuisance parameters", nuisance_blocks(found)),
+        PageSection(f"{prefix}nuisances", "Noise, nuisance parameters and correlations", nuisance_blocks(found)),
     ]

@@ -113,9 +113,8 @@ def _laws(found: Sequence[GroupFindings], references: References) -> list[str]:
     if len(named) == 1:
         return [f"The law was the {named[0]}."]
     tried = "; ".join(named)
-    return [
-        f"The laws tried were: {tried}. In them ε̇ is the creep rate in 1/s, σ the stress in MPa, ε the creep strain, t the time in s and T the temperature in K."
-    ]
+    letters = "ε̇ is the creep rate in 1/s, σ the stress in MPa, ε the strain, t the time in s, T the temperature in K"
+    return [f"The laws tried were: {tried}. In them {letters}."]
 
 
 def _formula(law: CreepLaw) -> str:

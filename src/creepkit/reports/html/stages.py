@@ -28,6 +28,7 @@ from creepkit.reports.html.elements import (
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import findings_of
+from creepkit.reports.html.test_details import NOT_STATED, table_of_details
 from creepkit.reports.rupture import rupture_text
 from creepkit.reports.rupture_plot import rupture_figure
 from creepkit.reports.temperature_law import plot_temperature_law, temperature_law_text, temperature_study_text
@@ -54,27 +55,27 @@ def data_section(contents: ReportContents) -> PageSection:
     histories = [h for group in contents.groups for h in group.histories]
     blocks: list[Block] = []
     if histories:
-        blocks.append(_table_of_histories(histories))
+        more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
+        blocks += [_table_of_histories(histories, more), table_of_details(histories[:MOST_LISTED], more)]
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)
     left_out = _exclusion_blocks(contents) if histories or contents.exclusions else []
     return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)])
 
 
-def _table_of_histories(histories: Sequence[History]) -> Table:
+def _table_of_histories(histories: Sequence[History], more: str) -> Table:
     rows = [
         (
             printable(h.name, 120),
-            printable(h.alloy or "not stated", 80),
+            printable(h.alloy or NOT_STATED, 80),
             printable(h.condition, 200),
             str(h.times.size),
             number(float(h.times[-1]) / 3600.0),
             _ending(h),
-            printable(re.split(r"[/\\]", h.source)[-1] or "–", 160),
+            printable(re.split(r"[/\\]", h.source)[-1] or NOT_STATED, 160),
         )
         for h in histories[:MOST_LISTED]
     ]
-    more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
     columns = ("test", "alloy", "condition", "measured frames", "last frame, h", "ended", "file")
     return Table(f"{plural(len(histories), 'test')} as measured{more}", columns, rows, numeric=(3, 4))
 
@@ -82,7 +83,7 @@ def _table_of_histories(histories: Sequence[History]) -> Table:
 def _ending(history: History) -> str:
     if history.rupture_time is not None:
         return f"ruptured at {number(history.rupture_time / 3600.0)} h"
-    return "stopped unruptured" if history.unruptured else "not stated"
+    return "stopped unruptured" if history.unruptured else NOT_STATED
 
 
 def _quality_blocks(quality: DataQuality) -> list[Block]:
