@@ -46,4 +46,4 @@ def correlation_table(fit: Identification) -> list[Block]:
         return [Paragraph(f"The correlations of {len(names)} parameters are in the file of the identification.")]
     rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, correlation.matrix, strict=True)]
     caption = f"Correlations of the estimates of {printable(fit.law.name, 120)}; ln where the logarithm is estimated"
-    return [Table(caption, ("", *names), rows, numeric=tuple(range(1, len(names) + 1)))]
+    return [Table(caption, ("parameter", *names), rows, numeric=tuple(range(1, len(names) + 1)))]
