@@ -127,7 +127,8 @@ class Study:
         anything differs from the study.lock that is there.
         progress : called as progress(task, done, total, note).
 
-        A stage that fails leaves the others; `failures` of the result, and the report, say what is missing.
+        A stage that fails leaves the others; `failures` of the result, and the report, say what is missing. Raises
+        StudyError for an unknown stage, for files that cannot be read or written, and for a study that is running.
         """
         kinds = STAGE_KINDS if only is None else [only] if isinstance(only, str) else list(only)
         for kind in kinds:

@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 class GroupFindings:
     """What was found of one material, whatever it was found by.
 
-    fit : the best law. ranking : of all laws, None where one law alone was identified. verdict : in a sentence.
-    equivalents : pairs of laws that the tests do not separate. remarks : further sentences.
+    name : of the material, "" where there is only one. fit : the best law, with its values in the author's units.
+    ranking : of all laws, None where one law alone was identified. verdict : in a sentence.
+    equivalents : pairs of laws that the tests do not separate, a sentence each. remarks : further sentences.
     """
 
     name: str

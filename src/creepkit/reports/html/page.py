@@ -112,10 +112,10 @@ def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) 
     warning: list[Block] = []
     if missing:
         listed = ", ".join(missing[:12]) + (f" and {len(missing) - 12} more" if len(missing) > 12 else "")
-        text = Markup(
+        reasons = Markup(
             'This report is not complete. Failed: {}. The reasons stand under <a href="#missing">What is missing</a>.'
         )
-        warning.append(Paragraph(text.format(listed), "warning"))
+        warning.append(Paragraph(reasons.format(listed), "warning"))
     if len(found) == 1:
         return PageSection("findings", "Findings", [*warning, *verdict_blocks(found[0])])
     if not found:
