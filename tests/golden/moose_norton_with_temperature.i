@@ -1,4 +1,4 @@
-# norton*arrhenius: Norton power law (PL), arrhenius in temperature
+# norton*arrhenius: Norton power law (PL), Arrhenius in temperature
 #
 # rate = A*stress**n*exp(-Q/R*(1/T - 1/1073.15))    [power law]
 #

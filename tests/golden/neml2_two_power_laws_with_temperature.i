@@ -1,4 +1,4 @@
-# norton+norton*arrhenius: Norton power law (PL) + Norton power law (PL), arrhenius in temperature
+# norton+norton*arrhenius: Norton power law (PL) + Norton power law (PL), Arrhenius in temperature
 #
 # rate = A_1*stress**n_1*exp(-Q/R*(1/T - 1/1073.15))    [power law 1]
 #      + A_2*stress**n_2*exp(-Q/R*(1/T - 1/1073.15))    [power law 2]

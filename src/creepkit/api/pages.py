@@ -32,6 +32,9 @@ def interactive_page(
     tests : measured ones that are laid over; by default those that an identification holds.
     specimen : which is shown first. title : of the page. surrogate : a trained network, which answers for its specimen
     while a slider moves. force : whether a file that exists may be replaced.
+
+    Raises ExportError for a law that cannot be written as JavaScript, for a page that is too large, and for a file that
+    exists or cannot be written. The page shows MPa, hours, mm and kelvin.
     """
     from creepkit.app.contents import page_contents
 

@@ -75,7 +75,9 @@ def report(
         histories.
     to : file of the page. title : of the page. force : whether a file that exists may be replaced.
 
-    The page runs no script and loads nothing. It holds figures, tables, laws to download, methods text and provenance.
+    Raises ReportError for what cannot be reported, for nothing at all, and for a file that exists or cannot be written.
+    The page loads nothing, and is complete without scripts. It holds figures, tables, laws to download, methods text
+    and provenance, in MPa, hours, kelvin and the units of the parameters.
     """
     from creepkit.files.writing import check_target, write_text
     from creepkit.reports.html import report_html

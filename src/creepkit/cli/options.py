@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from creepkit.api.searches import PENALTIES, SEARCHES, penalty_of_name, search_of_name
 
+if TYPE_CHECKING:
     from creepkit.inverse.search.global_search import GlobalSearch
     from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
 
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
 PAPER_SPECIMEN, DEFAULT_SPECIMEN = "bulge", "uniaxial"
 """What a data set is made of, and what a test is of that names no specimen and whose load it takes."""
-
-
-SEARCHES = ("multi-start", "swarm", "cma-es")
 
 
 def parsed_number(text: str) -> float:
@@ -45,27 +42,23 @@ def parsed_integer(text: str) -> int:
 def search_named(name: str) -> GlobalSearch | None:
     """The search of this name; None for the default."""
     from creepkit.errors import FitError
-    from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 
-    if name not in SEARCHES:
-        raise FitError(f"--search {name} is not known; allowed are {', '.join(SEARCHES)}")
-    return {"multi-start": None, "swarm": ParticleSwarm(), "cma-es": CmaEs()}[name]
+    for known in SEARCHES:
+        if known == name:
+            return search_of_name(known)
+    raise FitError(f"--search {name} is not known; allowed are {', '.join(SEARCHES)}")
 
 
 def penalty_named(name: str | None) -> ContributionPenalty | Subsets | None:
     """The penalty of this name, its strength chosen automatically; None for none."""
     from creepkit.errors import FitError
-    from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt, Subsets
 
-    penalties: dict[str, Callable[[], ContributionPenalty | Subsets]] = {
-        "l2": L2,
-        "group-l2": GroupL2,
-        "sqrt": Sqrt,
-        "subsets": Subsets,
-    }
-    if name is not None and name not in penalties:
-        raise FitError(f"--penalty {name} is not known; allowed are {', '.join(penalties)}")
-    return None if name is None else penalties[name]()
+    if name is None:
+        return None
+    for known in PENALTIES:
+        if known == name:
+            return penalty_of_name(known)
+    raise FitError(f"--penalty {name} is not known; allowed are {', '.join(PENALTIES)}")
 
 
 def parse_steps(texts: Sequence[str], option: str) -> list[tuple[float, float]]:

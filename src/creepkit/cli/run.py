@@ -43,7 +43,7 @@ def command(
     back to its study and data in a folder, which then runs.
     """
     from creepkit.errors import StudyError
-    from creepkit.studies.extraction import study_of_report
+    from creepkit.studies.carried_study import study_of_report
     from creepkit.studies.study import Study
 
     from_report = study.suffix.lower() in REPORT_SUFFIXES

@@ -50,10 +50,11 @@ def _time_range(history: History) -> tuple[float, float]:
     return float(history.times[0]), float(history.times[-1])
 
 
-def provenance_of(problem: LeastSquaresProblem, search_evaluations: int) -> dict[str, str | int]:
+def provenance_of(problem: LeastSquaresProblem, search_evaluations: int, search: str = "") -> dict[str, str | int]:
     """Versions, fingerprints and counts; one evaluation is one candidate on all tests.
 
-    search_evaluations : of the global search, by the reduced-order model where the predictor has one.
+    search_evaluations : of the global search, by the reduced-order model where the predictor has one. search : its
+    name, "" where it began from a given estimate.
     """
     law = problem.law
     return {
@@ -64,6 +65,7 @@ def provenance_of(problem: LeastSquaresProblem, search_evaluations: int) -> dict
         "specimen": getattr(problem.predictor, "name", type(problem.predictor).__name__),
         "evaluations": problem.evaluations.count,
         "search_evaluations": search_evaluations,
+        **({"search": search} if search else {}),
         "data": data_digest(problem),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }

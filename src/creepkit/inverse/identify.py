@@ -328,7 +328,7 @@ def _result(
         tests=tests,
         ranges=fitted_ranges(problem),
         settings=problem.settings,
-        provenance=provenance_of(problem, search_outcome.evaluations),
+        provenance=provenance_of(problem, search_outcome.evaluations, getattr(search_outcome.trace, "search", "")),
         errors=pooled_errors(histories, prediction, tests),
         nuisances=nuisance_estimates,
         converged=best.minimum.converged,

@@ -52,6 +52,14 @@ NOTEWORTHY_CHANGE = 0.01
 """Of the rate, from which on an effect is named."""
 
 
+LARGEST_PER_CENT = 0.4
+"""Of ln rate, from which on its change is given as a factor."""
+
+
+TAKEN_FOR_GRANTED = "intervals take for granted what no nuisance parameter models"
+"""How the note on unmodelled effects begins."""
+
+
 LIKE_HARDENING = 0.8
 """Correlation from which on a drift looks like hardening."""
 
@@ -80,6 +88,13 @@ class UnmodelledEffect:
         """What, and of which size."""
         article = "an" if self.kind[0] in "aeiou" else "a"
         return f"{article} {self.kind} of {self.size:.2g} {self.unit}".strip()
+
+    @property
+    def change_text(self) -> str:
+        """By how much it changes the rate at the reference point: in per cent, large ones as a factor."""
+        if self.rate_change < LARGEST_PER_CENT:
+            return f"{100 * float(np.expm1(self.rate_change)):.2g} %"
+        return f"a factor of {float(np.exp(self.rate_change)):.2g}"
 
 
 def unmodelled_effects(
@@ -128,13 +143,10 @@ def tolerated_dimensions(problem: LeastSquaresProblem) -> list[Dimension]:
 
 def unmodelled_note(effects: Sequence[UnmodelledEffect]) -> tuple[str, ...]:
     """One sentence on what intervals do not include, with what it would do to the rate; none where that is little."""
-    parts = [f"{e.description} {100 * e.rate_change:.2g} %" for e in effects if e.rate_change > NOTEWORTHY_CHANGE]
+    parts = [f"{e.description} {e.change_text}" for e in effects if e.rate_change > NOTEWORTHY_CHANGE]
     sentences = []
     if parts:
-        sentences.append(
-            f"intervals take for granted what no nuisance parameter models; the rate at the reference would change: by "
-            f"{', by '.join(parts)}"
-        )
+        sentences.append(f"{TAKEN_FOR_GRANTED}; the rate at the reference would change: by {', by '.join(parts)}")
     for effect in effects:
         if effect.hardening_correlation > LIKE_HARDENING:
             sentences.append(

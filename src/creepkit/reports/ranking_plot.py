@@ -46,6 +46,10 @@ MOST_NUMBERS = 14
 """Up to this many tests each misfit is written in its cell."""
 
 
+PANEL_WIDTH = 3.0
+"""Inches of the title of one test's panel, as wide as its axes."""
+
+
 HEAT_TITLE = (
     "mean square deviation of each law in each test, over the noise of a frame\n"
     "(offsets taken out, rates of single tests not; 1: noise alone)"
@@ -212,7 +216,7 @@ def _draw_test(axes: Axes, laws: Sequence[RankedLaw], curves: Sequence[FittedCur
         draw_curve(axes, curve, colour, "-" if k == 0 else "--", dots="0.35" if k == 0 else None)
     set_curve_ranges([axes], drawn, output)
     axes.set(xlabel="time, h", ylabel=axis_label(output))
-    axes.set_title(f"{history.name}: {program_text(history)}", fontsize=9)
+    axes.set_title(wrapped(f"{history.name}: {program_text(history)}", PANEL_WIDTH), fontsize=8.5)
 
 
 def _name_laws(part: Any, laws: Sequence[RankedLaw], every_test: bool) -> None:

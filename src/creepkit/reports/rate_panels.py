@@ -68,7 +68,7 @@ def draw_rates(axes: Axes, fit: Identification, rates: Sequence[HoldRate]) -> No
     reference = fit.reference
     axes.set_title(
         f"rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.4g} h\n"
-        "tests: identified rate × measured / identified growth or minimum rate",
+        "tests: identified rate × measured over\nidentified growth, or minimum rate",
         fontsize=9,
     )
 

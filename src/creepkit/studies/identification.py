@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from creepkit.api.searches import penalty_of_name, search_of_name
 from creepkit.studies.model import IdentificationPart
 
 if TYPE_CHECKING:
@@ -16,11 +17,7 @@ if TYPE_CHECKING:
 
 def search_of(part: IdentificationPart) -> tuple[Any, Any]:
     """The search and the penalty of an identification, None for the default and for none."""
-    import creepkit as ck
-
-    searches: dict[str, Any] = {"multi-start": None, "swarm": ck.ParticleSwarm(), "cma-es": ck.CmaEs()}
-    penalties: dict[str, Any] = {"l2": ck.L2, "group-l2": ck.GroupL2, "sqrt": ck.Sqrt, "subsets": ck.Subsets}
-    return searches[part.search], None if part.penalty is None else penalties[part.penalty]()
+    return search_of_name(part.search), None if part.penalty is None else penalty_of_name(part.penalty)
 
 
 def identified_laws(

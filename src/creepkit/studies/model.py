@@ -10,6 +10,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
+from creepkit.api.searches import PenaltyName, SearchName
+
 MOST_ITEMS = 1000
 """In a list of a study file."""
 
@@ -150,8 +152,8 @@ class IdentificationPart(Part):
     weights: Annotated[Any, BeforeValidator(_output_weights)] = None
     loss: Text | None = None
     test_loss: Text | None = None
-    search: Literal["multi-start", "swarm", "cma-es"] = "multi-start"
-    penalty: Literal["l2", "group-l2", "sqrt", "subsets"] | None = None
+    search: SearchName = "multi-start"
+    penalty: PenaltyName | None = None
 
 
 class SelectionPart(Part):

@@ -347,11 +347,6 @@ class Stages:
         return Stage(name, "export", group.name, described, make, (need,), ExportedFile)
 
 
-def _law_text(law: CreepLaw) -> str:
-    """All of a law that decides an identification."""
-    return repr((law.name, law.fingerprint, [(name, p.bounds, p.off) for name, p in law.table.items()]))
-
-
 def needed_stages(stages: Sequence[Stage], kinds: Sequence[str]) -> set[str]:
     """Names of the stages of some kinds, and of all that these need."""
     by_name = {stage.name: stage for stage in stages}

@@ -129,7 +129,8 @@ class Study:
         study, as it is now, rests on.
         progress : called as progress(task, done, total, note).
 
-        A stage that fails leaves the others; `failures` of the result, and the report, say what is missing.
+        A stage that fails leaves the others; `failures` of the result, and the report, say what is missing. Raises
+        StudyError for an unknown stage, for files that cannot be read or written, and for a study that is running.
         """
         kinds = STAGE_KINDS if only is None else [only] if isinstance(only, str) else list(only)
         for kind in kinds:

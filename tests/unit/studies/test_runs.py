@@ -17,7 +17,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import StudyError
 from creepkit.inverse.identification_document import identification_to_json
-from creepkit.studies.extraction import study_of_report
+from creepkit.studies.carried_study import study_of_report
 from creepkit.studies.result import StudyResult
 
 STUDY = """\

@@ -202,6 +202,17 @@ def _whitened_residuals(fits: Sequence[Identification]) -> Floats:
     return np.array([common.whiten(fit.residuals_of(fit.least_squares_problem).values) for fit in fits])
 
 
+def chi_square_by_test(first: Identification, second: Identification) -> Floats:
+    """(laws, tests) - chi-square of two laws in each test at their optima under one covariance, without priors."""
+    fits = [first, second]
+    whitened = _whitened_residuals(fits)
+    if all(fit.linearised is not None for fit in fits):
+        return np.asarray((whitened.reshape(len(fits), len(first.tests), -1) ** 2).sum(axis=2))
+    tests = np.nonzero(first.least_squares_problem.observations.present)[0]
+    count = len(first.tests)
+    return np.array([np.bincount(tests, weights=row**2, minlength=count) for row in whitened])
+
+
 def _reduction_between(first: Identification, second: Identification) -> tuple[str, str]:
     """(name of the richer law, "m = 0") where one law with a parameter off is the other, within its interval."""
     for richer, simpler in ((first, second), (second, first)):

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
 from markupsafe import Markup
 
 from creepkit.exporters.mathml import law_equations, symbol_element
 from creepkit.inverse.uncertainty.laplace_approximation import cut_intervals
+from creepkit.inverse.unmodelled_effects import TAKEN_FOR_GRANTED
 from creepkit.reports.html.elements import Block, Formula, Items, Paragraph, Table, number, sentence
+from creepkit.reports.html.law_tables import credible_values
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.ranking import equivalents_among_remaining
 
@@ -20,17 +21,14 @@ if TYPE_CHECKING:
     from creepkit.reports.contents import ReportGroup
 
 
-LARGEST_PER_CENT = 0.4
-"""Of a logarithm, from which its change is given as a factor."""
-
-
 @dataclass(frozen=True)
 class GroupFindings:
     """What was found of one material, whatever it was found by.
 
-    fit : the best law. ranking : of all laws, None where one law alone was identified. verdict : in a sentence.
-    equivalents : pairs of laws that the tests do not separate. remarks : further sentences. decisive : whether the
-    verdict is that this law is the one, None where no laws were compared.
+    name : of the material, "" where there is only one. fit : the best law, with its values in the author's units.
+    ranking : of all laws, None where one law alone was identified. verdict : in a sentence.
+    equivalents : pairs of laws that the tests do not separate, a sentence each. remarks : further sentences.
+    decisive : whether the verdict is that this law is the one, None where no laws were compared.
     """
 
     name: str
@@ -90,24 +88,18 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
         blocks.append(Paragraph(sentence(f"the law {fit.adequacy}")))
     undetermined = _undetermined(fit)
     if undetermined:
-        blocks += [Paragraph("What these tests do not determine:"), Items(undetermined)]
+        blocks += [Paragraph("What these tests do not determine, given this law:"), Items(undetermined)]
     else:
-        blocks.append(Paragraph("The tests determine every parameter of the law."))
+        blocks.append(Paragraph("The tests determine every parameter, given this law."))
+    blocks += credible_values(found.ranking)
     unmodelled = [
-        sentence(f"{effect.description}, which changes the rate by {_change(effect.rate_change)}")
-        for effect in fit.unmodelled
+        sentence(f"{effect.description}, which changes the rate by {effect.change_text}") for effect in fit.unmodelled
     ]
     if unmodelled:
         blocks += [Paragraph("The intervals do not include:"), Items(unmodelled)]
-    remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *fit.notes])))
+    notes = [note for note in fit.notes if not (fit.unmodelled and note.startswith(TAKEN_FOR_GRANTED))]  # said above
+    remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *notes])))
     return [*blocks, Paragraph("Remarks:"), Items(remarks)] if remarks else blocks
-
-
-def _change(log_factor: float) -> str:
-    """A change of a logarithm in words."""
-    if abs(log_factor) < LARGEST_PER_CENT:
-        return f"{number(100 * float(np.expm1(log_factor)), 2)} %"
-    return f"a factor of {number(float(np.exp(log_factor)), 2)}"
 
 
 def _undetermined(fit: Identification) -> list[str]:
@@ -128,7 +120,7 @@ def _values(fit: Identification) -> Table:
         )
         for e in fit.estimates
     ]
-    columns = ("parameter", "meaning", "value", "95 % interval", "unit", "by these tests")
+    columns = ("parameter", "meaning", "value", "95 % interval", "unit", "by these tests, given this law")
     caption = "Values for stress in MPa as a ratio to 1 MPa, and time in s as a ratio to 1 s"
     return Table(caption, columns, rows, numeric=(2, 3))
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creepkit.errors import CreepkitError
+from creepkit.inverse.selection.discrimination import chi_square_by_test
 from creepkit.records import output_unit
+from creepkit.reports.html.compared_values import compared_values
 from creepkit.reports.html.elements import (
     Block,
     Items,
@@ -22,6 +25,8 @@ from creepkit.reports.html.elements import (
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings
+from creepkit.reports.html.law_tables import correlation_table
+from creepkit.reports.html.methods_identification import rate_scatter_sentence
 from creepkit.reports.identification_plot import identification_figure
 from creepkit.reports.identification_text import rupture_rows
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
@@ -85,6 +90,7 @@ def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[B
 
 def _table_of_tests(fit: Identification) -> Table:
     rows = []
+    compared = compared_values(fit)
     for test in fit.tests:
         first = test.outputs[0] if test.outputs else None
         unit = f" {output_unit(first.output)}" if first is not None and output_unit(first.output) else ""
@@ -92,7 +98,7 @@ def _table_of_tests(fit: Identification) -> Table:
             (
                 printable(test.name, 120),
                 printable(test.condition, 200),
-                str(test.frames),
+                "not known" if compared is None else str(compared.by_test.get(test.name, 0)),
                 "–" if first is None else number(misfit_of(test), 3),
                 "–" if first is None else number(first.errors.relative_squared_error, 2),
                 "–" if first is None else f"{number(first.offset, 2)}{unit}",
@@ -101,7 +107,7 @@ def _table_of_tests(fit: Identification) -> Table:
             )
         )
     columns = (
-        *("test", "condition", "frames", "χ² without own rate", "relative squared error", "offset", "rate × law"),
+        *("test", "condition", "values compared", "χ² without own rate", "relative squared error", "offset", "rate × law"),
         "weight",
     )
     caption = (
@@ -155,7 +161,8 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
         *("law", "parameters", *misfit_columns(ranking.best), f"{criterion} − best", "weight", "explains the tests"),
     )
     blocks: list[Block] = [Table("Laws tried, the best first", columns, rows, numeric=(1, 2, 3, 4, 5))]
-    blocks += [Paragraph(text) for text in _separation(ranking)]
+    separation = _separation(ranking)
+    blocks += [Paragraph(text) for text in separation]
     if ranking.challenges:
         blocks += [
             Paragraph("What the tests allow beside the best law:"),
@@ -170,7 +177,7 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
                 f"Misfit of each law in each test{_of(found)}",
                 f"Mean square deviation over noise of {plural(len(ranking.laws), 'law')} in "
                 f"{plural(len(ranking.best.tests), 'test')}, the weights of the laws, and the curves of the credible "
-                f"ones. {' '.join(_separation(ranking))} Weights: "
+                f"ones. {' '.join(separation)} Weights: "
                 + ", ".join(f"{printable(r.fit.law.name, 60)} {r.weight:.3f}" for r in ranking.laws)
                 + ".",
                 "Where the laws differ: mean square misfit of each law in each test over the noise of a frame, without "
@@ -180,24 +187,29 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
     return blocks
 
 
-def _separation(ranking: Ranking) -> Iterator[str]:
-    """In which test the second law is farthest behind the best one."""
-    if len(ranking.laws) < 2:
-        return
+def _separation(ranking: Ranking) -> list[str]:
+    """The test that speaks most for the best law against the second, by its share of what is compared."""
+    if len(ranking.laws) < 2 or ranking.criterion == "hold-out":
+        return []
     best, second = ranking.laws[0].fit, ranking.laws[1].fit
-    differences = np.array(
-        [misfit_of(b) - misfit_of(a) for a, b in zip(best.tests, second.tests, strict=False)], dtype=float
-    )
-    if not np.isfinite(differences).any():
-        return
-    k = int(np.nanargmax(differences))
-    first, other = misfit_of(best.tests[k]), misfit_of(second.tests[k])
-    yield (
+    at_hand = all(f.linearised is not None or (f.histories and f.predictor is not None) for f in (best, second))
+    if not at_hand:
+        return []
+    try:
+        chi_square = chi_square_by_test(best, second)
+    except CreepkitError:
+        return []
+    differences = chi_square[1] - chi_square[0]
+    if not np.isfinite(differences).all() or differences.max() <= 0.0:
+        return []
+    k = int(np.argmax(differences))
+    total = float(differences.sum())
+    of_all = f", of {number(total, 3)} in all tests together" if len(best.tests) > 1 else ""
+    return [
         f"What separates {second.law.name} from {best.law.name} most is test {printable(best.tests[k].name, 120)} "
-        f"({printable(best.tests[k].condition, 200)}): there the mean square misfit over the noise of a frame, without "
-        f"the test's own factor on the rate, is {number(other, 3)} with {second.law.name} and {number(first, 3)} with "
-        f"{best.law.name}."
-    )
+        f"({printable(best.tests[k].condition, 200)}): its chi-square, under one covariance for both laws, is "
+        f"{number(float(differences[k]), 3)} larger with {second.law.name}{of_all}."
+    ]
 
 
 # ---- nuisance parameters ---------------------------------------------------------------------------------------------
@@ -210,12 +222,7 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
         (name.replace("_", " "), f"{number(one.noise, 2)}{_unit(name)}", f"{number(one.offset, 2)}{_unit(name)}")
         for name, one in fit.noise_model.outputs.items()
     ]
-    blocks: list[Block] = [
-        Paragraph(
-            f"The creep rates of single tests scatter by {number(100 * fit.noise_model.rate, 3)} % about the law (one "
-            "standard deviation of their logarithm)."
-        )
-    ]
+    blocks: list[Block] = [Paragraph(rate_scatter_sentence(fit))]
     if noise:
         blocks.append(
             Table("Noise as it was estimated, one standard deviation", ("output", "frame", "offset of a test"), noise)
@@ -233,7 +240,7 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
     if rows:
         columns = ("nuisance parameter", "of", "estimate", "prior", "deviation, sd")
         blocks.append(Table("Nuisance parameters estimated beside the law", columns, rows, numeric=(2, 3, 4)))
-    return blocks
+    return [*blocks, *correlation_table(fit)]
 
 
 def _unit(output: str) -> str:
@@ -249,5 +256,5 @@ def group_sections(
         PageSection(f"{prefix}curves", "The law over the tests", curve_blocks(found, figures)),
         PageSection(f"{prefix}tests", "Tests", test_blocks(found, figures, most_tests)),
         PageSection(f"{prefix}ranking", "Laws tried", ranking_blocks(found, figures, drawn=ranking_drawn)),
-        PageSection(f"{prefix}nuisances", "Noise and nuisance parameters", nuisance_blocks(found)),
+        PageSection(f"{prefix}nuisances", "Noise, nuisance parameters and correlations", nuisance_blocks(found)),
     ]

@@ -113,11 +113,10 @@ def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) 
     warning: list[Block] = []
     if missing:
         listed = ", ".join(missing[:12]) + (f" and {len(missing) - 12} more" if len(missing) > 12 else "")
-        warning.append(
-            Paragraph(
-                f"This report is not complete. Failed: {listed}. The reasons stand in the last section.", "warning"
-            )
+        reasons = Markup(
+            'This report is not complete. Failed: {}. The reasons stand under <a href="#missing">What is missing</a>.'
         )
+        warning.append(Paragraph(reasons.format(listed), "warning"))
     if len(found) == 1:
         return PageSection("findings", "Findings", [*warning, *verdict_blocks(found[0])])
     if not found:

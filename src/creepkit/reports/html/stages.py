@@ -12,6 +12,7 @@ from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
 from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows
 from creepkit.reports.forecast_plot import forecast_figure
+from creepkit.reports.html.compared_values import frame_counts, selection_sentence
 from creepkit.reports.html.elements import (
     Block,
     Items,
@@ -26,6 +27,8 @@ from creepkit.reports.html.elements import (
     sentence,
 )
 from creepkit.reports.html.figures import PageFigures
+from creepkit.reports.html.findings import findings_of
+from creepkit.reports.html.test_details import NOT_STATED, table_of_details
 from creepkit.reports.rupture import rupture_text
 from creepkit.reports.rupture_plot import rupture_figure
 from creepkit.reports.temperature_law import plot_temperature_law, temperature_law_text, temperature_study_text
@@ -36,7 +39,7 @@ if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
     from creepkit.quality.flags import DataQuality
     from creepkit.records import History
-    from creepkit.reports.contents import Exclusion, ReportContents
+    from creepkit.reports.contents import ReportContents
     from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 MOST_LISTED = 400
@@ -52,35 +55,35 @@ def data_section(contents: ReportContents) -> PageSection:
     histories = [h for group in contents.groups for h in group.histories]
     blocks: list[Block] = []
     if histories:
-        blocks.append(_table_of_histories(histories))
+        more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
+        blocks += [_table_of_histories(histories, more), table_of_details(histories[:MOST_LISTED], more)]
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)
-    left_out = _exclusion_blocks(contents.exclusions) if histories or contents.exclusions else []
+    left_out = _exclusion_blocks(contents) if histories or contents.exclusions else []
     return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)])
 
 
-def _table_of_histories(histories: Sequence[History]) -> Table:
+def _table_of_histories(histories: Sequence[History], more: str) -> Table:
     rows = [
         (
             printable(h.name, 120),
-            printable(h.alloy or "–", 80),
+            printable(h.alloy or NOT_STATED, 80),
             printable(h.condition, 200),
             str(h.times.size),
             number(float(h.times[-1]) / 3600.0),
             _ending(h),
-            printable(re.split(r"[/\\]", h.source)[-1] or "–", 160),
+            printable(re.split(r"[/\\]", h.source)[-1] or NOT_STATED, 160),
         )
         for h in histories[:MOST_LISTED]
     ]
-    more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
-    columns = ("test", "alloy", "condition", "frames", "last frame, h", "ended", "file")
+    columns = ("test", "alloy", "condition", "measured frames", "last frame, h", "ended", "file")
     return Table(f"{plural(len(histories), 'test')} as measured{more}", columns, rows, numeric=(3, 4))
 
 
 def _ending(history: History) -> str:
     if history.rupture_time is not None:
         return f"ruptured at {number(history.rupture_time / 3600.0)} h"
-    return "stopped unruptured" if history.unruptured else "–"
+    return "stopped unruptured" if history.unruptured else NOT_STATED
 
 
 def _quality_blocks(quality: DataQuality) -> list[Block]:
@@ -102,18 +105,30 @@ def _quality_blocks(quality: DataQuality) -> list[Block]:
     return [Table(caption, columns, rows, numeric=(3,))]
 
 
-def _exclusion_blocks(exclusions: Sequence[Exclusion]) -> list[Block]:
-    if not exclusions:
-        return [Paragraph("Nothing was left out: every frame of every test counts.")]
+def _exclusion_blocks(contents: ReportContents) -> list[Block]:
+    selected = [Paragraph(text) for text in _selections(contents)]
+    if not contents.exclusions:
+        return [Paragraph("No frame was excluded by hand or by the check of data quality."), *selected]
     rows = [
         (
             printable(one.test, 120),
             frame_ranges_text(one.frames) if one.frames else "the whole test",
             printable(one.reason),
         )
-        for one in exclusions[:MOST_LISTED]
+        for one in contents.exclusions[:MOST_LISTED]
     ]
-    return [Table("Left out of the identification", ("test", "what", "reason"), rows)]
+    return [Table("Left out of the identification", ("test", "what", "reason"), rows), *selected]
+
+
+def _selections(contents: ReportContents) -> Iterator[str]:
+    """How many frames of the tests of each group were selected for the fit."""
+    for group in contents.groups:
+        found = findings_of(group)
+        if found is None or not any(h.outputs for h in found.fit.histories):
+            continue
+        most = found.fit.settings.frames
+        text = selection_sentence(frame_counts(found.fit.histories, most), most)
+        yield f"{printable(group.name, 80)}: {text}" if len(contents.groups) > 1 else text
 
 
 def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[PageSection]:

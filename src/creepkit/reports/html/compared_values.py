@@ -1,0 +1,105 @@
+"""What an identification compared: frames as measured and as selected for the fit, values, and their transforms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.errors import CreepkitError
+from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.inverse.observation_vector import (
+    MINIMUM_RATE_OUTPUT,
+    RUPTURE_OUTPUT,
+    ObservationVector,
+    frames_with_data,
+    selected_frames,
+    thinned_history,
+)
+from creepkit.inverse.output_transforms import LinearTransform, LogTransform
+from creepkit.records import output_unit
+from creepkit.reports.html.elements import number, plural
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+    from creepkit.records import History
+
+
+@dataclass(frozen=True)
+class FrameCounts:
+    """Frames of tests: as measured, those of them that a fit may use, and those that were selected for it."""
+
+    measured: int
+    usable: int
+    fitted: int
+
+
+def frame_counts(histories: Sequence[History], frames: int) -> FrameCounts:
+    """The frames of tests with outputs; frames : at most so many were selected in each test."""
+    tests = [h for h in histories if h.outputs]
+    usable = sum(int((h.used & (h.times > 0) & frames_with_data(h)).sum()) for h in tests)
+    fitted = sum(int(selected_frames(h, frames).size) for h in tests)
+    return FrameCounts(sum(h.times.size for h in tests), usable, fitted)
+
+
+@dataclass(frozen=True)
+class ComparedValues:
+    """The values that a fit compared with its law's predictions.
+
+    by_test : {test: how many}, with its rupture time or minimum rate. transforms : a sentence on each output, in what
+    quantity it is compared.
+    """
+
+    by_test: Mapping[str, int]
+    transforms: tuple[str, ...]
+
+    @property
+    def count(self) -> int:
+        """Of all tests."""
+        return sum(self.by_test.values())
+
+
+def compared_values(fit: Identification) -> ComparedValues | None:
+    """What a fit compared; None where its tests are not at hand."""
+    if not fit.histories or fit.predictor is None:
+        return None
+    predictor = fit.predictor
+    predictor = CompositePredictor(dict(predictor)) if isinstance(predictor, Mapping) else predictor
+    try:
+        tests = [thinned_history(h, fit.settings.frames) for h in fit.histories]
+        observations = ObservationVector.from_histories(tests, predictor, fit.histories)
+    except CreepkitError:
+        return None
+    counts = np.asarray(observations.present).sum(axis=1)
+    return ComparedValues(
+        {h.name: int(count) for h, count in zip(tests, counts, strict=True)}, tuple(_transforms(observations))
+    )
+
+
+def _transforms(observations: ObservationVector) -> list[str]:
+    sentences = []
+    for output, transform in zip(observations.outputs, observations.transforms, strict=True):
+        name, unit = output.replace("_", " "), output_unit(output)
+        unit = f" {unit}" if unit else ""
+        if output == RUPTURE_OUTPUT:
+            sentences.append("rupture times by their logarithms")
+        elif output == MINIMUM_RATE_OUTPUT:
+            sentences.append("minimum creep rates by their logarithms")
+        elif isinstance(transform, LogTransform):
+            floor = f"{number(transform.floor, 3)}{unit}"
+            sentences.append(f"{name} ε as arsinh(ε / 2f), which is ln(ε / f) well above the floor f = {floor}")
+        elif isinstance(transform, LinearTransform):
+            sentences.append(f"{name} linearly, divided by the standard deviation {number(transform.scale, 3)}{unit}")
+    return sentences
+
+
+def selection_sentence(counts: FrameCounts, most: int) -> str:
+    """How many frames were selected for a fit, and how."""
+    if counts.fitted == counts.usable == counts.measured:
+        return f"All {plural(counts.measured, 'measured frame')} were fitted."
+    text = f"{counts.fitted} of {plural(counts.measured, 'measured frame')} were selected for the fit"
+    if counts.fitted < counts.usable:
+        return f"{text}: at most {most} of a test, half of them spread evenly in time and half in its logarithm."
+    return f"{text}: frames at time zero, and those without values, are not compared."

@@ -1,0 +1,49 @@
+"""Tables beside the best law's values: values of every credible law, and how the estimates are correlated."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from creepkit.reports.html.elements import Block, Paragraph, Table, number, printable
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection.ranking import Ranking
+
+MOST_CORRELATED = 12
+"""Parameters up to which their correlations are a table."""
+
+
+def credible_values(ranking: Ranking | None) -> list[Block]:
+    """Values and intervals of every credible law, where the tests do not decide for one; each given its own law."""
+    if ranking is None or ranking.decisive or len(ranking.credible) < 2:
+        return []
+    rows = [
+        (
+            printable(one.fit.law.name, 120),
+            f"{one.weight:.3f}",
+            e.name,
+            number(e.value, 5),
+            f"{number(e.low)} to {number(e.high)}",
+            "" if e.unit == "1" else e.unit,
+            e.verdict,
+        )
+        for one in ranking.credible
+        for e in one.fit.estimates
+    ]
+    columns = ("law", "weight", "parameter", "value", "95 % interval", "unit", "given this law")
+    caption = "Values of every credible law, of weight above 0.05: each interval holds only if its law is right"
+    return [Table(caption, columns, rows, numeric=(1, 3, 4))]
+
+
+def correlation_table(fit: Identification) -> list[Block]:
+    """Correlations of the estimated parameters, given the law."""
+    correlation = fit.correlation()
+    names = [printable(name, 80) for name in correlation.names]
+    if len(names) < 2:
+        return []
+    if len(names) > MOST_CORRELATED:
+        return [Paragraph(f"The correlations of {len(names)} parameters are in the file of the identification.")]
+    rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, correlation.matrix, strict=True)]
+    caption = f"Correlations of the estimates of {printable(fit.law.name, 120)}; ln where the logarithm is estimated"
+    return [Table(caption, ("parameter", *names), rows, numeric=tuple(range(1, len(names) + 1)))]
