@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -51,18 +52,20 @@ def write_page(
 
 
 def write_own(kept: ResultFolder, path: Path, text: str) -> None:
-    """Write a file beside the study; StudyError for one that exists and that the study has not written.
+    """Write a file beside the study; StudyError for one that exists and that the study has not written as it is.
 
-    It is noted as the study's own before it is written, so that a process that dies in between leaves nothing foreign.
+    Its hash is noted before it is written, so that a process that dies in between leaves nothing foreign.
     """
     content = text.encode()
-    foreign = path.exists() and path.name not in kept.outputs and not kept.overwrite
-    if foreign and not (path.is_file() and sha256_of(path) == hashlib.sha256(content).hexdigest()):
-        raise StudyError(
-            f"{path}: exists, and this study has not written it; choose another name in the study file, or overwrite "
-            "it by --force"
-        )
-    kept.add_output(path.name)
+    digest = hashlib.sha256(content).hexdigest()
+    if os.path.lexists(path) and not kept.overwrite:
+        own = [*kept.outputs.get(path.name, []), digest]
+        if path.is_symlink() or not path.is_file() or sha256_of(path) not in own:
+            raise StudyError(
+                f"{path}: exists, and this study has not written it as it is; choose another name in the study file, "
+                "or overwrite it by --force"
+            )
+    kept.add_output(path.name, digest)
     write_bytes(content, path, StudyError)
 
 
