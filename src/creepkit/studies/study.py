@@ -211,6 +211,7 @@ class Study:
         own = [self.path, kept.folder, lock_path]
         own += [folder / one.file for one in model.export if one.file is not None]
         own += [] if model.report is None else [folder / model.report.file]
+        own += [folder / name for name in kept.outputs]
         paths = [*self.paths]
         for k, part in enumerate(model.forecast):
             paths += resolve_paths(self.file, ("forecast", k, "tests"), part.tests, self.root) if part.tests else []
