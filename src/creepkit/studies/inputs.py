@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from itertools import islice
@@ -84,7 +84,12 @@ def resolve_paths(file: StudyFile, key: tuple[str | int, ...], texts: Sequence[s
             raise file.error(place, f"'{text}' goes through folders of any depth; name the folders")
         base, relative = (file.path.parent, pattern) if root is None else (root, PurePosixPath(carried_name(pattern)))
         path = base / relative
-        matches = [path] if path.exists() else _matches(base, relative)
+        try:
+            matches = [path] if path.exists() else _matches(base, relative)
+        except OSError as error:  # a folder that may not be entered, a name too long
+            raise file.error(
+                place, f"'{text}' cannot be read ({error.strerror}); check its name and who may read it"
+            ) from None
         if not matches:
             raise file.error(place, f"there is no file or folder '{text}' beside the study, and none matches it")
         found.update(dict.fromkeys(matches))
@@ -114,7 +119,7 @@ def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_
     base = file.path.parent if root is None else root
     files: dict[Path, None] = {}
     for path in paths:
-        for one in sorted(islice(path.rglob("*"), 2 * MOST_FILES)) if path.is_dir() else [path]:
+        for one in sorted(islice(_files_below(file, path), 2 * MOST_FILES)) if path.is_dir() else [path]:
             if one.is_file() and not any(one == own or own in one.parents for own in left_out):
                 files[one] = None
             if len(files) > MOST_FILES:
@@ -125,6 +130,20 @@ def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_
         name = str(relative) if root is not None else carried_name(relative)
         result.append(InputFile(name, one, sha256_of(one)))
     return result
+
+
+def _files_below(file: StudyFile, folder: Path) -> Iterator[Path]:
+    """All files of a folder; StudyError where a folder in it cannot be read, for its files would be left out."""
+    import os
+
+    def refuse(error: OSError) -> None:
+        raise file.error(
+            ("data", "files"),
+            f"folder {error.filename} cannot be read ({error.strerror}); make it readable, or move it",
+        )
+
+    for parent, _, names in os.walk(folder, onerror=refuse):
+        yield from (Path(parent, name) for name in names)
 
 
 def _relative(path: Path, base: Path) -> str:

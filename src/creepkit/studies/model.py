@@ -81,7 +81,7 @@ def _output_weights(value: Any) -> Any:
 LevelOrSteps = Annotated[list[Step], BeforeValidator(_level_or_steps), Field(min_length=1, max_length=MOST_ITEMS)]
 Labels = Annotated[list[Any], BeforeValidator(_label_values)]
 OneOrMore = Annotated[SomeTexts, BeforeValidator(_one_or_more)]
-Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
+Bounds = Annotated[list[Annotated[float, Field(ge=-1e100, le=1e100)]], Field(min_length=2, max_length=2)]
 
 
 class StudyPart(Part):

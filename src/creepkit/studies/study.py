@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cached_property
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.errors import StudyError, nearest
@@ -102,9 +103,11 @@ class Study:
             if same_name(name) in names:
                 raise file.error(key, f"'{name}' is written by another table already; give file = another name")
             names.append(same_name(name))
-            read = any(PurePosixPath(name).match(pattern) for pattern in model.data.files if "/" not in pattern)
+            read = any(fnmatchcase(name, pattern.removeprefix("./")) for pattern in model.data.files)
             if read or file.path.parent / name in data:
-                raise file.error(key, f"'{name}' would be among the data files; give file = another name")
+                raise file.error(
+                    key, f"'{name}' would be among the data files; give file = another name, or name those more exactly"
+                )
 
     @cached_property
     def paths(self) -> list[Path]:
