@@ -67,3 +67,10 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_half_written(command, tmp_p
     ]
     assert lines == [f"creepkit: {command} interrupted"]
     assert [path for path in tmp_path.rglob("*") if path.name.endswith((".part", ".lock"))] == []
+
+
+def test_to_be_ended_by_the_system_is_an_interrupt():
+    """As a queue of jobs or a container ends a process."""
+    end = "import os, signal; import creepkit.cli.app as app; app.app = lambda: os.kill(os.getpid(), signal.SIGTERM); "
+    process = subprocess.run([sys.executable, "-c", f"{end}from creepkit.cli import main; main()"], timeout=DEADLINE)
+    assert process.returncode == 130

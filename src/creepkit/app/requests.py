@@ -14,7 +14,7 @@ LARGEST_NUMBER = 1e60
 
 
 Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0.0, le=LARGEST_NUMBER, allow_inf_nan=False)]
+Positive = Annotated[float, Field(ge=1.0 / LARGEST_NUMBER, le=LARGEST_NUMBER, allow_inf_nan=False)]
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 Index = Annotated[int, Field(ge=0, le=10_000)]
 

@@ -10,7 +10,9 @@ from __future__ import annotations
 import hmac
 import json
 import secrets
+import socket
 import threading
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -28,6 +30,10 @@ LARGEST_BODY = 64 * 1024
 
 PATIENCE = 20.0
 """s that a connection may be silent."""
+
+
+DEADLINE = 20.0
+"""s in which a whole request must arrive, however slowly its bytes drip."""
 
 
 MOST_CONNECTIONS = 32
@@ -80,6 +86,31 @@ class PageHandler(BaseHTTPRequestHandler):
     timeout = PATIENCE
     wbufsize = -1  # head and body leave together
     disable_nagle_algorithm = True
+    _late = False
+    _deadline: threading.Timer
+
+    def handle_one_request(self) -> None:
+        """One request: its first byte within the patience for a silent connection, all of it before a deadline."""
+        reading: Any = self.rfile
+        try:
+            reading.peek(1)
+        except OSError:
+            self.close_connection = True
+            return
+        self._deadline = threading.Timer(DEADLINE, self._end_reading)
+        self._deadline.daemon = True
+        self._deadline.start()
+        try:
+            super().handle_one_request()
+        finally:
+            self._deadline.cancel()
+            self.close_connection |= self._late
+
+    def _end_reading(self) -> None:
+        """What waits for further bytes of a late request finds its end."""
+        self._late = True
+        with suppress(OSError):
+            self.connection.shutdown(socket.SHUT_RD)
 
     def do_GET(self) -> None:
         """The page."""
@@ -108,7 +139,7 @@ class PageHandler(BaseHTTPRequestHandler):
             self._send_json(HTTPStatus.BAD_REQUEST, {"error": _sentence(error)})
         except CreepkitError as error:
             self._send_json(HTTPStatus.UNPROCESSABLE_ENTITY, {"error": _sentence(error)})
-        except Exception as error:  # of somebody's specimen or law; the page shows it, the server goes on
+        except (Exception, KeyboardInterrupt, SystemExit) as error:  # of somebody's specimen or law: the page shows it
             problem = f"the prediction failed: {type(error).__name__}: {_sentence(error)}"
             self._send_json(HTTPStatus.INTERNAL_SERVER_ERROR, {"error": problem})
         else:
@@ -162,7 +193,9 @@ class PageHandler(BaseHTTPRequestHandler):
         elif len(length) > 9 or int(length) > LARGEST_BODY:
             self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"a request has at most {LARGEST_BODY} bytes")
         else:
-            return self.rfile.read(int(length))
+            body = self.rfile.read(int(length))
+            self._deadline.cancel()  # the answer may take longer
+            return body
         return None
 
     # ---- what leaves -----------------------------------------------------------------------------------------------
@@ -215,5 +248,5 @@ class PageHandler(BaseHTTPRequestHandler):
         """Say nothing of requests."""
 
 
-def _sentence(error: Exception) -> str:
+def _sentence(error: BaseException) -> str:
     return " ".join(str(error).split())[:2000]

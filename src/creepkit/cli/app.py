@@ -66,7 +66,7 @@ class CommandGroup(TyperGroup):
         except (CreepkitError, OSError) as error:
             if ctx.params["debug"]:
                 raise
-            typer.echo(f"creepkit: {' '.join(str(error).split())}", err=True)
+            typer.echo(f"creepkit: {' '.join(_sentence(error).split())}", err=True)
             raise typer.Exit(1) from None
         except KeyboardInterrupt:
             typer.echo(f"creepkit: {ctx.invoked_subcommand or ''} interrupted", err=True)
@@ -213,3 +213,11 @@ def _plugin_commands(own_names: set[str], *, listed_only: bool = False) -> tuple
             else:
                 added[name] = command
     return added, problems
+
+
+def _sentence(error: Exception) -> str:
+    """What an error says; with advice where it is the system's."""
+    if not isinstance(error, OSError) or isinstance(error, CreepkitError) or not error.strerror:
+        return str(error)
+    place = f"{error.filename}: " if error.filename is not None else ""
+    return f"{place}{error.strerror}; check the name, who may read and write there, and the space of the disk"

@@ -11,6 +11,7 @@ import errno
 import fcntl
 import itertools
 import os
+import stat
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -46,7 +47,12 @@ class ShardLock:
         self.deaths: Counter[int] = Counter()
 
     def __enter__(self) -> ShardLock:
-        self._file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
+        # neither through a link to another file, nor waiting for a pipe
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+        self._file = os.open(self._path, flags, 0o666)
+        if not stat.S_ISREG(os.fstat(self._file).st_mode):
+            os.close(self._file)
+            raise OSError(errno.EINVAL, f"{self._path.name} is no regular file", str(self._path))
         self.held = _locked(self._file)
         if self.held:
             lines = os.pread(self._file, 1 << 20, 0).split()

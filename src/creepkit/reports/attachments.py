@@ -11,6 +11,7 @@ import binascii
 import hashlib
 import json
 import re
+import unicodedata
 import zlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePosixPath
@@ -37,6 +38,14 @@ LONGEST_NAME = 400
 """Characters of a name."""
 
 
+LARGEST_NUMBER = 2**53
+"""Above it, a number of bytes is no size."""
+
+
+DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9\u00b9\u00b2\u00b3]|lpt[0-9\u00b9\u00b2\u00b3])( *\.|$)", re.IGNORECASE)
+"""Names that mean a device on Windows, whatever follows their first dot."""
+
+
 _FORMAT = "creepkit-attachments"
 _VERSION = 1
 _MANIFEST_START = '<script type="application/json" id="creepkit-attachments">'
@@ -53,7 +62,7 @@ def embed(attachments: Sequence[Attachment]) -> str:
     """
     if not attachments:
         return ""
-    problem = _problem_of_names([a.name for a in attachments]) or _problem_of_sizes(
+    problem = problem_of_names([a.name for a in attachments]) or _problem_of_sizes(
         [(a.name, len(a.content)) for a in attachments]
     )
     if problem:
@@ -103,7 +112,7 @@ def _listed_files(manifest: str, source: Path) -> list[tuple[str, int, str]]:
     """(name, bytes, sha256) of the files in the manifest."""
     try:
         document: Any = json.loads(manifest)
-    except (ValueError, RecursionError):
+    except (ValueError, RecursionError):  # ValueError: also of an integer of thousands of digits
         raise _damaged(source, "its list of files is not JSON") from None
     if not isinstance(document, dict) or set(document) != {"format", "version", "files"}:
         raise _damaged(source, "its list of files has other keys than format, version and files")
@@ -120,12 +129,12 @@ def _listed_files(manifest: str, source: Path) -> list[tuple[str, int, str]]:
         if not isinstance(entry, dict) or set(entry) != {"name", "bytes", "sha256"}:
             raise _damaged(source, "an entry of its list has other keys than name, bytes and sha256")
         name, size, digest = entry["name"], entry["bytes"], entry["sha256"]
-        whole = isinstance(size, int) and not isinstance(size, bool) and size >= 0
+        whole = isinstance(size, int) and not isinstance(size, bool) and 0 <= size <= LARGEST_NUMBER
         hexadecimal = isinstance(digest, str) and re.fullmatch("[0-9a-f]{64}", digest) is not None
         if not isinstance(name, str) or not whole or not hexadecimal:
             raise _damaged(source, "an entry of its list is not a name, a number of bytes and a sha256")
         files.append((name, size, digest))
-    problem = _problem_of_names([name for name, _, _ in files]) or _problem_of_sizes(
+    problem = problem_of_names([name for name, _, _ in files]) or _problem_of_sizes(
         [(name, size) for name, size, _ in files]
     )
     if problem:
@@ -158,7 +167,7 @@ def _problem_of_sizes(sizes: Sequence[tuple[str, int]]) -> str:
     return ""
 
 
-def _problem_of_names(names: Iterable[str]) -> str:
+def problem_of_names(names: Iterable[str]) -> str:
     """Why these names cannot be written below one folder on every system; "" where they can."""
     seen: set[PurePosixPath] = set()
     folders: set[PurePosixPath] = set()
@@ -166,13 +175,18 @@ def _problem_of_names(names: Iterable[str]) -> str:
         problem = problem_of_name(name)
         if problem:
             return problem
-        path = PurePosixPath(name.casefold())  # one file where upper and lower case are the same
+        path = PurePosixPath(same_name(name))
         if path in seen:
             return f"the name '{_shown(name)}' occurs twice"
         seen.add(path)
         folders.update(path.parents)
     clash = sorted(str(path) for path in seen & folders)
     return f"'{_shown(clash[0])}' is a file and a folder" if clash else ""
+
+
+def same_name(name: str) -> str:
+    """What two names share that are one file on some system: upper and lower case, and accents, as one."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 
 def problem_of_name(name: str) -> str:
@@ -186,6 +200,8 @@ def problem_of_name(name: str) -> str:
         and not re.match("[A-Za-z]:", name)  # a drive
         and all(part not in ("", ".", "..") for part in parts)
         and all(len(part.encode("utf-8", "replace")) <= 255 for part in parts)
+        and not any(part.startswith((".", "-", "~")) or part.endswith((".", " ")) for part in parts)
+        and not any(DEVICES.match(part) for part in parts)
     )
     return "" if plain else f"the name {_shown(name)!r} is not a plain path below a folder, such as data/test_1.csv"
 

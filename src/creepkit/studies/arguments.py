@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import nearest
@@ -89,9 +91,17 @@ def predictor_of(file: StudyFile) -> Predictor | None:
     named = None if model.identification is None else model.identification.predictor
     if named in (None, "specimen"):
         return specimen
-    beside = file.path.parent / str(named)
+    beside = file.path.parent / plain_path(file, ("identification", "predictor"), str(named))
     with file.at("identification", "predictor"):
         return ck.surrogate(beside if beside.is_file() else str(named))
+
+
+def plain_path(file: StudyFile, key: tuple[str | int, ...], text: str) -> PurePosixPath:
+    """A path relative to the study file; StudyError for an absolute one."""
+    path = PurePosixPath(text.replace("\\", "/"))
+    if path.is_absolute() or text.startswith("~") or re.match(r"^[A-Za-z]:", text):
+        raise file.error(key, f"'{text}' is absolute; write it relative to the study file, such as data/*.csv")
+    return path
 
 
 def lengths_of(

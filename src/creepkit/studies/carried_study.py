@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from creepkit.errors import StudyError
@@ -12,7 +13,7 @@ from creepkit.studies.inputs import DATA_FILE
 from creepkit.studies.result import CARRIED_FOLDER
 from creepkit.studies.study import Study
 
-STUDY_NAME, LOCK_NAME = "study.toml", "study.lock"
+STUDY_NAME, LOCK_NAME, INPUTS = "study.toml", "study.lock", f"{CARRIED_FOLDER}/"
 
 
 def study_of_report(report: Path, folder: Path) -> Study:
@@ -23,6 +24,13 @@ def study_of_report(report: Path, folder: Path) -> Study:
     files = read_attachments(report)
     if STUDY_NAME not in files:
         raise StudyError(f"{report}: carries no {STUDY_NAME}; give a report that 'creepkit run study.toml' wrote")
+    foreign = [name for name in files if name not in (STUDY_NAME, LOCK_NAME) and not name.startswith(INPUTS)]
+    if foreign:
+        raise StudyError(
+            f"{report}: carries '{foreign[0]}', and a report carries {STUDY_NAME}, {LOCK_NAME} and data below "
+            f"{INPUTS} alone; use the report as creepkit wrote it"
+        )
+    _refuse_links(folder, list(files))
     for name, content in files.items():
         path = folder / name
         if path.exists() and name == LOCK_NAME:
@@ -39,7 +47,18 @@ def study_of_report(report: Path, folder: Path) -> Study:
     inputs = folder / CARRIED_FOLDER
     if not inputs.is_dir():
         raise StudyError(
-            f"{report}: carries hashes of its data alone, for they are large; the study is in {folder / STUDY_NAME}: "
+            f"{report}: carries hashes of its data alone; the study is in {folder / STUDY_NAME}: "
             f"put the files that {folder / LOCK_NAME} names into {inputs}, and run the report again"
         )
     return Study.load(folder / STUDY_NAME, root=inputs)
+
+
+def _refuse_links(folder: Path, names: Sequence[str]) -> None:
+    """StudyError where a file would be written through a link, to a place that nobody named."""
+    places = {folder, folder / CARRIED_FOLDER}
+    for name in names:
+        path = folder / name
+        places |= {path, *(one for one in path.parents if folder in one.parents)}
+    for path in sorted(places):
+        if path.is_symlink():
+            raise StudyError(f"{path}: is a link, through which nothing is written; remove it, or give --to FOLDER")

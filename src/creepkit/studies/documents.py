@@ -37,6 +37,9 @@ from creepkit.records import (
     StressSteps,
 )
 
+FITS_FOLDER = "fits"
+
+
 STAGE_RESULT = DocumentFormat(
     "creepkit-stage-result",
     1,
@@ -182,7 +185,7 @@ class ResultFolder:
     @property
     def fits(self) -> Path:
         """Folder of single identifications, see creepkit.inverse.kept_fits."""
-        return self.folder / "fits"
+        return self.folder / FITS_FOLDER
 
     def path(self, stage: str) -> Path:
         """The file of a stage."""
@@ -195,15 +198,17 @@ class ResultFolder:
                 path.unlink(missing_ok=True)
 
     @property
-    def outputs(self) -> list[str]:
-        """Names of exports and reports beside the study that it has written, or began to."""
+    def outputs(self) -> dict[str, list[str]]:
+        """{name of an export or report beside the study: sha256 of what it has written, or began to write, there}."""
         found = self._load(OUTPUTS, OUTPUTS)
-        return [str(name) for name in found] if isinstance(found, list) else []
+        return {n: h for n, h in found.items() if isinstance(h, list)} if isinstance(found, dict) else {}
 
-    def add_output(self, name: str) -> None:
-        """Note that a file beside the study is the study's own."""
-        if name not in self.outputs:
-            self._save(OUTPUTS, OUTPUTS, [*self.outputs, name])
+    def add_output(self, name: str, sha256: str) -> None:
+        """Note that a file of this content is the study's own; what is there may be the last one still."""
+        outputs = self.outputs
+        hashes = [*(one for one in outputs.get(name, []) if one != sha256), sha256][-2:]
+        if hashes != outputs.get(name):
+            self._save(OUTPUTS, OUTPUTS, {**outputs, name: hashes})
 
     def prune_fits(self, asked: Collection[str]) -> int:
         """Remove the identifications but those of these keys; how many were removed."""

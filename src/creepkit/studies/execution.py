@@ -16,8 +16,8 @@ from creepkit.files.record_codec import RecordError
 from creepkit.inverse.kept_fits import COMPUTING, keep_fits
 from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text
 from creepkit.records import History
-from creepkit.reports.contents import StageFailure
-from creepkit.studies.documents import ResultCodec, ResultFolder, key_of
+from creepkit.reports.contents import ExportedFile, StageFailure
+from creepkit.studies.documents import FITS_FOLDER, ResultCodec, ResultFolder, key_of
 from creepkit.studies.numbers import numbers_of
 from creepkit.studies.stages import Stage
 
@@ -73,13 +73,17 @@ class LazyResults:
 @contextmanager
 def running_alone(folder: Path) -> Iterator[None]:
     """StudyError where another process is carrying out the same study; the system frees the lock of one that dies."""
+    for one in (folder, folder / FITS_FOLDER):
+        if one.is_symlink():
+            raise StudyError(f"{one}: is a link, and results are kept in a folder of the study's own; remove the link")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock = ShardLock(folder / LOCK_NAME)
         lock.__enter__()
     except OSError as error:
         raise StudyError(
-            f"{folder}: results cannot be kept there ({error.strerror}); name another folder by --to"
+            f"{folder}: results cannot be kept there ({error.strerror}); remove what stands in their place, or name "
+            "another folder by --to"
         ) from None
     try:
         if not lock.held:
@@ -161,9 +165,13 @@ class Execution:
             self.results.defer(stage.name, lambda: self._made(stage, _no_tick))
             return numbers
         try:
-            self.results.set(stage.name, self._codec(stage).from_json(stage.record, data["record"]))
-        except (CreepkitError, KeyError, TypeError, ValueError, AssertionError):
+            result = self._codec(stage).from_json(stage.record, data["record"])
+            if isinstance(result, ExportedFile):
+                _check_export(stage, result)
+            numbers = numbers_of(stage.kind, result)  # not those of the file, which anybody may have written
+        except (CreepkitError, KeyError, AttributeError, TypeError, ValueError, ArithmeticError, AssertionError):
             return None
+        self.results.set(stage.name, result)
         return numbers
 
     def _note_fits(self, data: Any) -> None:
@@ -214,6 +222,13 @@ class Execution:
                 self.asked.update(keys)
                 if fits is not None:
                     fits += keys
+
+
+def _check_export(stage: Stage, export: ExportedFile) -> None:
+    """ValueError for a kept export that is not the file that the study names."""
+    export.text.encode()
+    if export.name != stage.file:
+        raise ValueError("another file")
 
 
 def _no_tick(task: str, done: int, total: int) -> None:

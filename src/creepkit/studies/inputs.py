@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from itertools import islice
@@ -19,7 +18,7 @@ from creepkit.inverse.history_checks import SUSPECT_LABEL, truncated_at_strain
 from creepkit.records import ZERO_CELSIUS, History
 from creepkit.records.history_selection import select_tests
 from creepkit.reports.contents import Exclusion
-from creepkit.studies.arguments import HOUR
+from creepkit.studies.arguments import HOUR, plain_path
 from creepkit.studies.study_file import StudyFile
 
 DATA_FILE = FileKind("a data file", StudyError, "name files of tests", maximum_bytes=2_000_000_000)
@@ -80,14 +79,17 @@ def resolve_paths(file: StudyFile, key: tuple[str | int, ...], texts: Sequence[s
     found: dict[Path, None] = {}
     for k, text in enumerate(texts):
         place = (*key, k)
-        pattern = PurePosixPath(text.replace("\\", "/"))
-        if pattern.is_absolute() or text.startswith("~") or re.match(r"^[A-Za-z]:", text):
-            raise file.error(place, f"'{text}' is absolute; write it relative to the study file, such as data/*.csv")
+        pattern = plain_path(file, place, text)
         if "**" in pattern.parts:
             raise file.error(place, f"'{text}' goes through folders of any depth; name the folders")
         base, relative = (file.path.parent, pattern) if root is None else (root, PurePosixPath(carried_name(pattern)))
         path = base / relative
-        matches = [path] if path.exists() else _matches(base, relative)
+        try:
+            matches = [path] if path.exists() else _matches(base, relative)
+        except OSError as error:  # a folder that may not be entered, a name too long
+            raise file.error(
+                place, f"'{text}' cannot be read ({error.strerror}); check its name and who may read it"
+            ) from None
         if not matches:
             raise file.error(place, f"there is no file or folder '{text}' beside the study, and none matches it")
         found.update(dict.fromkeys(matches))
@@ -117,7 +119,7 @@ def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_
     base = file.path.parent if root is None else root
     files: dict[Path, None] = {}
     for path in paths:
-        for one in sorted(islice(path.rglob("*"), 2 * MOST_FILES)) if path.is_dir() else [path]:
+        for one in sorted(islice(_files_below(file, path), 2 * MOST_FILES)) if path.is_dir() else [path]:
             if one.is_file() and not any(one == own or own in one.parents for own in left_out):
                 files[one] = None
             if len(files) > MOST_FILES:
@@ -128,6 +130,20 @@ def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_
         name = str(relative) if root is not None else carried_name(relative)
         result.append(InputFile(name, one, sha256_of(one)))
     return result
+
+
+def _files_below(file: StudyFile, folder: Path) -> Iterator[Path]:
+    """All files of a folder; StudyError where a folder in it cannot be read, for its files would be left out."""
+    import os
+
+    def refuse(error: OSError) -> None:
+        raise file.error(
+            ("data", "files"),
+            f"folder {error.filename} cannot be read ({error.strerror}); make it readable, or move it",
+        )
+
+    for parent, _, names in os.walk(folder, onerror=refuse):
+        yield from (Path(parent, name) for name in names)
 
 
 def _relative(path: Path, base: Path) -> str:
@@ -158,7 +174,7 @@ def read_inputs(file: StudyFile, paths: Sequence[Path]) -> StudyInputs:
     chosen = measured
     if data.only:
         with file.at("data", "only"):
-            chosen = select_tests(measured, **_labels(data.only))
+            chosen = select_tests(measured, **_labels(file, data.only))
     histories, exclusions = _excluded(file, chosen)
     if data.suspect_frames == "exclude":
         sound = ck.exclude_suspect_frames(histories)
@@ -180,17 +196,20 @@ def read_inputs(file: StudyFile, paths: Sequence[Path]) -> StudyInputs:
     return StudyInputs(tuple(measured), tuple(exclusions), tuple(_groups(file, histories)))
 
 
-def _labels(only: dict[str, list[Any]]) -> dict[str, list[Any]]:
+def _labels(file: StudyFile, only: dict[str, list[Any]]) -> dict[str, list[Any]]:
     """Labels as select_tests takes them; temperature_C in K."""
     labels = {name: values for name, values in only.items() if name != "temperature_C"}
     if "temperature_C" in only:
+        if not all(isinstance(value, int | float) for value in only["temperature_C"]):
+            raise file.error(("data", "only", "temperature_C"), "must be a number in C, or a list of them")
         labels["temperature"] = [float(value) + ZERO_CELSIUS for value in only["temperature_C"]]
     return labels
 
 
 def _excluded(file: StudyFile, histories: Sequence[History]) -> tuple[list[History], list[Exclusion]]:
     """The histories without what the study excludes."""
-    remaining, exclusions = list(histories), []
+    remaining = list(histories)
+    exclusions: list[Exclusion] = []
     for k, part in enumerate(file.model.exclude):
         if part.from_h is not None and part.to_h is not None and not part.from_h < part.to_h:
             raise file.error(("exclude", k, "to_h"), f"{part.to_h:g} h does not lie after from_h, {part.from_h:g} h")
@@ -198,6 +217,7 @@ def _excluded(file: StudyFile, histories: Sequence[History]) -> tuple[list[Histo
         if not named:
             names = [h.name for h in histories]
             raise file.error(("exclude", k, "test"), f"there is no test '{part.test}'; {nearest(part.test, names)}")
+        before = len(exclusions)
         for history in named:
             if part.frames is None and part.from_h is None and part.to_h is None:
                 remaining = [h for h in remaining if h.name != history.name]
@@ -208,9 +228,17 @@ def _excluded(file: StudyFile, histories: Sequence[History]) -> tuple[list[Histo
                 unused[_frame_numbers(file, k, part.frames, history)] = True
             if part.from_h is not None or part.to_h is not None:
                 hours = history.times / HOUR
-                unused |= (hours >= (part.from_h or 0.0)) & (hours <= (np.inf if part.to_h is None else part.to_h))
+                within = (hours >= (part.from_h or 0.0)) & (hours <= (np.inf if part.to_h is None else part.to_h))
+                unused |= within
+            if not unused.any():
+                continue  # another test of the pattern has frames there
             exclusions.append(Exclusion(history.name, _frames(unused), part.reason))
             remaining = [replace(h, used=h.used & ~unused) if h.name == history.name else h for h in remaining]
+        if len(exclusions) == before:
+            given = "from_h" if part.from_h is not None else "to_h"
+            first, last = min(h.times[0] for h in named) / HOUR, max(h.times[-1] for h in named) / HOUR
+            what = f"test '{part.test}' has no frame there; its frames are from {first:g} h to {last:g} h"
+            raise file.error(("exclude", k, given), what)
     return remaining, exclusions
 
 

@@ -149,6 +149,8 @@ def _short(value: Any) -> str:
 
 def lock_if_any(path: Path) -> dict[str, Any] | None:
     """The lock that is there, or None."""
+    if path.is_symlink() and not path.exists():
+        raise StudyError(f"{path}: is a link to a file that there is not; {STUDY_LOCK.kind.advice}")
     if not path.exists():
         return None
     try:

@@ -5,6 +5,7 @@ A key that is missing takes the default of the function that it goes to, which s
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
@@ -59,17 +60,21 @@ def _one_or_more(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
 
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) and math.isfinite(value)
+
+
 def _label_values(value: Any) -> Any:
     """One value of a label, or several, as a list."""
     values = value if isinstance(value, list) else [value]
-    if values and all(isinstance(one, str | int | float) and not isinstance(one, bool) for one in values):
+    if values and all(isinstance(one, str) or _is_number(one) for one in values):
         return values
     raise PydanticCustomError("misfit", "must be a text, a number, or a list of them")
 
 
 def _output_weights(value: Any) -> Any:
     """A word, or weights by output."""
-    numbers = isinstance(value, dict) and all(type(one) in (int, float) for one in value.values())
+    numbers = isinstance(value, dict) and all(_is_number(one) for one in value.values())
     if isinstance(value, str) or (value and numbers):
         return value
     raise PydanticCustomError("misfit", "must be a word such as noise, or numbers by output such as { strain = 1 }")
@@ -78,7 +83,7 @@ def _output_weights(value: Any) -> Any:
 LevelOrSteps = Annotated[list[Step], BeforeValidator(_level_or_steps), Field(min_length=1, max_length=MOST_ITEMS)]
 Labels = Annotated[list[Any], BeforeValidator(_label_values)]
 OneOrMore = Annotated[SomeTexts, BeforeValidator(_one_or_more)]
-Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
+Bounds = Annotated[list[Annotated[float, Field(ge=-1e100, le=1e100)]], Field(min_length=2, max_length=2)]
 
 
 class StudyPart(Part):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,7 +42,7 @@ def write_page(
         from creepkit.reports.html import report_html
 
         if _is_report_of(path, file.text):
-            kept.add_output(path.name)
+            kept.add_output(path.name, sha256_of(path))
         write_own(kept, path, report_html(result.report_contents()))
     except Exception as error:  # what was found is there without a page
         what = str(error) if isinstance(error, CreepkitError) else f"{type(error).__name__}: {error}"
@@ -54,18 +55,20 @@ def write_page(
 
 
 def write_own(kept: ResultFolder, path: Path, text: str) -> None:
-    """Write a file beside the study; StudyError for one that exists and that the study has not written.
+    """Write a file beside the study; StudyError for one that exists and that the study has not written as it is.
 
-    It is noted as the study's own before it is written, so that a process that dies in between leaves nothing foreign.
+    Its hash is noted before it is written, so that a process that dies in between leaves nothing foreign.
     """
     content = text.encode()
-    foreign = path.exists() and path.name not in kept.outputs and not kept.overwrite
-    if foreign and not (path.is_file() and sha256_of(path) == hashlib.sha256(content).hexdigest()):
-        raise StudyError(
-            f"{path}: exists, and this study has not written it; choose another name in the study file, or overwrite "
-            "it by --force"
-        )
-    kept.add_output(path.name)
+    digest = hashlib.sha256(content).hexdigest()
+    if os.path.lexists(path) and not kept.overwrite:
+        own = [*kept.outputs.get(path.name, []), digest]
+        if path.is_symlink() or not path.is_file() or sha256_of(path) not in own:
+            raise StudyError(
+                f"{path}: exists, and this study has not written it as it is; choose another name in the study file, "
+                "or overwrite it by --force"
+            )
+    kept.add_output(path.name, digest)
     write_bytes(content, path, StudyError)
 
 

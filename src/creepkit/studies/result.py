@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.files.reading import read_bytes
+from creepkit.reports.attachments import problem_of_names
 from creepkit.reports.contents import (
     Attachment,
     Exclusion,
@@ -167,6 +168,11 @@ def attachments_of(result: StudyResult) -> tuple[tuple[Attachment, ...], tuple[s
     if result.lock_path is not None:
         attached.append(Attachment("study.lock", read_bytes(result.lock_path, DATA_FILE)))
     allowed = (file.model.report or ReportPart()).attach_MB * 1e6
+    names = [f"{CARRIED_FOLDER}/{one.name}" for one in result.files]
+    odd = problem_of_names(names)
+    if odd:
+        note = f"the report does not carry the data files, for {odd}; study.lock has their hashes"
+        return tuple(attached), (note,)
     size = sum(one.path.stat().st_size for one in result.files)
     if size > allowed:
         note = (
@@ -174,6 +180,6 @@ def attachments_of(result: StudyResult) -> tuple[tuple[Attachment, ...], tuple[s
             "report carry; study.lock has their hashes"
         )
         return tuple(attached), (note,)
-    for one in result.files:
-        attached.append(Attachment(f"{CARRIED_FOLDER}/{one.name}", read_bytes(one.path, DATA_FILE)))
+    for name, one in zip(names, result.files, strict=True):
+        attached.append(Attachment(name, read_bytes(one.path, DATA_FILE)))
     return tuple(attached), ()

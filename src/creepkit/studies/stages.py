@@ -55,7 +55,7 @@ class Stage:
     settings : JSON-able data of all that decides the result beside what it `needs`, names of other stages.
     make : from the results of these, with something to report progress to. record : class of the result, by which a
         file is read; None where the result is made again from identifications that are kept.
-    predictor : of identifications that its file holds.
+    predictor : of identifications that its file holds. file : that an export is written to, "" for other stages.
     """
 
     name: str
@@ -66,6 +66,7 @@ class Stage:
     needs: tuple[str, ...] = ()
     record: Any = None
     predictor: Predictor | None = field(default=None, repr=False)
+    file: str = ""
 
 
 def stage_name(kind: StageKind, group: str = "") -> str:
@@ -344,7 +345,7 @@ class Stages:
         assert part.target in exporters
         name = f"export {number + 1}{f' of {group.name}' if group.name else ''}: {part.target}"
         described = [part.model_dump(), file]
-        return Stage(name, "export", group.name, described, make, (need,), ExportedFile)
+        return Stage(name, "export", group.name, described, make, (need,), ExportedFile, file=file)
 
 
 def needed_stages(stages: Sequence[Stage], kinds: Sequence[str]) -> set[str]:

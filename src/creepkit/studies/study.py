@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from functools import cached_property
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.errors import StudyError, nearest
+from creepkit.reports.attachments import problem_of_name, same_name
 from creepkit.studies import arguments
 from creepkit.studies.documents import ResultFolder
 from creepkit.studies.execution import Execution, running_alone
@@ -17,7 +19,7 @@ from creepkit.studies.inputs import InputFile, input_files, read_inputs, resolve
 from creepkit.studies.lock import changed_results, differences, lock_if_any, lock_of, write_lock
 from creepkit.studies.page import lock_path_of, write_own, write_page
 from creepkit.studies.result import StudyResult
-from creepkit.studies.stages import STAGE_KINDS, Stages, needed_stages
+from creepkit.studies.stages import STAGE_KINDS, Stage, Stages, needed_stages
 from creepkit.studies.study_file import StudyFile, read_study_file
 
 if TYPE_CHECKING:
@@ -98,12 +100,14 @@ class Study:
         names: list[str] = []
         for key, name in places:
             _check_output(file, key, name)
-            if name.lower() in names:
+            if same_name(name) in names:
                 raise file.error(key, f"'{name}' is written by another table already; give file = another name")
-            names.append(name.lower())
-            read = any(PurePosixPath(name).match(pattern) for pattern in model.data.files if "/" not in pattern)
+            names.append(same_name(name))
+            read = any(fnmatchcase(name, pattern.removeprefix("./")) for pattern in model.data.files)
             if read or file.path.parent / name in data:
-                raise file.error(key, f"'{name}' would be among the data files; give file = another name")
+                raise file.error(
+                    key, f"'{name}' would be among the data files; give file = another name, or name those more exactly"
+                )
 
     @cached_property
     def paths(self) -> list[Path]:
@@ -159,6 +163,7 @@ class Study:
         if progress is not None:
             progress("reading", 1, 1, f"{len(inputs.histories)} tests in {len(files)} files")
         stages = Stages(self.file, inputs, self.root).all()
+        self._check_exports(stages, folder, files)
         now = lock_of(self.file, self._hash, files, [])
         changes = [] if before is None else differences(before, now)
         if locked and (before is None or changes):
@@ -182,11 +187,27 @@ class Study:
             lock_path=lock_path,
             asked=frozenset(execution.asked),
         )
-        for export in result.exports:
-            write_own(kept, folder / export.name, export.text)
+        for stage in stages:
+            if stage.file and stage.name in execution.results:  # by the name in the study file, not that of a result
+                write_own(kept, folder / stage.file, execution.results[stage.name].text)
         if self.file.model.report is None or "report" not in kinds:
             return result
         return write_page(self.file, result, folder, kept, progress)
+
+    def _check_exports(self, stages: Sequence[Stage], folder: Path, files: Sequence[InputFile]) -> None:
+        """StudyError for exports, one for each group, that would replace a file of the study or each other."""
+        report = self.file.model.report
+        names = [] if report is None else [same_name(report.file)]
+        read = {one.path.resolve() for one in files}
+        for stage in stages:
+            if not stage.file:
+                continue
+            if same_name(stage.file) in names or (folder / stage.file).resolve() in read:
+                raise StudyError(
+                    f"{self.path}: {stage.name} would write '{stage.file}', which is a data file or is written "
+                    "already; give file = another name"
+                )
+            names.append(same_name(stage.file))
 
     @cached_property
     def _hash(self) -> str:
@@ -198,6 +219,7 @@ class Study:
         own = [self.path, kept.folder, lock_path]
         own += [folder / one.file for one in model.export if one.file is not None]
         own += [] if model.report is None else [folder / model.report.file]
+        own += [folder / name for name in kept.outputs]
         paths = [*self.paths]
         for k, part in enumerate(model.forecast):
             paths += resolve_paths(self.file, ("forecast", k, "tests"), part.tests, self.root) if part.tests else []
@@ -209,8 +231,8 @@ class Study:
 
 def _check_output(file: StudyFile, key: tuple[str | int, ...], name: str) -> None:
     """StudyError for a file that would lie outside the folder of the study, or over what the study is."""
-    path = Path(name.replace("\\", "/"))
-    if path.is_absolute() or ".." in path.parts or len(path.parts) != 1 or name.startswith((".", "~")) or ":" in name:
+    if problem_of_name(name) or "/" in name or ":" in name:
         raise file.error(key, f"'{name}' must be a plain name of a file, such as report.html")
-    if name in (file.path.name, f"{file.path.stem}.lock", f"{file.path.stem}.results"):
+    own = (file.path.name, f"{file.path.stem}.lock", f"{file.path.stem}.results")
+    if same_name(name) in [same_name(one) for one in own]:
         raise file.error(key, f"'{name}' is a file of the study itself; choose another name")

@@ -23,6 +23,21 @@ STUDY_FILE = FileKind(
 )
 
 
+MOST_PARTS, MOST_KEYS = 20, 20_000
+"""Parts of one key, and keys of a file."""
+
+
+LARGEST_WHOLE = 2**63
+"""Whole numbers of TOML are below it."""
+
+
+LARGE_NUMBER = "the number is too large; whole numbers have 18 digits at most"
+
+
+_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS},}}")
+
+
 SHOWN = 40
 """Signs of a value or a name that a message quotes."""
 
@@ -62,18 +77,45 @@ def read_study_file(path: Path) -> StudyFile:
 
 def parse_study(path: Path, text: str) -> StudyFile:
     """The study file of a text; path : its name, for messages."""
+    _refuse_long_keys(path, text)
     try:
         data = tomllib.loads(text)
         lines = key_lines(text)
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{path}:{_syntax_error(str(error), text)}") from None
+    except ValueError:  # what int() says of thousands of digits
+        found = re.search(r"[0-9_]{400}", text)
+        line = 1 + text.count("\n", 0, found.start() if found else 0)
+        raise StudyError(f"{path}:{line}: {LARGE_NUMBER}") from None
     except RecursionError:
         raise StudyError(f"{path}: lists or tables nested too deep for a study file; {STUDY_FILE.advice}") from None
+    large = next(_large_numbers(data, ()), None)
+    if large is not None:
+        raise StudyError(f"{path}:{line_of(large, lines)}: {place_text(large)}: {LARGE_NUMBER}")
     try:
         model = StudyModel.model_validate(data)
     except ValidationError as error:
         raise StudyError(_sentence(path, error, lines)) from None
     return StudyFile(path, text, model)
+
+
+def _refuse_long_keys(path: Path, text: str) -> None:
+    """StudyError for keys whose reading would take minutes: of thousands of parts, or tens of thousands of them."""
+    found = _LONG_KEY.search(text)
+    if found is not None:
+        line = 1 + text.count("\n", 0, found.start())
+        raise StudyError(f"{path}:{line}: a key has more than {MOST_PARTS} parts; a study has keys of four at most")
+    if text.count("=") > MOST_KEYS:
+        raise StudyError(f"{path}: has more than {MOST_KEYS} keys, which a study file never has; {STUDY_FILE.advice}")
+
+
+def _large_numbers(data: Any, key: KeyPath) -> Iterator[KeyPath]:
+    """Keys of whole numbers beyond those of TOML."""
+    if isinstance(data, int) and not -LARGEST_WHOLE <= data < LARGEST_WHOLE:
+        yield key
+    elif isinstance(data, dict | list):
+        for name, value in data.items() if isinstance(data, dict) else enumerate(data):
+            yield from _large_numbers(value, (*key, name))
 
 
 def place_text(key: KeyPath) -> str:

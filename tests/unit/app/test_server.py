@@ -2,6 +2,7 @@
 
 import json
 import math
+import socket
 import threading
 
 import numpy as np
@@ -279,3 +280,37 @@ def test_a_bulge_test_by_the_reduced_order_model_and_by_finite_elements():
         assert top == pytest.approx(float(run.displacement(0.0, 28800.0)), rel=0.02)
     assert quick["program"]["section"]["stress"] is None
     assert len(exact["program"]["section"]["stress"][0]) == len(exact["program"]["section"]["elements"])
+
+
+def test_a_request_whose_bytes_drip_is_ended(server, monkeypatch):
+    """Whoever sends a byte now and then holds no connection for long."""
+    monkeypatch.setattr("creepkit.app.server.DEADLINE", 0.2)
+    with socket.create_connection(server.server_address[:2], timeout=30) as connection:
+        connection.settimeout(0.05)
+        for _ in range(200):  # 10 s, and less than the patience for a connection that is silent
+            try:
+                connection.sendall(b"G")
+                if connection.recv(1 << 16) is not None:
+                    break
+            except TimeoutError:
+                continue
+            except OSError:
+                break
+        else:
+            raise AssertionError("the server still reads")
+    assert ask(server).status == 200
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, SystemExit, ZeroDivisionError])
+def test_what_a_specimen_raises_is_an_answer(server, monkeypatch, stop):
+    def fails(*_):
+        raise stop("of a plugin")
+
+    monkeypatch.setattr(PageAnswers, "_program_document", fails)
+    answer = ask(server, client="00000000")
+    assert answer.status == 500
+    assert sentence(answer) == f"the prediction failed: {stop.__name__}: of a plugin"
+
+
+def test_a_number_too_small_for_a_time_is_refused(server):
+    assert ask(server, client="00000001", program=question()["program"] | {"end": 5e-324}).status == 400

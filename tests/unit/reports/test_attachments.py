@@ -59,6 +59,15 @@ ODD_NAMES = ["\ud800", "x" * 401, "x" * 300, "~/\x7f"]
         "a\nb",
         "a\x00",
         "a\u202eb",
+        ".bashrc",
+        ".git/hooks/post-checkout",
+        "inputs/.x",
+        "-rf",
+        "~x",
+        "con",
+        "inputs/AUX.txt",
+        "a.",
+        "a ",
     ],
 )
 def test_names_outside_a_folder_are_refused_both_ways(tmp_path: Path, name: str) -> None:
@@ -68,7 +77,7 @@ def test_names_outside_a_folder_are_refused_both_ways(tmp_path: Path, name: str)
         read_attachments(page(tmp_path, changed_manifest(lambda files: files[0].update(name=name))))
 
 
-@pytest.mark.parametrize("names", [("a", "A"), ("a", "a/b"), ("ä", "Ä"), ("b/c", "b")])
+@pytest.mark.parametrize("names", [("a", "A"), ("a", "a/b"), ("ä", "Ä"), ("b/c", "b"), ("\u00e9", "e\u0301")])
 def test_names_that_are_one_file_somewhere_are_refused(names: tuple[str, str]) -> None:
     with pytest.raises(ReportError, match=r"twice|a file and a folder"):
         embed([Attachment(name, b"x") for name in names])
@@ -87,6 +96,8 @@ DAMAGE: dict[str, Callable[[str], str]] = {
     "another digest": lambda html: html.replace(hashlib.sha256(FILES[0].content).hexdigest(), "0" * 64),
     "a size": lambda html: html.replace('"bytes": 0', '"bytes": 1'),
     "a negative size": lambda html: html.replace('"bytes": 0', '"bytes": -1'),
+    "a size of thousands of digits": lambda html: html.replace('"bytes": 0', '"bytes": 1' + "0" * 4000),
+    "a size of hundreds of digits": lambda html: html.replace('"bytes": 0', '"bytes": 1' + "0" * 400),
     "a size that is no number": lambda html: html.replace('"bytes": 0', '"bytes": true'),
     "an enormous size": lambda html: html.replace('"bytes": 0', f'"bytes": {LARGEST_ATTACHMENT + 1}'),
     "two lists": lambda html: html + embed(FILES),

@@ -281,7 +281,13 @@ def test_files_that_a_study_has_not_written_stay(study: Path, tmp_path: Path) ->
     text = own.read_text()
     assert "def " in text
     own.write_text("changed")
-    assert made(ck.Study.load(study).run()) == set()
+    with pytest.raises(StudyError, match="not written it as it is"):
+        ck.Study.load(study).run()
+    assert own.read_text() == "changed"
+    assert ck.Study.load(study).run(only="export", force=True).failures == ()
+    assert own.read_text() == text
+    own.unlink()
+    assert made(ck.Study.load(study).run()) == {"quality", "forecast of next"}
     assert own.read_text() == text
 
 

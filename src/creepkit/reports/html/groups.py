@@ -107,8 +107,8 @@ def _table_of_tests(fit: Identification) -> Table:
             )
         )
     columns = (
-        *("test", "condition", "values compared", "χ² without own rate", "relative squared error", "offset", "rate × law"),
-        "weight",
+        *("test", "condition", "values compared", "χ² without own rate"),
+        *("relative squared error", "offset", "rate × law", "weight"),
     )
     caption = (
         "Tests: mean square misfit over the noise of a frame (1: noise alone) with the same rates for all tests; error "
