@@ -121,7 +121,9 @@ def test_the_share_is_that_of_all_terms_of_a_law():
 def test_values_by_equal_weights_are_judged_where_their_own_chi_square_is_least():
     """A law cannot be beaten by itself: refined from elsewhere under the same covariance it is not lower."""
     tests = steady(NORTON, POWER, WIDE, noise=2e-4)
-    fit = identify(NORTON, tests, Steady(), settings=replace(SETTINGS, weights="noise", nuisances=(ck.Nuisance("rate"),)))
+    fit = identify(
+        NORTON, tests, Steady(), settings=replace(SETTINGS, weights="noise", nuisances=(ck.Nuisance("rate"),))
+    )
     best = FittedLaw.at_least_chi_square(fit)
     least = _chi_square(best.problem, best.x)
     assert least < _chi_square(best.problem, fit.x)
