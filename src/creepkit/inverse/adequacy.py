@@ -144,7 +144,7 @@ class Adequacy:
         expected = ""
         if self.expected_chi_square > NOTEWORTHY_EXPECTATION:
             expected = f" (expected {self.expected_chi_square:.3g} for a correct law, as the noise itself is estimated)"
-        return f"reduced chi-square {self.chi_square:.3g}{expected} with {self.freedom:.0f} degrees of freedom"
+        return f"reduced chi-square {self.chi_square:.3g} with {self.freedom:.0f} degrees of freedom{expected}"
 
     @property
     def _p_value_text(self) -> str:

@@ -245,8 +245,8 @@ WHERE = LargestDeviation("D3", "amplitude", 5400.0, -4.1e-3, 2.7)
 def test_the_sentence_of_a_discrepancy_says_how_much_where_and_what_would_help():
     found = Adequacy("leaves a discrepancy", (WIDTH, AMPLITUDE), 4.1, 77.0, 3e-9, 0.3, WHERE, ("thickness",))
     assert str(found) == (
-        "leaves 0.0037 mm of amplitude (2.5 times its stated noise) unexplained (reduced chi-square 4.1 with 77 degrees of freedom, "
-        "p = 3e-09 (Bonferroni, 3 comparisons)); "
+        "leaves 0.0037 mm of amplitude (2.5 times its stated noise) unexplained (reduced chi-square 4.1 with "
+        "77 degrees of freedom, p = 3e-09 (Bonferroni, 3 comparisons)); "
         "most in amplitude of 'D3' about 5400 s, where it lies 0.0041 mm below what was measured; it would "
         "explain them with thickness, which nobody modelled"
     )
