@@ -35,7 +35,7 @@
       data.tests.forEach((test, k) => {
         const entries = Object.entries(misfits.get(k) ?? {});
         const lines = (write) => (state.tests[k] ? entries.map((entry) => element("div", {}, write(entry))) : []);
-        rows[k].rms.replaceChildren(...lines(([name, one]) => `${entries.length > 1 ? (units[name]?.title ?? name) + " " : ""}${page.format(one.rms, 2)} ${units[name]?.unit ?? ""}`.trim()));
+        rows[k].rms.replaceChildren(...lines(([name, one]) => `${entries.length > 1 || !units[name]?.unit ? (units[name]?.title ?? name) + " " : ""}${page.format(one.rms, 2)} ${units[name]?.unit ?? ""}`.trim()));
         rows[k].ratio.replaceChildren(...lines(([, one]) => (one.ratio === null ? "\u2013" : page.format(one.ratio, 2))));
       });
       const shown = [...misfits].filter(([k]) => state.tests[k]).map(([, misfit]) => misfit);
