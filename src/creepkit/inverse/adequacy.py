@@ -23,12 +23,12 @@ from scipy.optimize import lsq_linear
 from scipy.stats import f
 
 from creepkit.arrays import Floats
-from creepkit.inverse.known_noise import KnownNoise
+from creepkit.inverse.known_noise import KnownNoise, how_to_state_noise
 from creepkit.inverse.largest_deviation import LargestDeviation, largest_deviation
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
-from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, SINGLE_VALUES, ObservationVector
+from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.scatter_of_lives import with_scatter_of_lives
@@ -167,7 +167,7 @@ class Adequacy:
     def __str__(self) -> str:
         """One sentence: the verdict, with what is left and where."""
         if self.verdict == "cannot be judged":
-            return f"cannot be judged: {_how_to_state_noise(self.not_judged)}"
+            return f"cannot be judged: {how_to_state_noise(self.not_judged)}"
         source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
         if self.explains:
             slow = np.isfinite(self.correlation)
@@ -196,23 +196,6 @@ class Adequacy:
             where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
         left = " and ".join(parts) or "more than noise"
         return f"leaves {left} unexplained ({self._chi_square_text}, {self._p_value_text}){where}"
-
-
-def _how_to_state_noise(outputs: Sequence[str]) -> str:
-    """Why nothing was known of the noise of these outputs, and where to state it."""
-    frames = [name for name in outputs if name not in SINGLE_VALUES]
-    if frames or not outputs:
-        column = f"{frames[0] if frames else 'strain'}_sd"
-        return (
-            f"no noise is stated, and too few frames show it (state it in a column such as {column}, in Python as "
-            "standard_deviation)"
-        )
-    if MINIMUM_RATE_OUTPUT in outputs:
-        return (
-            "no noise of the minimum rates is stated, and scatter between tests was estimated from them (state it in a "
-            "column such as minimum_rate_sd_1/s, in Python as minimum_rate_sd)"
-        )
-    return "rupture times alone show no noise beside the scatter between tests, which was estimated from them"
 
 
 def adequacy_of(
