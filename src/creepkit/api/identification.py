@@ -238,7 +238,7 @@ def _resolve_through(
 
 
 def export(
-    source: CreepLaw | Identification | TemperatureLaw | LawWithValues | str,
+    source: CreepLaw | Identification | Ranking | TemperatureLaw | LawWithValues | str,
     target: str,
     values: Mapping[str, float] | None = None,
     *,
@@ -251,8 +251,8 @@ def export(
     """Return a law with its values as text for a target (latex, python, abaqus ...), and write it to a file if asked.
 
     source : a law, which needs `values` {parameter: value}, or an identification or a temperature law, whose intervals
-        and range of validity become comments, or the record of law_with_values(), which may have elastic constants
-        and notes as well.
+        and range of validity become comments, or a ranking, whose best law is written with the verdict on it, or the
+        record of law_with_values(), which may have elastic constants and notes as well.
     target : one of `available("exporters")`. units : of stress and time in the text, Units("Pa", "h") or
         {"stress": "Pa"}.
     temperature : K, puts a number in the place of the temperature, for targets that know none.
@@ -274,7 +274,7 @@ def export(
 
 
 def law_with_values(
-    source: CreepLaw | Identification | TemperatureLaw | LawWithValues | str,
+    source: CreepLaw | Identification | Ranking | TemperatureLaw | LawWithValues | str,
     values: Mapping[str, float] | None = None,
     *,
     elastic: Elastic | None = None,
@@ -287,13 +287,17 @@ def law_with_values(
     elastic : E in MPa, and nu, for targets that state them. notes : lines that become comments.
     """
     from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection import Ranking
 
     resolved: Any = getattr(source, "valued", source)  # a temperature law has one
+    verdict = ""
+    if isinstance(resolved, Ranking):
+        verdict, resolved = resolved.verdict if len(resolved.laws) > 1 else "", resolved.best
     if isinstance(resolved, Identification):
         from creepkit.reports.identification_text import identification_comments
 
         resolved = LawWithValues(
-            resolved.law, resolved.values, tuple(identification_comments(resolved)), ranges=resolved.ranges
+            resolved.law, resolved.values, tuple(identification_comments(resolved, verdict)), ranges=resolved.ranges
         )
     if not isinstance(resolved, LawWithValues):
         return LawWithValues(resolve_law(resolved), values or {}, tuple(notes), elastic=elastic, name=name)

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from creepkit.api.identification import export, rank
+from creepkit.api.identification import export, law_with_values, rank
 from creepkit.errors import CreepkitError, ReportError
 
 if TYPE_CHECKING:
@@ -255,10 +255,11 @@ def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], t
         stem = "_".join(part for part in (one.name if len(found) > 1 else "", one.fit.law.name) if part)
         document = json_text(identification_to_json(one.fit))
         files.append(ExportedFile(f"{stem}_identification.json", "identification, read by ck.load", document))
+        verdict = () if one.ranking is None else (f"verdict on the law: {one.verdict}",)
         for target in EXPORT_TARGETS:
             exporter = default_registry().exporter(target)
             try:
-                text = export(one.fit, target)
+                text = export(law_with_values(one.fit, notes=verdict), target)
             except CreepkitError as error:
                 notes.append(f"the law {one.fit.law.name} is not written as {target}: {error}")
             else:

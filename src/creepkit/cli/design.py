@@ -1,4 +1,4 @@
-"""`creepkit design`: the next tests, by what they are expected to tell for each hour of the oven."""
+"""`creepkit design`: the next tests, by what they are expected to tell for each hour of machine time."""
 
 from __future__ import annotations
 

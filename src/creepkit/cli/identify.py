@@ -53,7 +53,7 @@ def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
     best = ranking.best
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
         path = folder / f"{file_stem(best.law.name)}{suffix}"
-        ck.export(best, language, to=path, force=True)
+        ck.export(ranking, language, to=path, force=True)
         written.append(path)
     return written
 

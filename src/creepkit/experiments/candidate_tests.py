@@ -1,4 +1,4 @@
-"""Candidates for further tests: runs of the oven that a rig can make, and variations of the tests that were made."""
+"""Candidates for further tests: runs of the machine that a rig can make, and variations of the tests that were made."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ LARGEST_CHANGE = 2.0
 
 @dataclass(frozen=True)
 class CandidateTest:
-    """A run of the oven that could be made.
+    """A run of the machine that could be made.
 
     description : in words. histories : the test or tests that it holds, without outputs, which share the oven.
-    hours : h of the oven.
+    hours : h of machine time.
     """
 
     description: str
@@ -288,7 +288,7 @@ def candidates_given(histories: Sequence[History | CandidateTest], rigs: Sequenc
         if not isinstance(given, CandidateTest | History):
             raise FitError(f"a planned test is a history without outputs, found {given!r:.60}")
         if isinstance(given, CandidateTest) and not (given.histories and 0 < given.hours < np.inf):
-            raise FitError(f"the planned test '{given.description}' needs a history and hours of the oven above zero")
+            raise FitError(f"the planned test '{given.description}' needs a history and a machine time above zero")
         if isinstance(given, CandidateTest):
             for history in given.histories:
                 _rig_for(history, rigs)

@@ -1,4 +1,4 @@
-"""design: the next tests, by what they are expected to tell for each hour of the oven.
+"""design: the next tests, by what they are expected to tell for each hour of machine time.
 
 Candidates are what a rig can make. Each is predicted with every law that remains, with exact sensitivities, and what it
 tells follows from Gaussian algebra about the estimates; the best ones are evaluated again at draws of the posteriors,
@@ -76,7 +76,7 @@ def design(
     """The next tests of an identification or of a ranking of laws, also of one that was loaded from its file.
 
     rig : what the equipment can do; by default a little more than what it did. goal : "law", "parameters" or a
-        quantity; by default the law where more than one remains. budget : h of the oven for one run or several.
+        quantity; by default the law where more than one remains. budget : h of machine time for one run or several.
     candidates : planned histories (without outputs) in the place of what the rig can make.
     Stopped by Ctrl-C it gives the best so far.
     """
@@ -92,7 +92,7 @@ def design(
     if budget is not None:
         planned = [c for c in planned if c.hours <= 1.0001 * budget]
         if not planned:
-            raise FitError(f"none of the planned tests fits into a budget of {budget:g} h of the oven")
+            raise FitError(f"none of the planned tests fits into a budget of {budget:g} h of machine time")
     return search.run(planned, refuse=candidates is not None)
 
 

@@ -51,7 +51,7 @@ class PlannedTest:
 
     @property
     def hours(self) -> float:
-        """h of the oven."""
+        """h of machine time."""
         return self.candidate.hours
 
     @property
@@ -61,12 +61,12 @@ class PlannedTest:
 
     @property
     def information_per_hour(self) -> float:
-        """Nats an hour of the oven."""
+        """Nats an hour of machine time."""
         return self.expectation.information / self.candidate.hours
 
     @property
     def first_order_per_hour(self) -> float:
-        """Nats an hour of the oven, to first order: like for like over all tests."""
+        """Nats an hour of machine time, to first order: like for like over all tests."""
         return self.first_order.information / self.candidate.hours
 
 
@@ -77,7 +77,7 @@ class Design(Presentable):
     goal : "parameters", "law", or the name of a quantity. laws, weights : that remain, the best first.
     altered : names of what the tests allow beside them, which a decisive verdict has to exclude (goal "law").
     tests : all that were considered; without those that were left out, {description: why}.
-    plan : the run to make, or the runs that fit the budget (h of the oven) together, and expected : what they tell.
+    plan : the run to make, or the runs that fit the budget (h of machine time) together, and expected : what they tell.
     interrupted : whether the work was stopped before its end. notes : what the expectation does not include.
     unit : of a quantity whose standard deviation is its own, None where it is that of its logarithm.
     obstacle : why no test is proposed, in a sentence.
@@ -114,7 +114,7 @@ class Design(Presentable):
         return present(self, "to_json")
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Map of what each candidate tells for an hour of the oven, over load and duration; written to `path`."""
+        """Map of what each candidate tells for an hour of machine time, over load and duration; written to `path`."""
         return present(self, "plot", path)
 
 
@@ -134,11 +134,11 @@ def design_sentence(design: Design) -> str:
     if design.budget is not None and len(design.plan) > 1 and design.expected is not None:
         runs = "; then ".join(_repeated(design.plan))
         total = sum(test.hours for test in design.plan)
-        return f"{runs} ({total:.3g} h of the oven): together {_told(design, design.expected)}"
+        return f"{runs} ({total:.3g} h of machine time): together {_told(design, design.expected)}"
     first = design.plan[0] if design.plan else best
     others = [test for test in design.tests if test is not first]
     further = f"; next best {others[0].description} ({_short(design, others[0].expectation)})" if others else ""
-    return f"{first.description} ({first.hours:.3g} h of the oven): {_told(design, first.expectation)}{further}"
+    return f"{first.description} ({first.hours:.3g} h of machine time): {_told(design, first.expectation)}{further}"
 
 
 def _is_hopeless(design: Design) -> bool:

@@ -23,12 +23,12 @@ from scipy.optimize import lsq_linear
 from scipy.stats import f
 
 from creepkit.arrays import Floats
-from creepkit.inverse.known_noise import KnownNoise
+from creepkit.inverse.known_noise import KnownNoise, how_to_state_noise
 from creepkit.inverse.largest_deviation import LargestDeviation, largest_deviation
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
-from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, SINGLE_VALUES, ObservationVector
+from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.scatter_of_lives import with_scatter_of_lives
@@ -52,6 +52,10 @@ TREND_SIGNIFICANCE, FEWEST_TREND_TESTS = 0.01, 5
 
 NOTEWORTHY_EXPECTATION = 1.05
 """Mean reduced chi-square of a right law from which on it is said beside the one that was found."""
+
+
+LARGEST_SHOWN_P_VALUE = 0.99
+"""p-values above are shown as such: the least of several times their number is cut at 1."""
 
 
 AdequacyVerdict = Literal["explains", "leaves a discrepancy", "cannot be judged"]
@@ -139,8 +143,20 @@ class Adequacy:
     def _chi_square_text(self) -> str:
         expected = ""
         if self.expected_chi_square > NOTEWORTHY_EXPECTATION:
-            expected = f" (noise estimated from so few frames makes {self.expected_chi_square:.3g} of a right law)"
-        return f"reduced chi-square {self.chi_square:.3g}{expected}"
+            expected = f" (expected {self.expected_chi_square:.3g} for a correct law, as the noise itself is estimated)"
+        return f"reduced chi-square {self.chi_square:.3g} with {self.freedom:.0f} degrees of freedom{expected}"
+
+    @property
+    def _p_value_text(self) -> str:
+        """The p-value; where it is the least of several, how many."""
+        p = self.p_value
+        comparisons = 1 + len(self.outputs) if len(self.outputs) > 1 else 1
+        several = f" (Bonferroni, {comparisons} comparisons)" if comparisons > 1 else ""
+        if p > LARGEST_SHOWN_P_VALUE:
+            return f"p > {LARGEST_SHOWN_P_VALUE:g}{several}"
+        if p <= 1e-12:
+            return f"p < 1e-12{several}"
+        return f"p = {p:.{2 if self.explains else 1}g}{several}"
 
     def __getitem__(self, output: str) -> OutputAdequacy:
         for one in self.outputs:
@@ -151,7 +167,7 @@ class Adequacy:
     def __str__(self) -> str:
         """One sentence: the verdict, with what is left and where."""
         if self.verdict == "cannot be judged":
-            return f"cannot be judged: {_how_to_state_noise(self.not_judged)}"
+            return f"cannot be judged: {how_to_state_noise(self.not_judged)}"
         source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
         if self.explains:
             slow = np.isfinite(self.correlation)
@@ -163,7 +179,7 @@ class Adequacy:
                 scatter += " (far larger than what the frames show: check its unit)"
             return (
                 f"explains the tests to their {source} noise{self.qualification}{scatter}: "
-                f"{self._chi_square_text}, p = {self.p_value:.2g}{correlated}"
+                f"{self._chi_square_text}, {self._p_value_text}{correlated}"
             )
         parts = [
             f"{o.discrepancy:.2g}{' ' + output_unit(o.output) if output_unit(o.output) else ''} of {o.output} "
@@ -175,30 +191,11 @@ class Adequacy:
             parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
         elif self.rate_trend_p_value < TREND_SIGNIFICANCE:
             parts.append(f"rates of tests that bend over the stress (p = {self.rate_trend_p_value:.1g})")
-        p_text = f"p = {self.p_value:.1g}" if self.p_value > 1e-12 else "p < 1e-12"
         where = f"; most in {self.largest}" if self.largest is not None else ""
         if self.remedies:
             where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
-        return (
-            f"leaves {' and '.join(parts) or 'more than noise'} unexplained ({self._chi_square_text}, {p_text}){where}"
-        )
-
-
-def _how_to_state_noise(outputs: Sequence[str]) -> str:
-    """Why nothing was known of the noise of these outputs, and where to state it."""
-    frames = [name for name in outputs if name not in SINGLE_VALUES]
-    if frames or not outputs:
-        column = f"{frames[0] if frames else 'strain'}_sd"
-        return (
-            f"no noise is stated, and too few frames show it (state it in a column such as {column}, in Python as "
-            "standard_deviation)"
-        )
-    if MINIMUM_RATE_OUTPUT in outputs:
-        return (
-            "no noise of the minimum rates is stated, and scatter between tests was estimated from them (state it in a "
-            "column such as minimum_rate_sd_1/s, in Python as minimum_rate_sd)"
-        )
-    return "rupture times alone show no noise beside the scatter between tests, which was estimated from them"
+        left = " and ".join(parts) or "more than noise"
+        return f"leaves {left} unexplained ({self._chi_square_text}, {self._p_value_text}){where}"
 
 
 def adequacy_of(

@@ -15,7 +15,10 @@ RANGE_TOLERANCE = 1e-3
 """Relative distance from a range within which a point counts as inside: 1 K at 1000 K."""
 
 
-UNITS = {"stress": " MPa", "temperature": " K", "time": " s", "strain": ""}
+UNITS = {"stress": " MPa", "temperature": " K", "time": " h", "strain": ""}
+
+
+HOUR = 3600.0
 
 
 def extrapolation_text(
@@ -35,6 +38,8 @@ def extrapolation_text(
         (low, high), values = ranges[name], np.asarray(given, float)
         tolerance = (tolerances or {}).get(name, RANGE_TOLERANCE)
         if values.size and (values.min() < low * (1 - tolerance) or values.max() > high * (1 + tolerance)):
+            if name == "time":
+                low, high, values = low / HOUR, high / HOUR, values / HOUR
             least, largest, unit = float(values.min()), float(values.max()), UNITS.get(name, "")
             asked = f"{least:.4g}{unit}" if least == largest else f"{least:.4g} to {largest:.4g}{unit}"
             parts.append(
@@ -48,6 +53,8 @@ def _distance(name: str, low: float, high: float, values: Floats) -> str:
     below, above = low - float(values.min()), float(values.max()) - high
     if name == "temperature":
         return f"; {max(below, above):.3g} K beyond"
+    if name == "time" and above > 0 and high > 0:
+        return f"; {float(values.max()) / high:.3g} times the longest test"
     ratios = [float(values.max()) / high] if above > 0 and high > 0 else []
     ratios += [low / float(values.min())] if below > 0 and values.min() > 0 else []
     return f"; {max(ratios):.3g} times beyond" if ratios else ""

@@ -10,7 +10,7 @@ from scipy.stats import chi2, f
 
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.frame_noise import frame_noise, usable_frames
-from creepkit.inverse.observation_vector import SINGLE_VALUES, SMALLEST_NOISE, ObservationVector
+from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, SINGLE_VALUES, SMALLEST_NOISE, ObservationVector
 from creepkit.records import History
 
 FREEDOM_PER_FRAME = 0.2
@@ -134,3 +134,20 @@ def chance_of_larger(reduced: float, freedom: float, noise_freedom: float) -> fl
     if np.isinf(noise_freedom):
         return float(chi2.sf(reduced * freedom, freedom))
     return float(f.sf(reduced, freedom, max(noise_freedom, 1.0)))
+
+
+def how_to_state_noise(outputs: Sequence[str]) -> str:
+    """Why nothing was known of the noise of these outputs, and where to state it."""
+    frames = [name for name in outputs if name not in SINGLE_VALUES]
+    if frames or not outputs:
+        column = f"{frames[0] if frames else 'strain'}_sd"
+        return (
+            f"no noise is stated, and too few frames show it (state it in a column such as {column}, in Python as "
+            "standard_deviation)"
+        )
+    if MINIMUM_RATE_OUTPUT in outputs:
+        return (
+            "no noise of the minimum rates is stated, and scatter between tests was estimated from them (state it in a "
+            "column such as minimum_rate_sd_1/s, in Python as minimum_rate_sd)"
+        )
+    return "rupture times alone show no noise beside the scatter between tests, which was estimated from them"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -321,6 +322,10 @@ def _as_program(given: ComponentHistory) -> Program:
     return Program.constant(given)
 
 
+MOST_LEVELS = 4
+"""Of a load, that are all named; of more, the first and the last."""
+
+
 def loading_text(loading: Loading, unit: str = "MPa") -> str:
     """What is imposed, as people say it: '43 MPa', '60 to 95 MPa', 'strain 0.002', '11 100 MPa, 12 40 MPa'.
 
@@ -332,11 +337,28 @@ def loading_text(loading: Loading, unit: str = "MPa") -> str:
     program = loading.program()
     if not unit:
         return f"{loading.quantity} {_levels_text(program)}"
-    if program.values[0] == 0.0 and program.times.size > 1:  # after a ramp, the load that was held is its largest
-        return f"{program.values.max():g} {unit}"
     return f"{_levels_text(program)} {unit}"
 
 
 def _levels_text(program: Program) -> str:
-    first, last = float(program.values[0]), float(program.values[-1])
-    return f"{last:g}" if float(np.ptp(program.values)) == 0.0 else f"{first:g} to {last:g}"
+    held, values = _held_levels(program), program.values
+    if 1 <= len(held) <= MOST_LEVELS and max(held) == values.max():
+        return " to ".join(f"{level:g}" for level in held)
+    if values[0] == 0.0:  # a load that was recorded from its ramp on
+        return f"{values.max():g}"
+    return f"{values[0]:g} to {values[-1]:g}"
+
+
+def _held_levels(program: Program) -> list[float]:
+    """The values that are held in turn, the last one beyond the end, without zeros before and after.
+
+    [] of a program that begins and ends at other values than it holds.
+    """
+    values = [float(v) for v in program.values]
+    held = [v for k, v in enumerate(values) if k == len(values) - 1 or v == values[k + 1]]
+    levels = [v for v, _ in itertools.groupby(held)]
+    while len(levels) > 1 and levels[0] == 0.0:
+        del levels[0]
+    while len(levels) > 1 and levels[-1] == 0.0:
+        del levels[-1]
+    return levels if values[0] in (0.0, levels[0]) else []

@@ -9,6 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.experiments.planned_design import kind_of_reason, precision_text
+from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.records import load_unit
 from creepkit.reports.figures import empty_figure, save_figure, wrapped
 from creepkit.reports.terminal import print_table
@@ -27,10 +28,10 @@ ROWS = 8
 
 
 def _columns(design: Design) -> tuple[str, ...]:
-    last = {"law": "decisive and right", "parameters": "standard deviations, before > after"}.get(
+    last = {"law": "probability, decisive and right", "parameters": "standard deviations, before > after"}.get(
         design.goal, "sd after"
     )
-    return ("planned test", "oven, h", "nats", "nats / h", last)
+    return ("planned test", "machine time, h", "nats", "nats / h", last)
 
 
 def _cells(design: Design, test: PlannedTest) -> tuple[str, ...]:
@@ -51,8 +52,19 @@ def design_text(design: Design) -> str:
         rows = [_columns(design), *(_cells(design, test) for test in design.tests[:ROWS])]
         widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
         lines += ["", *("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows)]
+        lines += ["", order_text(design)]
     lines += direction_lines(design)
     return "\n".join(lines + _ending(design))
+
+
+def order_text(design: Design) -> str:
+    """By what the planned tests are ordered, as a sentence."""
+    if design.goal != "law":
+        return "in the order of the expected information for each hour of machine time"
+    return (
+        f"in the order: tests with a probability of {DECISIVE_WEIGHT:g} or more of a decisive and right verdict, the "
+        "shortest first; then the others by that probability, and where it is alike by the expected information"
+    )
 
 
 def direction_lines(design: Design) -> list[str]:
@@ -64,13 +76,15 @@ def direction_lines(design: Design) -> list[str]:
     lines = ["", f"expected chi-squares with {'the plan' if len(design.plan) > 1 else first.description}:"]
     for each in expected.chi_squares:
         lines.append(
-            f"  if {each.reference_law} holds, {each.alternative_law} is {_by(each.expected)} (now {_by(each.current)})"
+            f"  if {each.reference_law} holds, the chi-square of {each.alternative_law} is expected "
+            f"{_by(each.expected)} than that of {each.reference_law} (now {_by(each.current)})"
         )
     return lines
 
 
 def _by(chi_square: float) -> str:
-    return f"worse by {chi_square:.3g}" if chi_square >= 0 else f"better by {-chi_square:.3g}"
+    size = f"{abs(chi_square):.3g}" if abs(chi_square) < 1000.0 else f"{abs(chi_square):.0f}"
+    return f"{size} {'higher' if chi_square >= 0 else 'lower'}"
 
 
 def _ending(design: Design) -> list[str]:
@@ -89,7 +103,8 @@ def print_design(design: Design) -> None:
     if design.tests:
         rows = [_cells(design, test) for test in design.tests[:ROWS]]
         print_table(f"{len(design.tests)} planned tests, goal: {design.goal}", _columns(design), rows)
-    print("\n".join([design.sentence, *direction_lines(design), *_ending(design)]))
+    order = [order_text(design)] if design.tests else []
+    print("\n".join([design.sentence, *order, *direction_lines(design), *_ending(design)]))
 
 
 def design_to_json(design: Design) -> dict[str, object]:
@@ -161,10 +176,11 @@ def _expectation_to_json(e: Expectation) -> dict[str, object]:
 
 
 def design_figure(design: Design, path: str | Path | None = None) -> Figure:
-    """What candidates tell for each hour of the oven, over the first load and the duration; the best of each place.
+    """What candidates tell for each hour of machine time, over the first load and the duration; the best of each place.
 
     To first order about the estimates, which is what is known of all candidates alike. Left: constant loads; right: the
-    load changes during the test. The runs of the plan are marked. Of several specimens that of the best test is drawn.
+    load changes during the test. The number in a cell is the probability of a decisive and right verdict, to first
+    order too. The runs of the plan are marked. Of several specimens that of the best test is drawn.
     """
     figure = empty_figure(10.5, 5.0)
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -186,8 +202,10 @@ def design_figure(design: Design, path: str | Path | None = None) -> Figure:
         panel.set_xlabel(_load_label(design))
     axes[0].set_ylabel("duration, h")
     if drawn is not None:
-        figure.colorbar(drawn, ax=list(axes), label="expected information to first order, nats per oven hour")
-    figure.suptitle(wrapped(design.sentence, 10.0, 9.0), fontsize=9)
+        figure.colorbar(drawn, ax=list(axes), label="information to first order, nats per hour of machine time")
+    numbers = np.isfinite([test.first_order.probability for test in drawn_tests]).any()
+    cells = "; in cells: probability of a decisive and right verdict, to first order" if numbers else ""
+    figure.suptitle(wrapped(design.sentence + cells, 10.0, 9.0), fontsize=9)
     return save_figure(figure, path)
 
 

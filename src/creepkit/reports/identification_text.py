@@ -233,9 +233,13 @@ def _unit(key: str) -> str:
     return f", {unit}" if unit else ""
 
 
-def identification_comments(fit: Identification) -> list[str]:
-    """Intervals, validity and provenance as lines, as comments of an exported law."""
+def identification_comments(fit: Identification, verdict: str = "") -> list[str]:
+    """Intervals, validity and provenance as lines, as comments of an exported law.
+
+    verdict : of the comparison of laws that it is the best of, where there was one.
+    """
     lines = [f"identified with creepkit {fit.provenance.get('creepkit', '')} from {_tests(len(fit.tests))}"]
+    lines += [f"verdict on the law: {verdict}"] if verdict else []
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
         lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {e.low:.4g} to {e.high:.4g}, {e.verdict}")

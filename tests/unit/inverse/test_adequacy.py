@@ -245,7 +245,8 @@ WHERE = LargestDeviation("D3", "amplitude", 5400.0, -4.1e-3, 2.7)
 def test_the_sentence_of_a_discrepancy_says_how_much_where_and_what_would_help():
     found = Adequacy("leaves a discrepancy", (WIDTH, AMPLITUDE), 4.1, 77.0, 3e-9, 0.3, WHERE, ("thickness",))
     assert str(found) == (
-        "leaves 0.0037 mm of amplitude (2.5 times its stated noise) unexplained (reduced chi-square 4.1, p = 3e-09); "
+        "leaves 0.0037 mm of amplitude (2.5 times its stated noise) unexplained (reduced chi-square 4.1 with "
+        "77 degrees of freedom, p = 3e-09 (Bonferroni, 3 comparisons)); "
         "most in amplitude of 'D3' about 5400 s, where it lies 0.0041 mm below what was measured; it would "
         "explain them with thickness, which nobody modelled"
     )
@@ -266,7 +267,7 @@ def test_noise_from_few_frames_says_what_chi_square_a_right_law_has():
     found = judged(tests := gauged(12, stated=False), *at_the_truth(tests))
     nu = FREEDOM_PER_FRAME * 40
     assert found.expected_chi_square == pytest.approx(nu / (nu - 2.0))
-    assert f"(noise estimated from so few frames makes {nu / (nu - 2.0):.3g} of a right law)" in str(found)
+    assert f"(expected {nu / (nu - 2.0):.3g} for a correct law, as the noise itself is estimated)" in str(found)
 
 
 def test_outputs_that_only_together_are_beyond_chance_have_left_something(stated):
@@ -281,4 +282,8 @@ def test_outputs_that_only_together_are_beyond_chance_have_left_something(stated
 
 def test_the_sentence_of_a_law_that_explains():
     found = Adequacy("explains", (AMPLITUDE, WIDTH), 1.04, 77.0, 0.38, float("nan"), WHERE)
-    assert str(found) == "explains the tests to their stated and estimated noise: reduced chi-square 1.04, p = 0.38"
+    judged_text = (
+        "explains the tests to their stated and estimated noise: reduced chi-square 1.04 with 77 degrees of freedom"
+    )
+    assert str(found) == f"{judged_text}, p = 0.38 (Bonferroni, 3 comparisons)"
+    assert str(replace(found, p_value=1.0)) == f"{judged_text}, p > 0.99 (Bonferroni, 3 comparisons)"

@@ -54,9 +54,9 @@
       if (logarithmic) {
         if (!options.whole) low = Math.max(low, high * (key === "y" ? 1e-6 : 1e-4));
         if (high / low < 1.3) return [low / 1.5, high * 1.5];
-        return key === "x" ? [low, high] : [10 ** (Math.floor(Math.log10(low) * 4) / 4), 10 ** (Math.ceil(Math.log10(high) * 4) / 4)];
+        return key === "x" ? [low / 1.05, high * 1.05] : [10 ** (Math.floor(Math.log10(low) * 4) / 4), 10 ** (Math.ceil(Math.log10(high) * 4) / 4)];
       }
-      if (key === "x") return [Math.min(0, low), high || 1];
+      if (key === "x") return [Math.min(0, low), 1.02 * high || 1]; // symbols at the last time stay whole
       const reach = high - low;
       if (reach === 0) return [Math.min(0, low * 0.9), (high || 1) * 1.1];
       if (low > 0 && reach > 0.35 * high) low = 0; // from zero, unless that would hide what changes

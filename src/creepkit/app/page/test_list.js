@@ -35,13 +35,13 @@
       data.tests.forEach((test, k) => {
         const entries = Object.entries(misfits.get(k) ?? {});
         const lines = (write) => (state.tests[k] ? entries.map((entry) => element("div", {}, write(entry))) : []);
-        rows[k].rms.replaceChildren(...lines(([name, one]) => `${entries.length > 1 ? (units[name]?.title ?? name) + " " : ""}${page.format(one.rms, 2)} ${units[name]?.unit ?? ""}`.trim()));
+        rows[k].rms.replaceChildren(...lines(([name, one]) => `${entries.length > 1 || !units[name]?.unit ? (units[name]?.title ?? name) + " " : ""}${page.format(one.rms, 2)} ${units[name]?.unit ?? ""}`.trim()));
         rows[k].ratio.replaceChildren(...lines(([, one]) => (one.ratio === null ? "\u2013" : page.format(one.ratio, 2))));
       });
       const shown = [...misfits].filter(([k]) => state.tests[k]).map(([, misfit]) => misfit);
       const weighted = page.weighted(shown);
       const lost = shown.flatMap((misfit) => Object.values(misfit)).reduce((sum, one) => sum + one.lost, 0);
-      total.textContent = shown.length === 0 ? "No test is shown." : weighted === null ? "The noise of these tests is not known." : `Weighted rms misfit: ${page.format(weighted, 3)} times the noise, of ${shown.length} ${shown.length === 1 ? "test" : "tests"}${lost ? `; ${lost} frames lie beyond the end of a curve` : ""}.`;
+      total.textContent = shown.length === 0 ? "No test is shown." : weighted === null ? "The noise of these tests is not known: state it in their files to see misfits over noise." : `Weighted rms misfit: ${page.format(weighted, 3)} times the noise, of ${shown.length} ${shown.length === 1 ? "test" : "tests"}${lost ? `; ${lost} frames lie beyond the end of a curve` : ""}.`;
     }
     return { group, show };
   };

@@ -5,7 +5,8 @@ are therefore asked before an answer is called decisive:
 
 1. May a share of the rate come from another law? The best law and each other law tried are added, the second carrying
    SHARE of the rate at the reference point, and the sum is fitted: where its chi-square is not larger by more than
-   3.84 (95 %, one degree of freedom), the tests do not exclude it.
+   3.84 (95 %, one degree of freedom), the tests do not exclude it; where it is smaller by more, it fits better. Both
+   are the least under the covariance of the best law's identification.
 2. May there be a threshold? The stress s in the terms of the best law is replaced by s - s_0, with s_0 THRESHOLD of
    the reference stress, and judged likewise.
 3. Does the answer rest on something nobody measured? The laws are ranked again with each unmodelled effect (see
@@ -14,6 +15,7 @@ are therefore asked before an answer is called decisive:
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -50,6 +52,10 @@ NOT_EXCLUDED = float(chi2.ppf(0.95, 1))
 """Increase of chi-square up to which a sum is not excluded."""
 
 
+SMALLEST_SHOWN = 0.05
+"""Difference of two chi-squares below which they are shown as the same."""
+
+
 SHARE_TOLERANCE = 1e-3
 """Of ln of the ratio of rates, within which a sum keeps its share."""
 
@@ -84,8 +90,8 @@ class Challenge:
 
 def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
     """The challenges of the first of some identifications, best first; the first law that is found ends the search."""
-    best, *others = fits
-    laws = itertools.chain((compatible_sum(best, other) for other in others), (compatible_threshold(best) for _ in "1"))
+    best, others = FittedLaw.at_least_chi_square(fits[0]), [FittedLaw.of(fit) for fit in fits[1:]]
+    laws = itertools.chain((_sum_challenge(best, other) for other in others), (_threshold_challenge(best) for _ in "1"))
     first_law = next((challenge for challenge in laws if challenge is not None), None)
     return (*([first_law] if first_law is not None else []), *decisive_effects(fits))
 
@@ -120,15 +126,30 @@ class ShareResidual:
 
 @dataclass(frozen=True, eq=False)
 class FittedLaw:
-    """A problem and where its chi-square is least: x (unknowns,), the coordinates u first."""
+    """A problem and the values of its law: x (unknowns,), the coordinates u first."""
 
     problem: LeastSquaresProblem
     x: Floats
 
     @classmethod
     def of(cls, fit: Identification) -> FittedLaw:
-        """That of an identification."""
+        """That of an identification, at its values."""
         return cls(fit.least_squares_problem, fit.x)
+
+    @classmethod
+    def at_least_chi_square(cls, fit: Identification) -> FittedLaw:
+        """That of an identification, where its chi-square under the noise that was found is least.
+
+        Values by frames of equal weight are not there: whatever is fitted under that noise would seem better than the
+        law itself.
+        """
+        problem, x = fit.least_squares_problem, fit.x
+        if fit.linearised is not None:  # by likelihood
+            return cls(problem, x)
+        with contextlib.suppress(CreepkitError):
+            refined = problem.minimise(x, tolerances=LAST_STEPS).x
+            x = min(x, refined, key=lambda one: _chi_square(problem, one))
+        return cls(problem, x)
 
     @property
     def law(self) -> CreepLaw:
@@ -155,7 +176,7 @@ class AlteredLaw:
 
     x : (unknowns,) its values. excess : its chi-square above that of the best law.
     constraints : (rows, unknowns) derivatives over tolerances of what was held, such as the share of a second law.
-    other : name of the law that has a share of a sum, else "". sentence : what it says, to follow "but".
+    other : name of the law that has a share of a sum, else "". description : what it is, for people.
     """
 
     kind: Literal["sum", "threshold"]
@@ -164,7 +185,7 @@ class AlteredLaw:
     excess: float
     constraints: Floats
     other: str
-    sentence: str
+    description: str
 
     @property
     def is_allowed(self) -> bool:
@@ -174,8 +195,12 @@ class AlteredLaw:
 
 def compatible_sum(best: Identification, other: Identification) -> Challenge | None:
     """The sum of the best law and another one that carries SHARE of the rate, if the tests do not exclude it."""
+    return _sum_challenge(FittedLaw.at_least_chi_square(best), FittedLaw.of(other))
+
+
+def _sum_challenge(best: FittedLaw, other: FittedLaw) -> Challenge | None:
     try:
-        found = sum_with_share(FittedLaw.of(best), FittedLaw.of(other))
+        found = sum_with_share(best, other)
     except CreepkitError:
         return _unexamined("sum", f"a sum with {other.law.name}")
     return _challenge_of(found)
@@ -183,8 +208,12 @@ def compatible_sum(best: Identification, other: Identification) -> Challenge | N
 
 def compatible_threshold(best: Identification) -> Challenge | None:
     """The best law above a threshold stress, if the tests do not exclude it."""
+    return _threshold_challenge(FittedLaw.at_least_chi_square(best))
+
+
+def _threshold_challenge(best: FittedLaw) -> Challenge | None:
     try:
-        found = above_threshold(FittedLaw.of(best))
+        found = above_threshold(best)
     except CreepkitError:
         return _unexamined("threshold", f"{best.law.name} above a threshold")
     return _challenge_of(found)
@@ -193,7 +222,7 @@ def compatible_threshold(best: Identification) -> Challenge | None:
 def _challenge_of(found: AlteredLaw | None) -> Challenge | None:
     if found is None or not found.is_allowed:
         return None
-    return Challenge(found.kind, found.problem.law.name, f"{found.sentence} {_change_text(found.excess)}")
+    return Challenge(found.kind, found.problem.law.name, f"{found.description} {_comparison_text(found.excess)}")
 
 
 def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
@@ -212,9 +241,9 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     least, x = _least_chi_square(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
-    sentence = f"{law.name} with {100 * SHARE:.0f} % of the rate from {other.law.name} explains them as well"
+    description = f"{law.name} with {100 * SHARE:.0f} % of the rate from {other.law.name}"
     excess = least - _chi_square(best.problem, best.x)
-    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), other.law.name, sentence)
+    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), other.law.name, description)
 
 
 def above_threshold(best: FittedLaw) -> AlteredLaw:
@@ -232,9 +261,9 @@ def above_threshold(best: FittedLaw) -> AlteredLaw:
     least, x = _least_chi_square(best, problem, x, fixed={position: threshold})
     held = np.zeros((1, x.size))
     held[0, position] = 1.0 / (SHARE_TOLERANCE * threshold)
-    sentence = f"{law.name} of {threshold:.3g} MPa explains them as well"
+    description = f"{law.name} of {threshold:.3g} MPa"
     excess = least - _chi_square(best.problem, best.x)
-    return AlteredLaw("threshold", problem, x, excess, held, "", sentence)
+    return AlteredLaw("threshold", problem, x, excess, held, "", description)
 
 
 def altered_laws(fits: Sequence[Identification], limit: float = NOT_EXCLUDED) -> list[AlteredLaw]:
@@ -242,7 +271,7 @@ def altered_laws(fits: Sequence[Identification], limit: float = NOT_EXCLUDED) ->
 
     What cannot be fitted is left out.
     """
-    best, *others = (FittedLaw.of(fit) for fit in fits)
+    best, others = FittedLaw.at_least_chi_square(fits[0]), [FittedLaw.of(fit) for fit in fits[1:]]
     results = []
     for other in (*others, None):
         try:
@@ -258,8 +287,13 @@ def _unexamined(kind: Literal["sum", "threshold"], name: str) -> Challenge:
     return Challenge(kind, name, f"whether {name} explains them as well could not be examined")
 
 
-def _change_text(excess: float) -> str:
-    return f"(its chi-square is {abs(excess):.1f} {'higher' if excess > 0 else 'lower'})"
+def _comparison_text(excess: float) -> str:
+    """How an altered law compares with the best one, from its chi-square above that of the best."""
+    if excess < -NOT_EXCLUDED:
+        return f"fits better (its chi-square is {-excess:.1f} lower)"
+    if abs(excess) < SMALLEST_SHOWN:
+        return "explains them as well (its chi-square is the same)"
+    return f"explains them as well (its chi-square is {abs(excess):.1f} {'higher' if excess > 0 else 'lower'})"
 
 
 def _are_one_function(problem: LeastSquaresProblem, x: Floats, own_terms: int) -> bool:

@@ -6,11 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
+from creepkit.inverse.identify import identify
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.selection.challenges import Challenge
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores, verdict_of
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
+from creepkit.laws.norton import NORTON
+from helpers.steady_rate_predictor import Steady, planted
 
 NAN = float("nan")
 STRAIN = OutputAdequacy("strain", 120, 2e-5, "stated", 1.02, 0.4, 0.0)
@@ -175,3 +181,15 @@ def test_what_cannot_be_ranked_is_refused():
         rank([fit("norton")], "hold-out")
     with pytest.raises(FitError, match="were made from different histories"):
         rank([fit("norton", provenance={"data": "a"}), fit("sinh", provenance={"data": "b"})])
+
+
+def test_an_export_of_a_ranking_carries_its_verdict():
+    """What is not decisive must not be read as proved where the law is used."""
+    tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(55.0, 1000.0), (65.0, 1000.0)], seed=0, noise=2e-4)
+    settings = IdentificationSettings(starts=1, sobol_points=8, frames=20, weights="likelihood", nuisances=())
+    found = rank([identify(law, tests, Steady(), settings=settings) for law in (NORTON, HYPERBOLIC_SINE)])
+    assert not found.decisive
+    for target, marker in (("latex", "%"), ("python", "#"), ("ansys", "")):
+        text = " ".join(ck.export(found, target).replace(marker or "\0", " ").split())
+        assert "verdict on the law: not decisive" in text
+    assert "verdict on the law" not in ck.export(found.best, "latex")
