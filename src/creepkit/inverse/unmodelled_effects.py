@@ -52,6 +52,10 @@ NOTEWORTHY_CHANGE = 0.01
 """Of the rate, from which on an effect is named."""
 
 
+LARGEST_DRIFT = 30.0
+"""K, of a furnace over a test: a larger drift explains nothing that anybody measures."""
+
+
 LIKE_HARDENING = 0.8
 """Correlation from which on a drift looks like hardening."""
 
@@ -136,7 +140,8 @@ def unmodelled_note(effects: Sequence[UnmodelledEffect]) -> tuple[str, ...]:
             f"{', by '.join(parts)}"
         )
     for effect in effects:
-        if effect.hardening_correlation > LIKE_HARDENING:
+        plausible = abs(effect.like_hardening) < LARGEST_DRIFT
+        if plausible and effect.hardening_correlation > LIKE_HARDENING:
             sentences.append(
                 f"no temperature was recorded: a drift of {effect.like_hardening:+.2g} K over a test would look like "
                 f"the hardening of this law (correlation {effect.hardening_correlation:.2f})"
