@@ -177,6 +177,7 @@ class Study:
             file=self.file,
             lock_path=lock_path,
         )
+        kept.write_identified(result.identified)
         for export in result.exports:
             write_own(kept, folder / export.name, export.text)
         if self.file.model.report is None or "report" not in kinds:
