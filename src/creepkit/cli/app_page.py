@@ -61,8 +61,7 @@ def _resolved(words: list[str]) -> tuple[PageSource, list[History]]:
             tests.append(word)
     if len(sources) > 1:
         raise FitError(f"{len(sources)} laws or results are named; name one, and tests beside it")
-    histories = ck.read_histories(tests) if tests else []
-    return sources[0] if sources else DEFAULT_LAW, list(histories)
+    return sources[0] if sources else DEFAULT_LAW, _tests(tests)
 
 
 DEFAULT_LAW = "norton"
@@ -79,6 +78,23 @@ def _format(path: Path) -> str | None:
     data = read_json(path, VALUED_LAW.kind)
     name = data.get("format") if isinstance(data, dict) else None
     return name if name in (VALUED_LAW.name, IDENTIFICATION.name, RANKING.name) else None
+
+
+def _tests(words: list[str]) -> list[History]:
+    """The measured tests; FitError for a JSON file that holds neither tests nor what a page is made of."""
+    import creepkit as ck
+    from creepkit.errors import CreepkitError, FitError
+
+    for word in words:
+        if Path(word).suffix.lower() == ".json" and Path(word).is_file():
+            try:
+                ck.read_histories([word])
+            except CreepkitError:
+                raise FitError(
+                    f"{word} is no identification, ranking or law that creepkit wrote, and no test; give a file that "
+                    "'creepkit identify' or 'creepkit export' wrote, or study.results/identified/ranking.json"
+                ) from None
+    return list(ck.read_histories(words)) if words else []
 
 
 def _serve(contents: PageContents, port: int, browser: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from creepkit.language import CreepLaw, strain, time
 from creepkit.records import UNKNOWN_DURATION, History
 
 STRAIN_OF_UNKNOWN_DURATION = 0.05
@@ -16,7 +17,21 @@ def compares_minimum_rate(history: History) -> bool:
 
 def followed_duration(history: History) -> float:
     """For how long a test lasted, s: to its rupture or last time, else to STRAIN_OF_UNKNOWN_DURATION at its rate."""
-    last = history.rupture_time or float(history.times[-1])
-    if history.minimum_rate is None or history.outputs or history.end_known or last > UNKNOWN_DURATION:
-        return last
+    if duration_known(history) or history.minimum_rate is None:
+        return history.rupture_time or float(history.times[-1])
     return STRAIN_OF_UNKNOWN_DURATION / history.minimum_rate
+
+
+def duration_known(history: History) -> bool:
+    """Whether it is known how long a test lasted; of a minimum creep rate alone it is not."""
+    if not compares_minimum_rate(history) or history.end_known:
+        return True
+    return float(history.times[-1]) > UNKNOWN_DURATION
+
+
+def needs_durations(law: CreepLaw) -> bool:
+    """Whether the minimum rate of a law depends on how long the test lasted: it has a rate of strain or time.
+
+    Over a duration that is assumed from the measured rate such a law would predict that rate from itself.
+    """
+    return law.uses(strain) or law.uses(time)

@@ -15,9 +15,9 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for
-from creepkit.inverse.duration import compares_minimum_rate, followed_duration
+from creepkit.inverse.duration import compares_minimum_rate, duration_known, followed_duration, needs_durations
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
-from creepkit.language import CreepLaw
+from creepkit.language import CreepLaw, strain, time
 from creepkit.records import History, NuisanceValues, Output, Prediction, Predictor, load_unit, outputs_of
 
 TIMES = np.concatenate([[0.0], np.geomspace(1e-6, 0.1, 48), np.linspace(0.1, 1.0, 25)[1:]])
@@ -32,8 +32,21 @@ CONSTANT_LOAD = 1e-6
 """Relative range of a load that is constant."""
 
 
-def check_minimum_rates(histories: Sequence[History], predictor: Predictor) -> None:
-    """FitError for a stated rate that cannot be predicted: no strain leads, or the load is not constant."""
+def check_minimum_rates(law: CreepLaw, histories: Sequence[History], predictor: Predictor) -> None:
+    """FitError for a stated rate that cannot be predicted.
+
+    No strain leads, the load is not constant, or the law depends on strain or time and the duration is not known.
+    """
+    unknown = [h.name for h in histories if not duration_known(h)]
+    if unknown and needs_durations(law):
+        variables = " and ".join(symbol.name for symbol in (strain, time) if law.uses(symbol))
+        more = f" and {len(unknown) - 1} more" if len(unknown) > 1 else ""
+        raise FitError(
+            f"law '{law.name}' depends on {variables}, and minimum creep rates of tests of unknown duration cannot "
+            f"judge it (history '{unknown[0]}'{more}): state how long these tests lasted, as rupture_h or as "
+            "end_time_h with 'ended: stopped', leave them out, or take a law that depends on neither strain nor time, "
+            "such as norton"
+        )
     for history in (h for h in histories if compares_minimum_rate(h)):
         own = predictor_for(predictor, history)
         leading = _leading_output(own)

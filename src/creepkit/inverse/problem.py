@@ -131,7 +131,7 @@ class LeastSquaresProblem:
         """
         predictor = CompositePredictor(dict(predictor)) if isinstance(predictor, Mapping) else predictor
         check_histories(law, histories, predictor)
-        check_minimum_rates(histories, predictor)
+        check_minimum_rates(law, histories, predictor)
         tests = [thinned_history(h, settings.frames) for h in histories]
         coordinates = Coordinates(law, reference or ReferencePoint.from_histories(tests, predictor))
         observations = ObservationVector.from_histories(tests, predictor, histories)

@@ -27,10 +27,15 @@ MOST_LAWS = 100
 
 def write_ranking_document(weights: Mapping[str, float], path: Path) -> Path:
     """Write the ranking; weights : {file of an identification, beside it: weight}."""
+    return write_json(ranking_to_document(weights), path, RANKING.kind)
+
+
+def ranking_to_document(weights: Mapping[str, float]) -> dict[str, Any]:
+    """The ranking as JSON-able data; weights : {file of an identification, beside it: weight}."""
     if len(weights) > MOST_LAWS:  # those of least weight say nothing
         weights = dict(sorted(weights.items(), key=lambda pair: -pair[1])[:MOST_LAWS])
     laws = [{"file": name, "weight": weight} for name, weight in weights.items()]
-    return write_json({**RANKING.heading, "laws": laws}, path, RANKING.kind)
+    return {**RANKING.heading, "laws": laws}
 
 
 def read_fit_or_ranking(path: str | Path) -> Identification | ModelAverage:

@@ -58,6 +58,8 @@ LARGEST_PER_CENT = 0.4
 
 TAKEN_FOR_GRANTED = "intervals take for granted what no nuisance parameter models"
 """How the note on unmodelled effects begins."""
+LARGEST_DRIFT = 30.0
+"""K, of a furnace over a test: a larger drift explains nothing that anybody measures."""
 
 
 LIKE_HARDENING = 0.8
@@ -148,7 +150,8 @@ def unmodelled_note(effects: Sequence[UnmodelledEffect]) -> tuple[str, ...]:
     if parts:
         sentences.append(f"{TAKEN_FOR_GRANTED}; the rate at the reference would change: by {', by '.join(parts)}")
     for effect in effects:
-        if effect.hardening_correlation > LIKE_HARDENING:
+        plausible = abs(effect.like_hardening) < LARGEST_DRIFT
+        if plausible and effect.hardening_correlation > LIKE_HARDENING:
             sentences.append(
                 f"no temperature was recorded: a drift of {effect.like_hardening:+.2g} K over a test would look like "
                 f"the hardening of this law (correlation {effect.hardening_correlation:.2f})"

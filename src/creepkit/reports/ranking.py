@@ -68,7 +68,8 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
     columns = ("law", "parameters", *misfit_columns(ranking.best), "BIC - best", "weight", "explains the tests")
     print_table(f"{test_count} tests", columns, rows)
     equivalent = [] if ranking.decisive else [f"- {pair}" for pair in equivalents_among_remaining(ranking)]
-    print("\n".join([ranking.verdict, *equivalent]) + f"\n\n{ranking.best}\n")
+    failed = [f"- left out: {name}: {reason}" for name, reason in ranking.failed.items()]
+    print("\n".join([ranking.verdict, *equivalent, *failed]) + f"\n\n{ranking.best}\n")
     for path in written:
         print(f"wrote {path}")
 
@@ -112,6 +113,7 @@ def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]
         "decisive": ranking.decisive,
         "adequacy": ranking.adequacy,
         "further": list(ranking.further),
+        "failed": dict(ranking.failed),
         "challenges": None if ranking.challenges is None else list(ranking.challenges),
         "laws": [
             {**_fit_to_json(ranked.fit), "bic_excess": ranked.excess, "weight": ranked.weight}

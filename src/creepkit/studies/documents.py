@@ -19,6 +19,7 @@ from creepkit.files.json_documents import (
 )
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError, ValueCodec
+from creepkit.files.writing import write_bytes
 from creepkit.inverse.fingerprints import short_hash
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
@@ -36,6 +37,7 @@ from creepkit.records import (
     StrainSteps,
     StressSteps,
 )
+from creepkit.reports.contents import ExportedFile
 
 FITS_FOLDER = "fits"
 
@@ -186,6 +188,20 @@ class ResultFolder:
     def fits(self) -> Path:
         """Folder of single identifications, see creepkit.inverse.kept_fits."""
         return self.folder / FITS_FOLDER
+
+    @property
+    def identified(self) -> Path:
+        """Folder of the identifications and rankings as other commands read them."""
+        return self.folder / "identified"
+
+    def write_identified(self, files: Sequence[ExportedFile]) -> None:
+        """Write identifications and rankings, and remove those of an earlier run that there are no longer."""
+        if files:
+            self.identified.mkdir(parents=True, exist_ok=True)
+        for one in files:
+            write_bytes(one.text.encode(), self.identified / one.name, StudyError)
+        for path in set(self.identified.glob("*.json")) - {self.identified / one.name for one in files}:
+            path.unlink(missing_ok=True)
 
     def path(self, stage: str) -> Path:
         """The file of a stage."""

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from creepkit.errors import CreepkitError, StudyError
+from creepkit.inverse.duration import duration_known, needs_durations
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import ZERO_CELSIUS, History, dimensions_of, load_unit
@@ -205,12 +206,13 @@ def candidate_laws(summary: DataSummary) -> list[str]:
     import creepkit as ck
 
     installed = ck.available("laws")
+    judged = all(map(duration_known, summary.tests))
     names = TERTIARY_LAWS if summary.tertiary > TERTIARY_SHARE * summary.framed else SECONDARY_LAWS
-    chosen = [name for name in names if name in installed]
+    chosen = [name for name in names if name in installed and (judged or not needs_durations(ck.law(name)))]
     several = len(summary.loads) > 2 and summary.loads[-1] > STRESS_RATIO * summary.loads[0]
     if several and names is SECONDARY_LAWS and SEVERAL_STRESSES_LAW in installed:
         chosen.append(SEVERAL_STRESSES_LAW)
-    return chosen if len(chosen) > 1 else [name for name in SECONDARY_LAWS if name in installed]
+    return chosen if len(chosen) > 1 or not judged else [name for name in SECONDARY_LAWS if name in installed]
 
 
 # ---- the text ------------------------------------------------------------------------------------------------------
@@ -298,6 +300,8 @@ def _identification_part(summary: DataSummary) -> list[str]:
     lines = []
     if len(summary.loads) == 1:
         lines.append("# All tests are at one load: how rates depend on stress they do not say.")
+    if not all(map(duration_known, summary.tests)):
+        lines.append("# Minimum rates of tests of unknown duration cannot judge laws that depend on strain or time.")
     lines += ["[identification]", f"laws = {_list(laws)}  # creepkit laws lists all"]
     with_alpha = [name for name in laws if "alpha" in ck.law(name).names]
     if with_alpha and not set(with_alpha) - set(TERTIARY_LAWS):

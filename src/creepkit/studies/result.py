@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from creepkit.reports.contents import (
     ReportProvenance,
     StageFailure,
 )
+from creepkit.reports.identified_files import identified_files
 from creepkit.studies.execution import StageRecord
 from creepkit.studies.inputs import DATA_FILE, InputFile, TestGroup
 from creepkit.studies.lock import versions_of
@@ -26,6 +28,10 @@ from creepkit.studies.study_file import StudyFile
 
 CARRIED_FOLDER = "inputs"
 """Of the data files that a report carries."""
+
+
+MOST_IDENTIFIED = 1_000_000
+"""Characters of identifications that a report carries."""
 
 
 if TYPE_CHECKING:
@@ -109,6 +115,11 @@ class StudyResult:
         """Laws as text."""
         return tuple(self.results[name] for name, _ in self._names("export"))
 
+    @cached_property
+    def identified(self) -> tuple[ExportedFile, ...]:
+        """Identifications and rankings as the files that other commands read."""
+        return tuple(identified_files(self.rankings))
+
     def _names(self, kind: str) -> list[tuple[str, str]]:
         return [(one.name, one.group) for one in self.stages if one.kind == kind and one.name in self.results]
 
@@ -133,6 +144,10 @@ def contents_of(result: StudyResult) -> ReportContents:
         for group in result.groups
     )
     attached, notes = attachments_of(result)
+    carried = result.identified
+    if sum(len(one.text) for one in carried) > MOST_IDENTIFIED:
+        carried, folder = (), f"{file.path.stem}.results/identified"
+        notes = (*notes, f"the identifications are too large for this page; 'creepkit run' writes them to {folder}")
     return ReportContents(
         title=result.title,
         groups=groups,
@@ -142,7 +157,7 @@ def contents_of(result: StudyResult) -> ReportContents:
         forecasts=dict(result.forecasts),
         design=_titled(result.designs),
         rupture=_titled(result.rupture),
-        exports=result.exports,
+        exports=(*result.exports, *carried),
         failures=result.failures,
         provenance=ReportProvenance(
             versions=versions_of(),

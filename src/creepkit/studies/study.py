@@ -187,6 +187,7 @@ class Study:
             lock_path=lock_path,
             asked=frozenset(execution.asked),
         )
+        kept.write_identified(result.identified)
         for stage in stages:
             if stage.file and stage.name in execution.results:  # by the name in the study file, not that of a result
                 write_own(kept, folder / stage.file, execution.results[stage.name].text)

@@ -220,6 +220,22 @@ def test_a_law_that_is_added_leaves_the_fits_of_the_others(study: Path) -> None:
     assert (kept.made, kept.read) == (0, 2)
 
 
+def test_identifications_are_written_as_other_commands_read_them(study: Path) -> None:
+    """Each law of each group as ck.load reads it, and rankings with the weights; the page holds the same files."""
+    result = ck.Study.load(study).run(only="identification")
+    folder = study.parent / "study.results" / "identified"
+    for group, ranking in result.rankings.items():
+        average = ck.load_ranking(folder / f"{group}_ranking.json")
+        assert average.weights == pytest.approx([one.weight for one in ranking.laws])
+        assert [fit.values for fit in average.fits] == [one.fit.values for one in ranking.laws]
+        assert ck.load(folder / f"{group}_norton.json").law.name == "norton"
+    carried = {one.name: one.text for one in result.report_contents().exports}
+    assert carried.items() >= {path.name: path.read_text() for path in folder.iterdir()}.items()
+    (folder / "earlier.json").write_text("{}")
+    ck.Study.load(study).run(only="identification")
+    assert sorted(carried) == sorted(path.name for path in folder.iterdir())
+
+
 def test_python_the_command_line_and_a_study_give_the_same_answer(study: Path) -> None:
     result = ck.Study.load(study).run(only="identification")
     tests = [h for h in ck.read_histories(study.parent / "data") if h.alloy == "B"]

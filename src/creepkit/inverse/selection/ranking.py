@@ -171,7 +171,8 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
         none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
         return f"{none} the tests; {found}: plan tests that can refute it"
     if len(names) > 1:
-        return f"of {count} laws tried these tests cannot tell apart {' and '.join(names)}; the best: {adequacy_text}"
+        found = f"the best is {best}: {adequacy_text}"
+        return f"of {count} laws tried these tests cannot tell apart {' and '.join(names)}; {found}"
     if ranking.challenges is None:
         unexamined = "what else the tests allow was not examined"
         return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}; {unexamined}"

@@ -15,6 +15,7 @@ import numpy as np
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
+from creepkit.inverse.duration import duration_known, needs_durations
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify, identify_values
 from creepkit.inverse.reference_conditions import with_arrhenius
@@ -126,7 +127,8 @@ def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLa
     laws = [ranked.fit.law for ranked in ranking.laws]
     tried = {law.fingerprint for law in laws}
     richer = _distinct_laws([*(laws[0] + other for other in laws[1:]), *_registered_laws(laws, histories)])
-    return [law for law in richer if law.fingerprint not in tried]
+    judged = all(map(duration_known, histories))
+    return [law for law in richer if law.fingerprint not in tried and (judged or not needs_durations(law))]
 
 
 def _registered_laws(tried: Sequence[CreepLaw], histories: Sequence[History]) -> list[CreepLaw]:

@@ -117,7 +117,8 @@ def test_a_law_that_nobody_asked_for_is_a_proposal():
 def test_laws_that_cannot_be_told_apart_are_named():
     found = verdict_of(ranking([0.5, 0.45, 0.05]))
     assert found == (
-        f"not decisive: of 3 laws tried these tests cannot tell apart norton and sinh; the best: it {EXPLAINS}"
+        "not decisive: of 3 laws tried these tests cannot tell apart norton and sinh; the best is norton: "
+        f"it {EXPLAINS}"
     )
 
 
