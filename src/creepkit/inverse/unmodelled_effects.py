@@ -58,6 +58,8 @@ LARGEST_PER_CENT = 0.4
 
 TAKEN_FOR_GRANTED = "intervals take for granted what no nuisance parameter models"
 """How the note on unmodelled effects begins."""
+
+
 LARGEST_DRIFT = 30.0
 """K, of a furnace over a test: a larger drift explains nothing that anybody measures."""
 

@@ -21,7 +21,7 @@ from creepkit.studies.documents import FITS_FOLDER, ResultCodec, ResultFolder, k
 from creepkit.studies.numbers import numbers_of
 from creepkit.studies.stages import Stage
 
-LOCK_NAME = "running.lock"
+RUNNING_LOCK = "running.lock"
 
 
 _log = logging.getLogger("creepkit.studies")
@@ -78,7 +78,7 @@ def running_alone(folder: Path) -> Iterator[None]:
             raise StudyError(f"{one}: is a link, and results are kept in a folder of the study's own; remove the link")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = ShardLock(folder / LOCK_NAME)
+        lock = ShardLock(folder / RUNNING_LOCK)
         lock.__enter__()
     except OSError as error:
         raise StudyError(

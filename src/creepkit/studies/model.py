@@ -226,7 +226,7 @@ class ForecastPart(Part):
 
 
 class DesignPart(Part):
-    """[design]: further tests, by what they tell for each hour of the oven."""
+    """[design]: further tests, by what they tell for each hour of machine time."""
 
     goal: Literal["law", "parameters", "rate", "exponent"] | None = None
     at_stress_MPa: Positive | None = None

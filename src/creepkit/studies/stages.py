@@ -338,7 +338,7 @@ class Stages:
 
         def make(results: Results, tick: Tick) -> ExportedFile:
             source = results[need]
-            law = source.temperature_law if part.law == "temperature" else source.best
+            law = source.temperature_law if part.law == "temperature" else source  # a ranking gives its verdict along
             record = ck.law_with_values(law, elastic=elastic, name=part.name or "")
             return ExportedFile(file, part.target, ck.export(record, part.target, units=units, temperature=temperature))
 

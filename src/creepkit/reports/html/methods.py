@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from creepkit.reports.design import order_text
 from creepkit.reports.html.citations import CITATIONS, References, listed
 from creepkit.reports.html.elements import plural, printable, sentence
 from creepkit.reports.html.methods_identification import identification_methods
@@ -63,12 +64,9 @@ def _stages(contents: ReportContents, references: References) -> list[list[str]]
             ]
         )
     if contents.design:
-        paragraphs.append(
-            [
-                f"Further tests were ranked by their expected information{references.cite('lindley')} for each hour of "
-                "the oven."
-            ]
-        )
+        order = order_text(next(iter(contents.design.values())))
+        cited = references.cite("lindley")
+        paragraphs.append([f"Expected information of further tests was computed{cited}; they are listed {order}."])
     return paragraphs
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from creepkit.quality.flags import frame_ranges_text
-from creepkit.reports.design import design_figure, direction_lines
+from creepkit.reports.design import design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
 from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows
@@ -269,25 +269,31 @@ def _forecast_cells(forecast: Forecast) -> list[tuple[str, ...]]:
 def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Block]:
     blocks: list[Block] = [Paragraph(sentence(design.sentence), "lead")]
     if design.tests:
+        to_decide = design.goal == "law"
         rows = [
             (
                 printable(test.description, 200),
                 number(test.hours, 3),
+                *((number(test.expectation.probability, 2),) if to_decide else ()),
                 number(test.expectation.information, 2),
                 number(test.information_per_hour, 2),
             )
             for test in design.tests[:MOST_DESIGNS]
         ]
-        columns = ("planned test", "oven, h", "expected information, nats", "nats per hour")
-        caption = f"The best of {plural(len(design.tests), 'planned test')} considered; goal: {design.goal}"
-        blocks.append(Table(caption, columns, rows, numeric=(1, 2, 3)))
+        probability = ("probability, decisive and right",) if to_decide else ()
+        columns = ("planned test", "machine time, h", *probability, "expected information, nats", "nats per hour")
+        caption = (
+            f"The first of {plural(len(design.tests), 'planned test')} considered, {order_text(design)}; goal: "
+            f"{design.goal}. A nat of information divides the volume of what is likely by 2.7"
+        )
+        blocks.append(Table(caption, columns, rows, numeric=tuple(range(1, len(columns)))))
         blocks.append(
             figures.picture(
                 lambda: design_figure(design),
                 f"What further tests tell{_of(name)}",
-                "Map of the expected information for an hour of the oven over the first load and the duration, left of "
+                "Map of the expected information for an hour of machine time over the first load and the duration, left of "
                 f"constant loads, right of loads that change. {sentence(design.sentence)}",
-                "Expected information for an hour of the oven over first load and duration; the plan is marked.",
+                "Expected information for an hour of machine time over first load and duration; the plan is marked.",
             )
         )
     lines = [line.strip() for line in direction_lines(design) if line.strip()]
