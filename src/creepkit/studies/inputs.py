@@ -208,7 +208,8 @@ def _labels(file: StudyFile, only: dict[str, list[Any]]) -> dict[str, list[Any]]
 
 def _excluded(file: StudyFile, histories: Sequence[History]) -> tuple[list[History], list[Exclusion]]:
     """The histories without what the study excludes."""
-    remaining, exclusions = list(histories), []
+    remaining = list(histories)
+    exclusions: list[Exclusion] = []
     for k, part in enumerate(file.model.exclude):
         if part.from_h is not None and part.to_h is not None and not part.from_h < part.to_h:
             raise file.error(("exclude", k, "to_h"), f"{part.to_h:g} h does not lie after from_h, {part.from_h:g} h")
