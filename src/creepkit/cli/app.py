@@ -64,9 +64,11 @@ class CommandGroup(TyperGroup):
             _load_plugin_files(ctx.params["plugin"])
             return super().invoke(ctx)
         except (CreepkitError, OSError) as error:
+            from creepkit.reports.terminal import printable
+
             if ctx.params["debug"]:
                 raise
-            typer.echo(f"creepkit: {' '.join(_sentence(error).split())}", err=True)
+            typer.echo(f"creepkit: {printable(' '.join(_sentence(error).split()))}", err=True)
             raise typer.Exit(1) from None
         except KeyboardInterrupt:
             typer.echo(f"creepkit: {ctx.invoked_subcommand or ''} interrupted", err=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.reports.terminal import ProgressBar, print_json, print_table
+from creepkit.reports.terminal import ProgressBar, print_json, print_table, printable
 
 if TYPE_CHECKING:
     from creepkit.studies.result import StudyResult
@@ -57,7 +57,7 @@ def command(
             to=target, only=only or None, force=force, locked=locked, prune=prune, progress=progress.tick
         )
     for change in result.changes:
-        typer.echo(f"since the last lock: {change}", err=True)
+        typer.echo(printable(f"since the last lock: {change}"), err=True)
     if prune:
         typer.echo(f"removed {result.pruned} kept identifications that no stage rests on", err=True)
     if as_json:
@@ -74,14 +74,14 @@ def command(
 
 def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, and where the report is."""
-    typer.echo(result.title)
+    typer.echo(printable(result.title))
     print_table("", ("stage", "state", ""), [(one.name, one.state, one.sentence) for one in result.stages])
     for exclusion in result.exclusions:
         count = len(exclusion.frames)
         frames = f", {count} frame{'s' if count > 1 else ''}" if count else ""
-        typer.echo(f"left out: {exclusion.test}{frames}: {exclusion.reason}")
+        typer.echo(printable(f"left out: {exclusion.test}{frames}: {exclusion.reason}"))
     for group, ranking in result.rankings.items():
-        typer.echo(f"{group}: {ranking.verdict}" if group else ranking.verdict)
+        typer.echo(printable(f"{group}: {ranking.verdict}" if group else ranking.verdict))
     if result.report is not None:
         typer.echo(f"report: {result.report}")
 

@@ -11,6 +11,13 @@ from typing import Any
 import typer
 
 
+def printable(text: str) -> str:
+    """A text for a terminal: what would steer it, or turn the direction of writing, as its code."""
+    from creepkit.files.delimited_text import UNPRINTABLE
+
+    return UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table as wide as the terminal, or 120 columns elsewhere; cells are plain text, the first never breaks."""
     from rich.console import Console
@@ -21,7 +28,7 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
     for k, column in enumerate(columns):
         table.add_column(column, overflow="fold", no_wrap=k == 0)
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
+        table.add_row(*(Text(printable(cell)) for cell in row))
     console = Console()
     (console if console.is_terminal else Console(width=120)).print(table)
 

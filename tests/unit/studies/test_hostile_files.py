@@ -127,3 +127,19 @@ def test_exports_replace_neither_data_nor_the_study(study: Path, name: str) -> N
     study.write_text(text if name in ("data", "one.csv") else STUDY.replace("law.py", name))
     with pytest.raises(CreepkitError, match=r"give file|plain name|of the study itself"):
         ck.Study.load(study)
+
+
+def test_what_a_forged_lock_says_does_not_steer_the_terminal(study: Path) -> None:
+    from typer.testing import CliRunner
+
+    from creepkit.cli.app import app
+
+    ck.Study.load(study).run(only="quality")
+    lock = study.parent / "study.lock"
+    content = json.loads(lock.read_text())
+    content["inputs"] = {"\x1b[31mred\u202e\u009b": "0"}
+    lock.write_text(json.dumps(content))
+    shown = CliRunner().invoke(app, ["run", str(study), "--only", "quality"])
+    assert shown.exit_code == 0
+    assert "\\u001b[31mred\\u202e\\u009b" in shown.output
+    assert not set("\x1b\u202e\u009b") & set(shown.output)
