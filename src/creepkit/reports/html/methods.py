@@ -64,9 +64,9 @@ def _stages(contents: ReportContents, references: References) -> list[list[str]]
             ]
         )
     if contents.design:
-        order = order_text(next(iter(contents.design.values())))
-        cited = references.cite("lindley")
-        paragraphs.append([f"Expected information of further tests was computed{cited}; they are listed {order}."])
+        by = order_text(next(iter(contents.design.values())))
+        information = f"Expected information of further tests was computed{references.cite('lindley')}"
+        paragraphs.append([f"{information}; they are listed {by}."])
     return paragraphs
 
 

@@ -291,7 +291,7 @@ def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Bloc
             figures.picture(
                 lambda: design_figure(design),
                 f"What further tests tell{_of(name)}",
-                "Map of the expected information for an hour of machine time over the first load and the duration, left of "
+                "Map of the expected information for an hour of machine time over first load and duration, left of "
                 f"constant loads, right of loads that change. {sentence(design.sentence)}",
                 "Expected information for an hour of machine time over first load and duration; the plan is marked.",
             )
