@@ -216,7 +216,8 @@ def _draw_test(axes: Axes, laws: Sequence[RankedLaw], curves: Sequence[FittedCur
         draw_curve(axes, curve, colour, "-" if k == 0 else "--", dots="0.35" if k == 0 else None)
     set_curve_ranges([axes], drawn, output)
     axes.set(xlabel="time, h", ylabel=axis_label(output))
-    axes.set_title(wrapped(f"{history.name}: {program_text(history)}", PANEL_WIDTH), fontsize=8.5)
+    title = f"{shortened(history.name, 48)}: {shortened(program_text(history), 96)}"
+    axes.set_title(wrapped(title, PANEL_WIDTH), fontsize=8.5)
 
 
 def _name_laws(part: Any, laws: Sequence[RankedLaw], every_test: bool) -> None:
