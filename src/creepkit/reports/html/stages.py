@@ -12,6 +12,7 @@ from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
 from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows
 from creepkit.reports.forecast_plot import forecast_figure
+from creepkit.inverse.duration import duration_known
 from creepkit.reports.html.elements import (
     Block,
     Items,
@@ -26,7 +27,7 @@ from creepkit.reports.html.elements import (
     sentence,
 )
 from creepkit.reports.html.figures import PageFigures
-from creepkit.reports.rupture import rupture_text
+from creepkit.reports.rupture import rupture_text, strength_rows
 from creepkit.reports.rupture_plot import rupture_figure
 from creepkit.reports.temperature_law import plot_temperature_law, temperature_law_text, temperature_study_text
 
@@ -65,8 +66,8 @@ def _table_of_histories(histories: Sequence[History]) -> Table:
             printable(h.name, 120),
             printable(h.alloy or "–", 80),
             printable(h.condition, 200),
-            str(h.times.size),
-            number(float(h.times[-1]) / 3600.0),
+            str(h.times.size) if h.outputs else "–",
+            number(float(h.times[-1]) / 3600.0) if duration_known(h) else "–",
             _ending(h),
             printable(re.split(r"[/\\]", h.source)[-1] or "–", 160),
         )
@@ -84,6 +85,8 @@ def _ending(history: History) -> str:
 
 
 def _quality_blocks(quality: DataQuality) -> list[Block]:
+    if not quality.tests:
+        return [Paragraph("No test has frames, so that there was nothing for the check of data quality to look at.")]
     if not quality.flags:
         return [Paragraph(f"The check of data quality found nothing suspect in {plural(quality.tests, 'test')}.")]
     rows = [
@@ -193,6 +196,16 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
     return [*blocks, Verbatim("The temperature law in full", printable_lines(text))]
 
 
+def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
+    """The verdict of a rupture assessment, and its strengths in a table."""
+    heads, rows, note = strength_rows(assessment)
+    columns = ("method", *heads[1:-1], "remarks")
+    cells = [tuple(map(printable, row)) for row in rows]
+    table = Table("Creep rupture strengths in MPa, with bounds in brackets", columns, cells, numeric=(2, 3))
+    blocks: list[Block] = [Paragraph(sentence(assessment.verdict), "lead"), table]
+    return [*blocks, Paragraph(sentence(note), "note")] if note else blocks
+
+
 def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigures) -> list[Block]:
     picture = figures.picture(
         lambda: rupture_figure(assessment),
@@ -203,7 +216,7 @@ def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigur
         "stresses tested.",
     )
     text = Verbatim("Methods, strengths with bounds, and checks", printable_lines(rupture_text(assessment)))
-    return [Paragraph(sentence(assessment.verdict), "lead"), picture, text]
+    return [*strength_blocks(assessment), picture, text]
 
 
 def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> list[Block]:
