@@ -296,8 +296,8 @@ def _with_conditions(
         entries = stated[unused[0]].values()
         where = next((entry.location for entry in entries), str(path))
         raise HistoryError(
-            f"{where}: '{unused[0]:.40}' has conditions, but no sheet or column of that name; correct the name, or leave "
-            "the sheet out by its name: --ignore, in Python ignore=[...]"
+            f"{where}: '{unused[0]:.40}' has conditions, but no sheet or column of that name; correct the name, or "
+            "leave the sheet out by its name: --ignore, in Python ignore=[...]"
         )
     return results
 

@@ -6,13 +6,13 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from creepkit.inverse.duration import duration_known
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.reports.design import design_figure, direction_lines
 from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
 from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows
 from creepkit.reports.forecast_plot import forecast_figure
-from creepkit.inverse.duration import duration_known
 from creepkit.reports.html.elements import (
     Block,
     Items,
