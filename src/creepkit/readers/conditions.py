@@ -149,6 +149,12 @@ class StatedConditions:
         unread = [(number.location, number.key) for number in self._numbers.values()]
         unread += [(entry.location, entry.key or key) for key, entry in self._texts.items()]
         for location, key in unread:
+            if self._vocabulary.synonyms.get(key, key) == "control":
+                raise HistoryError(
+                    f"{location}: '{key}' says whether a load or a true stress was held, and of this test neither was "
+                    "imposed: leave it out; a relaxation test, of which the strain is held and the stress measured, "
+                    "states strain_pct or steps of strain alone"
+                )
             raise HistoryError(
                 f"{location}: '{key}' has no meaning beside the other conditions; {_ALLOWED_COMBINATIONS}"
             )

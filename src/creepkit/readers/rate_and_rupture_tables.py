@@ -54,7 +54,9 @@ QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
         (
             *("minimum rate", "min rate", "minimum creep rate", "min creep rate", "minimum strain rate", "mcr"),
             *("steady state creep rate", "steady state rate", "secondary creep rate", "steady creep rate"),
-            *("kriechrate", "minimale kriechrate", "min kriechrate"),
+            *("kriechrate", "minimale kriechrate", "min kriechrate", "kriechgeschwindigkeit"),
+            *("minimale kriechgeschwindigkeit", "min kriechgeschwindigkeit", "stationäre kriechgeschwindigkeit"),
+            *("stationäre kriechrate", "sekundäre kriechrate", "sekundäre kriechgeschwindigkeit"),
         ),
     ),
     "minimum_rate_sd": (RATE, ("minimum rate sd", "min rate sd", "minimum creep rate sd", "min creep rate sd")),
@@ -81,7 +83,11 @@ TEXTS: Mapping[str, tuple[str, ...]] = {
         "id",
         "no",
         "sample",
+        "sample id",
         "specimen id",
+        "specimen no",
+        "specimen name",
+        "probennummer",
         "versuch",
         "probe",
     ),
@@ -252,7 +258,23 @@ def _keys(table: TextTable) -> list[str]:
             place = table.header[key_in_header].location
             raise HistoryError(f"{place}: '{key_in_header:.60}' is also a column, '{written:.60}'; keep one of them")
         keys.append(quantity)
-    return keys
+    return _named_by_specimen(table, keys)
+
+
+def _named_by_specimen(table: TextTable, keys: list[str]) -> list[str]:
+    """The keys, with a column of specimens as the tests' names where it tells all of them apart and nothing else does.
+
+    A column of kinds of specimens, such as uniaxial, has the same word in several rows, or words that are registered.
+    """
+    if "specimen" not in keys or "name" in keys:
+        return keys
+    column = keys.index("specimen")
+    cells = [table.entries(row).get(table.columns[column]) for row in table.rows]
+    texts = [cell.text for cell in cells if cell is not None]
+    terms = HeaderVocabulary().terms("")
+    if len(set(texts)) < len(cells) or {text.casefold() for text in texts} & set(terms.outputs):
+        return keys
+    return ["name" if k == column else key for k, key in enumerate(keys)]
 
 
 def _check_unit(quantity: str, unit: str, written: str, location: str) -> None:

@@ -206,19 +206,23 @@ class SpreadsheetReader:
     def read(self, path: Path) -> list[History]:
         """Return the histories in all sheets."""
         check_readable(path, SPREADSHEET_FILE)
-        grids = read_sheets(path)
+        left_out = {name.casefold() for name in self.vocabulary.ignored}
+        grids = [grid for grid in read_sheets(path) if grid.sheet.casefold() not in left_out]
         framed = [grid for grid in grids if names_time(grid, self.vocabulary)]
         if not framed:
             sheets = ", ".join(f"'{grid.sheet}'" for grid in grids) or "none that holds anything"
             raise HistoryError(f"{path}: no sheet has a column of time (sheets: {sheets}); name one time_h or Time (h)")
         stated: dict[str, dict[str, SourceText]] = {}
         aside: list[str] = []
+        found = [(grid, test) for grid in framed for test in tests_in(grid, self.vocabulary)]
+        names = {name for grid, test in found for name in (grid.sheet, test.name)}
         for grid in grids:
             if grid not in framed:
                 conditions = _conditions_by_test(grid, self.vocabulary)
-                aside += [] if conditions else [f"sheet '{grid.sheet}' not read as it has no column of time"]
-                _add_conditions(stated, conditions, grid)
-        found = [(grid, test) for grid in framed for test in tests_in(grid, self.vocabulary)]
+                if conditions.keys() & names or any(map(_states_a_condition, conditions.values())):
+                    _add_conditions(stated, conditions, grid)
+                else:  # remarks
+                    aside.append(f"sheet '{grid.sheet}' not read as it has no column of time")
         return histories_of_tests(_with_conditions(path, found, stated, aside), path, self.vocabulary)
 
 
@@ -257,6 +261,10 @@ def _conditions_by_test(grid: CellGrid, vocabulary: HeaderVocabulary) -> dict[st
     return tests
 
 
+def _states_a_condition(entries: Mapping[str, SourceText]) -> bool:
+    return any(not key.startswith("label ") for key in entries)
+
+
 def _add_conditions(
     stated: dict[str, dict[str, SourceText]], conditions: Mapping[str, dict[str, SourceText]], grid: CellGrid
 ) -> None:
@@ -285,7 +293,12 @@ def _with_conditions(
         results.append((grid, replace(test, entries={**test.entries, **extra}, table=table)))
     unused = sorted(stated.keys() - used)
     if unused:
-        raise HistoryError(f"{path}: test '{unused[0]:.40}' has conditions, but no sheet or column of that name")
+        entries = stated[unused[0]].values()
+        where = next((entry.location for entry in entries), str(path))
+        raise HistoryError(
+            f"{where}: '{unused[0]:.40}' has conditions, but no sheet or column of that name; correct the name, or "
+            "leave the sheet out by its name: --ignore, in Python ignore=[...]"
+        )
     return results
 
 

@@ -118,7 +118,8 @@ def _effect_lines(fit: RuptureFit) -> list[str]:
     return lines
 
 
-def _strength_lines(assessment: RuptureAssessment) -> list[str]:
+def strength_rows(assessment: RuptureAssessment) -> tuple[list[str], list[tuple[str, ...]], str]:
+    """Heads of columns, rows of the strengths of the average method, and what is said of a new heat, "" for nothing."""
     level = f"{100 * assessment.settings.level:g} %"
     shown = [one for one in assessment.strengths if one.method == "average"]
     if assessment.relation is not None:
@@ -140,13 +141,18 @@ def _strength_lines(assessment: RuptureAssessment) -> list[str]:
                 "; ".join(text for text in remarks if text),
             )
         )
-    lines = _aligned([*heads, "of one test", ""], rows)
+    note = ""
     if not assessment.tests.groups:
-        lines.append("no bounds of a new heat: the tests tell no heats or laboratories apart")
+        note = "no bounds of a new heat: the tests tell no heats or laboratories apart"
     elif not scattering:
         groups = " and ".join(map(_plural, assessment.tests.groups))
-        lines.append(f"no bounds of a new heat: no scatter between {groups} is found")
-    return lines
+        note = f"no bounds of a new heat: no scatter between {groups} is found"
+    return [*heads, "of one test", ""], rows, note
+
+
+def _strength_lines(assessment: RuptureAssessment) -> list[str]:
+    heads, rows, note = strength_rows(assessment)
+    return [*_aligned(heads, rows), *([note] if note else [])]
 
 
 def _largest_scatter(assessment: RuptureAssessment, group: str) -> float:

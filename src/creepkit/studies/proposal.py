@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.inverse.duration import duration_known, needs_durations
+from creepkit.inverse.duration import duration_known, followed_duration, needs_durations
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import ZERO_CELSIUS, History, dimensions_of, load_unit
@@ -106,7 +106,9 @@ class DataSummary:
         loads = f"{len(self.loads)} level{'s' if len(self.loads) > 1 else ''} of load"
         if len({load_unit(history) for history in self.tests}) == 1:
             loads += (
-                f", {self.loads[0]:g} to {self.loads[-1]:g} {unit}" if len(self.loads) > 1 else f", {self.loads[0]:g}"
+                f", {self.loads[0]:g} to {self.loads[-1]:g} {unit or self.tests[0].loading.quantity}"
+                if len(self.loads) > 1
+                else f", {self.loads[0]:g}"
             )
         count = f"{len(self.tests)} test{'s' if len(self.tests) > 1 else ''}"
         return [
@@ -355,12 +357,12 @@ def _forecast_part(summary: DataSummary) -> list[str]:
     history = next(h for h in summary.tests if h.outputs or h.minimum_rate is not None)
     quantity, unit = history.loading.quantity, load_unit(history)
     level = float(history.loading.program().values.max())
-    celsius, hours = history.mean_temperature - ZERO_CELSIUS, 2 * float(history.times[-1]) / 3600
+    celsius, hours = history.mean_temperature - ZERO_CELSIUS, 2 * followed_duration(history) / 3600
     lines = [
         "[[forecast]]",
         'name = "longer test"',
         f"specimen = {quoted(history.specimen)}",
-        f"load = {{ {quantity}_{unit} = {0.9 * level:.3g} }}",
+        f"load = {{ {'_'.join(filter(None, (quantity, unit)))} = {0.9 * level:.3g} }}",
         f"temperature_C = {celsius:.0f}",
         f"end_h = {hours:.3g}",
     ]

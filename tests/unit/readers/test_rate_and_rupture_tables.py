@@ -210,3 +210,10 @@ def test_what_an_empty_cell_leaves_unknown_is_said(row, unknown, tmp_path):
     (history,) = read(tmp_path, f"test,stress_MPa,temperature_C,min creep rate (1/h),t_r (h),ended\n{row}\n")
     assumed = history.labels["assumed"].split(", ")
     assert [text for text in assumed if "cell" in text] == unknown
+
+
+def test_a_column_of_specimens_names_the_tests(tmp_path):
+    path = tmp_path / "raten.csv"
+    path.write_text("Specimen;Spannung [MPa];Temperatur [°C];minimale Kriechgeschwindigkeit [1/h]\nP1;100;700;1E-6\n"
+                    "P2;120;700;2E-6\n", encoding="utf-8")  # fmt: skip
+    assert [h.name for h in ck.read_histories(path)] == ["P1", "P2"]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.readers.spreadsheets import SPREADSHEET
 from creepkit.records import History
@@ -65,8 +66,21 @@ def test_a_test_a_sheet_with_a_sheet_of_conditions(tmp_path: Path):
     assert second.labels["heat"] == "X8"
     assert "sheet 'Notes' not read as it has no column of time" in first.labels["assumed"]
     sheets["Conditions"].append(["A3", 80, 860, "X8"])
-    with pytest.raises(HistoryError, match="bars.xlsx: test 'A3' has conditions, but no sheet or column of that name"):
+    with pytest.raises(HistoryError, match="sheet 'Conditions', row 4: 'A3' has conditions, but no sheet or column"):
         read(written(tmp_path / "bars.xlsx", sheets))
+
+
+def test_a_sheet_of_remarks_is_left_out(tmp_path: Path):
+    """A sheet without columns of time that states nothing of a test; one that seems to is left out by its name."""
+    remarks = [["Probe", "KZ01"], ["Bemerkung", "Ofen 3"]]
+    (history,) = read(written(tmp_path / "bar.xlsx", {"KZ01": CONDITIONS + FRAMES, "Auswertung": remarks}))
+    assert "sheet 'Auswertung' not read" in history.labels["assumed"]
+    stated = [["Probe", "Stress (MPa)"], ["KZ02", 60]]
+    path = written(tmp_path / "bars.xlsx", {"KZ01": CONDITIONS + FRAMES, "Auswertung": stated})
+    with pytest.raises(HistoryError, match=r"sheet 'Auswertung', row 2: 'KZ02' .* leave the sheet out .* --ignore"):
+        read(path)
+    (history,) = ck.read_histories([path], ignore=["Auswertung"])
+    assert history.name == "bars"
 
 
 def test_pairs_below_merged_names(tmp_path: Path):

@@ -26,7 +26,7 @@ from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings, findings_of, verdict_blocks, with_histories
 from creepkit.reports.html.groups import group_sections
 from creepkit.reports.html.sliders import fragment_style, script_policy, slider_sections
-from creepkit.reports.html.stages import data_section, stage_sections
+from creepkit.reports.html.stages import data_section, stage_sections, strength_blocks
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -120,8 +120,18 @@ def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) 
     if len(found) == 1:
         return PageSection("findings", "Findings", [*warning, *verdict_blocks(found[0])])
     if not found:
-        text = "No law was identified."
-        return PageSection("findings", "Findings", [*warning, *([Paragraph(text, "lead")] if contents.groups else [])])
+        asked = any(group.failure or group.result is not None for group in contents.groups)
+        alone = bool(contents.groups) and (asked or not contents.rupture)
+        law = [Paragraph("No law was identified.", "lead")] if alone else []
+        rupture = [
+            block
+            for name, assessment in contents.rupture.items()
+            for block in (
+                *([Paragraph(f"{printable(name, 120)}:")] if len(contents.rupture) > 1 else []),
+                *strength_blocks(assessment),
+            )
+        ]
+        return PageSection("findings", "Findings", [*warning, *law, *rupture])
     blocks = [*warning, Paragraph(_overview(contents, found), "lead"), _table_of_groups(found)]
     return PageSection("findings", "Findings", blocks)
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from creepkit.inverse.duration import duration_known
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.reports.design import design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
@@ -29,7 +30,7 @@ from creepkit.reports.html.elements import (
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import findings_of
 from creepkit.reports.html.test_details import NOT_STATED, table_of_details
-from creepkit.reports.rupture import rupture_text
+from creepkit.reports.rupture import rupture_text, strength_rows
 from creepkit.reports.rupture_plot import rupture_figure
 from creepkit.reports.temperature_law import plot_temperature_law, temperature_law_text, temperature_study_text
 
@@ -69,8 +70,8 @@ def _table_of_histories(histories: Sequence[History], more: str) -> Table:
             printable(h.name, 120),
             printable(h.alloy or NOT_STATED, 80),
             printable(h.condition, 200),
-            str(h.times.size),
-            number(float(h.times[-1]) / 3600.0),
+            str(h.times.size) if h.outputs else "–",
+            number(float(h.times[-1]) / 3600.0) if duration_known(h) else "–",
             _ending(h),
             printable(re.split(r"[/\\]", h.source)[-1] or NOT_STATED, 160),
         )
@@ -87,6 +88,8 @@ def _ending(history: History) -> str:
 
 
 def _quality_blocks(quality: DataQuality) -> list[Block]:
+    if not quality.tests:
+        return [Paragraph("No test has frames, so that there was nothing for the check of data quality to look at.")]
     if not quality.flags:
         return [Paragraph(f"The check of data quality found nothing suspect in {plural(quality.tests, 'test')}.")]
     rows = [
@@ -208,6 +211,16 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
     return [*blocks, Verbatim("The temperature law in full", printable_lines(text))]
 
 
+def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
+    """The verdict of a rupture assessment, and its strengths in a table."""
+    heads, rows, note = strength_rows(assessment)
+    columns = ("method", *heads[1:-1], "remarks")
+    cells = [tuple(map(printable, row)) for row in rows]
+    table = Table("Creep rupture strengths in MPa, with bounds in brackets", columns, cells, numeric=(2, 3))
+    blocks: list[Block] = [Paragraph(sentence(assessment.verdict), "lead"), table]
+    return [*blocks, Paragraph(sentence(note), "note")] if note else blocks
+
+
 def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigures) -> list[Block]:
     picture = figures.picture(
         lambda: rupture_figure(assessment),
@@ -218,7 +231,7 @@ def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigur
         "stresses tested.",
     )
     text = Verbatim("Methods, strengths with bounds, and checks", printable_lines(rupture_text(assessment)))
-    return [Paragraph(sentence(assessment.verdict), "lead"), picture, text]
+    return [*strength_blocks(assessment), picture, text]
 
 
 def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> list[Block]:
