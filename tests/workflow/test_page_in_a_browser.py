@@ -274,7 +274,7 @@ def test_several_pages_in_one_document(chromium, tmp_path):
     (tmp_path / "two.html").write_text(text, encoding="utf-8")
     with tab(chromium) as one:
         one.open((tmp_path / "two.html").as_uri())
-        assert one.page.locator("h2").all_inner_texts() == [second.title, first.title]
+        assert one.page.locator(".creepkit-page .title").all_inner_texts() == [second.title, first.title]
         assert len(one.curves()) == 4
         assert one.problems == []
 

@@ -111,12 +111,12 @@ def _serve(contents: PageContents, port: int, browser: bool) -> None:
         raise FitError(f"--port {port} cannot be used: {error.strerror}; give another, or 0 for any") from None
     with server:
         threading.Thread(target=server.answers.prepare, daemon=True).start()
-        typer.echo(f"the page: {server.url}")
-        sys.stdout.flush()
-        typer.echo("Ctrl-C ends it", err=True)
-        if browser:
-            webbrowser.open(server.url)
         try:
+            typer.echo("Ctrl-C ends it", err=True)
+            typer.echo(f"the page: {server.url}")
+            sys.stdout.flush()
+            if browser:
+                webbrowser.open(server.url)
             server.serve_forever()
         except KeyboardInterrupt:
             typer.echo("ended", err=True)

@@ -344,7 +344,7 @@ def _levels_text(program: Program) -> str:
     held, values = _held_levels(program), program.values
     if 1 <= len(held) <= MOST_LEVELS and max(held) == values.max():
         return " to ".join(f"{level:g}" for level in held)
-    if values[0] == 0.0:  # a load that was recorded from its ramp on
+    if values[0] == 0.0 < values.max():  # a load that was recorded from its ramp on
         return f"{values.max():g}"
     return f"{values[0]:g} to {values[-1]:g}"
 

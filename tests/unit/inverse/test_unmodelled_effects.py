@@ -234,7 +234,7 @@ def test_sentences_name_what_would_change_the_rate_by_more_than_a_hundredth():
     offset = UnmodelledEffect("offset of amplitude", 4.5e-3, "mm", 0.012)
     assert unmodelled_note([thickness, offset, UnmodelledEffect(DRIFT, 5.0, "K over a test", 0.004)]) == (
         "intervals take for granted what no nuisance parameter models; the rate at the reference would change: by a "
-        "thickness of 0.01 mm 8.3 %, by an offset of amplitude of 0.0045 mm 1.2 %",
+        "thickness of 0.01 mm 8.7 %, by an offset of amplitude of 0.0045 mm 1.2 %",
     )
     assert unmodelled_note([]) == ()
     assert unmodelled_note([replace(thickness, rate_change=0.001)]) == ()
