@@ -28,8 +28,8 @@ def command(
 ) -> None:
     """Write results as a page to read, HTML.
 
-    One file without scripts: findings, curves, tests, laws tried, data, files to download, methods, provenance. It
-    prints, and opens anywhere. Identifications of the same tests are ranked.
+    One file, complete without scripts: findings, curves, tests, laws tried, data, files to download, methods,
+    provenance. It prints, and opens anywhere. Identifications of the same tests are ranked.
     """
     import creepkit as ck
     from creepkit.errors import ReportError

@@ -6,16 +6,12 @@ import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import creepkit as ck
 from creepkit.errors import StudyError
 from creepkit.studies.study_file import known_keys, parse_study
-from creepkit.studies.toml_lines import key_lines
 
 FULL = """\
 [study]
@@ -361,42 +357,3 @@ def test_what_the_tests_do_not_have_is_refused_with_its_line(folder, text, line,
     assert line is None or told.startswith(f"{folder / 'study.toml'}:{line}: "), told
     assert words in told
     assert "\n" not in told
-
-
-# ---- lines of a text -----------------------------------------------------------------------------------------------
-
-NAMES = st.sampled_from(["a", "b-c", "d_1", '"e f"', "'g.h'", '"i\\"j"'])
-SCALARS = st.sampled_from(["1", "-2.5e3", "true", '"x # y"', "'''l\n]m'''", '"""n\n"} o"""', "1979-05-27", "[]", "{}"])
-VALUES = st.recursive(
-    SCALARS,
-    lambda inner: st.lists(inner, min_size=1, max_size=3).map(lambda items: "[ # c ]\n" + ",\n ".join(items) + ",\n]"),
-    max_leaves=5,
-)
-
-
-def paths_of(data: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
-    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
-    for key, value in items:
-        yield (*path, key)
-        yield from paths_of(value, (*path, key))
-
-
-@settings(max_examples=150, deadline=None)
-@given(st.lists(st.tuples(st.sampled_from(["[{}]", "[[{}]]", ""]), NAMES, NAMES, VALUES), max_size=6))
-def test_the_lines_are_those_of_all_keys_that_tomllib_reads(parts):
-    """Whatever tomllib reads, the scan finds the same keys, tables and items."""
-    text = "# begin\n"
-    for heading, table, key, value in parts:
-        text += f"{heading.format(table)} # h\n" if heading else "\n"
-        text += f"{key} = {value} # v\n"
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        return
-    lines = key_lines(text)
-    assert set(paths_of(data)) == set(lines)
-    for path, line in lines.items():
-        name = next(part for part in reversed(path) if isinstance(part, str))
-        shown = text.splitlines()[line - 1]
-        if isinstance(path[-1], str):
-            assert name in shown or name.replace('"', '\\"') in shown

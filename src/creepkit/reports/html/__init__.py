@@ -1,4 +1,4 @@
-"""A report as one HTML page without scripts: findings first, then tests, ranking, data, methods and provenance."""
+"""A report as one HTML page, complete without scripts: findings, tests, ranking, data, methods, provenance."""
 
 from creepkit.reports.html.page import report_html
 
