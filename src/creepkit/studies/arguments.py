@@ -80,20 +80,28 @@ def predictor_of(file: StudyFile) -> Predictor | None:
     """What predicts the tests: the specimen of the study, or a surrogate; None for the specimens that tests name."""
     import creepkit as ck
 
-    model, specimen = file.model, None
-    if model.specimen is not None:
-        with file.at("specimen", "name"):
-            specimen = ck.specimen(model.specimen.name)
-        lengths = lengths_of(file, ("specimen", "lengths"), model.specimen.lengths, specimen)
-        untyped: Any = specimen
-        with file.at("specimen", "lengths"):
-            specimen = untyped.replace(**lengths) if lengths else specimen
+    model = file.model
+    specimen = None if model.specimen is None else specimen_of_study(file)
     named = None if model.identification is None else model.identification.predictor
     if named in (None, "specimen"):
         return specimen
     beside = file.path.parent / plain_path(file, ("identification", "predictor"), str(named))
     with file.at("identification", "predictor"):
         return ck.surrogate(beside if beside.is_file() else str(named))
+
+
+def specimen_of_study(file: StudyFile) -> Specimen:
+    """The specimen of the table [specimen], with its lengths."""
+    import creepkit as ck
+
+    part = file.model.specimen
+    assert part is not None
+    with file.at("specimen", "name"):
+        specimen = ck.specimen(part.name)
+    lengths = lengths_of(file, ("specimen", "lengths"), part.lengths, specimen)
+    untyped: Any = specimen
+    with file.at("specimen", "lengths"):
+        return untyped.replace(**lengths) if lengths else specimen
 
 
 def plain_path(file: StudyFile, key: tuple[str | int, ...], text: str) -> PurePosixPath:

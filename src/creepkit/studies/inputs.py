@@ -164,18 +164,30 @@ def sha256_of(path: Path) -> str:
 # ---- tests ---------------------------------------------------------------------------------------------------------
 
 
-def read_inputs(file: StudyFile, paths: Sequence[Path]) -> StudyInputs:
-    """The tests of a study: read, chosen, with what is left out, in groups."""
+def read_inputs(file: StudyFile, paths: Sequence[Path], watched: Sequence[History], *, complete: bool) -> StudyInputs:
+    """The tests of a study: read, chosen, with what is left out, in groups.
+
+    watched : tests of cameras. complete : whether no camera failed; else tests may be missing.
+    """
     import creepkit as ck
 
     data = file.model.data
-    with file.at("data", "reader" if data.reader is not None else "files"):
-        measured = ck.read_histories(list(paths), data.reader, data.ignore)
+    measured: list[History] = []
+    if paths:
+        with file.at("data", "reader" if data.reader is not None else "files"):
+            measured = ck.read_histories(list(paths), data.reader, data.ignore)
+    names = {history.name for history in measured}
+    for one in watched:
+        if one.name in names:
+            raise file.error(("data", "files"), f"hold a test '{one.name}', as a camera does; give that another name")
+    measured += watched
+    if not measured and not complete:
+        return StudyInputs((), (), ())
     chosen = measured
     if data.only:
         with file.at("data", "only"):
             chosen = select_tests(measured, **_labels(file, data.only))
-    histories, exclusions = _excluded(file, chosen)
+    histories, exclusions = _excluded(file, chosen, complete)
     if data.suspect_frames == "exclude":
         sound = ck.exclude_suspect_frames(histories)
         exclusions += [
@@ -206,7 +218,7 @@ def _labels(file: StudyFile, only: dict[str, list[Any]]) -> dict[str, list[Any]]
     return labels
 
 
-def _excluded(file: StudyFile, histories: Sequence[History]) -> tuple[list[History], list[Exclusion]]:
+def _excluded(file: StudyFile, histories: Sequence[History], complete: bool) -> tuple[list[History], list[Exclusion]]:
     """The histories without what the study excludes."""
     remaining = list(histories)
     exclusions: list[Exclusion] = []
@@ -214,6 +226,8 @@ def _excluded(file: StudyFile, histories: Sequence[History]) -> tuple[list[Histo
         if part.from_h is not None and part.to_h is not None and not part.from_h < part.to_h:
             raise file.error(("exclude", k, "to_h"), f"{part.to_h:g} h does not lie after from_h, {part.from_h:g} h")
         named = [h for h in histories if fnmatchcase(h.name, part.test)]
+        if not named and not complete:
+            continue  # it may be of a camera that failed
         if not named:
             names = [h.name for h in histories]
             raise file.error(("exclude", k, "test"), f"there is no test '{part.test}'; {nearest(part.test, names)}")

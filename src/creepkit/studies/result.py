@@ -37,7 +37,9 @@ MOST_IDENTIFIED = 1_000_000
 if TYPE_CHECKING:
     from creepkit.discovery.discover import TemperatureStudy
     from creepkit.experiments.planned_design import Design
+    from creepkit.extraction.extraction import Extraction
     from creepkit.forecasts.forecast import Forecast
+    from creepkit.instruments.imposed import Imposed
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.quality import DataQuality
     from creepkit.records import History
@@ -53,6 +55,7 @@ class StudyResult:
     changes : what differs from the study.lock that was there, one sentence each. files : that were read.
     measured : all tests as the files hold them. file, lock_path : the study, and the lock of this run.
     asked : keys of the identifications that the stages rest on. pruned : how many others were removed.
+    extractions, imposed : {test of a camera: what its frames gave, and what its instrument recorded}.
     """
 
     title: str
@@ -68,6 +71,8 @@ class StudyResult:
     lock_path: Path | None = None
     asked: frozenset[str] = field(default=frozenset(), repr=False)
     pruned: int = 0
+    extractions: Mapping[str, Extraction] = field(default_factory=dict, repr=False)
+    imposed: Mapping[str, Imposed] = field(default_factory=dict, repr=False)
 
     @property
     def histories(self) -> tuple[History, ...]:
@@ -157,6 +162,8 @@ def contents_of(result: StudyResult) -> ReportContents:
         forecasts=dict(result.forecasts),
         design=_titled(result.designs),
         rupture=_titled(result.rupture),
+        extractions=result.extractions,
+        imposed=result.imposed,
         exports=(*result.exports, *carried),
         failures=result.failures,
         provenance=ReportProvenance(

@@ -24,10 +24,23 @@ if TYPE_CHECKING:
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.language import CreepLaw
 
-StageKind = Literal["quality", "identification", "temperature", "rupture", "forecast", "design", "export", "report"]
+StageKind = Literal[
+    "extraction",
+    "record",
+    "quality",
+    "identification",
+    "temperature",
+    "rupture",
+    "forecast",
+    "design",
+    "export",
+    "report",
+]
 
 
 STAGE_KINDS: tuple[StageKind, ...] = (
+    "extraction",
+    "record",
     "quality",
     "identification",
     "temperature",
@@ -84,6 +97,8 @@ class Stages:
 
     def all(self) -> list[Stage]:
         """In the order in which they are made; those of a table that the study has not are missing."""
+        if not self.inputs.groups:  # of cameras whose stages failed
+            return []
         model = self.file.model
         stages = [self._quality()] if model.data.check_quality else []
         for kind, stage_of in (

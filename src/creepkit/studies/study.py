@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from creepkit.errors import StudyError, nearest
 from creepkit.reports.attachments import problem_of_name, same_name
 from creepkit.studies import arguments
+from creepkit.studies.cameras import CameraFiles, StudyCameras
 from creepkit.studies.documents import ResultFolder
 from creepkit.studies.execution import Execution, running_alone
 from creepkit.studies.inputs import InputFile, input_files, read_inputs, resolve_paths
@@ -85,13 +86,15 @@ class Study:
                     ("export", k, "target"),
                     f"there is no target '{export.target}'; {nearest(export.target, exporters)}",
                 )
+        self.cameras.check()
         self._check_outputs()
 
     def _check_outputs(self) -> None:
         """StudyError for data files that there are not, and for files that would replace data or be written twice."""
         import creepkit as ck
 
-        file, model, data = self.file, self.file.model, self.paths
+        file, model = self.file, self.file.model
+        data = [*self.paths, *(path for camera in self.camera_files for path in camera.all)]
         places: list[tuple[tuple[str | int, ...], str]] = [
             (("export", k, "file"), one.file or f"law{ck.available('exporters')[one.target].suffix}")
             for k, one in enumerate(model.export)
@@ -108,6 +111,16 @@ class Study:
                 raise file.error(
                     key, f"'{name}' would be among the data files; give file = another name, or name those more exactly"
                 )
+
+    @property
+    def cameras(self) -> StudyCameras:
+        """The cameras of the study."""
+        return StudyCameras(self.file, self.root)
+
+    @cached_property
+    def camera_files(self) -> list[CameraFiles]:
+        """Files of each camera."""
+        return self.cameras.files()
 
     @cached_property
     def paths(self) -> list[Path]:
@@ -159,17 +172,21 @@ class Study:
         if progress is not None:
             progress("reading", 0, 1, "")
         files = self._input_files(folder, kept, lock_path)
-        inputs = read_inputs(self.file, self.paths)
-        if progress is not None:
-            progress("reading", 1, 1, f"{len(inputs.histories)} tests in {len(files)} files")
-        stages = Stages(self.file, inputs, self.root).all()
-        self._check_exports(stages, folder, files)
         now = lock_of(self.file, self._hash, files, [])
         changes = [] if before is None else differences(before, now)
         if locked and (before is None or changes):
             what = changes[0] if changes else "there is no lock"
             raise StudyError(f"{lock_path}: the study cannot be repeated exactly: {what}; leave --locked out")
-        execution = Execution(kept, inputs.histories, progress)
+        execution = Execution(kept, (), progress)
+        watched = self.cameras.stages(self.camera_files, files)
+        execution.run(watched, [stage.name for stage in watched])  # whatever is asked for is made of their tests
+        complete = not execution.failures
+        inputs = read_inputs(self.file, self.paths, self.cameras.histories(execution.results), complete=complete)
+        if progress is not None:
+            progress("reading", 1, 1, f"{len(inputs.histories)} tests in {len(files)} files")
+        stages = Stages(self.file, inputs, self.root).all()
+        self._check_exports(stages, folder, files)
+        execution.histories = inputs.histories
         execution.run(stages, needed_stages(stages, kinds))
         write_lock(lock_of(self.file, self._hash, files, execution.records, before), lock_path)
         if before is not None:
@@ -177,7 +194,7 @@ class Study:
         result = StudyResult(
             self.file.model.study.title,
             inputs.groups,
-            inputs.exclusions,
+            (*self.cameras.flagged(execution.results), *inputs.exclusions),
             tuple(execution.records),
             tuple(files),
             tuple(changes),
@@ -186,6 +203,8 @@ class Study:
             file=self.file,
             lock_path=lock_path,
             asked=frozenset(execution.asked),
+            extractions=self.cameras.extractions(execution.results),
+            imposed=self.cameras.imposed(execution.results),
         )
         kept.write_identified(result.identified)
         for stage in stages:
@@ -221,7 +240,7 @@ class Study:
         own += [folder / one.file for one in model.export if one.file is not None]
         own += [] if model.report is None else [folder / model.report.file]
         own += [folder / name for name in kept.outputs]
-        paths = [*self.paths]
+        paths = [*self.paths, *(path for camera in self.camera_files for path in camera.all)]
         for k, part in enumerate(model.forecast):
             paths += resolve_paths(self.file, ("forecast", k, "tests"), part.tests, self.root) if part.tests else []
         if model.identification is not None and model.identification.predictor is not None:

@@ -96,6 +96,10 @@ def parse_study(path: Path, text: str) -> StudyFile:
         model = StudyModel.model_validate(data)
     except ValidationError as error:
         raise StudyError(_sentence(path, error, lines)) from None
+    if not model.data.files and not model.camera:
+        place, key = ("[data]", "files") if "data" in data else ("the study", "data")
+        where = line_of(("data",), lines) if "data" in data else 1
+        raise StudyError(f"{path}:{where}: {place} has no '{key}', which it needs; {EXAMPLES[key]}")
     return StudyFile(path, text, model)
 
 
@@ -184,8 +188,10 @@ def _problem(error: Any, key: KeyPath) -> str:
 
 
 EXAMPLES = {
-    "data": 'add the table [data] with files = ["*.csv"]',
+    "data": 'add the table [data] with files = ["*.csv"], or a [[camera]] with frames = "frames"',
     "files": 'write files = ["*.csv"]',
+    "frames": 'write frames = "folder of frames"',
+    "file": 'write file = "record.csv"',
     "laws": 'write laws = ["norton"]',
     "reason": 'write reason = "why it is left out"',
     "target": 'write target = "latex"',
