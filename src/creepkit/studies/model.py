@@ -268,7 +268,8 @@ class RupturePart(Part):
 class ForecastPart(Part):
     """[[forecast]]: measured tests by their files, or a planned one by its load, temperature and end.
 
-    load : as { stress_MPa = 80 } or steps; lengths as { thickness_mm = 0.5 }; targets as { strain = [0.01] }.
+    load : as { stress_MPa = 80 } or steps, of components as
+    { stress_11_MPa = 60, strain_12 = 0 }; lengths as { thickness_mm = 0.5 }; targets as { strain = [0.01] }.
     """
 
     name: Text

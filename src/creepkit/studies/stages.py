@@ -15,6 +15,7 @@ from creepkit.records import ZERO_CELSIUS, History, Predictor
 from creepkit.reports.contents import ExportedFile
 from creepkit.studies import arguments
 from creepkit.studies.inputs import StudyInputs, TestGroup, resolve_paths
+from creepkit.studies.planned_tests import check_forecast, planned_test
 from creepkit.studies.study_file import StudyFile
 
 if TYPE_CHECKING:
@@ -279,7 +280,7 @@ class Stages:
         from creepkit.forecasts.forecast import Forecast
 
         part, place = self.file.model.forecast[number], ("forecast", number)
-        arguments.check_forecast(self.file, number)
+        check_forecast(self.file, number)
         groups = self._groups_of(place, part.group)
         if len(groups) > 1:
             names = " or ".join(f"'{group.name}'" for group in groups)
@@ -303,7 +304,7 @@ class Stages:
             if not tests:
                 low, high = ranking.best.ranges["temperature"]
                 usual = 0.5 * (low + high) if high - low <= ISOTHERMAL_RANGE else None
-                tests = [arguments.planned_test(self.file, number, usual)]
+                tests = [planned_test(self.file, number, usual)]
             return ck.forecast(ranking, tests, progress=tick, **how)
 
         described = [part.model_dump(), self._digests(measured)]

@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING
 from creepkit.errors import StudyError, nearest
 from creepkit.reports.attachments import problem_of_name, same_name
 from creepkit.studies import arguments
+from creepkit.studies.camera_stages import CameraStages
 from creepkit.studies.cameras import CameraFiles, StudyCameras
 from creepkit.studies.documents import ResultFolder
 from creepkit.studies.execution import Execution, running_alone
 from creepkit.studies.inputs import InputFile, input_files, read_inputs, resolve_paths
 from creepkit.studies.lock import changed_results, differences, lock_if_any, lock_of, write_lock
 from creepkit.studies.page import lock_path_of, write_own, write_page
+from creepkit.studies.planned_tests import check_forecast
 from creepkit.studies.result import StudyResult
 from creepkit.studies.stages import STAGE_KINDS, Stage, Stages, needed_stages
 from creepkit.studies.study_file import StudyFile, read_study_file
@@ -73,7 +75,7 @@ class Study:
                 ck.law(model.temperature.law)
         arguments.check_names(file)
         for k, part in enumerate(model.forecast):
-            arguments.check_forecast(file, k)
+            check_forecast(file, k)
             names = [one.name for one in model.forecast[:k]]
             if part.name in names:
                 raise file.error(("forecast", k, "name"), f"two forecasts are called '{part.name}'; rename one of them")
@@ -178,10 +180,11 @@ class Study:
             what = changes[0] if changes else "there is no lock"
             raise StudyError(f"{lock_path}: the study cannot be repeated exactly: {what}; leave --locked out")
         execution = Execution(kept, (), progress)
-        watched = self.cameras.stages(self.camera_files, files)
+        cameras = CameraStages(self.cameras)
+        watched = cameras.stages(self.camera_files, files)
         execution.run(watched, [stage.name for stage in watched])  # whatever is asked for is made of their tests
         complete = not execution.failures
-        inputs = read_inputs(self.file, self.paths, self.cameras.histories(execution.results), complete=complete)
+        inputs = read_inputs(self.file, self.paths, cameras.histories(execution.results), complete=complete)
         if progress is not None:
             progress("reading", 1, 1, f"{len(inputs.histories)} tests in {len(files)} files")
         stages = Stages(self.file, inputs, self.root).all()
@@ -194,7 +197,7 @@ class Study:
         result = StudyResult(
             self.file.model.study.title,
             inputs.groups,
-            (*self.cameras.flagged(execution.results), *inputs.exclusions),
+            (*cameras.flagged(execution.results), *inputs.exclusions),
             tuple(execution.records),
             tuple(files),
             tuple(changes),
@@ -203,8 +206,8 @@ class Study:
             file=self.file,
             lock_path=lock_path,
             asked=frozenset(execution.asked),
-            extractions=self.cameras.extractions(execution.results),
-            imposed=self.cameras.imposed(execution.results),
+            extractions=cameras.extractions(execution.results),
+            imposed=cameras.imposed(execution.results),
         )
         kept.write_identified(result.identified)
         for stage in stages:
