@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import nearest
@@ -75,8 +75,11 @@ def laws_of(file: StudyFile) -> list[CreepLaw]:
         return [law.fix(**{n: v for n, v in part.fix.items() if n in law.names}) for law in laws]
 
 
-def predictor_of(file: StudyFile) -> Predictor | None:
-    """What predicts the tests: the specimen of the study, or a surrogate; None for the specimens that tests name."""
+def predictor_of(file: StudyFile, root: Path | None) -> Predictor | None:
+    """What predicts the tests: the specimen of the study, or a surrogate; None for the specimens that tests name.
+
+    root : folder of files that a report carried, in which `..` is written `up`.
+    """
     import creepkit as ck
 
     model = file.model
@@ -84,9 +87,19 @@ def predictor_of(file: StudyFile) -> Predictor | None:
     named = None if model.identification is None else model.identification.predictor
     if named in (None, "specimen"):
         return specimen
-    beside = file.path.parent / plain_path(file, ("identification", "predictor"), str(named))
+    beside = predictor_path(file, root)
     with file.at("identification", "predictor"):
-        return ck.surrogate(beside if beside.is_file() else str(named))
+        return ck.surrogate(beside if beside is not None else str(named))
+
+
+def predictor_path(file: StudyFile, root: Path | None) -> Path | None:
+    """The file of the study's predictor; None where it has none, or it is known by its name."""
+    part = file.model.identification
+    if part is None or part.predictor is None:
+        return None
+    plain = plain_path(file, ("identification", "predictor"), part.predictor)
+    path = file.path.parent / plain if root is None else root / carried_name(plain)
+    return path if path.is_file() else None
 
 
 def specimen_of_study(file: StudyFile) -> Specimen:
@@ -101,6 +114,11 @@ def specimen_of_study(file: StudyFile) -> Specimen:
     untyped: Any = specimen
     with file.at("specimen", "lengths"):
         return untyped.replace(**lengths) if lengths else specimen
+
+
+def carried_name(path: PurePosixPath) -> str:
+    """The name under which a report carries a file: plain parts only."""
+    return str(PurePosixPath(*("up" if part == ".." else part for part in path.parts)))
 
 
 def plain_path(file: StudyFile, key: tuple[str | int, ...], text: str) -> PurePosixPath:

@@ -66,7 +66,7 @@ class Study:
             raise file.error(
                 ("data", "reader"), f"there is no reader '{model.data.reader}'; {nearest(model.data.reader, readers)}"
             )
-        arguments.predictor_of(file)
+        arguments.predictor_of(file, self.root)
         arguments.settings_of(file)
         if model.identification is not None:
             arguments.laws_of(file)
@@ -190,7 +190,7 @@ class Study:
         stages = Stages(self.file, inputs, self.root).all()
         self._check_exports(stages, folder, files)
         execution.histories = inputs.histories
-        execution.run(stages, needed_stages(stages, kinds))
+        execution.run(stages, needed_stages(stages, kinds), read_others="report" in kinds)
         write_lock(lock_of(self.file, self._hash, files, execution.records, before), lock_path)
         if before is not None:
             changes += changed_results(before, execution.records)
@@ -208,6 +208,7 @@ class Study:
             asked=frozenset(execution.asked),
             extractions=cameras.extractions(execution.results),
             imposed=cameras.imposed(execution.results),
+            documents=dict(execution.documents),
         )
         kept.write_identified(result.identified)
         for stage in stages:
@@ -246,9 +247,8 @@ class Study:
         paths = [*self.paths, *(path for camera in self.camera_files for path in camera.all)]
         for k, part in enumerate(model.forecast):
             paths += resolve_paths(self.file, ("forecast", k, "tests"), part.tests, self.root) if part.tests else []
-        if model.identification is not None and model.identification.predictor is not None:
-            beside = self.path.parent / model.identification.predictor
-            paths += [beside] if beside.is_file() else []
+        predictor = arguments.predictor_path(self.file, self.root)
+        paths += [] if predictor is None else [predictor]
         return input_files(self.file, paths, self.root, own)
 
 
