@@ -94,6 +94,8 @@ class StudyCameras:
             for k, name in enumerate(names):
                 if name in names[:k]:
                     raise self.file.error((table, k, "name"), f"two of them are called '{name}'; rename one of them")
+        for k, part in enumerate(model.camera):
+            self._check(k, part)
         used = {part.record for part in model.camera}
         for k, record in enumerate(model.record):
             if record.name not in used:
@@ -101,8 +103,6 @@ class StudyCameras:
                     ("record", k, "name"), f"no [[camera]] says record = '{record.name}'; add that, or leave it out"
                 )
             self._check_name("instruments", ("record", k, "format"), record.format)
-        for k, part in enumerate(model.camera):
-            self._check(k, part)
 
     def _check_name(self, kind: Any, key: tuple[str | int, ...], name: str | None) -> None:
         import creepkit as ck
