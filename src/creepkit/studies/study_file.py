@@ -97,10 +97,17 @@ def parse_study(path: Path, text: str) -> StudyFile:
     except ValidationError as error:
         raise StudyError(_sentence(path, error, lines)) from None
     if not model.data.files and not model.camera:
-        place, key = ("[data]", "files") if "data" in data else ("the study", "data")
-        where = line_of(("data",), lines) if "data" in data else 1
-        raise StudyError(f"{path}:{where}: {place} has no '{key}', which it needs; {EXAMPLES[key]}")
+        raise StudyError(f"{path}:{_no_tests(data, lines)}")
     return StudyFile(path, text, model)
+
+
+def _no_tests(data: Mapping[str, Any], lines: Mapping[KeyPath, int]) -> str:
+    """What a study lacks that names neither files of tests nor cameras, with its line."""
+    if "data" not in data:
+        return f"1: the study has no 'data', which it needs; {EXAMPLES['data']}"
+    if "files" not in data["data"]:
+        return f"{line_of(('data',), lines)}: [data] has no 'files', which it needs; {EXAMPLES['files']}"
+    return f"{line_of(('data', 'files'), lines)}: [data] files is [], and needs 1 or more entries"
 
 
 def _refuse_long_keys(path: Path, text: str) -> None:
