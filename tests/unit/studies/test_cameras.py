@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import pytest
 
 import creepkit as ck
 from creepkit.errors import StudyError
+from creepkit.studies.proposal import propose_study
+from creepkit.studies.study_file import parse_study
 from helpers.camera_samples import vic_3d
 from helpers.instrument_samples import plate_record
+from helpers.paths import ROOT
 
 CAMERA = """\
 [[record]]
@@ -181,3 +185,27 @@ def test_a_folder_that_cannot_be_listed_is_an_error(curves: Path, monkeypatch: p
     with pytest.raises(StudyError, match="for locked cannot .Permission denied.") as caught:
         loaded(curves, CURVES.replace("*.csv", "*/x.csv"))
     assert "\n" not in str(caught.value)
+
+
+def test_a_proposal_names_frames_records_and_times(folder: Path) -> None:
+    """What it assumed stands in comments, and the file is a study."""
+    proposal = propose_study(folder, folder / "study.toml")
+    model = parse_study(folder / "study.toml", proposal.text).model
+    (camera,), (record,) = model.camera, model.record
+    assert (camera.frames, camera.times, camera.record) == (["frames"], "times.csv", record.name)
+    assert record.file == "record.csv"
+    assert "assumed" in proposal.text
+    loaded(folder, proposal.text)
+
+
+def test_the_tables_of_the_guide_are_valid() -> None:
+    text = (ROOT / "docs" / "how-to" / "run_a_study.md").read_text()
+    blocks = re.findall(r"```toml\n(.*?)```", text, re.S)
+    models = [
+        parse_study(Path("study.toml"), block if "[[camera]]" in block or "[data]" in block else DATA + block).model
+        for block in blocks
+    ]
+    assert [len(model.camera) for model in models] == [0, 1, 0]
+
+
+DATA = '[data]\nfiles = ["*.csv"]\n'
