@@ -207,7 +207,10 @@ def _checked_frames(record: InstrumentRecord, frame_times: ArrayLike, displaceme
 
 
 def nominal_zero(record: InstrumentRecord, times: Floats, camera_start: float | None) -> float:
-    """Camera time at which the record's time is zero if both clocks are right, or, not knowing, by the first frame."""
+    """Camera time at which the record's time is zero if both clocks are right, or, not knowing, by the first frame.
+
+    times : (frames,) s on the camera's clock. camera_start : unix time, s, of its zero.
+    """
     absolute = times[0] > UNIX_TIME
     if absolute and camera_start is not None:
         raise HistoryError(f"frame_times begin with {times[0]:g} s, which is a unix time; leave camera_start away")

@@ -105,12 +105,21 @@ def _matches(base: Path, pattern: PurePosixPath) -> list[Path]:
     found = [base]
     for part in pattern.parts:
         if not set(part) & set("*?["):
-            found = [one / part for one in found if (one / part).exists()]
+            found = [one / part for one in found if _is_there(one / part)]
             continue
         entries = ((one, sorted(os.listdir(one))) for one in found if one.is_dir())
         matching = (one / name for one, names in entries for name in names if fnmatchcase(name, part))
         found = list(islice(matching, MOST_FILES + 1))
     return found if found != [base] else []
+
+
+def _is_there(path: Path) -> bool:
+    """Whether there is such a file; OSError where nobody may look, which Path.exists answers otherwise since 3.13."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
 
 
 def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_out: Sequence[Path]) -> list[InputFile]:

@@ -50,7 +50,7 @@ def loaded(folder: Path, text: str) -> ck.Study:
     ("old", "new", "line", "words"),
     [
         ('record = "rig"', 'record = "rog"', 8, "there is no record 'rog'; did you mean 'rig'?"),
-        ('record = "rig"', "", 2, "no [[camera]] says record = 'rig'"),
+        ('record = "rig"', "load = { pressure_bar = 5 }\ntemperature_C = 700", 2, "no [[camera]] says record = 'rig'"),
         ('frames = "frames"', 'frames = "films"', 7, "there is no file or folder 'films'"),
         ('file = "record.csv"', 'file = "rec*.txt"', 3, "there is no file or folder 'rec*.txt'"),
         ("interval_s = 10", 'interval_s = 10\ntimes = "times.csv"', 9, "interval_s: contradicts times"),
@@ -183,7 +183,7 @@ def test_a_folder_that_cannot_be_listed_is_an_error(curves: Path, monkeypatch: p
 
     monkeypatch.setattr(os, "listdir", refusing)
     with pytest.raises(StudyError, match="for locked cannot .Permission denied.") as caught:
-        loaded(curves, CURVES.replace("*.csv", "*/x.csv"))
+        loaded(curves, CURVES.replace("*.csv", "*/*.csv"))
     assert "\n" not in str(caught.value)
 
 
