@@ -24,7 +24,7 @@ from helpers.report_pages import HOSTILE, contents, ranking
 
 TAGS = """
 html head meta title style body a header h1 h2 h3 h4 p nav ol ul li main section div table caption thead tbody tr th td
-figure figcaption pre span footer script math mrow mi mn mo mtext msub msup msubsup mfrac mfenced mtable mtr mtd mover
+figure figcaption pre code span footer script math mrow mi mn mo mtext msub msup msubsup mfrac mfenced mtable mtr mtd mover
 mstyle msqrt mroot noscript svg desc g path text tspan use defs clipPath rect image
 """
 """Elements that a page may have."""
