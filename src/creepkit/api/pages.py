@@ -69,7 +69,7 @@ def _smaller(contents: PageContents) -> str:
     network = sum(len(text) for text in network_of(contents).values())
     if network > LARGE_NETWORK:
         return (
-            f"the weights of the network alone are {network / 1e6:.1f} MB: train one with fewer hidden units or layers, "
-            "or leave the surrogate out"
+            f"the weights of the network alone are {network / 1e6:.1f} MB: train one with fewer hidden units or "
+            "layers, or leave the surrogate out"
         )
     return "give fewer tests or laws"

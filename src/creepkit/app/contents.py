@@ -190,7 +190,10 @@ def _first_temperature(histories: Sequence[History], fit: Identification | None)
 
 
 def usual_end(page_law: PageLaw, stress: float, kelvin: float) -> float:
-    """s, when a bar under `stress` (MPa) at `kelvin` (K) has crept by USUAL_STRAIN, or ruptures; what a first curve is to show."""
+    """s, when a bar has crept by USUAL_STRAIN, or ruptures; what a first curve is to show.
+
+    stress : MPa. kelvin : K.
+    """
     times = np.geomspace(1e-6, 1e22, 561)
     plan = History(name="first curve", times=times, outputs={}, loading=_held_stress(stress), temperature=kelvin)
     law = page_law.law

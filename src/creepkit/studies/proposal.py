@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.duration import duration_known, followed_duration, needs_durations
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality

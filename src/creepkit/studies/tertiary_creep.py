@@ -5,9 +5,9 @@ fitted by least squares to a part of a concave curve the curvature is then negat
 (the weights of its curvature are those of a mean of second derivatives). Its estimate over its standard deviation
 therefore has Student's distribution at most. Noise is what a polynomial of the fourth degree leaves, correlated from
 mean to mean of neighbouring frames as an AR(1) process, whose correlation is corrected for the fit. Noise that is
-correlated over a large part of the test cannot be told from creep, and a rate that rises and falls within a quarter of a
-test is missed where that polynomial does not follow it: tests/unit/studies/test_tertiary_creep.py says what
-was measured.
+correlated over a large part of the test cannot be told from creep, and a rate that rises and falls within a quarter of
+a test is missed where that polynomial does not follow it: tests/unit/studies/test_tertiary_creep.py says what was
+measured.
 """
 
 from __future__ import annotations

@@ -147,7 +147,7 @@ def _assumed_duration(fit: Identification) -> str:
     if not unknown:
         return ""
     return (
-        f" The strain and the time of this point are assumed: of {plural(unknown, 'test')} only a minimum creep rate is "
-        f"known, not the duration, and each is taken to last until a strain of {100 * STRAIN_OF_UNKNOWN_DURATION:g} % at "
-        "that rate."
+        f" The strain and the time of this point are assumed: of {plural(unknown, 'test')} only a minimum creep rate "
+        "is known, not the duration, and each is taken to last until a strain of "
+        f"{100 * STRAIN_OF_UNKNOWN_DURATION:g} % at that rate."
     )

@@ -229,9 +229,7 @@ def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
     return [*blocks, Paragraph(sentence(note), "note")] if note else blocks
 
 
-def _rupture_blocks(
-    name: str, assessment: RuptureAssessment, figures: PageFigures, *, strengths: bool
-) -> list[Block]:
+def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigures, *, strengths: bool) -> list[Block]:
     picture = figures.picture(
         lambda: rupture_figure(assessment),
         f"Rupture assessment{_of(name)}",
