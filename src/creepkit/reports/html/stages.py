@@ -238,7 +238,7 @@ def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigur
         "Isotherms with tests and bounds; master curve; predicted against measured times. Broken lines lie beyond the "
         "stresses tested.",
     )
-    text = Verbatim("Methods, strengths with bounds, and checks", printable_lines(rupture_text(assessment)))
+    text = Verbatim("Methods and checks", printable_lines(rupture_text(assessment, strengths=False)))
     return [*(strength_blocks(assessment) if strengths else []), picture, text]
 
 
