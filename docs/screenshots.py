@@ -4,9 +4,13 @@
 To take them anew, with Chromium on PATH and the Python package playwright::
 
     make docs
-    .venv/bin/python docs/screenshots.py
+    .venv/bin/python docs/screenshots.py [--to FOLDER]
+
+A part of a report that is missing, or an error in the browser's console, ends the program with exit code 1: with
+another folder than the committed one it is a test of the reports as they are built.
 """
 
+import argparse
 import io
 import os
 import shutil
@@ -47,17 +51,23 @@ FLAGS = [
 
 def main() -> None:
     """Write every picture; an error where a report, or a part of it, is missing."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--to", type=Path, default=TARGET, help="folder of the pictures; the committed one by default")
+    target = parser.parse_args().to
     chromium = shutil.which("chromium")
     if chromium is None:
         raise SystemExit("there is no chromium on PATH; the committed pictures stay as they are")
-    TARGET.mkdir(parents=True, exist_ok=True)
+    target.mkdir(parents=True, exist_ok=True)
+    errors: list[str] = []
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         page = browser.new_context(
             viewport={"width": WIDTH, "height": WIDTH}, color_scheme="light", offline=True
         ).new_page()
+        page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: errors.append(str(error)))
         for name, (report, element, most) in SHOTS.items():
-            path = TARGET / f"{name}.png"
+            path = target / f"{name}.png"
             width = WIDE.get(name, WIDTH)
             page.set_viewport_size({"width": width, "height": WIDTH})
             page.goto((REPORTS / f"{report}.html").as_uri())
@@ -69,8 +79,10 @@ def main() -> None:
                 "height": min(place["height"] + MARGIN, most),
             }
             path.write_bytes(reduced(page.screenshot(clip=clip, full_page=True)))
-            print(f"{path.relative_to(DOCS.parent)}: {path.stat().st_size / 1000:.0f} kB")
+            print(f"{name}: {path.stat().st_size / 1000:.0f} kB")
         browser.close()
+    if errors:
+        raise SystemExit("errors in the browser's console: " + "; ".join(errors))
 
 
 def reduced(png: bytes) -> bytes:

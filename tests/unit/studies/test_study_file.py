@@ -359,7 +359,7 @@ BASE = '[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["norton"]\n'
         (BASE + '[temperature]\nforms = { n = ["linar"] }\n', 6, "did you mean 'linear'"),
         (BASE + '[temperature]\nforms = { nn = ["linear"] }\n', 6, "no law has a parameter 'nn'"),
         ('[data]\nfiles = ["../**/*.csv"]\n', 2, "folders of any depth"),
-        (BASE + '[[forecast]]\nname = "a"\n', 5, "one load"),
+        (BASE + '[[forecast]]\nname = "a"\n', 5, "a planned test has a load"),
         (BASE + '[[forecast]]\nname = "a"\nload = { stress_MPa = 5 }\n', 5, "end_h"),
         (BASE + '[[forecast]]\nname = "a"\nload = { stres_MPa = 5 }\nend_h = 1\n', 7, "did you mean 'stress_MPa'"),
         (BASE + '[[forecast]]\nname = "a"\nload = { stress_C = 5 }\nend_h = 1\n', 7, "stress"),
