@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import IO, Any
 
+from creepkit.files.cache_folders import cache_environment
 from creepkit.import_path import environment_without_working_folder
 from creepkit.registry.plugin_registry import load_plugin_file, loaded_plugin_files
 
@@ -41,7 +42,7 @@ def start_worker() -> subprocess.Popen[bytes]:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         bufsize=0,
-        env={**environment_without_working_folder(), **ONE_THREAD},
+        env={**environment_without_working_folder(), **cache_environment(), **ONE_THREAD},
         start_new_session=True,
     )
 
