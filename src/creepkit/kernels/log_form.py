@@ -8,7 +8,8 @@ Differences of exponentials that cancel are rewritten, and the leading exponent 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +30,7 @@ from creepkit.kernels.kernel_functions import (
     Tanh,
     in_sympy_functions,
 )
+from creepkit.language.expression_cost import expression_cost
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, strain, temperature, time
 
@@ -112,8 +114,26 @@ class LogForm:
     coefficients: tuple[tuple[int, ...], ...]
 
 
+@contextmanager
+def in_one_sentence(law: CreepLaw) -> Iterator[None]:
+    """LawError for what sympy raises while it rewrites or differentiates a law, such as conditions on conditions."""
+    try:
+        yield
+    except (ArithmeticError, AttributeError, NotImplementedError, RecursionError, TypeError, ValueError) as error:
+        cause = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        raise LawError(
+            f"law '{law.name}' cannot be differentiated and lowered to kernels ({cause}); write it without conditions "
+            "within conditions"
+        ) from error
+
+
 def log_form(law: CreepLaw) -> LogForm:
     """Lower a law; LawError, naming the term, where it holds what no kernel can evaluate."""
+    with in_one_sentence(law):
+        return _log_form(law)
+
+
+def _log_form(law: CreepLaw) -> LogForm:
     logs = _log_symbols(law)
     lowering = _LogLowering(logs, {*POINT_VARIABLES, *law.states})
     rates = {f"rate of '{symbol}'": state.rate for symbol, state in law.states.items()}
@@ -157,10 +177,12 @@ def _check_expression(expression: sympy.Expr, origin: str) -> None:
         if not (node.is_Atom or isinstance(node, (*KNOWN_FUNCTIONS, *_ALGEBRAIC_NODES, *_CONDITIONS))):
             allowed = ", ".join(sorted(f.__name__ for f in KNOWN_FUNCTIONS))
             raise LawError(
-                f"{origin}: the function {node.func.__name__} in {node} has no kernel; allowed are {allowed}"
+                f"{origin}: the function {node.func.__name__} in {node!s:.200} has no kernel; allowed are {allowed}"
             )
         if isinstance(node, sympy.Piecewise) and node.args[-1].cond != sympy.true:
-            raise LawError(f"{origin}: the last branch of {node} must hold in all remaining cases: write (..., True)")
+            raise LawError(
+                f"{origin}: the last branch of {node!s:.200} must hold in all remaining cases: write (..., True)"
+            )
 
 
 def _vanishing_factors(term: sympy.Expr) -> set[sympy.Symbol]:
@@ -307,15 +329,21 @@ def _exponent_at_zero(term: sympy.Expr, variable: sympy.Symbol) -> sympy.Expr:
     return sympy.S.Zero if _is_undefined(result) else result
 
 
+LIMIT_SIZE = 3000
+"""Nodes of the derivatives of a slope up to which sympy is asked for its limit, which it finds in seconds or not."""
+
+
 def _limit(slope: sympy.Expr, variable: sympy.Symbol) -> sympy.Expr:
     at_zero = slope.subs(variable, 0)
     if not _is_undefined(at_zero):
         return at_zero
+    if expression_cost(slope).derivatives > LIMIT_SIZE:
+        return sympy.S.NaN
     positive = {s: sympy.Dummy(s.name, positive=True) for s in slope.free_symbols}
     original_symbols = {d: s for s, d in positive.items()}
     try:
         return sympy.limit(slope.xreplace(positive), positive[variable], 0, "+").xreplace(original_symbols)
-    except (NotImplementedError, ValueError):
+    except (ArithmeticError, AttributeError, NotImplementedError, RecursionError, TypeError, ValueError):
         return sympy.S.NaN
 
 
