@@ -122,8 +122,8 @@ def in_one_sentence(law: CreepLaw) -> Iterator[None]:
     except (ArithmeticError, AttributeError, NotImplementedError, RecursionError, TypeError, ValueError) as error:
         cause = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise LawError(
-            f"law '{law.name}' cannot be differentiated and lowered to kernels ({cause}); write it without conditions "
-            "within conditions"
+            f"law '{law.name}' cannot be differentiated and lowered to kernels ({cause}); write it in another "
+            "form, without conditions within conditions"
         ) from error
 
 

@@ -16,10 +16,13 @@ from dataclasses import dataclass
 import sympy
 
 from creepkit.errors import LawError
-from creepkit.language.expression_trees import DEPTH_LIMIT, SIZE_LIMIT
+from creepkit.language.expression_trees import DEPTH_LIMIT, EXPONENT_LIMIT, SIZE_LIMIT, magnitude
 
-DERIVATIVE_LIMIT = 100_000
-"""Nodes of all first derivatives of a law, before common subexpressions are shared."""
+TERM_LIMIT, DERIVATIVE_LIMIT = 6_000, 40_000
+"""Nodes of the first derivatives of a term and of a whole law, before common subexpressions are shared.
+
+Eleven laws of the packages added, each with an activation energy, have 20,000 together, and 2,000 in a term at most.
+"""
 
 
 SUMMAND_LIMIT = 2000
@@ -36,7 +39,7 @@ class ExpressionCost:
 
     depth : levels. size : nodes, each as often as it is used. lowered : nodes once it is lowered. derivatives : nodes
     of its derivatives to all of its symbols. summands : of its expansion. branches : combinations of conditions.
-    symbols : on which it depends.
+    power : the largest product of numeric exponents within each other. symbols : on which it depends.
     """
 
     depth: float
@@ -45,6 +48,7 @@ class ExpressionCost:
     derivatives: float
     summands: float
     branches: float
+    power: float
     symbols: frozenset[sympy.Symbol]
 
 
@@ -68,8 +72,10 @@ def check_cost(origin: str, expressions: Iterable[tuple[str, sympy.Basic]]) -> N
         excess = (
             (cost.depth, DEPTH_LIMIT, "levels of nesting"),
             (cost.size, SIZE_LIMIT, "nodes"),
+            (cost.power, EXPONENT_LIMIT, "as the product of exponents"),
             (cost.branches, BRANCH_LIMIT, "combinations of branches, for its conditions hold other conditions"),
             (cost.summands, SUMMAND_LIMIT, "summands when its products and powers of sums are expanded"),
+            (cost.derivatives, TERM_LIMIT, "operations in its derivatives"),
             (total, DERIVATIVE_LIMIT, "operations in the derivatives of the law"),
         )
         for count, limit, what in excess:
@@ -98,22 +104,27 @@ def _nodes_after_arguments(expression: sympy.Basic) -> Iterator[sympy.Basic]:
             pending.extend((argument, False) for argument in node.args)
 
 
-_ROUNDED = (sympy.Abs, sympy.sign, sympy.Heaviside)
+_EXPONENT_LEVELS = 4.0
+"""Levels that a power with a symbol in its exponent adds, and what sympy asks of towers of them."""
+
+
+_BRANCHED = (sympy.Abs, sympy.sign, sympy.Heaviside)
 """Functions that become branches."""
 
 
 def _node_cost(node: sympy.Basic, parts: list[ExpressionCost]) -> ExpressionCost:
     if not parts:
         symbols = frozenset([node] if isinstance(node, sympy.Symbol) else [])
-        return ExpressionCost(1.0, 1.0, 2.0, float(len(symbols)), 1.0, 1.0, symbols)
+        return ExpressionCost(1.0, 1.0, 2.0, float(len(symbols)), 1.0, 1.0, 1.0, symbols)
     lowered = _lowered_nodes(node, parts)
     return ExpressionCost(
-        depth=1.0 + max(part.depth for part in parts),
+        depth=1.0 + max(part.depth for part in parts) + (_EXPONENT_LEVELS if node.is_Pow and parts[1].symbols else 0.0),
         size=1.0 + sum(part.size for part in parts),
         lowered=lowered,
         derivatives=sum(part.derivatives for part in parts) + _of_partial_derivatives(node, parts, lowered),
         summands=_summands(node, parts),
         branches=_branches(node, parts),
+        power=_power(node, parts),
         symbols=frozenset().union(*(part.symbols for part in parts)),
     )
 
@@ -121,7 +132,7 @@ def _node_cost(node: sympy.Basic, parts: list[ExpressionCost]) -> ExpressionCost
 def _lowered_nodes(node: sympy.Basic, parts: list[ExpressionCost]) -> float:
     """A condition on x and the branches x and -x are three of it; a power is exp(k ln x)."""
     total = sum(part.lowered for part in parts)
-    if isinstance(node, _ROUNDED):
+    if isinstance(node, _BRANCHED):
         return 3.0 * total + 6.0
     return total + (4.0 if node.is_Pow else 1.0)
 
@@ -161,3 +172,17 @@ def _branches(node: sympy.Basic, parts: list[ExpressionCost]) -> float:
     if node.is_Boolean and product > 1.0:
         return product * product
     return product
+
+
+def _power(node: sympy.Basic, parts: list[ExpressionCost]) -> float:
+    """The product of numeric exponents; sympy multiplies them, and raises the numbers in their base to it."""
+    largest = max(part.power for part in parts)
+    if not node.is_Pow or parts[1].symbols:
+        return largest
+    if parts[1].size > _LARGEST_CONSTANT or parts[1].power > EXPONENT_LIMIT:
+        return math.inf
+    return largest * max(1.0, float(min(magnitude(node.args[1]), 1e300)))
+
+
+_LARGEST_CONSTANT = 50
+"""Nodes of an exponent without symbols that is computed."""
