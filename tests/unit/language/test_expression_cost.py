@@ -39,7 +39,7 @@ HOSTILE = {
     "a product of sums": lambda: Mul(*(exp(k * stress) + exp(k * strain) - k for k in range(1, 22)), evaluate=False),
     "a large power of a sum": lambda: (stress + strain + time + temperature) ** 999,
     "nested squares": lambda: nested(lambda e: Pow(e, 2, evaluate=False), 28),
-    "a number of a million digits": lambda: stress * Pow(7, 10**6, evaluate=False),
+    "a number of a million digits": lambda: Mul(stress, Pow(7, 10**6, evaluate=False), evaluate=False),
     "a tower of numbers": lambda: stress ** Pow(7, Pow(7, Pow(7, 7, evaluate=False), evaluate=False), evaluate=False),
     "a deep expression": lambda: nested(lambda e: exp(-e, evaluate=False), 200),
     "a sum of 2000 powers": lambda: Add(*(strain**k for k in range(2, 2000))),
