@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.duration import duration_known, followed_duration, needs_durations
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
@@ -18,16 +16,13 @@ from creepkit.records import ZERO_CELSIUS, History, dimensions_of, load_unit
 from creepkit.studies.camera_proposal import CameraProposal, proposed_cameras, text_of_cameras
 from creepkit.studies.folders import folders_with_tests
 from creepkit.studies.study_file import parse_study
+from creepkit.studies.tertiary_creep import shows_tertiary_creep
 from creepkit.studies.toml_text import comment, one_line, quoted, quoted_list, study_part
 
 SECONDARY_LAWS = ("norton", "strain-hardening", "time-hardening")
 SEVERAL_STRESSES_LAW = "hyperbolic-sine"
 TERTIARY_LAWS = ("norton", "mpc-omega", "kachanov-rabotnov")
 """Candidates, those of them that are installed."""
-
-
-TERTIARY_RATIO = 2.0
-"""Rate at the end of a test over its smallest, from which on it is called tertiary creep."""
 
 
 TERTIARY_SHARE = 0.3
@@ -89,7 +84,7 @@ class DataSummary:
             tuple(dict.fromkeys(h.alloy for h in tests if h.alloy)),
             tuple(dict.fromkeys(h.labels["heat"] for h in tests if h.labels.get("heat"))),
             sum(history.rupture_time is not None for history in tests),
-            sum(_is_tertiary(history) for history in tests),
+            sum(shows_tertiary_creep(history) for history in tests),
         )
 
     @property
@@ -124,21 +119,6 @@ def _held_levels(history: History) -> list[float]:
     values = program.values
     held = [float(v) for v, later in pairwise((*values, values[-1])) if v == later and v > 0]
     return held or [float(values.max())]
-
-
-def _is_tertiary(history: History) -> bool:
-    """Whether the rate of its first output rises at the end: the last tenth against the slowest tenth."""
-    if not history.outputs or history.used.sum() < 20:
-        return False
-    times, values = history.times[history.used], next(iter(history.outputs.values()))[history.used]
-    edges = np.unique(np.linspace(0, times.size - 1, 11).astype(int))
-    span = np.diff(times[edges])
-    rates = np.diff(values[edges])[span > 0] / span[span > 0]
-    slowest = rates[rates > 0].min(initial=np.inf)
-    steady = np.ptp(history.loading.program().values[1:]) == 0 if history.loading.program().values.size > 1 else True
-    return bool(
-        steady and np.isfinite(slowest) and rates[-1] > TERTIARY_RATIO * slowest and rates.argmin() < len(rates) - 1
-    )
 
 
 def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyProposal:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.duration import duration_known
+from creepkit.inverse.uncertainty.laplace_approximation import cut_intervals
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.reports.design import design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
@@ -29,6 +31,7 @@ from creepkit.reports.html.elements import (
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import findings_of
+from creepkit.reports.html.law_tables import ENDS_AT_BOUND
 from creepkit.reports.html.test_details import NOT_STATED, table_of_details
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.rupture import rupture_text, strength_rows
@@ -137,12 +140,16 @@ def _selections(contents: ReportContents) -> Iterator[str]:
 
 
 def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[PageSection]:
-    """Extraction, records, temperature, rupture, forecasts and further tests, where there are such results."""
+    """Extraction, records, temperature, rupture, forecasts and further tests, where there are such results.
+
+    Strengths stand among the findings where no law was identified, and are not repeated.
+    """
+    identified = any(findings_of(group) is not None for group in contents.groups)
     stages: tuple[tuple[str, str, Mapping[str, Any], Callable[[str, Any, PageFigures], list[Block]]], ...] = (
         ("extraction", "Extraction from camera frames", contents.extractions, _extraction_blocks),
         ("imposed", "Loads and temperatures from instrument records", contents.imposed, _imposed_blocks),
         ("temperature", "Trends with temperature", contents.temperature, _temperature_blocks),
-        ("rupture", "Rupture", contents.rupture, _rupture_blocks),
+        ("rupture", "Rupture", contents.rupture, partial(_rupture_blocks, strengths=identified)),
         ("forecasts", "Forecasts", contents.forecasts, _forecast_blocks),
         ("design", "Further tests proposed", contents.design, _design_blocks),
     )
@@ -204,13 +211,14 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
                 f"those at {law.T_ref:.1f} K."
             )
         )
+        cut = cut_intervals(law.law, law.estimates)
         rows = [
             (
                 e.name,
                 number(e.value, 5),
                 f"{number(e.low)} to {number(e.high)}",
                 "" if e.unit == "1" else e.unit,
-                e.verdict,
+                ENDS_AT_BOUND if e.name in cut else e.verdict,
             )
             for e in law.estimates
         ]
@@ -240,7 +248,7 @@ def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
     return [*blocks, Paragraph(sentence(note), "note")] if note else blocks
 
 
-def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigures) -> list[Block]:
+def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigures, *, strengths: bool) -> list[Block]:
     picture = figures.picture(
         lambda: rupture_figure(assessment),
         f"Rupture assessment{_of(name)}",
@@ -249,8 +257,8 @@ def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigur
         "Isotherms with tests and bounds; master curve; predicted against measured times. Broken lines lie beyond the "
         "stresses tested.",
     )
-    text = Verbatim("Methods, strengths with bounds, and checks", printable_lines(rupture_text(assessment)))
-    return [*strength_blocks(assessment), picture, text]
+    text = Verbatim("Methods and checks", printable_lines(rupture_text(assessment, strengths=False)))
+    return [*(strength_blocks(assessment) if strengths else []), picture, text]
 
 
 def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> list[Block]:
