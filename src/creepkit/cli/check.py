@@ -33,19 +33,20 @@ def command(
 
 
 def _reports_of(target: str) -> list[ConformanceReport]:
-    """The reports of a plugin file, whose name ends in .py, or of what is registered under a name.
+    """The reports of what is registered under a name, or else of a plugin file, whose name ends in .py.
 
     No other file is executed: one that happens to have the name of a law is not asked for.
     """
     from creepkit import registry
     from creepkit.errors import CreepkitError, PluginError
+    from creepkit.registry.plugin_sources import is_plugin_file_name
     from creepkit.testing import check_named, check_plugin
 
-    if target.endswith(".py"):
-        return check_plugin(registry.default_registry().load_file(target))
     try:
         return check_named(target)
     except CreepkitError as error:
+        if is_plugin_file_name(target):
+            return check_plugin(registry.default_registry().load_file(target))
         if Path(target).is_file():
             raise PluginError(
                 f"{error}; the file {target} is not executed, for only names that end in .py are those of files"

@@ -1,20 +1,16 @@
 """Workers that run the tasks of a job: processes of this machine with one thread each, or a dask cluster.
 
-A worker process receives task numbers on standard input and writes results to standard output. It is started as a new
-interpreter, because a fork would copy locks of libraries such as torch.
+A worker process receives task numbers on standard input and writes results to standard output.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import pickle
 import re
 import selectors
 import signal
-import struct
 import subprocess
-import sys
 import time
 from collections import Counter
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -25,7 +21,7 @@ from typing import IO, Any, Protocol
 from creepkit.arrays import usable_cores
 from creepkit.errors import CreepkitError, DatasetError
 from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task
-from creepkit.registry.plugin_registry import loaded_plugin_files
+from creepkit.jobs.worker_start import setup_message, start_worker
 
 SHARD_ROWS = 256
 """Samples of a shard: some seconds of work, so that little is lost when a process dies."""
@@ -119,13 +115,6 @@ class ClusterWorkers:
 
 def _one_line(error: BaseException) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())
-
-
-THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMBA")
-"""Libraries that start threads of their own: two threads on one busy core are many times slower than one."""
-
-
-ONE_THREAD = dict.fromkeys((f"{library}_NUM_THREADS" for library in THREADED_LIBRARIES), "1")
 
 
 TERMINATION_TIMEOUT = 5
@@ -243,8 +232,7 @@ class ProcessWorkers:
     """Worker processes of this machine; a context."""
 
     def __init__(self, job: Job, processes: int) -> None:
-        parts = (pickle.dumps(sys.path), pickle.dumps(loaded_plugin_files()), pickle.dumps(job))
-        self._setup_message = b"".join(struct.pack("!Q", len(part)) + part for part in parts)
+        self._setup_message = setup_message(job)
         self._size = processes
         self._processes: list[WorkerProcess] = []
         self._selector = selectors.DefaultSelector()
@@ -277,15 +265,7 @@ class ProcessWorkers:
             self._close(process)
 
     def _start(self) -> WorkerProcess:
-        """A new process, in a session of its own: Ctrl-C is for us alone, who then end it."""
-        popen = subprocess.Popen(
-            [sys.executable, "-P", "-m", "creepkit.jobs.worker_process"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            bufsize=0,
-            env={**os.environ, **ONE_THREAD},
-            start_new_session=True,
-        )
+        popen = start_worker()
         process = WorkerProcess(popen)
         self._processes.append(process)
         self._selector.register(_pipe(popen.stdout), selectors.EVENT_READ, process)

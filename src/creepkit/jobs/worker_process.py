@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import json
 import os
-import pickle
 import signal
-import struct
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any, Protocol
 
 from creepkit.errors import CreepkitError
-from creepkit.registry.plugin_registry import load_plugin_file
+from creepkit.jobs.worker_start import receive_job
 
 
 @dataclass(frozen=True)
@@ -101,10 +99,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _terminate)
     stdin, stdout = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # whatever else is printed belongs on stderr
-    sys.path[:] = _read_pickled(stdin)
-    for plugin_file in _read_pickled(stdin):  # whose classes the job may have
-        load_plugin_file(plugin_file)
-    job = _read_pickled(stdin).on_one_thread()
+    job = receive_job(stdin).on_one_thread()
     _write_result(stdout, {"ready": True})
     for line in stdin:
         _write_result(stdout, asdict(run_task(job, int(line))))
@@ -113,11 +108,6 @@ def main() -> None:
 def _terminate(*_: object) -> None:
     """End as after an error: a sample that is given up on request has not killed its process."""
     raise SystemExit(0)
-
-
-def _read_pickled(stream: IO[bytes]) -> Any:
-    (size,) = struct.unpack("!Q", stream.read(8))
-    return pickle.loads(stream.read(size))
 
 
 def _write_result(stream: IO[bytes], document: dict[str, Any]) -> None:

@@ -3,7 +3,7 @@
 Each generated module has a folder of its own, named after the hash of all that it was made from, with the source, the
 machine code and the SHA-256 of both. A folder is built under a temporary name and renamed into place whole; one whose
 checksums do not match is built anew. What is checked is what is executed. Machine code from the cache is executed, so
-a folder that another user owns or can write to is not used; without a folder, modules run from memory.
+nothing that another user owns or can write to is used (files.cache_folders); without a folder, modules run from memory.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, frozen
 from creepkit.errors import CacheWarning
+from creepkit.files.cache_folders import SharedFolderError, cache_folder, check_own, check_private, is_marked
 from creepkit.kernels.interface import CompiledLaw, Entry
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, expression_source, law_comments
 from creepkit.kernels.llvm_code import Module, add_entry
@@ -49,13 +50,20 @@ _loaded_modules: dict[str, ModuleType] = {}
 def load_module(key: str, source: Callable[[], str]) -> ModuleType:
     """Return the module of `key`: from memory, from disk, or made from source() now."""
     if key not in _loaded_modules:
-        folder = cache_folder() / f"law_{key}"
+        cache_of_kernels = cache_folder(KERNELS)
+        if cache_of_kernels is None:
+            _loaded_modules[key] = _execute_module(key, Path(f"law_{key}"), _made_files(source()))
+            return _loaded_modules[key]
+        folder = cache_of_kernels / f"law_{key}"
         files, shared = None, False
         try:
             files = _stored_files(folder)
-        except _SharedError as error:
+        except SharedFolderError as error:
             shared = True
-            _warn(str(error))
+            _warn(
+                f"{error}, so that the law is neither read from there nor kept there, and every process compiles it "
+                f"anew; delete it, or set CREEPKIT_CACHE to a folder of your own"
+            )
         if files is None:
             files = _made_files(source())
             if not shared:
@@ -64,37 +72,30 @@ def load_module(key: str, source: Callable[[], str]) -> ModuleType:
     return _loaded_modules[key]
 
 
-def cache_folder() -> Path:
-    """Where generated kernels are kept: CREEPKIT_CACHE, else `creepkit` in the user's cache folder."""
-    chosen = os.environ.get("CREEPKIT_CACHE")
-    base = Path(chosen) if chosen else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "creepkit"
-    return base / "kernels"
+KERNELS = "kernels"
+"""Name of the cache folder."""
 
 
 def is_intact(folder: Path) -> bool:
     """Whether a folder holds source, code and their seal, unchanged, nothing else, and nobody else can write to it."""
     try:
         return _stored_files(folder) is not None
-    except _SharedError:
+    except SharedFolderError:
         return False
 
 
 # ---- reading -------------------------------------------------------------------------------------------------------
 
 
-class _SharedError(Exception):
-    """Others may have written what would be executed."""
-
-
 def _stored_files(folder: Path) -> dict[str, bytes] | None:
-    """Source and code of an intact folder, {name: content}, else None; _SharedError where others can write."""
+    """Source and code of an intact folder, {name: content}, else None; SharedFolderError where others can write."""
     names = (SOURCE_FILE, CODE_FILE, CHECKSUM_FILE)
     try:
-        _check_owner(folder.parent, os.stat(folder.parent))
+        check_private(folder.parent)
         status = os.lstat(folder)
         if not stat.S_ISDIR(status.st_mode):
             return None
-        _check_owner(folder, status)
+        check_own(folder, status)
         if {*os.listdir(folder)} != {*names}:
             return None
         contents = {name: _content(folder / name) for name in names}
@@ -113,24 +114,8 @@ def _content(path: Path) -> bytes:
         status = os.fstat(stream.fileno())
         if not stat.S_ISREG(status.st_mode):
             raise OSError(f"{path} is not a regular file")
-        _check_owner(path, status)
+        check_own(path, status)
         return stream.read()
-
-
-def _check_owner(path: Path, status: os.stat_result) -> None:
-    """Raise _SharedError unless a file or folder is this user's and nobody else can write to it."""
-    if not hasattr(os, "geteuid"):  # the mode says nothing of others there
-        return
-    if status.st_uid != os.geteuid():
-        problem = "belongs to another user"
-    elif status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        problem = "can be written by other users"
-    else:
-        return
-    raise _SharedError(
-        f"{path} {problem}, so that compiled laws are neither read from there nor kept there, and every process "
-        f"compiles them anew; delete it, or set CREEPKIT_CACHE to a folder of your own"
-    )
 
 
 @cache
@@ -153,7 +138,6 @@ def _store(folder: Path, files: dict[str, bytes]) -> None:
     Where that is impossible (no permission, a full disk) the module runs from memory, and the next process makes it.
     """
     with suppress(OSError):
-        folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f"new_{folder.name}_"))
         try:
             for name, content in {**files, CHECKSUM_FILE: _seal(files)}.items():
@@ -165,8 +149,11 @@ def _store(folder: Path, files: dict[str, bytes]) -> None:
 
 
 def _install_folder(temporary: Path, folder: Path) -> None:
-    """Rename the new folder into place; an intact one that is there already stays, a damaged one goes."""
-    if os.path.lexists(folder) and not is_intact(folder):
+    """Rename the new folder into place; an intact one that is there already stays, a damaged one goes.
+
+    Only in a cache folder that creepkit has marked as its own is anything removed.
+    """
+    if os.path.lexists(folder) and is_marked(folder.parent) and not is_intact(folder):
         _remove_folder(folder)
     os.rename(temporary, folder)  # fails where another process has just done it
 

@@ -8,7 +8,8 @@ Differences of exponentials that cancel are rewritten, and the leading exponent 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -112,8 +113,26 @@ class LogForm:
     coefficients: tuple[tuple[int, ...], ...]
 
 
+@contextmanager
+def in_one_sentence(law: CreepLaw) -> Iterator[None]:
+    """LawError for what sympy raises while it rewrites or differentiates a law, such as conditions on conditions."""
+    try:
+        yield
+    except (ArithmeticError, AttributeError, NotImplementedError, RecursionError, TypeError, ValueError) as error:
+        cause = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        raise LawError(
+            f"law '{law.name}' cannot be differentiated and lowered to kernels ({cause}); write it in another "
+            "form, without conditions within conditions"
+        ) from error
+
+
 def log_form(law: CreepLaw) -> LogForm:
     """Lower a law; LawError, naming the term, where it holds what no kernel can evaluate."""
+    with in_one_sentence(law):
+        return _log_form(law)
+
+
+def _log_form(law: CreepLaw) -> LogForm:
     logs = _log_symbols(law)
     lowering = _LogLowering(logs, {*POINT_VARIABLES, *law.states})
     rates = {f"rate of '{symbol}'": state.rate for symbol, state in law.states.items()}
@@ -157,10 +176,12 @@ def _check_expression(expression: sympy.Expr, origin: str) -> None:
         if not (node.is_Atom or isinstance(node, (*KNOWN_FUNCTIONS, *_ALGEBRAIC_NODES, *_CONDITIONS))):
             allowed = ", ".join(sorted(f.__name__ for f in KNOWN_FUNCTIONS))
             raise LawError(
-                f"{origin}: the function {node.func.__name__} in {node} has no kernel; allowed are {allowed}"
+                f"{origin}: the function {node.func.__name__} in {node!s:.200} has no kernel; allowed are {allowed}"
             )
         if isinstance(node, sympy.Piecewise) and node.args[-1].cond != sympy.true:
-            raise LawError(f"{origin}: the last branch of {node} must hold in all remaining cases: write (..., True)")
+            raise LawError(
+                f"{origin}: the last branch of {node!s:.200} must hold in all remaining cases: write (..., True)"
+            )
 
 
 def _vanishing_factors(term: sympy.Expr) -> set[sympy.Symbol]:

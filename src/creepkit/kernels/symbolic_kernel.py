@@ -9,14 +9,21 @@ from __future__ import annotations
 import keyword
 import re
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
 
 import sympy
 
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, Floored, LogFloor, assignment_lines, expression_source
-from creepkit.kernels.log_form import FLOOR, LogForm, floor_of, log_form, with_all_exponential_differences
+from creepkit.kernels.log_form import (
+    FLOOR,
+    LogForm,
+    floor_of,
+    in_one_sentence,
+    log_form,
+    with_all_exponential_differences,
+)
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES
 
@@ -120,6 +127,17 @@ class KernelFunction:
         return "\n".join(lines) + f"\n    return (\n{outputs}    )\n"
 
 
+def _explained(entry: Callable[[SymbolicKernel], KernelFunction]) -> Callable[[SymbolicKernel], KernelFunction]:
+    """The entry of a kernel, made with what sympy raises as one sentence."""
+
+    @wraps(entry)
+    def explained(kernel: SymbolicKernel) -> KernelFunction:
+        with in_one_sentence(kernel.law):
+            return entry(kernel)
+
+    return explained
+
+
 class SymbolicKernel:
     """A law as entries, ready for a printer, each made when it is first asked for.
 
@@ -136,33 +154,39 @@ class SymbolicKernel:
         self._size, self._variables = len(point), (*point, *self.form.theta)
 
     @cached_property
+    @_explained
     def rate(self) -> KernelFunction:
         """Rates: of creep, then of each state."""
         return _kernel_function("rate", self.names, self._terms, self._rates)
 
     @cached_property
+    @_explained
     def terms(self) -> KernelFunction:
         """The rate of each term of the law."""
         return _kernel_function("terms", self.names, self._terms, [*self._terms])
 
     @cached_property
+    @_explained
     def log_rate(self) -> KernelFunction:
         """ln of the rate of creep, then rates of states."""
         return _kernel_function("log_rate", self.names, self._scaled_terms, self._log_rates)
 
     @cached_property
+    @_explained
     def update(self) -> KernelFunction:
         """The same, then derivatives to the point and the states."""
         outputs = [*self._log_rates, *self._derivatives(self._weights, 0, self._size)]
         return _kernel_function("update", self.names, self._scaled_terms, outputs)
 
     @cached_property
+    @_explained
     def sensitivity(self) -> KernelFunction:
         """Rates, their derivatives to the point and the states, then to theta."""
         derivatives = self._all_derivatives([*self._terms])
         return _kernel_function("sensitivity", self.names, self._terms, [*self._rates, *derivatives])
 
     @cached_property
+    @_explained
     def log_sensitivity(self) -> KernelFunction:
         """The same of ln of the rate."""
         derivatives = self._all_derivatives(self._weights)
@@ -206,7 +230,8 @@ class SymbolicKernel:
 
 def symbolic_kernel(law: CreepLaw) -> SymbolicKernel:
     """Lower a law to its entries; LawError, naming the term, where it holds what no kernel can evaluate."""
-    return SymbolicKernel(law)
+    with in_one_sentence(law):
+        return SymbolicKernel(law)
 
 
 def _log_sum_exp(

@@ -307,15 +307,15 @@ def _rational_from(arguments: list[Any]) -> sympy.Rational:
 
 def _check_numbers(built: sympy.Basic, tree: list[Any]) -> None:
     """Refuse numbers that sympy could not evaluate later, such as 9**9**9**9 and x**(10**99)."""
-    if isinstance(built, sympy.Pow) and not built.exp.free_symbols and not _magnitude(built.exp) <= EXPONENT_LIMIT:
+    if isinstance(built, sympy.Pow) and not built.exp.free_symbols and not magnitude(built.exp) <= EXPONENT_LIMIT:
         raise LawError(f"{_short_text(tree)} has an exponent outside -{EXPONENT_LIMIT} to {EXPONENT_LIMIT}")
     if isinstance(built, sympy.Expr) and not built.free_symbols:
-        size = _magnitude(built)
+        size = magnitude(built)
         if not (size == 0 or 1e-308 < size < 1e308):
             raise LawError(f"{_short_text(tree)} is not a real number between 1e-308 and 1e308 in size")
 
 
-def _magnitude(number: sympy.Basic) -> Any:
+def magnitude(number: sympy.Basic) -> Any:
     """Absolute value of an expression without symbols; infinite when it is not real or cannot be computed."""
     try:
         with mpmath.workdps(20):

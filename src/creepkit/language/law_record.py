@@ -21,6 +21,7 @@ from sympy.logic.boolalg import Boolean, BooleanAtom
 
 from creepkit.arrays import ArrayLike, Bools, Floats
 from creepkit.errors import LawError, nearest
+from creepkit.language.expression_cost import check_cost
 from creepkit.language.expression_trees import evaluate_multiprecision
 from creepkit.language.symbols import POINT_VARIABLES, Param, State
 
@@ -214,11 +215,16 @@ class LawRecord:
                     f"law '{self.name}', term '{label}': {expression!r} is not a sympy expression; "
                     "text is never evaluated, write the term with the symbols of creepkit.language"
                 ) from None
+        states, constraints = dict(self.states), tuple(self.constraints)
+        expressions = [(f"term '{label}'", term) for label, term in terms.items()]
+        expressions += [(f"rate of state '{k}'", z.rate) for k, z in states.items() if isinstance(z, State)]
+        expressions += [("constraint", relation) for relation in constraints]
+        check_cost(f"law '{self.name}'", [pair for pair in expressions if isinstance(pair[1], sympy.Basic)])
         freeze = object.__setattr__
         freeze(self, "terms", MappingProxyType(terms))
         freeze(self, "params", MappingProxyType(dict(self.params)))
-        freeze(self, "states", MappingProxyType(dict(self.states)))
-        freeze(self, "constraints", tuple(self.constraints))
+        freeze(self, "states", MappingProxyType(states))
+        freeze(self, "constraints", constraints)
         references = (self.references,) if isinstance(self.references, str) else tuple(self.references)
         freeze(self, "references", references)
         freeze(self, "examples", checked_examples(self.name, self.examples))

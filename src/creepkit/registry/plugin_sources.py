@@ -56,11 +56,21 @@ def plugin_files_in_environment() -> list[Path]:
 
 
 def check_files_in_environment() -> None:
-    """PluginError, in one sentence, where the environment variable names a file that does not exist."""
+    """PluginError, in one sentence, where the environment variable names what is no plugin file or does not exist."""
     for path in plugin_files_in_environment():
+        advice = f"separate several files with '{os.pathsep}'" if "," in str(path) else "correct or unset it"
+        if not is_plugin_file_name(path):
+            raise PluginError(f"{ENVIRONMENT_VARIABLE} names {path}, which is {_NO_PLUGIN_FILE}; {advice}")
         if not path.is_file():
-            advice = f"separate several files with '{os.pathsep}'" if "," in str(path) else "correct or unset it"
             raise PluginError(f"{ENVIRONMENT_VARIABLE} names the plugin file {path}, which does not exist; {advice}")
+
+
+_NO_PLUGIN_FILE = "not executed, for only files whose names end in .py are"
+
+
+def is_plugin_file_name(path: str | Path) -> bool:
+    """Whether a path names a file of Python code: no other is ever executed."""
+    return Path(path).suffix == ".py"
 
 
 def provenance_of_file(path: Path) -> Provenance:
@@ -106,7 +116,9 @@ def import_entry(provenance: Provenance, entry: EntryPoint) -> object:
 
 
 def import_file(provenance: Provenance, path: Path) -> ModuleType:
-    """Import a plugin file under a module name of its own; PluginError when it is missing or raises."""
+    """Import a plugin file under a module name of its own; PluginError when it is no .py, is missing or raises."""
+    if not is_plugin_file_name(path):
+        raise PluginError(f"plugin file {path} is {_NO_PLUGIN_FILE}; name a Python file with hooks in it")
     if not path.is_file():
         raise PluginError(f"plugin file {path} does not exist; name a Python file with hooks in it")
     digest = hashlib.sha256(provenance.origin.encode()).hexdigest()[:8]

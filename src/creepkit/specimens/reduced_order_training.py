@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from creepkit.fem.reduced_order_model import ReducedBasis
 from creepkit.fem.reduced_order_training import TrainingRun, snapshots, train
 from creepkit.fem.simulation import LoadHistory, simulate
 from creepkit.fem.solver import SolverSettings
+from creepkit.files.cache_folders import SharedFolderError, cache_folder, check_own
 from creepkit.files.json_documents import DocumentFormat
 from creepkit.files.reading import FileKind
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
@@ -190,29 +192,30 @@ def _key(models: Sequence[FiniteElementModel], settings: SolverSettings, modes: 
     return digest.hexdigest()[:32]
 
 
-def _file(key: str) -> Path:
-    """Where a basis is kept: CREEPKIT_CACHE, else `creepkit` in the user's cache folder."""
-    chosen = os.environ.get("CREEPKIT_CACHE")
-    base = Path(chosen) if chosen else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "creepkit"
-    return base / "reduced_bases" / f"{key}.safetensors"
+def _file(key: str) -> Path | None:
+    """Where a basis is kept; None where it cannot be."""
+    folder = cache_folder("reduced_bases")
+    return None if folder is None else folder / f"{key}.safetensors"
 
 
-def _keep(basis: ReducedBasis, path: Path) -> None:
+def _keep(basis: ReducedBasis, path: Path | None) -> None:
     """Write a basis; where nothing can be written it is trained again by the next process."""
-    try:
-        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        arrays = {"modes": basis.modes, "points": basis.points, "factors": basis.factors}
-        write_safetensors(path, arrays, {"sha256": _checksum(arrays)}, _FORMAT)
-    except (OSError, CreepkitError):
+    if path is None:
         return
+    arrays = {"modes": basis.modes, "points": basis.points, "factors": basis.factors}
+    with suppress(OSError, CreepkitError):
+        write_safetensors(path, arrays, {"sha256": _checksum(arrays)}, _FORMAT)
 
 
-def _read(path: Path, model: FiniteElementModel) -> ReducedBasis | None:
-    """The basis of a file; None where there is none for this mesh, or not as it was written."""
+def _read(path: Path | None, model: FiniteElementModel) -> ReducedBasis | None:
+    """The basis of a file of ours; None where there is none for this mesh, or not as it was written."""
+    if path is None:
+        return None
     try:
+        check_own(path, os.lstat(path))
         arrays, header = read_safetensors(path, _FORMAT)
         modes, points, factors = (arrays[name] for name in ("modes", "points", "factors"))
-    except (OSError, CreepkitError, KeyError):
+    except (OSError, CreepkitError, SharedFolderError, KeyError):
         return None
     if header.get("sha256") != _checksum(arrays):
         return None

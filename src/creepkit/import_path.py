@@ -1,0 +1,69 @@
+"""Where modules come from: never the working folder, nor a folder that is named relative to it.
+
+Python itself puts the working folder first in `sys.path` for `python -m creepkit`, and reads an empty or relative entry
+of PYTHONPATH as a place in it. A file beside the data, such as `json.py`, would then be executed. What Python imports
+before a line of creepkit runs (`sitecustomize` of such an entry, `creepkit.py` for `python -m creepkit`) is beyond
+this module; the script `creepkit`, and `python -P -m creepkit`, look into no working folder at all.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+_OPTIONS_WITH_VALUES = "WX"
+
+
+def leave_working_folder_out_of_command() -> None:
+    """Take the working folder out of `sys.path` if this process is the command line of creepkit, else do nothing."""
+    module = _started_module()
+    as_module = module is not None and module.split(".")[0] == "creepkit"
+    as_script = module is None and os.path.splitext(os.path.basename(sys.argv[0] if sys.argv else ""))[0] == "creepkit"
+    if as_module and not sys.flags.safe_path and sys.argv[:1] == ["-m"]:  # Python has just put it there
+        del sys.path[:1]
+    if as_module or as_script:
+        named = {*_entries(os.environ.get("PYTHONPATH", ""))}
+        relative = {os.path.abspath(entry) for entry in named if not os.path.isabs(entry)} - named
+        sys.path[:] = [entry for entry in sys.path if os.path.isabs(entry) and entry not in relative]
+
+
+def environment_without_working_folder() -> dict[str, str]:
+    """The environment for another interpreter: its variables name no place of Python's relative to the working folder.
+
+    Absolute entries stay: whoever names a folder there trusts it.
+    """
+    environment = dict(os.environ)
+    kept = [entry for entry in _entries(environment.pop("PYTHONPATH", "")) if os.path.isabs(entry)]
+    if kept:
+        environment["PYTHONPATH"] = os.pathsep.join(kept)
+    for name in ("PYTHONPYCACHEPREFIX", "PYTHONUSERBASE"):
+        if not os.path.isabs(environment.get(name, os.sep)):
+            del environment[name]
+    return environment
+
+
+def _entries(path: str) -> list[str]:
+    """The entries of a search path; an empty one is the working folder."""
+    return path.split(os.pathsep) if path else []
+
+
+def _started_module() -> str | None:
+    """The module of `python -m module`, as the command of this process names it; None without that option."""
+    arguments = iter(sys.orig_argv[1:])
+    for argument in arguments:
+        if not argument.startswith("-") or argument == "-":
+            return None
+        if argument == "--check-hash-based-pycs":
+            next(arguments, None)
+        if argument.startswith("--"):
+            continue
+        for k, letter in enumerate(argument[1:], 2):
+            if letter == "c":
+                return None
+            if letter == "m":
+                return argument[k:] or next(arguments, None)
+            if letter in _OPTIONS_WITH_VALUES:
+                if not argument[k:]:
+                    next(arguments, None)
+                break
+    return None

@@ -1,0 +1,183 @@
+"""What creepkit and its workers can import: nothing from the working folder, nor what lies beside a script."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from creepkit import import_path
+from creepkit.jobs import worker_start
+from helpers import source_tree
+
+PLANTED = "import sys; open({ran!r}, 'a').write(__name__ + chr(10))\n"
+NAMES = ("json", "numpy", "sympy", "lazy_loader", "typer", "pickle", "creepkit_plugin", "openpyxl")
+"""Modules that creepkit imports first or last: of Python, of what it depends on, and of nothing at all."""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A working folder with modules that say when they are executed."""
+    for name in NAMES:
+        (tmp_path / f"{name}.py").write_text(PLANTED.format(ran=str(tmp_path / "ran")))
+    return tmp_path
+
+
+def environment(**variables: str) -> dict[str, str]:
+    path = os.pathsep.join(entry for entry in sys.path if os.path.isabs(entry) and not entry.endswith("tests"))
+    return {**os.environ, "PYTHONPATH": path, **variables}
+
+
+def test_the_command_as_a_module_imports_nothing_from_the_working_folder(folder: Path) -> None:
+    words = [sys.executable, "-m", "creepkit", "laws"]
+    done = subprocess.run(words, cwd=folder, env=environment(), capture_output=True, text=True, check=False)
+
+    assert done.returncode == 0, done.stderr
+    assert "norton" in done.stdout
+    assert not (folder / "ran").exists()
+
+
+WORKER_OF_A_SCRIPT = """
+import sys
+sys.path[:] = [folder for folder in sys.path if folder]  # this process is not the one that is looked at
+from creepkit.jobs.worker_pools import ProcessWorkers
+from creepkit.jobs.worker_process import TaskResult
+sys.path.insert(0, {beside!r})
+from beside_the_script import AskedJob
+sys.path.insert(0, "")
+with ProcessWorkers(AskedJob({names!r}), 1) as workers:
+    workers.submit(0)
+    results = []
+    while not results:
+        results = workers.results(30)
+    print(results[0].text)
+"""
+
+BESIDE_THE_SCRIPT = """
+from creepkit.jobs.worker_process import TaskResult
+
+class AskedJob:
+    task_name = "question"
+
+    def __init__(self, names):
+        self.names = names
+
+    def on_one_thread(self):
+        return self
+
+    def run(self, number):
+        import importlib, os, sys
+        working = os.getcwd()
+        found = []
+        for name in self.names:
+            try:
+                spec = importlib.util.find_spec(name)
+            except ValueError:
+                continue
+            if spec is not None and (spec.origin or "").startswith(working):
+                found.append(name)
+        found += [entry for entry in sys.path if not os.path.isabs(entry) or entry == working]
+        return TaskResult(number, "done", text=" ".join(found) or "nothing")
+"""
+
+
+@pytest.mark.parametrize("entry", ["", "."])
+def test_a_worker_finds_nothing_in_the_working_folder_but_the_class_of_its_job(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory, entry: str
+) -> None:
+    """Both an empty entry of PYTHONPATH and '.' are the working folder."""
+    beside = tmp_path_factory.mktemp("beside")
+    (beside / "beside_the_script.py").write_text(BESIDE_THE_SCRIPT)
+    for name in NAMES:
+        (beside / f"{name}.py").write_text(PLANTED.format(ran=str(folder / "ran")))
+    program = WORKER_OF_A_SCRIPT.format(beside=str(beside), names=(*NAMES, "beside_the_script_not_imported"))
+    variables = environment()
+    variables["PYTHONPATH"] = os.pathsep.join([variables["PYTHONPATH"], entry])
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", program], cwd=folder, env=variables, capture_output=True, text=True, check=False
+    )
+
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["nothing"]
+    assert not (folder / "ran").exists()
+
+
+def test_variables_keep_absolute_places_alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(["", ".", "src", str(tmp_path)]))
+    monkeypatch.setenv("PYTHONPYCACHEPREFIX", "compiled")
+    monkeypatch.setenv("PYTHONUSERBASE", str(tmp_path))
+
+    variables = import_path.environment_without_working_folder()
+
+    assert variables["PYTHONPATH"] == str(tmp_path)
+    assert "PYTHONPYCACHEPREFIX" not in variables
+    assert variables["PYTHONUSERBASE"] == str(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "module"),
+    [
+        ("-m creepkit laws", "creepkit"),
+        ("-mcreepkit", "creepkit"),
+        ("-Im creepkit", "creepkit"),
+        ("-W error -X dev -m creepkit", "creepkit"),
+        ("-Werror -m pytest creepkit", "pytest"),
+        ("-c pass -m creepkit", None),
+        ("creepkit -m creepkit", None),
+        ("script.py", None),
+        ("", None),
+    ],
+)
+def test_the_started_module_is_read_as_python_reads_it(
+    monkeypatch: pytest.MonkeyPatch, words: str, module: str | None
+) -> None:
+    monkeypatch.setattr(sys, "orig_argv", ["python", *words.split()])
+    assert import_path._started_module() == module
+
+
+def test_restrictions_of_the_interpreter_hold_for_its_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Flags:
+        isolated, ignore_environment, no_user_site, no_site = 0, 1, 1, 0
+
+    assert worker_start._interpreter_options()[0] in ("-P", "-I")
+    monkeypatch.setattr(sys, "flags", Flags)
+    assert worker_start._interpreter_options() == ["-P", "-E", "-s"]
+    Flags.isolated = 1
+    assert worker_start._interpreter_options() == ["-I"]
+
+
+STARTING = {
+    "subprocess", "multiprocessing", "pty", "asyncio", "joblib", "loky", "billiard", "runpy", "webbrowser",
+}  # fmt: skip
+OF_OS = ("system", "popen", "fork", "forkpty", "posix_spawn", "posix_spawnp", "startfile")
+
+
+def _starts_processes(module: str) -> bool:
+    """Whether a module imports what starts processes, or calls what does."""
+    for node in ast.walk(source_tree.tree(module)):
+        if isinstance(node, ast.Import):
+            names = {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names = {str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "os":
+            names = {"subprocess"} if node.attr in OF_OS or node.attr.startswith(("exec", "spawn")) else set()
+        else:
+            names = {node.attr} & {"ProcessPoolExecutor"} if isinstance(node, ast.Attribute) else set()
+        if {name.split(".")[0] for name in names} & STARTING or any("ProcessPool" in name for name in names):
+            return True
+    return False
+
+
+def test_processes_are_started_in_one_place() -> None:
+    """`worker_pools` waits for workers and ends them; `app_page` asks the desktop for its browser, with our address."""
+    starting = {module for module in source_tree.modules() if _starts_processes(module)}
+    assert starting == {"creepkit.jobs.worker_start", "creepkit.jobs.worker_pools", "creepkit.cli.app_page"}
+    pools = source_tree.tree("creepkit.jobs.worker_pools")
+    called = {
+        node.func.attr
+        for node in ast.walk(pools)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
+    }
+    assert called & {"Popen", "run", "call", "check_call", "check_output"} == set()
