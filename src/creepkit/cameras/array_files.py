@@ -79,7 +79,8 @@ class ArrayTable:
         count = sum(math.prod(self.shapes[name]) for name in chosen)
         if count > (most := raised(LARGEST_FRAME)):
             raise HistoryError(
-                f"{self.path}: a frame of {count} numbers, of at most {most}; is it damaged? {how_to_raise(count, most)}"
+                f"{self.path}: a frame of {count} numbers, of at most {most}; is it damaged? "
+                f"{how_to_raise(count, most)}"
             )
         arrays = self.load(chosen)
         return np.stack([arrays[name] for name in chosen], axis=1)

@@ -28,7 +28,7 @@ _ALWAYS_ALLOWED_BYTES = 1_000_000
 """Of an array whose values are nowhere, as those of a file that was only begun."""
 
 
-MAXIMUM_OBJECTS = 100_000
+MAXIMUM_OBJECTS = 20_000
 """Groups and arrays in a file that is read; a data set has some twenty."""
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from creepkit.arrays import Ints
+from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import ERROR_VALUES, Dialect, decode_text, detect_dialect, split_line, text_lines
 from creepkit.files.limits import how_to_raise, raised
@@ -44,6 +44,10 @@ MAXIMUM_CELL = 10_000
 
 _LARGE_TEXT = 65_536
 """Characters above which the rows of a text are read as numbers at once where they hold nothing else."""
+
+
+_PART_CHARACTERS = 4_000_000
+"""Of a large text that are turned into numbers at once."""
 
 
 _HEAD_LINES = 1000
@@ -268,18 +272,33 @@ def _number_rows(
     if not body.strip():
         return None
     allowed = f"0123456789+-eE\n{dialect.delimiter}{dialect.decimal}"
-    if not body.isascii() or body.encode().translate(None, allowed.encode()):
+    if not body.isascii() or any(part.encode().translate(None, allowed.encode()) for part in _parts_of(body)):
         return None
     if re.search(rf"(?:^|[\n{dialect.delimiter}+-])0[0-9]+(?:[\n{dialect.delimiter}]|$)", body):
         return None  # a whole number such as 0123 is refused
-    plain = io.StringIO(body if dialect.decimal == "." else body.replace(",", "."))
     try:
-        numbers = np.loadtxt(plain, delimiter=dialect.delimiter, comments=None, ndmin=2)
-    except ValueError:
+        numbers = np.concatenate([_numbers_of(part, dialect) for part in _parts_of(body)])
+    except ValueError:  # also of parts that differ in their number of columns
         return None
     if numbers.shape != (line_numbers.size, len(split_line(lines[start], dialect))) or not np.isfinite(numbers).all():
         return None
     return dialect, NumberRows(numbers, line_numbers, dialect.decimal), comments
+
+
+def _parts_of(body: str) -> Iterator[str]:
+    """The lines of a text by some megabytes, for what is made of them takes several times their size."""
+    start = 0
+    while start < len(body):
+        end = body.find("\n", start + _PART_CHARACTERS)
+        end = len(body) if end < 0 else end
+        yield body[start:end]
+        start = end + 1
+
+
+def _numbers_of(lines: str, dialect: Dialect) -> Floats:
+    """(rows, columns) of lines that hold numbers alone; ValueError where they do not."""
+    plain = io.StringIO(lines if dialect.decimal == "." else lines.replace(",", "."))
+    return np.loadtxt(plain, delimiter=dialect.delimiter, comments=None, ndmin=2)
 
 
 def _without_comments(body: str, first_line: int) -> tuple[str, Ints, list[tuple[int, str]]]:

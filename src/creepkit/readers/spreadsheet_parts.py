@@ -84,8 +84,8 @@ def _check_size(path: Path, size: int, packed: int) -> None:
     most = raised(MAXIMUM_UNPACKED_BYTES)
     if is_bomb:
         raise HistoryError(
-            f"{path}: unpacks to {size / 1e6:.0f} MB, more than {MAXIMUM_EXPANSION} times its size, which no spreadsheet "
-            "of tests does; save it as CSV"
+            f"{path}: unpacks to {size / 1e6:.0f} MB, more than {MAXIMUM_EXPANSION} times its size, which no "
+            "spreadsheet of tests does; save it as CSV"
         )
     if size > most:
         raise HistoryError(

@@ -65,7 +65,7 @@ def check_files_in_environment() -> None:
 
 def provenance_of_file(path: Path) -> Provenance:
     """Return the provenance of a plugin file."""
-    return Provenance(str(path.resolve()), path.stem)
+    return Provenance(os.path.realpath(path), path.stem)
 
 
 def mentions_commands(source: EntryPoint | Path) -> bool:
