@@ -41,7 +41,6 @@ ALLOWED = {
     "creepkit.registry.plugin_sources read_bytes": "the source of an installed package, to find a hook in it",
     "creepkit.readers.spreadsheet_parts ZipFile": "bytes in memory, read by files.reading",
     "creepkit.readers.spreadsheets load_workbook": "bytes in memory, read by files.reading and checked",
-    "creepkit.readers.cell_grids loadtxt": "text in memory, read by files.reading",
 }
 """{module and name: why it may}."""
 

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from creepkit.arrays import Floats, Ints
+from creepkit.arrays import Ints
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import ERROR_VALUES, Dialect, decode_text, detect_dialect, split_line, text_lines
+from creepkit.files.delimited_text import (
+    ERROR_VALUES,
+    Dialect,
+    decode_text,
+    detect_dialect,
+    split_line,
+    table_of_numbers,
+    text_lines,
+)
 from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.column_names import split_written_name
@@ -38,16 +44,12 @@ MAXIMUM_COLUMNS, MAXIMUM_LINE, MAXIMUM_KEYS = 2000, 1_000_000, 1000
 """Columns of a table, characters of a line, and `# key: value` lines of a head; no table of tests comes near them."""
 
 
-MAXIMUM_CELL = 10_000
-"""Characters of a cell: names and units are found in it in a time that grows faster than it does."""
+MAXIMUM_CELL, MAXIMUM_TEXTS = 10_000, 6_000_000
+"""Characters of a cell, for units are looked for in it; cells of a table that holds not numbers alone."""
 
 
 _LARGE_TEXT = 65_536
 """Characters above which the rows of a text are read as numbers at once where they hold nothing else."""
-
-
-_PART_CHARACTERS = 4_000_000
-"""Of a large text that are turned into numbers at once."""
 
 
 _HEAD_LINES = 1000
@@ -203,6 +205,12 @@ def _grid_of_lines(path: Path, lines: Sequence[str]) -> CellGrid:
     head = lines[:start]
     numbered = [(k, line) for k, line in enumerate(lines[start:], start + 1) if line.strip() and not is_comment(line)]
     dialect = detect_dialect((line for _, line in numbered), str(path), _stated_decimal(path, head))
+    cells = len(numbered) * len(split_line(lines[start], dialect, f"{path}:{start + 1}"))
+    if cells > (most := raised(MAXIMUM_TEXTS)):
+        raise HistoryError(
+            f"{path}: a table of {cells} cells that are not all numbers, more than {most}; keep the columns of numbers "
+            f"alone, which may be many more, or {how_to_raise(cells, most)}"
+        )
     comments = [(k, line) for k, line in enumerate(lines[start:], start + 1) if is_comment(line)]
     late = _late_entries(path, comments, dialect)
     rows = []
@@ -271,34 +279,12 @@ def _number_rows(
     body, line_numbers, comments = _without_comments(body, start + 2)
     if not body.strip():
         return None
-    allowed = f"0123456789+-eE\n{dialect.delimiter}{dialect.decimal}"
-    if not body.isascii() or any(part.encode().translate(None, allowed.encode()) for part in _parts_of(body)):
-        return None
-    if re.search(rf"(?:^|[\n{dialect.delimiter}+-])0[0-9]+(?:[\n{dialect.delimiter}]|$)", body):
-        return None  # a whole number such as 0123 is refused
-    try:
-        numbers = np.concatenate([_numbers_of(part, dialect) for part in _parts_of(body)])
-    except ValueError:  # also of parts that differ in their number of columns
+    numbers = table_of_numbers(body, dialect)
+    if numbers is None:
         return None
     if numbers.shape != (line_numbers.size, len(split_line(lines[start], dialect))) or not np.isfinite(numbers).all():
         return None
     return dialect, NumberRows(numbers, line_numbers, dialect.decimal), comments
-
-
-def _parts_of(body: str) -> Iterator[str]:
-    """The lines of a text by some megabytes, for what is made of them takes several times their size."""
-    start = 0
-    while start < len(body):
-        end = body.find("\n", start + _PART_CHARACTERS)
-        end = len(body) if end < 0 else end
-        yield body[start:end]
-        start = end + 1
-
-
-def _numbers_of(lines: str, dialect: Dialect) -> Floats:
-    """(rows, columns) of lines that hold numbers alone; ValueError where they do not."""
-    plain = io.StringIO(lines if dialect.decimal == "." else lines.replace(",", "."))
-    return np.loadtxt(plain, delimiter=dialect.delimiter, comments=None, ndmin=2)
 
 
 def _without_comments(body: str, first_line: int) -> tuple[str, Ints, list[tuple[int, str]]]:
