@@ -45,7 +45,8 @@ NODES = "id,r_mm,z_mm\n1,0.0,0.0\n2,1.5,0.0\n3,1.5,1.25\n4,0.0,1.25\n5,3.0,0.0\n
 ELEMENTS = "id,n1,n2,n3,n4\n1,1,2,3,4\n2,2,5,6,3\n"
 SETS = '{"encastre": [5, 6],\n "top": [3, 4, 6],\n "pressure_face_S1": [1, 2]}\n'
 DECK = (
-    "*HEADING\nplate\n*NODE, NSET=ALL\n1, 0.0, 0.0\n2, 1.5, 0.0\n3, 1.5, 1.25\n4, 0.0, 1.25\n5, 3.0, 0.0\n6, 3.0, 1.25\n"
+    "*HEADING\nplate\n*NODE, NSET=ALL\n"
+    "1, 0.0, 0.0\n2, 1.5, 0.0\n3, 1.5, 1.25\n4, 0.0, 1.25\n5, 3.0, 0.0\n6, 3.0, 1.25\n"
     "*ELEMENT, TYPE=CAX4, ELSET=BODY\n1, 1, 2, 3, 4\n2, 2, 5, 6, 3\n*NSET, NSET=TOP\n3, 4, 6\n"
     "*SURFACE, NAME=FACE\nBODY, S1\n*BOUNDARY\n5, 1, 2\n6, 1, 2\n*DSLOAD\nFACE, P, 1.0\n"
 )

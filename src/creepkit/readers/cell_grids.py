@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from creepkit.arrays import Ints
-from creepkit.errors import HistoryError, quoted
+from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import (
     ERROR_VALUES,
     Dialect,
@@ -111,6 +111,7 @@ def read_text_grid(path: Path) -> CellGrid:
                 rows,
                 _late_entries(path, comments, dialect),
             )
+    _refuse_many_texts(path, 2 * text.count("\n"))  # a table has two columns or more
     return _grid_of_lines(path, text_lines(text))
 
 
@@ -140,13 +141,20 @@ def _refuse_many(location: str, columns: int, keys: int) -> None:
             )
 
 
+def _refuse_many_texts(path: Path, count: int) -> None:
+    """Refuse a table that is not of numbers alone and has more cells than memory holds as texts."""
+    if count > (most := raised(MAXIMUM_TEXTS)):
+        raise HistoryError(
+            f"{path}: a table of {count} cells or more that are not all numbers, more than {most}; keep its numbers "
+            f"alone, or {how_to_raise(count, most)}"
+        )
+
+
 def _refuse_long_cells(location: str, line: str, cells: Sequence[str]) -> None:
     """Refuse a cell that is no name, number or remark."""
-    if len(line) > MAXIMUM_CELL and max(map(len, cells), default=0) > MAXIMUM_CELL:
-        longest = max(cells, key=len)
+    if len(line) > MAXIMUM_CELL and len(longest := max(cells, key=len)) > MAXIMUM_CELL:
         raise HistoryError(
-            f"{location}: a cell of {len(longest)} characters, '{quoted(longest)}'; none may have more than "
-            f"{MAXIMUM_CELL}; is a quote or a line end missing?"
+            f"{location}: a cell of {len(longest)} characters, more than {MAXIMUM_CELL}; is a quote or a line missing?"
         )
 
 
@@ -205,12 +213,7 @@ def _grid_of_lines(path: Path, lines: Sequence[str]) -> CellGrid:
     head = lines[:start]
     numbered = [(k, line) for k, line in enumerate(lines[start:], start + 1) if line.strip() and not is_comment(line)]
     dialect = detect_dialect((line for _, line in numbered), str(path), _stated_decimal(path, head))
-    cells = len(numbered) * len(split_line(lines[start], dialect, f"{path}:{start + 1}"))
-    if cells > (most := raised(MAXIMUM_TEXTS)):
-        raise HistoryError(
-            f"{path}: a table of {cells} cells that are not all numbers, more than {most}; keep the columns of numbers "
-            f"alone, which may be many more, or {how_to_raise(cells, most)}"
-        )
+    _refuse_many_texts(path, len(numbered) * len(split_line(lines[start], dialect, f"{path}:{start + 1}")))
     comments = [(k, line) for k, line in enumerate(lines[start:], start + 1) if is_comment(line)]
     late = _late_entries(path, comments, dialect)
     rows = []
