@@ -43,7 +43,6 @@ DECIMAL_SIGNS: Mapping[str, str] = {".": ".", ",": ",", "point": ".", "comma": "
 MAXIMUM_COLUMNS, MAXIMUM_LINE, MAXIMUM_KEYS = 2000, 1_000_000, 1000
 """Columns of a table, characters of a line, and `# key: value` lines of a head; no table of tests comes near them."""
 
-
 MAXIMUM_CELL, MAXIMUM_TEXTS = 10_000, 6_000_000
 """Characters of a cell, for units are looked for in it; cells of a table that holds not numbers alone."""
 
