@@ -3,11 +3,43 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
+
+LONGEST_QUOTE, LONGEST_MESSAGE = 40, 2000
+"""Characters of a text of a file that a message quotes, and of a whole message."""
+
+
+_UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff]")
+"""Characters that steer a terminal, break lines, turn the direction of writing or cannot be encoded."""
+
+
+def printable(text: str) -> str:
+    """A text on one line: what would break it, steer a terminal or turn the direction of writing, as its code."""
+    return _UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def quoted(text: object, longest: int = LONGEST_QUOTE) -> str:
+    """A text of a file as messages quote it: printable, without blanks around it, and shortened."""
+    whole = str(text).strip()
+    shown = printable(whole[: longest + 1])
+    return shown if len(shown) <= longest else f"{shown[: longest - 3]}..."
 
 
 class CreepkitError(Exception):
-    """Base of every error that creepkit raises on purpose; its message is one sentence for the user."""
+    """Base of every error that creepkit raises on purpose; its message is one sentence for the user.
+
+    Whatever of a file or a name is quoted in it, the message is printable, on one line, and of limited length.
+    """
+
+    def __init__(self, *args: object) -> None:
+        super().__init__(*(_message(arg) if isinstance(arg, str) else arg for arg in args))
+
+
+def _message(text: str) -> str:
+    if len(text) > LONGEST_MESSAGE:  # the beginning names the file, the end says what to do
+        text = f"{text[: LONGEST_MESSAGE - 503]}...{text[-500:]}"
+    return printable(text)
 
 
 class LawError(CreepkitError):

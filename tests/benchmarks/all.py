@@ -90,6 +90,7 @@ BENCHMARKS = {
     "structure": Benchmark(0.1),
     "rate_tables": Benchmark(20, needs=DATA),
     "reader_fuzz": Benchmark(40),
+    "large_files": Benchmark(3),
 }
 """{name of the program: what it costs and how it is run}."""
 

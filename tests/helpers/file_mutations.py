@@ -142,6 +142,11 @@ def _misspelt(sample: ReaderSample, draw: random.Random) -> Mutation | None:
     return _written_otherwise("name misspelt", sample, sample.misspelt, draw)
 
 
+def _key_repeated(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """A key with its value stands there twice."""
+    return _written_otherwise("key repeated", sample, [(text, text + text) for text in sample.repeated], draw)
+
+
 def _written_otherwise(
     kind: str, sample: ReaderSample, choices: Sequence[tuple[str, str]], draw: random.Random
 ) -> Mutation | None:
@@ -194,4 +199,5 @@ MEANINGFUL: tuple[Callable[[ReaderSample, random.Random], Mutation | None], ...]
     _no_number,
     _time_not_increasing,
     _line_cut,
+    _key_repeated,
 )

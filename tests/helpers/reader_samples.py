@@ -21,7 +21,7 @@ class ReaderSample:
     results, "" for nothing. decided : what a reader says that it assumed of a result, so that it is no silent change.
     delimiter : between cells, where the file is a table of text; "" where it is none. misspelling : (key or name,
     misspelt) that the file holds, and another (head with a unit, without it). reader : name of the reader, "" where no
-    other sample is of the same one.
+    other sample is of the same one. repeated : texts, such as a key with its value, none of which may stand twice.
     """
 
     name: str
@@ -34,6 +34,7 @@ class ReaderSample:
     misspelt: tuple[tuple[str, str], ...] = ()
     without_unit: tuple[tuple[str, str], ...] = ()
     reader: str = ""
+    repeated: tuple[str, ...] = ()
 
     def write(self, folder: Path, content: bytes | None = None) -> Path:
         """Write the files into a folder, with other content of the mutated one; the path of that."""

@@ -343,7 +343,7 @@ def _inputs(histories: Sequence[History]) -> Iterator[tuple[str, str]]:
     """(file, sha256) of the files of histories that are still there."""
     from creepkit.files.reading import FileKind, read_bytes
 
-    kind = FileKind("a test", ReportError, "", maximum_bytes=500_000_000)
+    kind = FileKind("a test", ReportError, "write the test to several files", maximum_bytes=500_000_000)
     for source in dict.fromkeys(h.source for h in histories if h.source):
         path = Path(source)
         try:

@@ -22,6 +22,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.cameras.text_files import FRAME_FILE
 from creepkit.errors import HistoryError
+from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import read_bytes
 
 LARGEST_FRAME = 20_000_000
@@ -76,8 +77,11 @@ class ArrayTable:
             listed = ", ".join(f"{name} has {' x '.join(map(str, self.shapes[name]))}" for name in chosen)
             raise HistoryError(f"{self.path}: its arrays differ in their number of points ({listed}); is it damaged?")
         count = sum(math.prod(self.shapes[name]) for name in chosen)
-        if count > LARGEST_FRAME:
-            raise HistoryError(f"{self.path}: a frame of {count} numbers, of at most {LARGEST_FRAME}; is it damaged?")
+        if count > (most := raised(LARGEST_FRAME)):
+            raise HistoryError(
+                f"{self.path}: a frame of {count} numbers, of at most {most}; is it damaged? "
+                f"{how_to_raise(count, most)}"
+            )
         arrays = self.load(chosen)
         return np.stack([arrays[name] for name in chosen], axis=1)
 
@@ -135,7 +139,7 @@ def _hdf5_table(path: Path) -> ArrayTable:
         shapes = {
             name: item.shape
             for name, item in file.items()
-            if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and 0 < item.size <= LARGEST_FRAME
+            if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and 0 < item.size <= raised(LARGEST_FRAME)
         }
     return ArrayTable(path, shapes, load)
 
@@ -234,7 +238,7 @@ def _described(head: memoryview, order: str) -> tuple[str, tuple[int, ...]] | No
     if word & 0xFF not in _NUMERIC_CLASSES or word & 0x0800 or shape.kind != 5:
         return None
     sizes = struct.unpack(f"{order}{len(shape.data) // 4}i", shape.data[: len(shape.data) // 4 * 4])
-    if not 0 < len(sizes) <= 32 or min(sizes) < 1 or math.prod(sizes) > LARGEST_FRAME:
+    if not 0 < len(sizes) <= 32 or min(sizes) < 1 or math.prod(sizes) > raised(LARGEST_FRAME):
         return None
     return bytes(name.data).decode("ascii", errors="replace").rstrip("\0"), sizes
 

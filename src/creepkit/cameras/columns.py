@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.records import CameraFrame
 from creepkit.records.camera_format import (
     COORDINATES,
@@ -22,7 +22,6 @@ from creepkit.records.camera_format import (
     TIMES_ALLOWED,
     CameraFormat,
     ColumnName,
-    shown,
 )
 
 LARGEST_LENGTH = 1e6
@@ -106,7 +105,7 @@ def columns_of(format: CameraFormat, names: Sequence[str], location: str) -> Fra
         if len({k for k, _ in found}) > 1:  # the same in the image and on the surface, as of pyvale
             found = [(k, word) for k, word in found if parsed[k].unit.casefold() not in PIXELS] or found
         if len({k for k, _ in found}) > 1:
-            both = " and ".join(f"'{shown(names[k])}'" for k in sorted({k for k, _ in found})[:2])
+            both = " and ".join(f"'{quoted(names[k])}'" for k in sorted({k for k, _ in found})[:2])
             raise HistoryError(f"{location}: {both} both are the column {quantity} of {format}; keep one of them")
         if found:
             places[quantity], spelt[quantity] = found[0][0], ColumnName.of(found[0][1])
@@ -115,7 +114,7 @@ def columns_of(format: CameraFormat, names: Sequence[str], location: str) -> Fra
     wanted = {q: k for q, k in places.items() if q not in ("image_x", "image_y")}
     units = {q: parsed[k].unit or spelt[q].unit for q, k in wanted.items()}
     factors = {
-        q: _factor(format, q, units[q], shown(names[k]), location) for q, k in wanted.items() if q != "confidence"
+        q: _factor(format, q, units[q], quoted(names[k]), location) for q, k in wanted.items() if q != "confidence"
     }
     positions = list(wanted.values())
     rules = []
@@ -182,7 +181,7 @@ def _check_sizes(
     row, k = (int(one) for one in np.argwhere(wrong)[0])
     place = columns.quantities[(*COORDINATES, *DISPLACEMENTS)[k]]
     raise HistoryError(
-        f"{locate(row)}: '{shown(columns.name_of(place))}' is {values[row, place]:g}; a length is a finite number of "
+        f"{locate(row)}: '{quoted(columns.name_of(place))}' is {values[row, place]:g}; a length is a finite number of "
         f"at most {LARGEST_LENGTH:g} mm, or nan for a lost point"
     )
 
@@ -222,7 +221,7 @@ def _missing(format: CameraFormat, names: Sequence[str], quantity: str, spelling
             "a table of a two-dimensional correlation, which has no out-of-plane displacement; export a stereo one, or "
             "name x, y, u and v alone with format=ck.CameraFormat(...)"
         )
-    listed = ", ".join(shown(name) for name in names[:20])
+    listed = ", ".join(quoted(name) for name in names[:20])
     return f"missing column '{spellings[0]}' ({quantity} of {format}); found: {listed:.400}"
 
 
@@ -242,4 +241,4 @@ def _factor(format: CameraFormat, quantity: str, unit: str, name: str, location:
             f"format=dataclasses.replace(format, unit='mm')"
         )
     allowed = TIMES_ALLOWED if is_time else LENGTHS_ALLOWED
-    raise HistoryError(f"{location}: '{name}' has the unit '{shown(unit)}'; allowed are {allowed}")
+    raise HistoryError(f"{location}: '{name}' has the unit '{quoted(unit)}'; allowed are {allowed}")

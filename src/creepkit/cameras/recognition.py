@@ -10,9 +10,9 @@ from pathlib import Path
 from creepkit.cameras.array_files import ArrayTable, is_matlab, matlab_table, row_table
 from creepkit.cameras.columns import columns_of, count_of_columns, fits, looks_planar
 from creepkit.cameras.text_files import FRAME_FILE, TextHead, candidate_heads, head_bytes
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.reading import read_bytes
-from creepkit.records.camera_format import CameraFormat, shown
+from creepkit.records.camera_format import CameraFormat
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Recognised:
             )
         different = {*found.names} ^ {*self.head.names}
         if different:
-            one = shown(sorted(different)[0])
+            one = quoted(sorted(different)[0])
             raise HistoryError(
                 f"{found.location(path)}: its columns are not those of {self.path.name} ('{one}' stands in one of them "
                 "only); all frames of a sequence must have the same"
@@ -128,7 +128,7 @@ def _explain_near_misses(path: Path, heads: Sequence[TextHead], formats: Sequenc
 
 
 def _unknown(names: Sequence[str], formats: Sequence[CameraFormat], what: str) -> str:
-    listed = ", ".join(shown(name) for name in names[:12])
+    listed = ", ".join(quoted(name) for name in names[:12])
     found = f"(found: {listed:.300})" if listed else "(it has none)"
     known = ", ".join(one.name for one in formats)
     return (

@@ -14,10 +14,9 @@ import numpy as np
 
 from creepkit import core
 from creepkit.arrays import Floats
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import ERROR_VALUES, Dialect, decode_text, split_line
 from creepkit.files.reading import FileKind, read_bytes, read_range
-from creepkit.records.camera_format import shown
 
 FRAME_FILE = FileKind("a frame of cameras", HistoryError, "name a table of points", maximum_bytes=200_000_000)
 
@@ -208,7 +207,7 @@ class FrameText:
             )
         sign = "comma" if decimal == "," else "point"
         return (
-            f"{self.path}:{number}: '{shown(self.names[column])}' is '{shown(found)}'; write a finite number with a "
+            f"{self.path}:{number}: '{quoted(self.names[column])}' is '{quoted(found)}'; write a finite number with a "
             f"decimal {sign}, or nan for a lost point"
         )
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import decode_text, detect_dialect, is_number, parse_numbers, split_line, text_lines
 from creepkit.files.reading import FileKind, read_bytes
-from creepkit.records.camera_format import TIME_UNITS, TIMES_ALLOWED, ColumnName, shown
+from creepkit.records.camera_format import TIME_UNITS, TIMES_ALLOWED, ColumnName
 
 TIME_FILE = FileKind(
     "a table of the times of frames", HistoryError, "name a table of numbers", maximum_bytes=50_000_000
@@ -51,7 +51,7 @@ def read_frame_times(path: str | Path) -> Floats:
     name = ColumnName.of(table[0][column]) if has_head else ColumnName("time", "")
     values = parse_numbers([cells[column] for cells in body], dialect, lambda k: f"{file}:{places[k]}", name.name)
     if name.unit and name.unit not in TIME_UNITS:
-        raise HistoryError(f"{file}:{rows[0][0]}: times in '{shown(name.unit)}'; write them in {TIMES_ALLOWED}")
+        raise HistoryError(f"{file}:{rows[0][0]}: times in '{quoted(name.unit)}'; write them in {TIMES_ALLOWED}")
     since_1970 = not name.unit and values.size > 0 and float(values.min()) > FIRST_UNIX_MILLISECONDS
     return np.asarray(values * (1e-3 if since_1970 else TIME_UNITS[name.unit or "s"]))
 
@@ -62,7 +62,7 @@ def _column_of_times(file: Path, number: int, head: list[str]) -> int:
         return found[0]
     if not found and len(head) == 1:
         return 0
-    names = ", ".join(f"'{shown(cell)}'" for cell in head[:6])
+    names = ", ".join(f"'{quoted(cell)}'" for cell in head[:6])
     raise HistoryError(f"{file}:{number}: which of {names} is the time of a frame is not clear; call one column time")
 
 

@@ -66,10 +66,6 @@ FILE_UNITS = "MPa, mm, s, K"
 NAME_LISTS = ("outputs", "parameter_names", "condition_names", "reason_names", "reason_texts")
 
 
-LARGEST_COMPRESSION = 1032
-"""Bytes that one of gzip's may stand for, at most."""
-
-
 def check_format(file: h5py.File, source: str) -> None:
     """DatasetError when the file is not one of ours, or of another layout or unit."""
     format_name = file.attrs.get("format")
@@ -97,8 +93,6 @@ def check_shapes(file: h5py.File, expected: dict[str, Any], source: str) -> None
         if array.shape != (len(file["index"]), *empty.shape[1:]) or array.dtype.kind != kind:
             description = f"{array.dtype} {array.shape}"
             raise DatasetError(f"{source}: the array '{name}' is {description}, which does not fit the others")
-        if array.nbytes > LARGEST_COMPRESSION * array.id.get_storage_size():
-            raise DatasetError(f"{source}: the array '{name}' says to be {array.shape}, and is not all there")
 
 
 def check_attributes(attributes: dict[str, Any], source: str) -> None:

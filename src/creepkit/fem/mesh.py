@@ -17,6 +17,10 @@ CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 """Corners of the reference element; mid-side nodes follow, on the sides 1-2, 2-3, 3-4 and 4-1."""
 
 
+MOST_ELEMENTS = 1_000_000
+"""Of a mesh that is generated; one of a specimen has 50 to some thousands."""
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A half section of a body of revolution, in mm.
@@ -252,6 +256,15 @@ class StripMesh(NamedTuple):
     outer_line: Ints
 
 
+def check_elements(count: int) -> None:
+    """SolveError, before any memory is taken, for a mesh of more elements than can be solved for."""
+    if count > MOST_ELEMENTS:
+        raise SolveError(
+            f"a mesh of {count} elements is asked for; at most {MOST_ELEMENTS} are made; lower its refinement, or its "
+            "numbers of columns and layers"
+        )
+
+
 def strip_mesh(inner: Floats, outer: Floats, breaks: Floats) -> StripMesh:
     """The strip whose column lines run straight from `inner` to `outer`.
 
@@ -261,6 +274,7 @@ def strip_mesh(inner: Floats, outer: Floats, breaks: Floats) -> StripMesh:
     With `layers` layers the half-bandwidth of a matrix of two unknowns a node is 6 layers + 9.
     """
     columns, layers = len(inner) // 2, len(breaks) - 1
+    check_elements(columns * layers)
     start = (3 * layers + 2) * np.arange(columns + 1)
     middle = start[:-1] + 2 * layers + 1
     a, b, j = start[:-1, None], start[1:, None], np.arange(layers)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from creepkit.errors import SolveError, nearest
+from creepkit.errors import LONGEST_QUOTE, SolveError, nearest, quoted
 from creepkit.fem.mesh import Mesh
 from creepkit.fem.mesh_builder import ElementNodes, MeshBuilder
 from creepkit.files.json_documents import read_json
@@ -105,11 +105,11 @@ class _Sets:
 
 def _rows(path: Path, columns: Sequence[str], more: Sequence[str] = ()) -> Iterator[tuple[str, int, dict[str, str]]]:
     """Place, number and cells of each row; the columns `more` belong to it when all of them are there."""
-    lines = csv.reader(read_text(path, MESH_FILE).splitlines())
+    lines = _csv_rows(path)
     names = [name.strip() for name in next(lines, [])]
     for name in ("id", *columns):
         if name not in names:
-            raise SolveError(f"{path}:1: missing column '{name}'; found: {', '.join(names) or 'nothing'}")
+            raise SolveError(f"{path}:1: missing column '{name}'; found: {quoted(', '.join(names), 200) or 'nothing'}")
     wanted = [*columns, *more] if set(more) <= set(names) else columns
     for line, cells in enumerate(lines, 2):
         place = f"{path}:{line}"
@@ -120,11 +120,23 @@ def _rows(path: Path, columns: Sequence[str], more: Sequence[str] = ()) -> Itera
             yield place, parse_index(place, "id", row["id"]), {name: row[name] for name in wanted}
 
 
+def _csv_rows(path: Path) -> Iterator[list[str]]:
+    lines = csv.reader(read_text(path, MESH_FILE).splitlines())
+    try:
+        yield from lines
+    except csv.Error as error:
+        raise SolveError(f"{path}:{lines.line_num}: no line of a CSV table ({error}); look for stray quotes") from None
+
+
 T = TypeVar("T")
 
 
 ELEMENT_TYPES = {"CAX4": 4, "CAX4R": 4, "CAX8": 8, "CAX8R": 8}
 """Nodes of the element types that are read."""
+
+
+MOST_LABELS, LARGEST_LABEL = 10_000_000, 10**15
+"""Numbers in one range of a set, and the largest number of a node or an element."""
 
 
 NAMED_SUPPORTS = {"ENCASTRE": (True, True), "PINNED": (True, True), "XSYMM": (True, False), "YSYMM": (False, True)}
@@ -183,18 +195,18 @@ def builder_from_deck(path: Path, pressed: str | None, top: str | None) -> MeshB
 def _cards(path: Path) -> Iterator[KeywordCard]:
     """The cards of a deck; a keyword line that ends in a comma goes on in the next line."""
     card: KeywordCard | None = None
-    head = ""
+    head: list[str] = []
     for line, text in enumerate(read_text(path, MESH_FILE).splitlines(), 1):
         text, place = text.strip(), f"{path}:{line}"
         if not text or text.startswith("**"):
             continue
         if text.startswith("*") or head:
-            head += text
-            if head.endswith(","):
+            head.append(text)
+            if text.endswith(","):
                 continue
             if card is not None:
                 yield card
-            card, head = _card(place, head), ""
+            card, head = _card(place, "".join(head)), []
         elif card is not None:
             card.rows.append((place, [cell.strip() for cell in text.split(",")]))
         else:
@@ -221,7 +233,9 @@ def _node(deck: InputDeck, card: KeywordCard) -> None:
 def _element(deck: InputDeck, card: KeywordCard) -> None:
     kind = card.option("TYPE")
     if kind not in ELEMENT_TYPES:
-        raise SolveError(f"{card.place}: element type {kind} is not supported; allowed are {', '.join(ELEMENT_TYPES)}")
+        raise SolveError(
+            f"{card.place}: element type {quoted(kind)} is not supported; allowed are {', '.join(ELEMENT_TYPES)}"
+        )
     cells: list[str] = []
     for place, row in card.rows:
         cells += [cell for cell in row if cell]
@@ -243,10 +257,21 @@ def _set(deck: InputDeck, card: KeywordCard) -> None:
     sets.setdefault(name, {})
     for place, cells in card.rows:
         if "GENERATE" in card.options:
-            first, last, step = (parse_index(place, "range", cell) for cell in [*[c for c in cells if c], "1"][:3])
-            cells = [str(label) for label in range(first, last + 1, step)]
+            cells = _generated(place, cells)
         for cell in cells:
             _collect(sets, name, members(place, cell) if cell else [])
+
+
+def _generated(place: str, cells: list[str]) -> list[str]:
+    """The numbers that first, last and step stand for; step is 1 where it is not there."""
+    written = [cell for cell in cells if cell]
+    if not 2 <= len(written) <= 3:
+        raise SolveError(f"{place}: GENERATE needs first, last and step, found {len(written)} cells; write 1, 9, 2")
+    first, last, step = (parse_index(place, "range", cell) for cell in [*written, "1"][:3])
+    labels = range(first, last + 1, step)
+    if last - first >= MOST_LABELS * step:
+        raise SolveError(f"{place}: the range has more than {MOST_LABELS} numbers, which no mesh has; correct it")
+    return [str(label) for label in labels]
 
 
 def _surface(deck: InputDeck, card: KeywordCard) -> None:
@@ -266,7 +291,9 @@ def _boundary(deck: InputDeck, card: KeywordCard) -> None:
             begin = parse_index(place, "first direction", first)
             directions = range(begin, parse_index(place, "last direction", last or first) + 1)
             if motion and parse_number(place, "motion", motion) != 0:
-                raise SolveError(f"{place}: a motion of {motion} mm is prescribed; only nodes at rest are read, with 0")
+                raise SolveError(
+                    f"{place}: a motion of {quoted(motion)} mm is prescribed; only nodes at rest are read, with 0"
+                )
             r, z = 1 in directions, 2 in directions
         deck.draft.hold(deck.nodes(place, cells[0]), r, z)
 
@@ -311,24 +338,27 @@ def _members(
     place: str, cell: str, sets: Mapping[str, Mapping[int, None]], known: Mapping[int, object], what: str
 ) -> list[int]:
     """One number, or the members of a set; the name of an instance before a point is dropped."""
-    if not cell.isdigit():
+    if not (cell.isascii() and cell.isdigit()):
         return list(_named(place, cell, sets, f"{what} set"))
-    if int(cell) not in known:
-        raise SolveError(f"{place}: there is no {what} {cell}; name one of the {len(known)} {what}s given before")
-    return [int(cell)]
+    label = parse_index(place, what, cell)
+    if label not in known:
+        raise SolveError(f"{place}: there is no {what} {label}; name one of the {len(known)} {what}s given before")
+    return [label]
 
 
 def _named(place: str | Path, name: str, known: Mapping[str, Iterable[T]], what: str) -> Iterable[T]:
     key = name.upper().rpartition(".")[2]
     if key not in known:
-        raise SolveError(f"{place}: there is no {what} '{name}'; {nearest(key, known)}")
+        raise SolveError(f"{place}: there is no {what} '{quoted(name)}'; {nearest(key[:LONGEST_QUOTE], known)}")
     return known[key]
 
 
 def _face(place: str, cells: list[str], letter: str) -> int:
     label = cells[1].upper() if len(cells) > 1 else ""
     if label not in {f"{letter}{k}" for k in range(1, 5)}:
-        raise SolveError(f"{place}: '{label}' is no side of a quadrilateral; allowed are {letter}1 to {letter}4")
+        raise SolveError(
+            f"{place}: '{quoted(label)}' is no side of a quadrilateral; allowed are {letter}1 to {letter}4"
+        )
     return int(label[1])
 
 
@@ -347,10 +377,10 @@ def parse_number(place: str, name: str, cell: str) -> float:
 def parse_index(place: str, name: str, cell: str) -> int:
     """A number of a node, an element or the like, from 1 on."""
     text = cell.strip()
-    if not (text.isascii() and text.isdigit() and int(text) > 0):
+    if not (text.isascii() and text.isdigit() and len(text) < 20 and 0 < int(text) <= LARGEST_LABEL):
         raise SolveError(f"{place}: '{name}' is {_shown(text)}; write a whole number from 1 on")
     return int(text)
 
 
 def _shown(text: str) -> str:
-    return f"'{text}'" if text else "empty"
+    return f"'{quoted(text)}'" if text else "empty"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -12,7 +13,17 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import AxialConstraints, FiniteElementModel, RigidContact, finite_element_model
-from creepkit.fem.mesh import SIDE_SLOPES, SIDE_VALUES, SIDE_WEIGHTS, SIDES, Mesh, half_bandwidth, outline, strip_mesh
+from creepkit.fem.mesh import (
+    SIDE_SLOPES,
+    SIDE_VALUES,
+    SIDE_WEIGHTS,
+    SIDES,
+    Mesh,
+    check_elements,
+    half_bandwidth,
+    outline,
+    strip_mesh,
+)
 from creepkit.fem.mesh_builder import order_by_neighbours
 
 SAME_PLACE = 1e-9
@@ -327,8 +338,10 @@ def _outline(elements: Ints) -> Ints:
 def _breaks(count: int | ArrayLike) -> Floats:
     """Boundaries of elements, from 0 to 1."""
     if np.ndim(count) == 0:
-        if not (float(np.asarray(count)) == int(np.asarray(count)) >= 1):
+        number = float(np.asarray(count))
+        if not (math.isfinite(number) and number == int(number) >= 1):
             raise SolveError(f"the number of elements in a row is {count!r}; allowed are whole numbers from 1 on")
+        check_elements(int(number))
         return np.linspace(0.0, 1.0, int(np.asarray(count)) + 1)
     breaks = np.asarray(count, dtype=float)
     if breaks.ndim != 1 or breaks.size < 2 or breaks[0] != 0.0 or breaks[-1] != 1.0 or (np.diff(breaks) <= 0.0).any():

@@ -15,11 +15,20 @@ from typing import Any
 import h5py
 import numpy as np
 
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, quoted
+from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, check_readable
 from creepkit.files.writing import replace_on_success
 
-MAXIMUM_OBJECTS = 100_000
+LARGEST_COMPRESSION = 1032
+"""Bytes that one of gzip's may stand for, at most; what lies outside chunks is not compressed at all."""
+
+
+_ALWAYS_ALLOWED_BYTES = 1_000_000
+"""Of an array whose values are nowhere, as those of a file that was only begun."""
+
+
+MAXIMUM_OBJECTS = 20_000
 """Groups and arrays in a file that is read; a data set has some twenty."""
 
 
@@ -87,10 +96,12 @@ def open_hdf5(path: Path, kind: FileKind) -> Iterator[h5py.File]:
             yield file
     except MemoryError:
         raise kind.error(f"{path}: holds more than there is memory for") from None
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+    except (OSError, RuntimeError, LookupError, ValueError, TypeError, NotImplementedError, RecursionError) as error:
         if path.is_file() and not h5py.is_hdf5(path):
             raise kind.error(f"{path}: not an HDF5 file; {kind.advice}") from None
-        raise kind.error(f"{path}: cannot be read, it seems damaged: {' '.join(str(error).split())}") from None
+        raise kind.error(
+            f"{path}: cannot be read, it seems damaged: {quoted(' '.join(str(error).split()), 300)}"
+        ) from None
 
 
 def write_names(group: h5py.Group, name: str, words: tuple[str, ...]) -> None:
@@ -101,17 +112,37 @@ def write_names(group: h5py.Group, name: str, words: tuple[str, ...]) -> None:
 def _check_links(file: h5py.File, path: Path, kind: FileKind) -> None:
     """Raise the error of `kind` for a file that would have HDF5 open other files, or that has no end."""
     groups: list[h5py.Group] = [file]
-    visited = 0
+    visited, most = 0, raised(MAXIMUM_OBJECTS)
     while groups:
         group = groups.pop()
         for name in group:
             visited += 1
-            if visited > MAXIMUM_OBJECTS:  # hard links may also lead back to where they came from
-                raise kind.error(f"{path}: more than {MAXIMUM_OBJECTS} objects, or links in a circle; {kind.advice}")
+            if visited > most:  # hard links may also lead back to where they came from
+                raise kind.error(
+                    f"{path}: more than {most} objects, or links in a circle; {kind.advice}, or "
+                    f"{how_to_raise(2 * most, most)}"
+                )
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-                raise kind.error(f"{path}: '{name}' is a link to elsewhere, which is not followed; {kind.advice}")
+                raise kind.error(
+                    f"{path}: '{quoted(name)}' is a link to elsewhere, which is not followed; {kind.advice}"
+                )
             item = group[name]
             if isinstance(item, h5py.Group):
                 groups.append(item)
-            elif isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
-                raise kind.error(f"{path}: the array '{name}' lies in other files, which are not opened; {kind.advice}")
+            elif isinstance(item, h5py.Dataset):
+                _check_array(item, path, kind)
+
+
+def _check_array(array: h5py.Dataset, path: Path, kind: FileKind) -> None:
+    """Raise the error of `kind` for an array that lies in other files, or says to be larger than its bytes can be."""
+    if array.external or array.is_virtual:
+        raise kind.error(
+            f"{path}: the array '{quoted(array.name)}' lies in other files, which are not opened; {kind.advice}"
+        )
+    stored = array.id.get_storage_size()
+    allowed = stored * LARGEST_COMPRESSION if array.chunks else stored
+    if array.nbytes > max(allowed, _ALWAYS_ALLOWED_BYTES):
+        raise kind.error(
+            f"{path}: the array '{quoted(array.name)}' says to have {array.nbytes} bytes, and holds {stored}; "
+            f"{kind.advice}"
+        )

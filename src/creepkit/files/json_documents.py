@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from creepkit.errors import nearest
+from creepkit.errors import LONGEST_QUOTE, nearest, quoted
 from creepkit.files.reading import FileKind, read_text
 from creepkit.files.writing import write_text
 
@@ -108,7 +108,7 @@ def check_keys(data: Mapping[str, Any], allowed: tuple[str, ...], place: str, *,
     """
     for key in data:
         if key not in allowed:
-            return f"{place}: unknown key {str(key)[:40]!r}; {nearest(str(key)[:40], allowed)}"
+            return f"{place}: unknown key '{quoted(key)}'; {nearest(str(key)[:LONGEST_QUOTE], allowed)}"
     missing = [key for key in allowed if key not in data]
     return f"{place}: '{missing[0]}' is missing" if missing and not optional else ""
 
@@ -120,9 +120,9 @@ class _JsonError(ValueError):
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     result = dict(pairs)
     if len(result) < len(pairs):
-        keys = [key for key, _ in pairs]
-        repeated = next(key for key in result if keys.count(key) > 1)
-        raise _JsonError(f"the key {repeated[:40]!r} stands twice in one object")
+        seen: set[str] = set()
+        repeated = next(key for key, _ in pairs if key in seen or seen.add(key))  # type: ignore[func-returns-value]
+        raise _JsonError(f"the key '{quoted(repeated)}' stands twice in one object")
     return result
 
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, quoted
+from creepkit.files.limits import how_to_raise, raised
 
 DEFAULT_MAXIMUM_BYTES = 50_000_000
 """Bytes; no document of creepkit is near it, and a reader must not load what memory cannot hold."""
@@ -25,13 +26,19 @@ class FileKind:
     """A kind of file that creepkit reads or writes.
 
     noun : with its article, as messages name it: "an identification". error : what is raised for a file of this kind.
-    advice : what to do about a file that is something else. maximum_bytes : largest size that is read.
+    advice : what to do about a file that is something else. maximum_bytes : largest size that is read, unless
+    `limits.VARIABLE` allows more.
     """
 
     noun: str
     error: type[CreepkitError]
     advice: str
     maximum_bytes: int = DEFAULT_MAXIMUM_BYTES
+
+    @property
+    def most_bytes(self) -> int:
+        """The largest size that is read in this process."""
+        return raised(self.maximum_bytes)
 
 
 _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
@@ -54,11 +61,11 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
     descriptor = _open_regular(path, kind, any_size=first is not None)
     try:
         with os.fdopen(descriptor, "rb") as stream:
-            content = _read_pieces(stream, kind.maximum_bytes + 1 if first is None else first)
+            content = _read_pieces(stream, kind.most_bytes + 1 if first is None else first)
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
-    if first is None and len(content) > kind.maximum_bytes:
-        raise kind.error(_too_large(path, kind))
+    if first is None and len(content) > kind.most_bytes:
+        raise kind.error(_too_large(path, kind, len(content)))
     return content
 
 
@@ -119,17 +126,20 @@ def _open_regular(path: Path, kind: FileKind, *, any_size: bool = False) -> int:
         problem = f"{path}: is a folder; {kind.advice}"
     elif not stat.S_ISREG(status.st_mode):
         problem = f"{path}: is no regular file but a device, a pipe or the like; {kind.advice}"
-    elif status.st_size > kind.maximum_bytes and not any_size:
-        problem = _too_large(path, kind)
+    elif not any_size and status.st_size > kind.most_bytes:
+        problem = _too_large(path, kind, status.st_size)
     if problem:
         os.close(descriptor)
         raise kind.error(problem)
     return descriptor
 
 
-def _too_large(path: Path, kind: FileKind) -> str:
-    return f"{path}: larger than {kind.maximum_bytes / 1e6:g} MB, which {kind.noun} never is; {kind.advice}"
+def _too_large(path: Path, kind: FileKind, size: int) -> str:
+    return (
+        f"{path}: larger than {kind.most_bytes / 1e6:g} MB, which {kind.noun} never is; {kind.advice}, or "
+        f"{how_to_raise(size, kind.most_bytes)}"
+    )
 
 
 def _cause(error: Exception) -> str:
-    return getattr(error, "strerror", None) or " ".join(str(error).split())
+    return getattr(error, "strerror", None) or quoted(" ".join(str(error).split()), 120)

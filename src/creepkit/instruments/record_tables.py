@@ -19,6 +19,7 @@ from creepkit.files.delimited_text import (
     parse_numbers,
     split_line,
 )
+from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, open_binary, read_range
 from creepkit.files.time_stamps import ClockColumn, is_clock_time
 from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
@@ -274,10 +275,12 @@ class KeptColumns:
 
     def _read(self, rows: list[tuple[int, list[str]]]) -> None:
         self._rows += len(rows)
-        if len(self.columns) * self._rows > MOST_VALUES * self.every:
+        if len(self.columns) * self._rows > MOST_VALUES * self.every and (
+            len(self.columns) * self._rows > (most := raised(MOST_VALUES)) * self.every
+        ):
             raise HistoryError(
-                f"{self.path}: more than {MOST_VALUES} readings; ask for channels=[...], or for every=10, the mean of "
-                "ten rows"
+                f"{self.path}: more than {most} readings; ask for channels=[...], or for every=10, the mean of ten "
+                f"rows; or {how_to_raise(2 * most, most)}"
             )
         numbers = [number for number, _ in rows]
         self.lines.append(np.array(numbers, dtype=np.int64))

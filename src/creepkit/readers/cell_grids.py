@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +10,16 @@ import numpy as np
 
 from creepkit.arrays import Ints
 from creepkit.errors import HistoryError
-from creepkit.files.delimited_text import ERROR_VALUES, Dialect, decode_text, detect_dialect, split_line, text_lines
+from creepkit.files.delimited_text import (
+    ERROR_VALUES,
+    Dialect,
+    decode_text,
+    detect_dialect,
+    split_line,
+    table_of_numbers,
+    text_lines,
+)
+from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.column_names import split_written_name
 from creepkit.readers.text_tables import (
@@ -35,6 +42,9 @@ DECIMAL_SIGNS: Mapping[str, str] = {".": ".", ",": ",", "point": ".", "comma": "
 
 MAXIMUM_COLUMNS, MAXIMUM_LINE, MAXIMUM_KEYS = 2000, 1_000_000, 1000
 """Columns of a table, characters of a line, and `# key: value` lines of a head; no table of tests comes near them."""
+
+MAXIMUM_CELL, MAXIMUM_TEXTS = 10_000, 6_000_000
+"""Characters of a cell, for units are looked for in it; cells of a table that holds not numbers alone."""
 
 
 _LARGE_TEXT = 65_536
@@ -90,6 +100,7 @@ def read_text_grid(path: Path) -> CellGrid:
             dialect, rows, comments = numbers
             names = TableRow(start + 1, split_line(lines[start], dialect, f"{path}:{start + 1}"))
             _refuse_many(f"{path}:{start + 1}", len(names.cells), 0)
+            _refuse_long_cells(f"{path}:{start + 1}", lines[start], names.cells)
             return CellGrid(
                 path,
                 "",
@@ -99,28 +110,50 @@ def read_text_grid(path: Path) -> CellGrid:
                 rows,
                 _late_entries(path, comments, dialect),
             )
+    _refuse_many_texts(path, 2 * text.count("\n"))  # a table has two columns or more
     return _grid_of_lines(path, text_lines(text))
 
 
 def _refuse_long_lines(text: str, path: Path) -> None:
     """Refuse a line that no table of tests has, before it is split into cells."""
-    start = 0
-    while len(text) - start > MAXIMUM_LINE:
-        end = text.rfind("\n", start, start + MAXIMUM_LINE + 1)
+    start, most = 0, raised(MAXIMUM_LINE)
+    while len(text) - start > most:
+        end = text.rfind("\n", start, start + most + 1)
         if end < 0:
             line = text.count("\n", 0, start) + 1
-            raise HistoryError(f"{path}:{line}: the line has more than {MAXIMUM_LINE} characters; write shorter rows")
+            raise HistoryError(
+                f"{path}:{line}: the line has more than {most} characters; write shorter rows, or "
+                f"{how_to_raise(2 * most, most)}"
+            )
         start = end + 1
 
 
 def _refuse_many(location: str, columns: int, keys: int) -> None:
-    if columns > MAXIMUM_COLUMNS:
+    """Refuse more columns or keys than a table has."""
+    for noun, found, usual, advice in (
+        ("columns", columns, MAXIMUM_COLUMNS, "write the tests to several files"),
+        ("keys above the table", keys, MAXIMUM_KEYS, "write only those that count"),
+    ):
+        if found > usual and found > (most := raised(usual)):
+            raise HistoryError(
+                f"{location}: number of {noun} {found}, more than {most}; {advice}, or {how_to_raise(found, most)}"
+            )
+
+
+def _refuse_many_texts(path: Path, count: int) -> None:
+    """Refuse a table that is not of numbers alone and has more cells than memory holds as texts."""
+    if count > (most := raised(MAXIMUM_TEXTS)):
         raise HistoryError(
-            f"{location}: number of columns {columns}, more than {MAXIMUM_COLUMNS}; write the tests to several files"
+            f"{path}: a table of {count} cells or more that are not all numbers, more than {most}; keep its numbers "
+            f"alone, or {how_to_raise(count, most)}"
         )
-    if keys > MAXIMUM_KEYS:
+
+
+def _refuse_long_cells(location: str, line: str, cells: Sequence[str]) -> None:
+    """Refuse a cell that is no name, number or remark."""
+    if len(line) > MAXIMUM_CELL and len(longest := max(cells, key=len)) > MAXIMUM_CELL:
         raise HistoryError(
-            f"{location}: number of keys {keys} above the table, more than {MAXIMUM_KEYS}; write only those that count"
+            f"{location}: a cell of {len(longest)} characters, more than {MAXIMUM_CELL}; is a quote or a line missing?"
         )
 
 
@@ -179,13 +212,16 @@ def _grid_of_lines(path: Path, lines: Sequence[str]) -> CellGrid:
     head = lines[:start]
     numbered = [(k, line) for k, line in enumerate(lines[start:], start + 1) if line.strip() and not is_comment(line)]
     dialect = detect_dialect((line for _, line in numbered), str(path), _stated_decimal(path, head))
+    _refuse_many_texts(path, len(numbered) * len(split_line(lines[start], dialect, f"{path}:{start + 1}")))
     comments = [(k, line) for k, line in enumerate(lines[start:], start + 1) if is_comment(line)]
     late = _late_entries(path, comments, dialect)
-    split = (TableRow(number, split_line(line, dialect, f"{path}:{number}")) for number, line in numbered)
     rows = []
-    for row in split:
-        _refuse_many(f"{path}:{row.line}", len(row.cells), 0)
-        rows += [row] if any(row.cells) else []
+    for number, line in numbered:
+        cells = split_line(line, dialect, f"{path}:{number}")
+        _refuse_many(f"{path}:{number}", len(cells), 0)
+        _refuse_long_cells(f"{path}:{number}", line, cells)
+        if any(cells):
+            rows.append(TableRow(number, cells))
     if not rows:
         raise HistoryError(f"{path}:{start + 1}: no cell holds anything; write a line of columns, then rows")
     return CellGrid(path, "", dialect, _header(path, head, rows[0].cells, dialect), rows, None, late)
@@ -245,15 +281,8 @@ def _number_rows(
     body, line_numbers, comments = _without_comments(body, start + 2)
     if not body.strip():
         return None
-    allowed = f"0123456789+-eE\n{dialect.delimiter}{dialect.decimal}"
-    if not body.isascii() or body.encode().translate(None, allowed.encode()):
-        return None
-    if re.search(rf"(?:^|[\n{dialect.delimiter}+-])0[0-9]+(?:[\n{dialect.delimiter}]|$)", body):
-        return None  # a whole number such as 0123 is refused
-    plain = io.StringIO(body if dialect.decimal == "." else body.replace(",", "."))
-    try:
-        numbers = np.loadtxt(plain, delimiter=dialect.delimiter, comments=None, ndmin=2)
-    except ValueError:
+    numbers = table_of_numbers(body, dialect)
+    if numbers is None:
         return None
     if numbers.shape != (line_numbers.size, len(split_line(lines[start], dialect))) or not np.isfinite(numbers).all():
         return None

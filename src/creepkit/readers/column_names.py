@@ -79,6 +79,10 @@ STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
 _IN_BRACKETS = re.compile(r"([^()\[\]]*)[(\[]([^()\[\]]*)[)\]]\s*([^()\[\]]*)")
 
 
+_PARTS_OF_UNIT = 8
+"""Into which a unit may be divided by a separator, as `mm / mm` is."""
+
+
 _RATE_UNIT = re.compile(r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:(/|per )\s*)?([a-z]+)(\^?-1)?")
 
 
@@ -111,7 +115,7 @@ def split_written_name(text: str) -> tuple[str, str]:
             return f"{name} {rest}".strip(), unit
     for separator in (",", " in ", "_", " ", "/"):
         parts = text.split(separator)
-        for k in range(1, len(parts)):
+        for k in range(max(1, len(parts) - _PARTS_OF_UNIT), len(parts)):
             name, unit = separator.join(parts[:k]), separator.join(parts[k:])
             # A blank before 1 sets a number apart, as of a sensor, and no unit.
             if name and unit_suffix(unit) and not (separator == " " and unit in ("1", "-")):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from creepkit.errors import HistoryError
+from creepkit.files.limits import how_to_raise, raised
 
 MAXIMUM_UNPACKED_BYTES = 100_000_000
 """Of all parts of a file together."""
@@ -80,11 +81,16 @@ def checked_parts(path: Path, content: bytes) -> dict[str, bytes]:
 
 def _check_size(path: Path, size: int, packed: int) -> None:
     is_bomb = size > _ALWAYS_ALLOWED_BYTES and size > MAXIMUM_EXPANSION * packed
-    if size > MAXIMUM_UNPACKED_BYTES or is_bomb:
-        allowed = f"{MAXIMUM_UNPACKED_BYTES / 1e6:g} MB" if not is_bomb else f"{MAXIMUM_EXPANSION} times its size"
+    most = raised(MAXIMUM_UNPACKED_BYTES)
+    if is_bomb:
         raise HistoryError(
-            f"{path}: unpacks to {size / 1e6:.0f} MB, which no spreadsheet of tests does; allowed: {allowed}; save it "
-            "as CSV"
+            f"{path}: unpacks to {size / 1e6:.0f} MB, more than {MAXIMUM_EXPANSION} times its size, which no "
+            "spreadsheet of tests does; save it as CSV"
+        )
+    if size > most:
+        raise HistoryError(
+            f"{path}: unpacks to {size / 1e6:.0f} MB, more than {most / 1e6:g} MB; save it as CSV, or "
+            f"{how_to_raise(size, most)}"
         )
 
 

@@ -18,6 +18,7 @@ from typing import Any
 
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
+from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, check_readable, read_bytes
 from creepkit.readers.cell_grids import CellGrid, grid_of_rows, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
@@ -94,11 +95,14 @@ def _formulas(content: bytes, load_workbook: Any) -> dict[str, set[tuple[int, in
 def _rows(sheet: Any) -> Iterator[tuple[Any, ...]]:
     """The rows of a sheet as they stand, whatever size the file claims that it has."""
     sheet.reset_dimensions()
-    count = 0
+    count, most = 0, raised(MAXIMUM_CELLS)
     for row in sheet.iter_rows():
         count += len(row) + 1
-        if count > MAXIMUM_CELLS:
-            raise HistoryError(f"sheet '{sheet.title}' has more than {MAXIMUM_CELLS} cells; save its columns as CSV")
+        if count > most:
+            raise HistoryError(
+                f"sheet '{sheet.title}' has more than {most} cells; save its columns as CSV, or "
+                f"{how_to_raise(2 * most, most)}"
+            )
         yield row
 
 

@@ -35,7 +35,7 @@ OUT_OF_PLANE = ("z", "w")
 QUANTITIES_OF_FRAMES = (*COORDINATES, *DISPLACEMENTS, "confidence", "time", "image_x", "image_y")
 
 
-_UNIT_IN_BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]$", re.DOTALL)
+_UNIT_IN_BRACKETS = re.compile(r"^([^\[(]*)[\[(]([^\])]*)[\])]$")
 
 
 _PACKED = re.compile(r"\?|[<>=|]?(?:[iu][1248]|f[248])", re.ASCII)
@@ -72,13 +72,6 @@ def _column_name(text: str) -> ColumnName:
 def _plain(name: str) -> str:
     """A name whose separators are blanks, so that `disp.Out-Of-Plane: W` and `disp_Out_Of_Plane_W` are one."""
     return " ".join(re.split(r"[\s._:\-]+", name.strip())).strip()
-
-
-def shown(text: str) -> str:
-    """A name or a cell of a file as messages show it: without unprintable signs, and not longer than 40."""
-    text = text.strip()
-    plain = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text[:41])
-    return plain if len(text) <= 40 else f"{plain[:37]}..."
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
 from creepkit.arrays import Floats
-from creepkit.errors import CreepkitError, ExportError, HistoryError, SolveError
+from creepkit.errors import CreepkitError, ExportError, HistoryError, SolveError, quoted
 from creepkit.records.history import History
 from creepkit.records.prediction import NuisanceValues, Prediction
 from creepkit.records.prediction_checks import checked_prediction, predictor_in_words
@@ -39,9 +39,32 @@ def call_of_plugin(call: Callable[[], _T], owner: object, what: str, error: type
     except (Exception, SystemExit) as raised:
         if type(owner).__module__.partition(".")[0] == OWN_PACKAGE:
             raise
-        message = " ".join(str(raised).split()) or "no message"
-        place = _place(raised, owner)
-        raise error(f"{what} raised {type(raised).__name__}: {message}{place}") from raised
+        raise error(_unforeseen(what, raised, owner)) from raised
+
+
+def _unforeseen(what: str, raised: BaseException, owner: object) -> str:
+    message = quoted(" ".join(str(raised).split()), 300) or "no message"
+    return f"{what} raised {type(raised).__name__}: {message}{_place(raised, owner)}"
+
+
+def call_of_reader(call: Callable[[], _T], reader: Reader, path: Path, method: str) -> _T:
+    """What a reader's accepts() or read() returns; HistoryError whatever it raises, also of creepkit's own readers.
+
+    The content of a file may lead any reader to an error that nobody has foreseen; the user is told of which file.
+    """
+    what = f"{path}: {method}() of reader '{reader.name}'"
+    try:
+        return call()
+    except CreepkitError:
+        raise
+    except MemoryError:
+        raise HistoryError(f"{what} needs more memory than there is; divide the file, or give it more") from None
+    except RecursionError:
+        raise HistoryError(f"{what} found something nested too deep; no file of a test is") from None
+    except OSError as failure:
+        raise HistoryError(f"{what} cannot read it ({quoted(failure.strerror or failure, 120)})") from failure
+    except (Exception, SystemExit) as raised:
+        raise HistoryError(_unforeseen(what, raised, reader)) from raised
 
 
 def _place(raised: BaseException, owner: object) -> str:
@@ -78,9 +101,7 @@ def predict_with(
 
 def accepts_path(reader: Reader, path: Path) -> bool:
     """Whether a reader accepts a file or folder; HistoryError where accepts() raises or returns no bool."""
-    accepted = call_of_plugin(
-        lambda: reader.accepts(path), reader, f"{path}: accepts() of reader '{reader.name}'", HistoryError
-    )
+    accepted = call_of_reader(lambda: reader.accepts(path), reader, path, "accepts")
     if not isinstance(accepted, bool):
         raise HistoryError(
             f"{path}: accepts() of reader '{reader.name}' returned a {type(accepted).__name__}; it must return a bool"
@@ -91,7 +112,7 @@ def accepts_path(reader: Reader, path: Path) -> bool:
 def histories_in(reader: Reader, path: Path) -> list[History]:
     """The histories that a reader finds in a file or folder; HistoryError where read() raises or returns others."""
     what = f"{path}: read() of reader '{reader.name}'"
-    histories = call_of_plugin(lambda: reader.read(path), reader, what, HistoryError)
+    histories = call_of_reader(lambda: reader.read(path), reader, path, "read")
     if not isinstance(histories, list):
         raise HistoryError(f"{what} returned a {type(histories).__name__}; it must return a list of histories")
     for history in histories:

@@ -75,7 +75,7 @@ def is_plugin_file_name(path: str | Path) -> bool:
 
 def provenance_of_file(path: Path) -> Provenance:
     """Return the provenance of a plugin file."""
-    return Provenance(str(path.resolve()), path.stem)
+    return Provenance(os.path.realpath(path), path.stem)
 
 
 def mentions_commands(source: EntryPoint | Path) -> bool:

@@ -10,12 +10,12 @@ from typing import Any
 
 import typer
 
+from creepkit import errors
+
 
 def printable(text: str) -> str:
-    """A text for a terminal: what would steer it, or turn the direction of writing, as its code."""
-    from creepkit.files.delimited_text import UNPRINTABLE
-
-    return UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    """A text for a terminal, of any number of lines, each as messages show it."""
+    return "\n".join(map(errors.printable, text.split("\n")))
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

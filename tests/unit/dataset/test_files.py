@@ -324,7 +324,7 @@ def enormous(file):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (enormous, "says to be .*, and is not all there"),
+        (enormous, "says to have .* bytes, and holds"),
         (replaced("reasons", np.zeros(32)), r"the array 'reasons' is float64 \(32,\), which does not fit"),
         (replaced("parameters", np.zeros((32, 2), complex)), "'parameters' is complex128"),
         (replaced("parameters", np.full((32, 2), b"1e-12")), "'parameters' is |S5"),

@@ -157,7 +157,10 @@ def zipped(parts: dict[str, bytes]) -> bytes:
         (b"time_h,strain_pct\n0,0\n", "x.xlsx: is no spreadsheet in the format .xlsx"),
         (b"", "x.xlsx: is no spreadsheet in the format .xlsx"),
         (zipped({"a.txt": b"a"}), "x.xlsx: is no spreadsheet that can be read"),
-        (zipped({"xl/worksheets/sheet1.xml": bytes(600_000_000)}), "x.xlsx: unpacks to 600 MB, which no spreadsheet"),
+        (
+            zipped({"xl/worksheets/sheet1.xml": bytes(600_000_000)}),
+            "x.xlsx: unpacks to 600 MB, more than 100 times its size, which no spreadsheet",
+        ),
         (zipped({"xl/workbook.xml": b'<?xml version="1.0"?><!DOCTYPE a>'}), "x.xlsx: a part of it defines XML"),
     ],
     ids=["text", "empty", "another archive", "bomb", "entities"],
