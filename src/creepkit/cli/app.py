@@ -44,6 +44,7 @@ from creepkit.cli import (
     sweep,
     train,
 )
+from creepkit.cli.declared_options import checked
 from creepkit.cli.described_test import TestCommand
 from creepkit.cli.identification_options import CommandWithDefaults
 from creepkit.errors import CreepkitError, PluginError
@@ -152,7 +153,7 @@ TEST_COMMANDS = ("simulate", "predict")
 
 
 for name, command in COMMANDS.items():
-    app.command(name, cls=TestCommand if name in TEST_COMMANDS else CommandWithDefaults)(command)
+    app.command(name, cls=TestCommand if name in TEST_COMMANDS else CommandWithDefaults)(checked(command))
 
 
 def _print_version(requested: bool) -> None:

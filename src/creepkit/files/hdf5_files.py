@@ -17,7 +17,7 @@ import numpy as np
 
 from creepkit.errors import CreepkitError
 from creepkit.files.reading import FileKind, check_readable
-from creepkit.files.writing import replace_on_success
+from creepkit.files.writing import ADVICE, replace_on_success
 
 MAXIMUM_OBJECTS = 100_000
 """Groups and arrays in a file that is read; a data set has some twenty."""
@@ -60,9 +60,17 @@ class FaultTolerantFile(io.FileIO):
 
 
 @contextmanager
-def write_hdf5(path: Path, error: type[CreepkitError], advice: str) -> Iterator[h5py.File]:
-    """A new file, open for writing, that takes the place of `path` when all of it is written."""
-    with replace_on_success(path, error, advice) as temporary, create_hdf5(temporary) as file:
+def write_hdf5(
+    path: Path, error: type[CreepkitError], advice: str = ADVICE, *, force: bool = False, internal: bool = False
+) -> Iterator[h5py.File]:
+    """A new file, open for writing, that takes the place of `path` when all of it is written.
+
+    advice : what to do when it cannot be written. force, internal : as of replace_on_success().
+    """
+    with (
+        replace_on_success(path, error, advice, force=force, internal=internal) as temporary,
+        create_hdf5(temporary) as file,
+    ):
         yield file
 
 

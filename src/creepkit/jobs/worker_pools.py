@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import IO, Any, Protocol
 
+from creepkit import limits
 from creepkit.arrays import usable_cores
 from creepkit.errors import CreepkitError, DatasetError
 from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task
@@ -206,8 +207,8 @@ class ThisProcess:
 
 def process_count(workers: int | None, error: type[CreepkitError] = DatasetError) -> int:
     """How many processes are meant: `workers`, or one for each core; `error` for what is no number of them."""
-    if workers is not None and (workers != int(workers) or workers < 1):
-        raise error(f"workers is {workers}; allowed are whole numbers above zero, or None for one on each core")
+    if workers is not None:
+        limits.check_number("workers", workers, limits.WORKERS, error)
     return workers or usable_cores()
 
 

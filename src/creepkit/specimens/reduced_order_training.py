@@ -202,7 +202,7 @@ def _keep(basis: ReducedBasis, path: Path) -> None:
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         arrays = {"modes": basis.modes, "points": basis.points, "factors": basis.factors}
-        write_safetensors(path, arrays, {"sha256": _checksum(arrays)}, _FORMAT)
+        write_safetensors(path, arrays, {"sha256": _checksum(arrays)}, _FORMAT, internal=True)
     except (OSError, CreepkitError):
         return
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.errors import StudyError, nearest
+from creepkit.files.writing import check_target
 from creepkit.reports.attachments import problem_of_name, same_name
 from creepkit.studies import arguments
 from creepkit.studies.documents import ResultFolder
@@ -169,8 +170,12 @@ class Study:
         if locked and (before is None or changes):
             what = changes[0] if changes else "there is no lock"
             raise StudyError(f"{lock_path}: the study cannot be repeated exactly: {what}; leave --locked out")
+        wanted = needed_stages(stages, kinds)
+        for stage in stages:
+            if stage.file and stage.name in wanted:  # now, not after all the work
+                check_target(folder / stage.file, StudyError, force=kept.overwrite)
         execution = Execution(kept, inputs.histories, progress)
-        execution.run(stages, needed_stages(stages, kinds))
+        execution.run(stages, wanted)
         write_lock(lock_of(self.file, self._hash, files, execution.records, before), lock_path)
         if before is not None:
             changes += changed_results(before, execution.records)
