@@ -45,7 +45,11 @@ def numbers(low: float, high: float, *, above: bool = False) -> Limits:
 def check_number(name: str, value: Any, limits: Limits, error: type[CreepkitError]) -> None:
     """Raise `error` for a number that is not within its limits."""
     if value not in limits:
-        raise error(f"{name} is {value!r:.40}; allowed are {limits}")
+        try:
+            text = repr(value)
+        except ValueError:  # Python writes no integers of more than some thousand digits
+            text = "an integer of thousands of digits"
+        raise error(f"{name} is {text[:40]}; allowed are {limits}")
 
 
 STARTS = Limits(1, 10_000)

@@ -12,6 +12,7 @@ import pickle
 import re
 import selectors
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -39,6 +40,10 @@ CONNECT_TIMEOUT = 30
 """s, in which a scheduler answers."""
 
 
+WORKERLESS_TIMEOUT = 600
+"""s, within which a queue of jobs starts a worker."""
+
+
 LEAST_QUEUED = 8
 """Shards handed over while a cluster has few workers or none: an adaptive one grows with its queue."""
 
@@ -56,6 +61,7 @@ class ClusterWorkers:
         self._size = thread_limit
         self._client: Any = None
         self._futures: dict[Any, int] = {}
+        self._last_worker = time.monotonic()
 
     def __enter__(self) -> ClusterWorkers:
         try:
@@ -64,13 +70,38 @@ class ClusterWorkers:
             raise DatasetError("--cluster needs dask; install it with: pip install 'creepkit[cluster]'") from None
         if not ADDRESS.fullmatch(self._address):  # a client of such an address takes a minute to go
             raise DatasetError(f"'{self._address}' is no address of a dask scheduler; write tcp://host:port")
+
+        class OwnClient(Client):  # type: ignore[misc]
+            """A client that is closed by us: one that could not connect would be closed for a minute, and fail."""
+
+            def __del__(self) -> None:
+                """Nothing."""
+
+        self._check_reachable()
         try:
-            self._client = Client(  # type: ignore[no-untyped-call]
+            self._client = OwnClient(  # type: ignore[no-untyped-call]
                 self._address, timeout=CONNECT_TIMEOUT, set_as_default=False
             )
-        except (OSError, ValueError) as error:
-            raise DatasetError(f"no dask scheduler answers at {self._address}: {_one_line(error)}") from None
+        except Exception as error:  # whatever dask makes of what another kind of server says
+            raise self._silent(error) from None
         return self
+
+    def _check_reachable(self) -> None:
+        """DatasetError where nothing answers: a client of dask takes minutes for that, and fails in several ways."""
+        scheme, _, rest = self._address.partition("://")
+        host, _, port = rest.rstrip("/").rpartition(":")
+        if scheme == "inproc":
+            return
+        try:
+            socket.create_connection((host.strip("[]"), int(port)), CONNECT_TIMEOUT).close()
+        except (OSError, ValueError, OverflowError) as error:
+            raise self._silent(error) from None
+
+    def _silent(self, error: Exception) -> DatasetError:
+        return DatasetError(
+            f"no dask scheduler answers at {self._address}: {_one_line(error)}; check the "
+            "address, and that the scheduler runs"
+        )
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -92,6 +123,7 @@ class ClusterWorkers:
         """Wait for results, at most `timeout` s."""
         from distributed import wait
 
+        self._check_workers()
         if not self._futures:
             time.sleep(timeout)
             return []
@@ -99,6 +131,20 @@ class ClusterWorkers:
             wait(list(self._futures), timeout, "FIRST_COMPLETED")  # type: ignore[no-untyped-call]
         finished = [future for future in self._futures if future.done()]
         return [self._result(future, self._futures.pop(future)) for future in finished]
+
+    def _check_workers(self) -> None:
+        """DatasetError where the scheduler is gone, or has had no worker for WORKERLESS_TIMEOUT."""
+        if self._client.status not in ("running", "connecting"):
+            raise DatasetError(
+                f"the dask scheduler at {self._address} is gone; start it again, and the same call goes on from here"
+            )
+        if self._client.status == "running" and self._client.nthreads():
+            self._last_worker = time.monotonic()
+        elif time.monotonic() - self._last_worker > WORKERLESS_TIMEOUT:
+            raise DatasetError(
+                f"the dask scheduler at {self._address} has had no worker for {WORKERLESS_TIMEOUT} s; start workers "
+                "that reach it, and the same call goes on from here"
+            )
 
     def _result(self, future: Any, number: int) -> TaskResult:
         """The result of a task; that its workers died is a result too."""
