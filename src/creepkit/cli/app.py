@@ -47,7 +47,7 @@ from creepkit.cli import (
 )
 from creepkit.cli.declared_options import checked
 from creepkit.cli.described_test import TestCommand
-from creepkit.cli.failures import failure_sentence
+from creepkit.cli.failures import NO_READER, failure_sentence
 from creepkit.cli.identification_options import CommandWithDefaults
 from creepkit.errors import CreepkitError, PluginError
 
@@ -66,8 +66,8 @@ class CommandGroup(TyperGroup):
             _check_files_in_environment()
             _load_plugin_files(ctx.params["plugin"])
             return super().invoke(ctx)
-        except BrokenPipeError:  # nobody reads the output any more
-            raise
+        except BrokenPipeError:
+            raise typer.Exit(NO_READER) from None
         except (CreepkitError, OSError) as error:
             if ctx.params["debug"]:
                 raise

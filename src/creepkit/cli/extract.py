@@ -92,7 +92,7 @@ def command(
     import creepkit as ck
     from creepkit.api.extraction import operator_of
     from creepkit.errors import HistoryError
-    from creepkit.files.writing import check_target
+    from creepkit.files.writing import check_folder_target, check_target
     from creepkit.records import ZERO_CELSIUS
     from creepkit.reports.terminal import ProgressBar
 
@@ -119,8 +119,10 @@ def command(
         typer.echo(str(one))
     sheets = [plot if len(found) == 1 else plot.with_stem(f"{plot.stem}_{one.name}") for one in found] if plot else []
     files = [to / f"{one.name}.csv" for one in found] if to is not None else []
-    for path in (*sheets, *files):
+    for path in sheets:
         check_target(path, HistoryError)
+    if to is not None:
+        check_folder_target(to, HistoryError, tuple(path.name for path in files))
     histories = []
     for one in found if to is not None else ():  # all of them, before any is written
         if recorded is not None:

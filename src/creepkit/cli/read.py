@@ -75,6 +75,7 @@ def command(
 def _write(histories: list[History], folder: Path) -> list[Path]:
     """Write each history; what cannot stand in the name of a file becomes a line."""
     import creepkit as ck
+    from creepkit.files.writing import check_folder_target
     from creepkit.readers.history_csv import history_text
     from creepkit.reports.figures import make_folder
 
@@ -83,6 +84,7 @@ def _write(histories: list[History], folder: Path) -> list[Path]:
         names = [f"{number}_{name}" for number, name in enumerate(names, 1)]
     for history in histories:
         history_text(history)  # an error of the last one must not leave the others written
+    check_folder_target(folder, ck.errors.HistoryError, tuple(f"{name}.csv" for name in names))
     make_folder(folder, ck.errors.HistoryError)
     return [ck.write_history(h, folder / f"{name}.csv") for h, name in zip(histories, names, strict=True)]
 

@@ -16,6 +16,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import StudyError
+from creepkit.files.writing import RECORD
 from creepkit.inverse.identification_document import identification_to_json
 from creepkit.studies.carried_study import study_of_report
 from creepkit.studies.result import StudyResult
@@ -183,8 +184,11 @@ def test_a_report_whose_notes_were_deleted_is_still_the_studys_own(study: Path, 
         for one in gone:
             (study.parent / "study.results" / f"{one}.json").unlink()
         first.report.write_text(first.report.read_text() + "<!-- older -->")
+        (study.parent / RECORD).unlink()
         assert states(ck.Study.load(study).run())["report"] == "made"
     (study.parent / "study.results" / "outputs.json").unlink()
+    first.report.write_text(first.report.read_text() + "<!-- edited -->")
+    assert states(ck.Study.load(study).run())["report"] == "failed"
     first.report.write_text("of somebody else")
     (study.parent / "study.results" / "report.json").unlink()
     assert states(ck.Study.load(study).run())["report"] == "failed"
@@ -289,7 +293,7 @@ def test_a_run_that_is_killed_anywhere_goes_on_to_the_same_result(tmp_path: Path
 def test_files_that_a_study_has_not_written_stay(study: Path, tmp_path: Path) -> None:
     own = tmp_path / "law_A.py"
     own.write_text("mine")
-    with pytest.raises(StudyError, match="this study has not written it"):
+    with pytest.raises(StudyError, match="creepkit did not write it as it is now"):
         ck.Study.load(study).run()
     assert own.read_text() == "mine"
     own.unlink()
@@ -297,7 +301,7 @@ def test_files_that_a_study_has_not_written_stay(study: Path, tmp_path: Path) ->
     text = own.read_text()
     assert "def " in text
     own.write_text("changed")
-    with pytest.raises(StudyError, match="not written it as it is"):
+    with pytest.raises(StudyError, match="creepkit did not write it as it is now"):
         ck.Study.load(study).run()
     assert own.read_text() == "changed"
     assert ck.Study.load(study).run(only="export", force=True).failures == ()
