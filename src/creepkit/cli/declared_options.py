@@ -79,7 +79,7 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
     run.__signature__ = signature.replace(parameters=list(parameters.values()))  # type: ignore[attr-defined]
     run.__annotations__ = {name: parameter.annotation for name, parameter in parameters.items()}
     run.__annotations__["return"] = None
-    del run.__wrapped__  # type: ignore[attr-defined]  # whose annotations typer would read instead
+    del run.__wrapped__  # whose annotations typer would read instead
     return run
 
 

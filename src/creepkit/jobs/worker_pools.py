@@ -71,7 +71,7 @@ class ClusterWorkers:
         if not ADDRESS.fullmatch(self._address):  # a client of such an address takes a minute to go
             raise DatasetError(f"'{self._address}' is no address of a dask scheduler; write tcp://host:port")
 
-        class OwnClient(Client):  # type: ignore[misc]
+        class OwnClient(Client):
             """A client that is closed by us: one that could not connect would be closed for a minute, and fail."""
 
             def __del__(self) -> None:
