@@ -9,7 +9,7 @@
 #   Q = 400000.0 J/mol, activation energy
 # Note: n = 5.2 [5.1, 5.3]
 # Note: valid from 973 to 1123 K
-# Source: Norton (1929), The Creep of Steel at High Temperatures
+# Source: Norton (1929), The Creep of Steel at High Temperatures, McGraw-Hill
 # Source: Arrhenius (1889), Z. Phys. Chem. 4, 226
 #
 # PowerLawCreepStressUpdate: rate = coefficient s^n_exponent exp(-activation_energy/(gas_constant T)) (t -

@@ -12,8 +12,9 @@
 #   m = -0.7, time exponent
 # Note: n = 5.2 [5.1, 5.3]
 # Note: valid from 973 to 1123 K
-# Source: Norton (1929), The Creep of Steel at High Temperatures
-# Source: Bailey (1935), Proc. Inst. Mech. Eng. 131, 131
+# Source: Norton (1929), The Creep of Steel at High Temperatures, McGraw-Hill
+# Source: Bailey (1935), The Utilization of Creep Test Data in Engineering Design, Proc. Inst. Mech. Eng. 131,
+#     131-349
 # Source: Table 1 of Chen et al., Machine Learning-Driven Creep Law Discovery
 #
 # PowerLawCreepStressUpdate: rate = coefficient s^n_exponent exp(-activation_energy/(gas_constant T)) (t -

@@ -8,7 +8,7 @@
 #   n = 5.2, stress exponent
 # Note: n = 5.2 [5.1, 5.3]
 # Note: valid from 973 to 1123 K
-# Source: Norton (1929), The Creep of Steel at High Temperatures
+# Source: Norton (1929), The Creep of Steel at High Temperatures, McGraw-Hill
 #
 # For NEML2 3.1. PerzynaPlasticFlowRate: rate = (s/reference_stress)^exponent, of the von Mises stress s,
 #     which stands in the place of the yield function. The model called `model` makes the stress of strain E

@@ -12,7 +12,7 @@
 #   Q = 300000.0 J/mol, activation energy
 # Note: n = 5.2 [5.1, 5.3]
 # Note: valid from 973 to 1123 K
-# Source: Norton (1929), The Creep of Steel at High Temperatures
+# Source: Norton (1929), The Creep of Steel at High Temperatures, McGraw-Hill
 # Source: Arrhenius (1889), Z. Phys. Chem. 4, 226
 #
 # For NEML2 3.1. PerzynaPlasticFlowRate: rate = (s/reference_stress)^exponent, of the von Mises stress s,

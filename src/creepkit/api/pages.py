@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from creepkit.records import History, Predictor
 
 
+LARGE_NETWORK = 300_000
+"""Bytes of weights from which a network is named as what makes a page too large."""
+
+
 def interactive_page(
     source: PageSource,
     to: str | Path = "page.html",
@@ -53,6 +57,19 @@ def write_page(contents: PageContents, path: Path, *, force: bool = False) -> Pa
     if size > LARGEST_PAGE:
         raise ExportError(
             f"{path}: the page would have {size / 1e6:.1f} MB, allowed is {LARGEST_PAGE / 1e6:g} MB; "
-            "give fewer tests or laws"
+            f"{_smaller(contents)}"
         )
     return write_text(text, path, ExportError, force=force)
+
+
+def _smaller(contents: PageContents) -> str:
+    """What makes a page that is too large smaller."""
+    from creepkit.app.page_models import network_of
+
+    network = sum(len(text) for text in network_of(contents).values())
+    if network > LARGE_NETWORK:
+        return (
+            f"the weights of the network alone are {network / 1e6:.1f} MB: train one with fewer hidden units or "
+            "layers, or leave the surrogate out"
+        )
+    return "give fewer tests or laws"

@@ -239,22 +239,24 @@ def _exclusions(histories: Sequence[History]) -> Iterator[Exclusion]:
 
 
 def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], tuple[str, ...]]:
-    """The best law of each material for some targets, and the identification; and what cannot be written."""
+    """The best law of each material for some targets, identifications and rankings; and what cannot be written."""
     from creepkit.files.json_documents import json_text
     from creepkit.inverse.identification_document import identification_to_json
     from creepkit.registry import default_registry
     from creepkit.reports.contents import ExportedFile
     from creepkit.reports.html.findings import findings_of
+    from creepkit.reports.identified_files import identified_files
 
     found = [one for one in map(findings_of, groups) if one is not None]
     if not 0 < len(found) <= MOST_EXPORTED_GROUPS:
         return (), ()
-    files: list[ExportedFile] = []
+    files = identified_files({one.name: one.ranking for one in found if one.ranking is not None})
     notes: list[str] = []
     for one in found:
         stem = "_".join(part for part in (one.name if len(found) > 1 else "", one.fit.law.name) if part)
-        document = json_text(identification_to_json(one.fit))
-        files.append(ExportedFile(f"{stem}_identification.json", "identification, read by ck.load", document))
+        if one.ranking is None:
+            document = json_text(identification_to_json(one.fit))
+            files.append(ExportedFile(f"{stem}_identification.json", "identification, read by ck.load", document))
         verdict = () if one.ranking is None else (f"verdict on the law: {one.verdict}",)
         for target in EXPORT_TARGETS:
             exporter = default_registry().exporter(target)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from creepkit import kernels
-from creepkit.app.contents import PageContents, PageLaw, specimen_name
+from creepkit.app.contents import PageContents, PageLaw, specimen_name, temperature_warning
 from creepkit.app.documents import compared_frames, finite, numbers, rate_point
 from creepkit.app.requests import PredictRequest, ProgramRequest, RequestError
 from creepkit.app.sections import section_document
@@ -108,6 +108,9 @@ class PageAnswers:
                 answer["rate"] = rate_document(page_law, values, request.rate_temperature)
             if request.program is not None:
                 answer["program"] = self._program_document(page_law, values, theta, request)
+            warning = temperature_warning(page_law.law, [self.contents.histories[k] for k in request.tests])
+            if warning:
+                answer["warning"] = warning
             answer["tests"] = []
             for k in request.tests:
                 check()

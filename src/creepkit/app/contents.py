@@ -16,7 +16,8 @@ import numpy as np
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.reference_conditions import ReferencePoint
-from creepkit.records import History, LawWithValues, Predictor, Specimen, known_specimens, predict_with
+from creepkit.language import temperature
+from creepkit.records import ZERO_CELSIUS, History, LawWithValues, Predictor, Specimen, known_specimens, predict_with
 from creepkit.registry.arguments import check_histories, resolve_law
 
 if TYPE_CHECKING:
@@ -188,10 +189,13 @@ def _first_temperature(histories: Sequence[History], fit: Identification | None)
     return USUAL_TEMPERATURE if fit is None else float(fit.reference.temperature)
 
 
-def usual_end(page_law: PageLaw, stress: float, temperature: float) -> float:
-    """s, when a bar under `stress` (MPa) has crept by USUAL_STRAIN, or ruptures; what a first curve is to show."""
+def usual_end(page_law: PageLaw, stress: float, kelvin: float) -> float:
+    """s, when a bar has crept by USUAL_STRAIN, or ruptures; what a first curve is to show.
+
+    stress : MPa. kelvin : K.
+    """
     times = np.geomspace(1e-6, 1e22, 561)
-    plan = History(name="first curve", times=times, outputs={}, loading=_held_stress(stress), temperature=temperature)
+    plan = History(name="first curve", times=times, outputs={}, loading=_held_stress(stress), temperature=kelvin)
     law = page_law.law
     try:
         prediction = predict_with(known_specimens()[plan.specimen], law, law.to_internal(dict(page_law.values)), [plan])
@@ -206,6 +210,22 @@ def usual_end(page_law: PageLaw, stress: float, temperature: float) -> float:
         return USUAL_TIME
     hours = float(f"{end / 3600.0:.2g}")
     return 3600.0 * hours
+
+
+SAME_TEMPERATURE = 5.0
+"""K, up to which tests are at one temperature."""
+
+
+def temperature_warning(law: CreepLaw, histories: Sequence[History]) -> str:
+    """A sentence where a law without temperature is laid over tests at several temperatures; "" where it is not."""
+    temperatures = [history.mean_temperature for history in histories]
+    if law.uses(temperature) or not temperatures or max(temperatures) - min(temperatures) <= SAME_TEMPERATURE:
+        return ""
+    low, high = min(temperatures) - ZERO_CELSIUS, max(temperatures) - ZERO_CELSIUS
+    return (
+        f"The law does not depend on temperature, and these tests are at {low:.0f} to {high:.0f} C: its curves are the "
+        "same at every temperature, so that they cannot follow all of them."
+    )
 
 
 def _held_stress(stress: float) -> Any:

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.app.contents import RATE_STRAIN, RATE_TIME, USUAL_STRESS, PageContents, PageLaw, specimen_name, usual_end
+from creepkit.app.contents import (
+    RATE_STRAIN,
+    RATE_TIME,
+    SAME_TEMPERATURE,
+    USUAL_STRESS,
+    PageContents,
+    PageLaw,
+    specimen_name,
+    temperature_warning,
+    usual_end,
+)
 from creepkit.app.model_data import law_data
 from creepkit.app.page_models import model_of, network_of
 from creepkit.errors import CreepkitError
@@ -65,12 +75,17 @@ def contents_document(contents: PageContents, models: Collection[str] = ()) -> d
     stress = specimens[0]["loads"][0]["stress"]
     return {
         "title": contents.title,
-        "laws": [law_document(one, usual_end(one, stress, contents.temperature)) for one in contents.laws],
+        "laws": [
+            law_document(one, usual_end(one, stress, contents.temperature))
+            | {"warning": temperature_warning(one.law, contents.histories)}
+            for one in contents.laws
+        ],
         "specimens": specimens,
         "tests": [
             with_model(test_document(one, contents), contents.specimen(one.specimen), one) for one in contents.histories
         ],
         "temperature": contents.temperature,
+        "same_temperature": SAME_TEMPERATURE,
     }
 
 

@@ -98,7 +98,8 @@ class Adequacy:
         of a bend of these rates over stress, by which a law shows that it misses the dependence on stress.
     implausible : nuisances that lie far from their priors, without which the law would not explain the tests.
     expected_chi_square : what `chi_square` is in the mean if the law is right: above one where noise is estimated from
-        few frames. not_judged : the outputs, where nothing can be judged.
+        few frames. not_judged : the outputs, where nothing can be judged, and few_frames : the tests, each with how
+        many frames it has, where these are too few to show the noise.
     """
 
     verdict: AdequacyVerdict
@@ -114,6 +115,7 @@ class Adequacy:
     implausible: tuple[ImplausibleNuisance, ...] = ()
     expected_chi_square: float = 1.0
     not_judged: tuple[str, ...] = ()
+    few_frames: tuple[tuple[str, int], ...] = ()
 
     @property
     def explains(self) -> bool:
@@ -167,7 +169,7 @@ class Adequacy:
     def __str__(self) -> str:
         """One sentence: the verdict, with what is left and where."""
         if self.verdict == "cannot be judged":
-            return f"cannot be judged: {how_to_state_noise(self.not_judged)}"
+            return f"cannot be judged: {how_to_state_noise(self.not_judged, self.few_frames)}"
         source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
         if self.explains:
             slow = np.isfinite(self.correlation)
@@ -217,7 +219,8 @@ def adequacy_of(
     known = (known or KnownNoise.of_histories(observations, histories)).where(linear.residuals.offset_sensitivity > 0)
     if not known.judged.any():
         nan = float("nan")
-        return Adequacy("cannot be judged", (), nan, 0.0, nan, nan, None, not_judged=observations.outputs)
+        nothing = Adequacy("cannot be judged", (), nan, 0.0, nan, nan, None, not_judged=observations.outputs)
+        return replace(nothing, few_frames=known.few_frames)
     residuals = _of_judged(linear.residuals, known)
     independent = _independent_noise(observations, known, noise_model, predictor_errors)
     judged_problem = replace(linear, residuals=residuals)

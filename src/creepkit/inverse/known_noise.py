@@ -26,23 +26,30 @@ FEWEST_HALF_FRAMES, NOTEWORTHY_GROWTH = 15, 1.4
 """Frames of half a test whose noise can be estimated, and the growth of noise and output from which it is compared."""
 
 
+MOST_NAMED_TESTS = 4
+"""Tests with too few frames that a sentence names."""
+
+
 @dataclass(frozen=True, eq=False)
 class KnownNoise:
     """The noise that is known without the law.
 
     judged : (tests, observations) which are data of which it is known. sd : (tests, observations) in the output's unit.
     freedom : (tests, observations) -, how well it is known: infinite where it is stated.
+    few_frames : names of tests whose frames are too few to show their noise, each with how many there are.
     """
 
     judged: Bools
     sd: Floats
     freedom: Floats
+    few_frames: tuple[tuple[str, int], ...] = ()
 
     @classmethod
     def of_histories(cls, observations: ObservationVector, histories: Sequence[History]) -> KnownNoise:
         """The noise that histories state, and of others that of each test between neighbouring frames."""
         sd = observations.per_observation(observations.noise) * observations.relative_noise
         freedom = np.full(sd.shape, np.inf)
+        few: dict[str, int] = {}
         for test, history in enumerate(histories):
             for position, name in enumerate(observations.outputs):
                 mask = observations.present[test] & (observations.output_index[test] == position)
@@ -53,9 +60,11 @@ class KnownNoise:
                 estimated = _estimated_noise(history, name, observations.values[test, mask])
                 sd[test, mask] = np.maximum(estimated, floor) if (estimated > 0).all() else 0.0
                 freedom[test, mask] = FREEDOM_PER_FRAME * frames
+                if FREEDOM_PER_FRAME * frames < LEAST_NOISE_FREEDOM:
+                    few[history.name] = min(frames, few.get(history.name, frames))
         ruptures = observations.rupture_mask
         judged = observations.present & ~ruptures & (sd > 0) & (freedom >= LEAST_NOISE_FREEDOM)
-        return cls(judged, np.where(judged, sd, 1.0), freedom)
+        return cls(judged, np.where(judged, sd, 1.0), freedom, tuple(few.items()))
 
     def where(self, mask: Bools) -> KnownNoise:
         """The same of some observations alone; mask : (tests, observations)."""
@@ -136,14 +145,21 @@ def chance_of_larger(reduced: float, freedom: float, noise_freedom: float) -> fl
     return float(f.sf(reduced, freedom, max(noise_freedom, 1.0)))
 
 
-def how_to_state_noise(outputs: Sequence[str]) -> str:
-    """Why nothing was known of the noise of these outputs, and where to state it."""
+def how_to_state_noise(outputs: Sequence[str], few_frames: Sequence[tuple[str, int]] = ()) -> str:
+    """Why nothing was known of the noise of these outputs, and where to state it.
+
+    few_frames : tests that have too few frames to show it, each with how many.
+    """
     frames = [name for name in outputs if name not in SINGLE_VALUES]
     if frames or not outputs:
         column = f"{frames[0] if frames else 'strain'}_sd"
+        named = ", ".join(f"'{name}' ({count})" for name, count in few_frames[:MOST_NAMED_TESTS])
+        more = len(few_frames) - MOST_NAMED_TESTS
+        tests = f" of {named}{f' and {more} more tests' if more > 0 else ''}" if few_frames else ""
         return (
-            f"no noise is stated, and too few frames show it (state it in a column such as {column}, in Python as "
-            "standard_deviation)"
+            f"no noise is stated, and too few frames{tests} show it: noise that is estimated from fewer than "
+            f"{LEAST_NOISE_FREEDOM / FREEDOM_PER_FRAME:.0f} frames of a test cannot judge whether a law explains it "
+            f"(state it in a column such as {column}, in Python as standard_deviation)"
         )
     if MINIMUM_RATE_OUTPUT in outputs:
         return (

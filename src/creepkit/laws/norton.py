@@ -13,7 +13,7 @@ NORTON = CreepLaw(
         A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0),
         n: Param("stress exponent", bounds=(1, 8), off=0.0),
     },
-    references=("Norton (1929), The Creep of Steel at High Temperatures",),
+    references=("Norton (1929), The Creep of Steel at High Temperatures, McGraw-Hill",),
 )
 
 

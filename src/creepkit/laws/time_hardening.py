@@ -18,7 +18,7 @@ TIME_HARDENING = CreepLaw(
         m: Param("time exponent", bounds=(-0.95, 0), off=0.0),
     },
     references=(
-        "Bailey (1935), Proc. Inst. Mech. Eng. 131, 131",
+        "Bailey (1935), The Utilization of Creep Test Data in Engineering Design, Proc. Inst. Mech. Eng. 131, 131-349",
         "Table 1 of Chen et al., Machine Learning-Driven Creep Law Discovery",
     ),
 )

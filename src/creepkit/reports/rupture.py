@@ -27,8 +27,8 @@ SHOWN_EFFECTS = 6
 PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 
 
-def rupture_text(assessment: RuptureAssessment) -> str:
-    """The verdict, then tables of methods, strengths and checks, and the notes."""
+def rupture_text(assessment: RuptureAssessment, *, strengths: bool = True) -> str:
+    """The verdict, then tables of methods, strengths (where wanted) and checks, and the notes."""
     tests = assessment.tests
     span = f"{_range(tests.stress)} MPa, {_range(tests.temperature - 273.15)} °C"
     heats = "".join(f", {len(set(v))} {_plural(group)}" for group, v in tests.groups.items())
@@ -59,7 +59,8 @@ def rupture_text(assessment: RuptureAssessment) -> str:
     if assessment.relation is not None:
         lines += ["not ranked, for they use minimum rates:", *_constants(assessment.relation.times)]
         lines += _constants(assessment.relation.rates)
-    lines += ["", *_strength_lines(assessment), "", f"checks of {best.name}:"]
+    lines += ["", *_strength_lines(assessment)] if strengths else []
+    lines += ["", f"checks of {best.name}:"]
     lines += [f"- {PASSED[check.passed]}: {check.name}; {check.found}" for check in assessment.checks]
     lines += [f"note: {note}" for note in assessment.notes]
     return "\n".join(lines)

@@ -118,3 +118,21 @@ def test_a_page_names_no_other_address():
     text = text.replace("http://www.w3.org/1998/Math/MathML", "").replace("http://www.w3.org/2000/svg", "")
     for word in ("http:", "https:", "//cdn", "src=", "@import", "url("):
         assert word not in text
+
+
+def test_a_law_without_temperature_over_several_temperatures_is_warned_of(histories):
+    hot = [histories[0], histories[1].replace(temperature=histories[1].mean_temperature + 100.0)]
+    (law,) = document("norton", hot)["laws"]
+    assert law["warning"].startswith("The law does not depend on temperature, and these tests are at ")
+    assert document("norton", histories)["laws"][0]["warning"] == ""
+    assert document(ck.with_arrhenius(ck.law("norton"), hot), hot)["laws"][0]["warning"] == ""
+
+
+def test_a_network_that_is_too_large_for_a_page_is_named(monkeypatch, tmp_path):
+    import creepkit.app.page
+    import creepkit.app.page_models
+
+    monkeypatch.setattr(creepkit.app.page, "LARGEST_PAGE", 1000)
+    monkeypatch.setattr(creepkit.app.page_models, "network_of", lambda contents: {"network-1": "x" * 1_400_000})
+    with pytest.raises(ExportError, match=r"the weights of the network alone are 1\.4 MB: train one with fewer"):
+        ck.interactive_page("norton", tmp_path / "page.html")

@@ -14,6 +14,7 @@ from creepkit.app.contents import page_contents
 from creepkit.app.requests import read_request
 from creepkit.app.server import LARGEST_BODY
 from helpers.http_requests import ask, question, request, send, serving
+from helpers.planted_bars import bars
 
 
 @pytest.fixture(scope="module")
@@ -314,3 +315,11 @@ def test_what_a_specimen_raises_is_an_answer(server, monkeypatch, stop):
 
 def test_a_number_too_small_for_a_time_is_refused(server):
     assert ask(server, client="00000001", program=question()["program"] | {"end": 5e-324}).status == 400
+
+
+def test_an_answer_warns_of_a_law_without_temperature_over_several_temperatures():
+    tests = bars(ck.law("norton"), {"A": 1e-16, "n": 4.0}, [ck.constant_stress(s) for s in (40.0, 60.0)], seed=1)
+    tests = [tests[0], tests[1].replace(temperature=tests[1].mean_temperature + 50.0)]
+    with serving(page_contents("norton", tests)) as one:
+        assert "does not depend on temperature" in ask(one, tests=[0, 1]).data["warning"]
+        assert "warning" not in ask(one, tests=[0]).data

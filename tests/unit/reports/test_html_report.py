@@ -20,12 +20,13 @@ from creepkit.reports.attachments import read_attachments
 from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
 from creepkit.reports.html import report_html
 from creepkit.reports.html.elements import sentence
+from helpers.planted_rupture import larson_miller, planted
 from helpers.report_pages import HOSTILE, contents, ranking
 
 TAGS = """
 html head meta title style body a header h1 h2 h3 h4 p nav ol ul li main section div table caption thead tbody tr th td
-figure figcaption pre span footer script math mrow mi mn mo mtext msub msup msubsup mfrac mfenced mtable mtr mtd mover
-mstyle msqrt mroot noscript svg desc g path text tspan use defs clipPath rect image
+figure figcaption pre code span footer script math mrow mi mn mo mtext msub msup msubsup mfrac mfenced mtable mtr mtd
+mover mstyle msqrt mroot noscript svg desc g path text tspan use defs clipPath rect image
 """
 """Elements that a page may have."""
 
@@ -253,3 +254,23 @@ def test_identifications_of_the_same_tests_are_ranked() -> None:
     fits = [one.fit for one in ranking().laws]
     (group,) = report_contents(fits).groups
     assert {r.fit.law.name for r in group.result.laws} == {"norton", "strain-hardening"}
+
+
+def test_laws_have_their_titles_and_methods_say_bounds_and_priors() -> None:
+    page = page_of(False)
+    assert "Strain-hardening power law (SPL) (<code>strain-hardening</code>)" in page
+    assert "The bounds of the search were of the " in page
+    n = ck.law("norton").table["n"].bounds
+    assert f"n {n[0]:g} to {n[1]:g}" in page
+
+
+def test_a_page_outside_a_study_has_its_ranking_among_the_downloads(tmp_path: Path) -> None:
+    page = ck.report(ranking(), tmp_path / "report.html").read_text()
+    assert {"ranking.json", "norton.json", "strain-hardening.json"} <= set(re.findall(r'download="([^"]+)"', page))
+
+
+def test_strengths_of_ruptures_stand_once_on_a_page(tmp_path: Path) -> None:
+    found = ck.rupture(planted(larson_miller, seed=1), "larson-miller")
+    page = ck.report(found, tmp_path / "report.html").read_text()
+    assert page.count("<caption><span>Creep rupture strengths") == 1
+    assert len(re.findall("(?i)rupture strengths? ", re.sub(r'aria-label="[^"]*"', "", page))) == 1

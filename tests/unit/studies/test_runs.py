@@ -1,4 +1,4 @@
-"""Runs of studies: only what changed runs again, whatever kills a process; the lock; stages that fail; reports back."""
+"""Runs of studies: only what changed runs again, whatever kills a process; the lock; stages that fail."""
 
 from __future__ import annotations
 
@@ -16,97 +16,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import StudyError
-from creepkit.files.writing import RECORD
-from creepkit.inverse.identification_document import identification_to_json
-from creepkit.studies.carried_study import study_of_report
-from creepkit.studies.result import StudyResult
-
-STUDY = """\
-[study]
-title = "two laws"
-[data]
-files = ["data/*.csv"]
-[identification]
-laws = ["norton", "strain-hardening"]
-group_by = "alloy"
-starts = 1
-frames = 12
-[selection]
-sums = false
-further_laws = 0
-[[forecast]]
-name = "next"
-group = "A"
-load = { stress_MPa = 60 }
-end_h = 50
-draws = 50
-[[export]]
-target = "python"
-file = "law.py"
-"""
-
-
-ONE_FIT = """\
-[study]
-title = "one law"
-[data]
-files = ["data/*850C*.csv"]
-[identification]
-laws = ["norton"]
-temperature = "none"
-starts = 1
-frames = 12
-"""
-
-
-@pytest.fixture
-def plain_pages(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pages with their attachments and failures alone: what else they show takes seconds."""
-    from creepkit.reports import html
-    from creepkit.reports.attachments import embed
-
-    def page(contents: Any) -> str:
-        return f"<p>{[one.stage for one in contents.failures]}</p>{embed(contents.attachments)}"
-
-    monkeypatch.setattr(html, "report_html", page)
-
-
-@pytest.fixture
-def study(tmp_path: Path) -> Path:
-    """A study of two alloys, A at 750 C and B at 850 C, of two tests each."""
-    return study_in(tmp_path)
-
-
-def study_in(folder: Path, text: str = STUDY) -> Path:
-    (folder / "data").mkdir(parents=True)
-    for source in sorted(ck.example_data("planted creep curves").glob("*MPa.csv")):
-        alloy = {"750": "A", "850": "B"}.get(source.name[8:11])
-        if alloy and "_to_" not in source.name:
-            content = source.read_text()
-            (folder / "data" / source.name).write_text(f"# alloy: {alloy}\n{content}")
-    path = folder / "study.toml"
-    path.write_text(text)
-    return path
-
-
-def states(result: StudyResult) -> dict[str, str]:
-    return {one.name: one.state for one in result.stages}
-
-
-def made(result: StudyResult) -> set[str]:
-    return {name for name, state in states(result).items() if state == "made"}
-
-
-def numbers(result: StudyResult) -> Any:
-    """All numbers of the results, without the times at which they were made."""
-    laws = {}
-    for group, ranking in result.rankings.items():
-        for one in ranking.laws:
-            content = json.loads(json.dumps(identification_to_json(one.fit)))
-            content["provenance"].pop("when")
-            laws[group, one.fit.law.name] = (content, one.excess, one.weight, one.chi_square)
-    forecasts = {name: str(forecast) for name, forecast in result.forecasts.items()}
-    return laws, forecasts, {name: r.verdict for name, r in result.rankings.items()}
+from helpers.study_runs import ONE_FIT, STUDY, made, numbers, study_in
 
 
 def test_only_what_changed_runs_again(study: Path) -> None:
@@ -174,25 +84,6 @@ def test_other_code_of_the_package_makes_results_again_and_the_lock_compares_the
     assert ck.Study.load(study).run(prune=True).pruned == 0
     (kept,) = fits.glob("*.json")
     assert kept.is_file()
-
-
-def test_a_report_whose_notes_were_deleted_is_still_the_studys_own(study: Path, plain_pages: None) -> None:
-    study.write_text(ONE_FIT + "[report]\n")
-    first = ck.Study.load(study).run()
-    assert first.report is not None
-    for gone in (["report"], ["outputs", "report"]):
-        for one in gone:
-            (study.parent / "study.results" / f"{one}.json").unlink()
-        first.report.write_text(first.report.read_text() + "<!-- older -->")
-        (study.parent / RECORD).unlink()
-        assert states(ck.Study.load(study).run())["report"] == "made"
-    (study.parent / "study.results" / "outputs.json").unlink()
-    first.report.write_text(first.report.read_text() + "<!-- edited -->")
-    assert states(ck.Study.load(study).run())["report"] == "failed"
-    first.report.write_text("of somebody else")
-    (study.parent / "study.results" / "report.json").unlink()
-    assert states(ck.Study.load(study).run())["report"] == "failed"
-    assert first.report.read_text() == "of somebody else"
 
 
 def test_a_result_that_cannot_be_stored_says_so(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -362,53 +253,3 @@ def test_the_lock_says_what_a_run_depends_on_and_refuses_another(study: Path) ->
     path.write_text("{}")
     with pytest.raises(StudyError, match="not a study.lock"):
         ck.Study.load(study).run()
-
-
-def test_a_stage_that_fails_leaves_the_others(study: Path, plain_pages: None) -> None:
-    """Two tests do not determine a law of temperature; whatever rests on it is missing, the rest is there."""
-    text = STUDY + '[temperature]\n[[export]]\ntarget = "latex"\nlaw = "temperature"\ngroup = "A"\n[report]\n'
-    study.write_text(text)
-    result = ck.Study.load(study).run()
-    assert states(result)["temperature of A"] == "failed"
-    assert states(result)["export 2 of A: latex"] == "failed"
-    assert "three temperatures" in " ".join(f.sentence for f in result.failures) or result.failures[0].sentence
-    assert set(result.rankings) == {"A", "B"}
-    assert result.report is not None
-    page = result.report.read_text()
-    assert "temperature of A" in page
-    again = ck.Study.load(study).run()
-    assert states(again)["report"] == "kept"
-    assert states(again)["temperature of A"] == "failed"
-
-
-def test_a_report_runs_again_from_what_it_carries(study: Path, plain_pages: None, tmp_path: Path) -> None:
-    study.write_text(STUDY.replace("data/*.csv", "../elsewhere/*.csv") + "[report]\n")
-    (study.parent / "data").rename(study.parent.parent / "elsewhere")
-    first = ck.Study.load(study).run()
-    assert first.report is not None
-    assert ck.report(ck.Study.load(study), tmp_path / "other.html").read_bytes() == first.report.read_bytes()
-    (study.parent.parent / "elsewhere").rename(tmp_path / "gone")
-    again = study_of_report(first.report, tmp_path / "again").run()
-    assert again.changes == ()
-    assert numbers(again) == numbers(first)
-    lock = tmp_path / "again" / "study.lock"
-    content = json.loads(lock.read_text())
-    content["stages"]["identification of A"]["numbers"]["values"]["norton"]["n"] *= 1.001
-    lock.write_text(json.dumps(content))
-    (change,) = study_of_report(first.report, tmp_path / "again").run().changes
-    assert change.startswith("result of identification of A: values norton n was ")
-    assert (tmp_path / "again" / "inputs" / "up" / "elsewhere").is_dir()
-    (tmp_path / "again" / "study.toml").write_text(STUDY)
-    with pytest.raises(StudyError, match="differs from what"):
-        study_of_report(first.report, tmp_path / "again")
-
-
-def test_a_report_of_large_data_carries_their_hashes(study: Path, plain_pages: None, tmp_path: Path) -> None:
-    study.write_text(STUDY + "[report]\nattach_MB = 0.001\n")
-    result = ck.Study.load(study).run()
-    assert result.report is not None
-    with pytest.raises(StudyError, match="hashes of its data alone"):
-        study_of_report(result.report, tmp_path / "again")
-    (tmp_path / "again" / "inputs").mkdir()
-    (study.parent / "data").rename(tmp_path / "again" / "inputs" / "data")
-    assert numbers(study_of_report(result.report, tmp_path / "again").run()) == numbers(result)

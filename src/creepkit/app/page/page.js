@@ -8,11 +8,18 @@
 
   const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
+  // What a law without temperature cannot do, where tests at several temperatures are shown.
+  page.temperatureWarning = function (data, state) {
+    const shown = data.tests.filter((_, k) => state.tests[k]).map((test) => test.temperature);
+    return Math.max(...shown) - Math.min(...shown) > data.same_temperature ? data.laws[state.law].warning : "";
+  };
+
   page.start = function (root) {
     const data = JSON.parse(root.querySelector(".creepkit-page-data").textContent);
     const state = { law: 0, temperature: data.temperature, end: data.laws[0].end, tests: data.tests.map((_, k) => k < MOST_SHOWN), planned: data.tests.length === 0 };
     const status = element("p", { class: "status", role: "status" });
     const problem = element("p", { class: "problem", role: "alert", hidden: true });
+    const warning = element("p", { class: "warning", role: "note", hidden: true });
     const panels = element("div", { class: "panels" });
     let inputAt = null, charts = new Map(), rates = null, section = null, last = null, timer = null, before = null, settled = true;
 
@@ -30,6 +37,7 @@
     root.replaceChildren(
       element("header", {}, element(root.classList.contains("embedded") ? "p" : "h2", { class: "title" }, data.title), status),
       problem,
+      warning,
       element("div", { class: "columns" },
         element("form", { class: "controls", onsubmit: (event) => event.preventDefault() }, laws.group, data.tests.length ? tests.group : null, planned.group, page.copies(() => ({ state, law: data.laws[state.law] }))),
         panels),
@@ -126,6 +134,8 @@
         const planned = answer.program?.outputs[name]?.filter((v) => v !== null).at(-1);
         chart.draw({ series, xLabel: `time, ${unit.name}`, summary: planned === undefined ? `${shown.length} measured tests.` : `The planned test ends at ${page.format(planned)}.` });
       }
+      warning.textContent = shown.length ? answer.warning ?? page.temperatureWarning(data, state) : "";
+      warning.hidden = warning.textContent === "";
       drawRates(answer.rate);
       if (answer.program?.section) {
         section.panel.hidden = false;

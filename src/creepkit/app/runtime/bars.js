@@ -44,6 +44,17 @@
     });
   }
 
+  /** What creep and relaxation have in common: creep strain, its rate, states, and how the integration ended. */
+  function alongRun(law, times, temperature, stress, run) {
+    return {
+      creepStrain: run.strain,
+      rate: ratesAlong(law, times, temperature, stress, run.strain, run.states),
+      states: Object.fromEntries(law.names.map((name, k) => [name, run.states[k]])),
+      steps: run.steps + run.rejected,
+      ...creepkit.ending(run.code, run.time),
+    };
+  }
+
   /** Creep of a bar under a program of nominal stress; see app/__init__.py for options and result. */
   function simulateCreep(module, parameters, options) {
     const law = creepkit.bindLaw(module, parameters), times = creepkit.outputTimes(options.times);
@@ -57,13 +68,9 @@
     const engineering = options.strainMeasure === "engineering";
     return {
       times,
-      creepStrain: run.strain,
       strain: run.strain.map((creep, k) => (engineering ? Math.expm1(creep) : creep) + elastic[k]),
       stress,
-      rate: ratesAlong(law, times, temperature, stress, run.strain, run.states),
-      states: Object.fromEntries(law.names.map((name, k) => [name, run.states[k]])),
-      steps: run.steps + run.rejected,
-      ...creepkit.ending(run.code, run.time),
+      ...alongRun(law, times, temperature, stress, run),
     };
   }
 
@@ -87,11 +94,7 @@
     return {
       times,
       stress,
-      creepStrain: run.strain,
-      rate: ratesAlong(law, times, temperature, stress, run.strain, run.states),
-      states: Object.fromEntries(law.names.map((name, k) => [name, run.states[k]])),
-      steps: run.steps + run.rejected,
-      ...creepkit.ending(run.code, run.time),
+      ...alongRun(law, times, temperature, stress, run),
     };
   }
 

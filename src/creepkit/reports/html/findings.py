@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from creepkit.exporters.mathml import law_equations, symbol_element
+from creepkit.inverse.duration import STRAIN_OF_UNKNOWN_DURATION, duration_known
 from creepkit.inverse.uncertainty.laplace_approximation import cut_intervals
 from creepkit.inverse.unmodelled_effects import TAKEN_FOR_GRANTED
-from creepkit.reports.html.elements import Block, Formula, Items, Paragraph, Table, number, sentence
-from creepkit.reports.html.law_tables import credible_values
+from creepkit.reports.html.elements import Block, Formula, Items, Paragraph, Table, number, plural, sentence
+from creepkit.reports.html.law_tables import ENDS_AT_BOUND, credible_values, titled_law
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.ranking import equivalents_among_remaining
 
@@ -81,7 +82,8 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     blocks: list[Block] = [Paragraph(sentence(found.verdict), "lead")]
     if found.equivalents:
         blocks.append(Items([sentence(text) for text in found.equivalents]))
-    blocks.append(Paragraph(f"{'The best law' if found.ranking else 'The law'}: {fit.law.title or fit.law.name}."))
+    which = "The best law" if found.ranking else "The law"
+    blocks.append(Paragraph(Markup("{}: {}.").format(which, titled_law(fit.law))))
     blocks += [Formula(Markup(equation)) for equation in law_equations(fit.law)]
     blocks += [_values(fit), _point(fit)]
     if fit.adequacy is not None and found.ranking is not None:
@@ -116,7 +118,7 @@ def _values(fit: Identification) -> Table:
             number(e.value, 5),
             f"{number(e.low)} to {number(e.high)}",
             "" if e.unit == "1" else e.unit,
-            "determined; interval ends at its bound" if e.name in cut else e.verdict,
+            ENDS_AT_BOUND if e.name in cut else e.verdict,
         )
         for e in fit.estimates
     ]
@@ -135,4 +137,17 @@ def _point(fit: Identification) -> Paragraph:
         f"Amid the tests, at {number(r.stress)} MPa, {r.temperature:.0f} K, a strain of {number(r.strain, 2)} and "
         f"{number(r.time / SECONDS_PER_HOUR, 3)} h, the creep rate{virgin} is {rate[0]} per second (95 % interval "
         f"{rate[1]} to {rate[2]}) and the local stress exponent is {exponent[0]} ({exponent[1]} to {exponent[2]})."
+        f"{_assumed_duration(fit)}"
+    )
+
+
+def _assumed_duration(fit: Identification) -> str:
+    """What is said of the reference point where it rests on tests whose duration is not known."""
+    unknown = sum(not duration_known(history) for history in fit.histories)
+    if not unknown:
+        return ""
+    return (
+        f" The strain and the time of this point are assumed: of {plural(unknown, 'test')} only a minimum creep rate "
+        "is known, not the duration, and each is taken to last until a strain of "
+        f"{100 * STRAIN_OF_UNKNOWN_DURATION:g} % at that rate."
     )

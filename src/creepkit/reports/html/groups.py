@@ -25,7 +25,7 @@ from creepkit.reports.html.elements import (
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings
-from creepkit.reports.html.law_tables import correlation_table
+from creepkit.reports.html.law_tables import correlation_table, titled_law
 from creepkit.reports.html.methods_identification import rate_scatter_sentence
 from creepkit.reports.identification_plot import identification_figure
 from creepkit.reports.identification_text import rupture_rows
@@ -147,7 +147,7 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
         return []
     rows = [
         (
-            printable(one.fit.law.name, 120),
+            titled_law(one.fit.law),
             str(len(one.fit.law.params)),
             *misfit_cells(one.fit),
             number(one.excess, 3),

@@ -4,14 +4,33 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from markupsafe import Markup
+
 from creepkit.reports.html.elements import Block, Paragraph, Table, number, printable
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.language import CreepLaw
 
 MOST_CORRELATED = 12
 """Parameters up to which their correlations are a table."""
+
+
+ENDS_AT_BOUND = "determined; interval ends at its bound"
+"""What is said of a parameter whose interval the bound of the search cuts."""
+
+
+def law_title(law: CreepLaw, *, longest: int = 160) -> str:
+    """The title of a law; its name where it has none."""
+    return printable(law.title or law.name, longest)
+
+
+def titled_law(law: CreepLaw) -> Markup:
+    """The title of a law with its name in the font of code, by which commands and files know it."""
+    if not law.title:
+        return Markup("<code>{}</code>").format(printable(law.name, 120))
+    return Markup("{} (<code>{}</code>)").format(law_title(law), printable(law.name, 120))
 
 
 def credible_values(ranking: Ranking | None) -> list[Block]:
@@ -20,7 +39,7 @@ def credible_values(ranking: Ranking | None) -> list[Block]:
         return []
     rows = [
         (
-            printable(one.fit.law.name, 120),
+            law_title(one.fit.law),
             f"{one.weight:.3f}",
             e.name,
             number(e.value, 5),
@@ -45,5 +64,5 @@ def correlation_table(fit: Identification) -> list[Block]:
     if len(names) > MOST_CORRELATED:
         return [Paragraph(f"The correlations of {len(names)} parameters are in the file of the identification.")]
     rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, correlation.matrix, strict=True)]
-    caption = f"Correlations of the estimates of {printable(fit.law.name, 120)}; ln where the logarithm is estimated"
+    caption = f"Correlations of the estimates of the {law_title(fit.law)}; ln where the logarithm is estimated"
     return [Table(caption, ("parameter", *names), rows, numeric=tuple(range(1, len(names) + 1)))]

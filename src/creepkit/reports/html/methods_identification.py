@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.noise_model import MINIMUM_TESTS
+from creepkit.inverse.variance_components import NOISE_PRIOR_SD
 from creepkit.language.printing import expression_text, state_equations
+from creepkit.records import output_unit
 from creepkit.reports.html.citations import References, listed
 from creepkit.reports.html.compared_values import compared_values, frame_counts
 from creepkit.reports.html.elements import number, plural, printable
@@ -136,9 +138,11 @@ def _estimation(found: GroupFindings, contents: ReportContents, references: Refe
     sentences = [
         f"The tests were predicted by the model of the specimen '{printable(specimen, 80)}'." if specimen else "",
         _search(fit, contents, references),
+        _bounds(found),
         *_weights(fit, references),
         rate_scatter_sentence(fit),
         _explicit_nuisances(fit),
+        _noise_priors(fit),
         _penalty(found),
     ]
     if settings.loss != "linear":
@@ -170,6 +174,36 @@ def _search(fit: Identification, contents: ReportContents, references: Reference
     if how.startswith("cma-es"):
         return f"Parameters were sought within their bounds by CMA-ES{references.cite('cma-es')}{seed}{end}"
     return f"Parameters were sought within their bounds{end}"
+
+
+def _bounds(found: GroupFindings) -> str:
+    """Between which values each law's parameters were sought."""
+    laws = {one.law.name: one.law for one in _fits(found)}
+    parts = []
+    for law in laws.values():
+        ranges = [
+            f"{name} {number(p.bounds[0], 3)} to {number(p.bounds[1], 3)}{'' if p.unit == '1' else f' {p.unit}'}"
+            for name, p in law.table.items()
+            if name in {e.name for one in _fits(found) if one.law.name == law.name for e in one.estimates}
+        ]
+        named = f"of the {printable(law.title or law.name, 160)} " if len(laws) > 1 else ""
+        parts.append(f"{named}{listed(ranges)}")
+    return f"The bounds of the search were {'; '.join(parts)}."
+
+
+def _noise_priors(fit: Identification) -> str:
+    """The prior about noise that the tests state, where there is some."""
+    stated = [
+        f"{name.replace('_', ' ')} {number(one.stated, 3)}{f' {unit}' if (unit := output_unit(name)) else ''}"
+        for name, one in fit.noise_model.outputs.items()
+        if one.stated > 0
+    ]
+    if not stated:
+        return ""
+    return (
+        f"The noise of a frame has a log-normal prior about the noise that the tests state ({listed(stated)}), with a "
+        f"standard deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
+    )
 
 
 def _search_name(fit: Identification, contents: ReportContents) -> str:

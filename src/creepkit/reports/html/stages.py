@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.duration import duration_known
+from creepkit.inverse.uncertainty.laplace_approximation import cut_intervals
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.reports.design import design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
@@ -29,7 +31,9 @@ from creepkit.reports.html.elements import (
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import findings_of
+from creepkit.reports.html.law_tables import ENDS_AT_BOUND
 from creepkit.reports.html.test_details import NOT_STATED, table_of_details
+from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.rupture import rupture_text, strength_rows
 from creepkit.reports.rupture_plot import rupture_figure
 from creepkit.reports.temperature_law import plot_temperature_law, temperature_law_text, temperature_study_text
@@ -38,6 +42,7 @@ if TYPE_CHECKING:
     from creepkit.experiments.planned_design import Design
     from creepkit.extraction.extraction import Extraction
     from creepkit.forecasts.forecast import Forecast
+    from creepkit.instruments.imposed import Imposed
     from creepkit.quality.flags import DataQuality
     from creepkit.records import History
     from creepkit.reports.contents import ReportContents
@@ -135,11 +140,16 @@ def _selections(contents: ReportContents) -> Iterator[str]:
 
 
 def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[PageSection]:
-    """Extraction, temperature, rupture, forecasts and further tests, where there are such results."""
+    """Extraction, records, temperature, rupture, forecasts and further tests, where there are such results.
+
+    Strengths stand among the findings where no law was identified, and are not repeated.
+    """
+    identified = any(findings_of(group) is not None for group in contents.groups)
     stages: tuple[tuple[str, str, Mapping[str, Any], Callable[[str, Any, PageFigures], list[Block]]], ...] = (
         ("extraction", "Extraction from camera frames", contents.extractions, _extraction_blocks),
+        ("imposed", "Loads and temperatures from instrument records", contents.imposed, _imposed_blocks),
         ("temperature", "Trends with temperature", contents.temperature, _temperature_blocks),
-        ("rupture", "Rupture", contents.rupture, _rupture_blocks),
+        ("rupture", "Rupture", contents.rupture, partial(_rupture_blocks, strengths=identified)),
         ("forecasts", "Forecasts", contents.forecasts, _forecast_blocks),
         ("design", "Further tests proposed", contents.design, _design_blocks),
     )
@@ -173,6 +183,22 @@ def _extraction_blocks(name: str, extraction: Extraction, figures: PageFigures) 
     return [picture, Verbatim("What was extracted, and how well", printable_lines(extraction_text(extraction)))]
 
 
+def _imposed_blocks(name: str, under: Imposed, figures: PageFigures) -> list[Block]:
+    """The alignment of the clocks with its interval, and how well programs follow the record."""
+    alignment = under.alignment
+    low, high = alignment.lag_interval
+    lag = f"The clock of the record is ahead of that of the camera by {number(alignment.lag, 5)} s"
+    found = (
+        f"(95 % interval {number(low, 5)} to {number(high, 5)} s), found from the changes of load in "
+        f"{alignment.frames} frames."
+    )
+    return [
+        Paragraph(f"{lag} {found}" if alignment.lags.size else f"{lag}, as was stated."),
+        Verbatim("Alignment of the clocks", printable_lines(alignment_text(alignment))),
+        Verbatim("What was imposed", printable_lines(imposed_text(under))),
+    ]
+
+
 def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Block]:
     law = getattr(result, "temperature_law", result)
     blocks: list[Block] = []
@@ -185,13 +211,14 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
                 f"those at {law.T_ref:.1f} K."
             )
         )
+        cut = cut_intervals(law.law, law.estimates)
         rows = [
             (
                 e.name,
                 number(e.value, 5),
                 f"{number(e.low)} to {number(e.high)}",
                 "" if e.unit == "1" else e.unit,
-                e.verdict,
+                ENDS_AT_BOUND if e.name in cut else e.verdict,
             )
             for e in law.estimates
         ]
@@ -221,7 +248,7 @@ def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
     return [*blocks, Paragraph(sentence(note), "note")] if note else blocks
 
 
-def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigures) -> list[Block]:
+def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigures, *, strengths: bool) -> list[Block]:
     picture = figures.picture(
         lambda: rupture_figure(assessment),
         f"Rupture assessment{_of(name)}",
@@ -230,8 +257,8 @@ def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigur
         "Isotherms with tests and bounds; master curve; predicted against measured times. Broken lines lie beyond the "
         "stresses tested.",
     )
-    text = Verbatim("Methods, strengths with bounds, and checks", printable_lines(rupture_text(assessment)))
-    return [*strength_blocks(assessment), picture, text]
+    text = Verbatim("Methods and checks", printable_lines(rupture_text(assessment, strengths=False)))
+    return [*(strength_blocks(assessment) if strengths else []), picture, text]
 
 
 def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> list[Block]:

@@ -1,0 +1,94 @@
+"""Whether a test shows tertiary creep: whether its rate rises after its minimum by more than noise makes it seem to.
+
+Under one load creep strain without tertiary creep is concave in time: its rate falls or is constant. Of the parabola
+fitted by least squares to a part of a concave curve the curvature is then negative or zero, whatever that curve is
+(the weights of its curvature are those of a mean of second derivatives). Its estimate over its standard deviation
+therefore has Student's distribution at most. Noise is what a polynomial of the fourth degree leaves, correlated from
+mean to mean of neighbouring frames as an AR(1) process, whose correlation is corrected for the fit. Noise that is
+correlated over a large part of the test cannot be told from creep, and a rate that rises and falls within a quarter of
+a test is missed where that polynomial does not follow it: tests/unit/studies/test_tertiary_creep.py says what was
+measured.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import t as student
+
+from creepkit.arrays import Floats
+from creepkit.quality.frames import load_segments
+from creepkit.records import History, growing_output
+
+LEAST_RISE = 1.5
+"""Rate at the end over the smallest, of the fitted curve, from which on it is called tertiary creep."""
+
+
+SIGNIFICANCE = 0.003
+"""Probability by which a test without tertiary creep may seem to have it: of all parts of the curve together."""
+
+
+PARTS = ((0.0, 1.0), (0.25, 1.0), (0.5, 1.0), (0.7, 1.0), (0.0, 0.6), (0.2, 0.8))
+"""Parts of a curve in which its rate is judged, over its duration: a rate that rises may fall again later."""
+
+
+FEWEST_FRAMES = 12
+"""Of a part that is judged."""
+
+
+MOST_MEANS = 25
+"""Means over neighbouring frames of a part: what is correlated over shorter times is then nearly independent."""
+
+
+def shows_tertiary_creep(history: History) -> bool:
+    """Whether the rate of the output that grows rises under the last load by LEAST_RISE and by more than noise."""
+    segments = load_segments(history)
+    if not segments or not segments[-1].load_increased:
+        return False
+    frames = segments[-1].frames
+    times, values = history.times[frames], history.outputs[growing_output(history)][frames]
+    if np.ptp(times) <= 0 or values[-1] < values[0]:
+        return False
+    places = (times - times[0]) / np.ptp(times)
+    masks = [(places >= start) & (places <= end) for start, end in PARTS]
+    parts = [(places[mask], values[mask]) for mask in masks if mask.sum() >= FEWEST_FRAMES]
+    return any(_rises(x, y, SIGNIFICANCE / len(parts)) for x, y in parts)
+
+
+def _rises(x: Floats, y: Floats, significance: float) -> bool:
+    """Whether the slope of y over x rises by more than chance, and by LEAST_RISE."""
+    x, y = _means(x, y)
+    x = 2.0 * (x - x[0]) / np.ptp(x) - 1.0
+    parabola = np.linalg.lstsq(np.vander(x, 3), y, rcond=None)[0]
+    curvature, slope = parabola[:2]
+    if curvature <= 0 or slope + 2 * curvature < LEAST_RISE * (slope - 2 * curvature):
+        return False
+    weights = np.linalg.pinv(np.vander(x, 3))[0]
+    flexible = np.vander(x, 5)
+    left = y - flexible @ np.linalg.lstsq(flexible, y, rcond=None)[0]
+    freedom = x.size - flexible.shape[1]
+    smallest = 1e-9 * float(np.ptp(y))
+    variance = max(float((left**2).sum()) / freedom, smallest**2)
+    correlation = _correlation(left, flexible.shape[1])
+    lags = np.abs(np.subtract.outer(np.arange(x.size), np.arange(x.size)))
+    covariance = correlation**lags
+    projection = np.eye(x.size) - flexible @ np.linalg.pinv(flexible)
+    share = float(np.trace(projection @ covariance)) / freedom
+    sd = float(np.sqrt(weights @ covariance @ weights * variance / share))
+    effective = freedom * (1.0 - correlation) / (1.0 + correlation)
+    return bool(curvature / sd > student.isf(significance, max(effective, 2.0)))
+
+
+def _correlation(left: Floats, unknowns: int) -> float:
+    """Of neighbours, from what a fit with so many unknowns leaves; a fit makes it appear smaller."""
+    variance = float((left**2).sum())
+    r = float((left[1:] * left[:-1]).sum()) / variance if variance > 0 else 0.0
+    return float(np.clip((r + unknowns / left.size) / (1.0 - unknowns / left.size), 0.0, 0.9))
+
+
+def _means(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """At most MOST_MEANS means over neighbouring frames."""
+    if x.size <= MOST_MEANS:
+        return x, y
+    edges = np.linspace(0, x.size, MOST_MEANS + 1).astype(int)
+    counts = np.diff(edges)
+    return np.add.reduceat(x, edges[:-1]) / counts, np.add.reduceat(y, edges[:-1]) / counts

@@ -1,0 +1,83 @@
+"""Reports of studies: whose file they are, what they say of stages that failed, and studies run again from them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import creepkit as ck
+from creepkit.errors import StudyError
+from creepkit.files.writing import RECORD
+from creepkit.studies.carried_study import study_of_report
+from helpers.study_runs import ONE_FIT, STUDY, numbers, states
+
+
+def test_a_report_whose_notes_were_deleted_is_still_the_studys_own(study: Path, plain_pages: None) -> None:
+    study.write_text(ONE_FIT + "[report]\n")
+    first = ck.Study.load(study).run()
+    assert first.report is not None
+    for gone in (["report"], ["outputs", "report"]):
+        for one in gone:
+            (study.parent / "study.results" / f"{one}.json").unlink()
+        first.report.write_text(first.report.read_text() + "<!-- older -->")
+        (study.parent / RECORD).unlink()
+        assert states(ck.Study.load(study).run())["report"] == "made"
+    (study.parent / "study.results" / "outputs.json").unlink()
+    first.report.write_text(first.report.read_text() + "<!-- edited -->")
+    assert states(ck.Study.load(study).run())["report"] == "failed"
+    first.report.write_text("of somebody else")
+    (study.parent / "study.results" / "report.json").unlink()
+    assert states(ck.Study.load(study).run())["report"] == "failed"
+    assert first.report.read_text() == "of somebody else"
+
+
+def test_a_stage_that_fails_leaves_the_others(study: Path, plain_pages: None) -> None:
+    """Two tests do not determine a law of temperature; whatever rests on it is missing, the rest is there."""
+    text = STUDY + '[temperature]\n[[export]]\ntarget = "latex"\nlaw = "temperature"\ngroup = "A"\n[report]\n'
+    study.write_text(text)
+    result = ck.Study.load(study).run()
+    assert states(result)["temperature of A"] == "failed"
+    assert states(result)["export 2 of A: latex"] == "failed"
+    assert "three temperatures" in " ".join(f.sentence for f in result.failures) or result.failures[0].sentence
+    assert set(result.rankings) == {"A", "B"}
+    assert result.report is not None
+    page = result.report.read_text()
+    assert "temperature of A" in page
+    again = ck.Study.load(study).run()
+    assert states(again)["report"] == "kept"
+    assert states(again)["temperature of A"] == "failed"
+
+
+def test_a_report_runs_again_from_what_it_carries(study: Path, plain_pages: None, tmp_path: Path) -> None:
+    study.write_text(STUDY.replace("data/*.csv", "../elsewhere/*.csv") + "[report]\n")
+    (study.parent / "data").rename(study.parent.parent / "elsewhere")
+    first = ck.Study.load(study).run()
+    assert first.report is not None
+    assert ck.report(ck.Study.load(study), tmp_path / "other.html").read_bytes() == first.report.read_bytes()
+    (study.parent.parent / "elsewhere").rename(tmp_path / "gone")
+    again = study_of_report(first.report, tmp_path / "again").run()
+    assert again.changes == ()
+    assert numbers(again) == numbers(first)
+    lock = tmp_path / "again" / "study.lock"
+    content = json.loads(lock.read_text())
+    content["stages"]["identification of A"]["numbers"]["values"]["norton"]["n"] *= 1.001
+    lock.write_text(json.dumps(content))
+    (change,) = study_of_report(first.report, tmp_path / "again").run().changes
+    assert change.startswith("result of identification of A: values norton n was ")
+    assert (tmp_path / "again" / "inputs" / "up" / "elsewhere").is_dir()
+    (tmp_path / "again" / "study.toml").write_text(STUDY)
+    with pytest.raises(StudyError, match="differs from what"):
+        study_of_report(first.report, tmp_path / "again")
+
+
+def test_a_report_of_large_data_carries_their_hashes(study: Path, plain_pages: None, tmp_path: Path) -> None:
+    study.write_text(STUDY + "[report]\nattach_MB = 0.001\n")
+    result = ck.Study.load(study).run()
+    assert result.report is not None
+    with pytest.raises(StudyError, match="hashes of its data alone"):
+        study_of_report(result.report, tmp_path / "again")
+    (tmp_path / "again" / "inputs").mkdir()
+    (study.parent / "data").rename(tmp_path / "again" / "inputs" / "data")
+    assert numbers(study_of_report(result.report, tmp_path / "again").run()) == numbers(result)
