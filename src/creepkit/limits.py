@@ -88,7 +88,7 @@ HOURS = numbers(0, 1e9, above=True)
 
 SECONDS = numbers(0, 1e12, above=True)
 RAMP = numbers(0, 1e12)
-PROBABILITY = numbers(0.5, 1.0 - 1e-9)
+PROBABILITY = numbers(0.5, 0.999999)
 CELSIUS = numbers(-273.15, 1e5, above=True)
 KELVIN_DIFFERENCE = numbers(0, 1e5)
 GIGAPASCAL = numbers(0, 1e6, above=True)
