@@ -60,6 +60,7 @@ for test in ck.read_histories(folder):
         alloy="CMSX-6",
         source="",
     )
-    ck.write_history(thinned, out / f"{test.name}.csv")
+    with ck.overwriting():  # files that version control put there
+        ck.write_history(thinned, out / f"{test.name}.csv")
     end = f"ruptured at {test.rupture_time / 3600:.1f} h" if test.rupture_time else "stopped"
     print(f"{test.name}: {test.times.size} frames to {test.times[-1] / 3600:.0f} h ({end}), {kept.size} kept")

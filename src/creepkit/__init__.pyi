@@ -34,6 +34,7 @@ from .experiments.design import design as design
 from .experiments.rig import Rig as Rig
 from .fem.mesh_files import read_mesh as read_mesh
 from .fem.section import Section as Section
+from .files.writing import overwriting as overwriting
 from .forecasts.forecast import Forecast as Forecast
 from .forecasts.forecast import forecast as forecast
 from .hookspecs import hookimpl as hookimpl

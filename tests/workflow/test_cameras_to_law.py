@@ -90,9 +90,12 @@ def test_from_frames_and_a_record_to_a_law(laboratory, monkeypatch, tmp_path):
     assert low < -LAG < high
     (history,) = ck.read_histories(folder / "out" / "D1.csv")
     assert history.mean_temperature == pytest.approx(TEMPERATURE + 273.15, abs=0.5)
+    written = (folder / "out" / "D1.csv").read_bytes()
+    (folder / "out" / "D1.csv").write_text("edited")
     again = CliRunner().invoke(app, [*map(str, extract)])
     assert again.exit_code == 1
-    assert "D1.csv exists already and was left as it is" in again.stderr
+    assert "D1.csv: cannot be written: it is there, and creepkit did not write it as it is now" in again.stderr
+    (folder / "out" / "D1.csv").write_bytes(written)
     assert "D1" in run("read", folder / "out" / "D1.csv")
     answer = json.loads(
         run(

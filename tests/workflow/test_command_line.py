@@ -16,6 +16,7 @@ import creepkit as ck
 from creepkit.cli.app import app
 from creepkit.cli.demo import PLANTED, PLANTED_BULGE
 from helpers.paths import EXAMPLES
+from helpers.written_files import names_in
 
 CURVES = sorted(str(p) for p in PLANTED.glob("*.csv"))
 
@@ -52,8 +53,8 @@ def test_identify_finds_the_planted_law_and_its_values(identified):
 
 def test_identify_leaves_json_plots_latex_and_python(identified):
     folder, answer = identified
-    assert sorted(Path(f).name for f in answer["files"]) == sorted(p.name for p in folder.iterdir())
-    assert {p.suffix for p in folder.iterdir()} == {".json", ".png", ".tex", ".py"}
+    assert sorted(Path(f).name for f in answer["files"]) == names_in(folder)
+    assert {Path(name).suffix for name in names_in(folder)} == {".json", ".png", ".tex", ".py"}
 
 
 def test_identifying_again_replaces_what_was_left(tmp_path):

@@ -14,6 +14,7 @@ from creepkit.cli.app import app
 from creepkit.cli.generate import design_changes, select_design
 from creepkit.errors import DatasetError
 from helpers.paths import EXAMPLES
+from helpers.written_files import names_in
 
 EXAMPLES = EXAMPLES / "cluster"
 BARS = ("norton", "--specimen", "uniaxial", "--interval", "3600", "--seed", "1")
@@ -73,7 +74,7 @@ def test_data_checks_measured_tests():
 def test_data_draws_inputs_and_histories(made, tmp_path):
     to, _ = made
     assert creepkit("data", to, "--plots", tmp_path / "plots").exit_code == 0
-    pictures = sorted(path.name for path in (tmp_path / "plots").iterdir())
+    pictures = names_in(tmp_path / "plots")
     assert pictures == ["histories.png", "inputs.png"]
     assert all((tmp_path / "plots" / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
 
@@ -93,7 +94,7 @@ def test_a_dry_run_simulates_nothing(tmp_path):
     result = creepkit("generate", "combined", "--domain", "paper", "--dry-run", "--to", tmp_path / "a.h5")
     assert result.exit_code == 0, result.output
     assert "criterion" in result.stdout
-    assert os.listdir(tmp_path) == ["a.rates.png"]
+    assert names_in(tmp_path) == ["a.rates.png"]
     conditioned = creepkit("generate", "combined", "--dry-run", "--json", "--to", tmp_path / "r.h5")
     assert json.loads(conditioned.stdout)["simulated"] > 0.8
 
@@ -137,7 +138,7 @@ def test_ranges_of_conditions_and_what_is_left_out_can_be_said():
 def test_what_is_wrong_is_said_in_a_sentence(tmp_path, monkeypatch, words, message):
     monkeypatch.chdir(tmp_path)
     assert message in sentence(creepkit(*words))
-    assert os.listdir(tmp_path) == []
+    assert names_in(tmp_path) == []
 
 
 def test_a_job_array_without_slurm_is_one_job(tmp_path):

@@ -50,7 +50,7 @@ def test_it_finds_the_planted_law_and_confirms_it(plate):
 
 def test_everything_is_written(plate):
     folder, alloy, _ = plate
-    written = {str(path.relative_to(folder / "screened")) for path in (folder / "screened").rglob("*.*")}
+    written = {str(path.relative_to(folder / "screened")) for path in (folder / "screened").rglob("[!.]*.*")}
     pictures = {f"pictures/{name}.png" for name in ("histories", "laws", "parity")}
     assert written == {f"{alloy}.json", "Flat.json", f"fits/{alloy}.json", "plate.csv", "plate.h5", *pictures}
 

@@ -35,10 +35,10 @@ def interactive_page(
     source : a law or its name, a law with values, an identification or a ranking.
     tests : measured ones that are laid over; by default those that an identification holds.
     specimen : which is shown first. title : of the page. surrogate : a trained network, which answers for its specimen
-    while a slider moves. force : whether a file that exists may be replaced.
+    while a slider moves. force : whether a file that creepkit did not write is replaced.
 
     Raises ExportError for a law that cannot be written as JavaScript, for a page that is too large, and for a file that
-    exists or cannot be written. The page shows MPa, hours, mm and kelvin.
+    cannot be written. The page shows MPa, hours, mm and kelvin.
     """
     from creepkit.app.contents import page_contents
 
@@ -59,7 +59,7 @@ def write_page(contents: PageContents, path: Path, *, force: bool = False) -> Pa
             f"{path}: the page would have {size / 1e6:.1f} MB, allowed is {LARGEST_PAGE / 1e6:g} MB; "
             f"{_smaller(contents)}"
         )
-    return write_text(text, path, ExportError)
+    return write_text(text, path, ExportError, force=force)
 
 
 def _smaller(contents: PageContents) -> str:

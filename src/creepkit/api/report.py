@@ -73,7 +73,7 @@ def report(
         same tests are ranked, others stand one below the other, and forecasts, designs, temperature laws, rupture
         assessments and extractions have sections of their own. Curves are drawn of identifications that have their
         histories.
-    to : file of the page. title : of the page. force : whether a file that exists may be replaced.
+    to : file of the page. title : of the page. force : whether a file that creepkit did not write is replaced.
 
     Raises ReportError for what cannot be reported, for nothing at all, and for a file that exists or cannot be written.
     The page loads nothing, and is complete without scripts. It holds figures, tables, laws to download, methods text
@@ -84,7 +84,7 @@ def report(
 
     path = Path(to)
     check_target(path, ReportError, force=force)
-    return write_text(report_html(report_contents(source, title=title)), path, ReportError)
+    return write_text(report_html(report_contents(source, title=title)), path, ReportError, force=force)
 
 
 def report_contents(

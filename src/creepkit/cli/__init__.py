@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import signal
-import sys
 from types import FrameType
+
+from creepkit.cli.failures import prepare_streams, print_warnings_plainly, run_to_the_end
 
 
 def main() -> None:
     """Run the command line; the entry point of the script `creepkit`."""
-    try:
-        signal.signal(signal.SIGTERM, _terminate)  # as Ctrl-C: a line, nothing half written
-        from creepkit.cli.app import app
+    prepare_streams()
+    print_warnings_plainly()
+    run_to_the_end(_run)
 
-        app()
-    except KeyboardInterrupt:  # before the command began, which says so itself
-        sys.exit(130)
+
+def _run() -> None:
+    for name in ("SIGTERM", "SIGHUP"):  # as Ctrl-C: a line, nothing half written
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # of nohup
+            signal.signal(number, _terminate)
+    from creepkit.cli.app import app
+
+    app()
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

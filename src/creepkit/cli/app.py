@@ -1,6 +1,7 @@
 """The command `creepkit`: its global options, its commands, and how errors end it.
 
-Exit 0 fine, 1 an error that we can explain in one line, 2 wrong usage, 130 interrupted by Ctrl-C.
+Exit 0 fine, 1 an error that we can explain in one line, 2 wrong usage, 70 a fault of creepkit, 130 interrupted by
+Ctrl-C or a signal to end, 141 nobody reads the output any more.
 """
 
 from __future__ import annotations
@@ -44,7 +45,9 @@ from creepkit.cli import (
     sweep,
     train,
 )
+from creepkit.cli.declared_options import checked
 from creepkit.cli.described_test import TestCommand
+from creepkit.cli.failures import NO_READER, failure_sentence
 from creepkit.cli.identification_options import CommandWithDefaults
 from creepkit.errors import CreepkitError, PluginError
 
@@ -63,16 +66,19 @@ class CommandGroup(TyperGroup):
             _check_files_in_environment()
             _load_plugin_files(ctx.params["plugin"])
             return super().invoke(ctx)
+        except BrokenPipeError:
+            raise typer.Exit(NO_READER) from None
         except (CreepkitError, OSError) as error:
-            from creepkit.reports.terminal import printable
-
             if ctx.params["debug"]:
                 raise
-            typer.echo(f"creepkit: {printable(' '.join(_sentence(error).split()))}", err=True)
-            raise typer.Exit(1) from None
+            raise _ended(_sentence(error), 1) from None
         except KeyboardInterrupt:
             typer.echo(f"creepkit: {ctx.invoked_subcommand or ''} interrupted", err=True)
             raise typer.Exit(130) from None
+        except Exception as error:
+            if ctx.params["debug"] or _is_of_the_command_line(error):
+                raise
+            raise _ended(*failure_sentence(error)) from None
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of this name, creepkit's own or a plugin's; say which plugins failed where none has it."""
@@ -152,7 +158,7 @@ TEST_COMMANDS = ("simulate", "predict")
 
 
 for name, command in COMMANDS.items():
-    app.command(name, cls=TestCommand if name in TEST_COMMANDS else CommandWithDefaults)(command)
+    app.command(name, cls=TestCommand if name in TEST_COMMANDS else CommandWithDefaults)(checked(command))
 
 
 def _print_version(requested: bool) -> None:
@@ -215,6 +221,20 @@ def _plugin_commands(own_names: set[str], *, listed_only: bool = False) -> tuple
             else:
                 added[name] = command
     return added, problems
+
+
+def _ended(sentence: str, code: int) -> typer.Exit:
+    """The end of the command, after one line on stderr."""
+    from creepkit.reports.terminal import printable
+
+    typer.echo(f"creepkit: {printable(' '.join(sentence.split()))}", err=True)
+    return typer.Exit(code)
+
+
+def _is_of_the_command_line(error: Exception) -> bool:
+    """Whether typer ends by this exception, or says in its own words what is wrong with the options."""
+    usage_error = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
+    return isinstance(error, typer.Exit | typer.Abort | usage_error)
 
 
 def _sentence(error: Exception) -> str:

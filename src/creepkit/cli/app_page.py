@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
+
 if TYPE_CHECKING:
     from creepkit.app.contents import PageContents, PageSource
     from creepkit.records import History
@@ -19,9 +22,10 @@ def command(
     ] = None,
     specimen: Annotated[str | None, typer.Option(help="Which is shown first; by default that of the tests.")] = None,
     surrogate: Annotated[Path | None, typer.Option(help="A trained network, for while a slider moves.")] = None,
-    to: Annotated[Path | None, typer.Option(help="Write the page as one file, and serve nothing.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the server; 0 takes any that is free.")] = 0,
+    to: Annotated[
+        Path | None, typer.Option(help="Write the page as one file, and serve nothing."), OutputPath()
+    ] = None,
+    port: Annotated[int, typer.Option(help="Of the server; 0 takes any that is free."), limits.PORT] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Whether to open a browser.")] = True,
 ) -> None:
     """Explore a law by sliders in a browser page.
@@ -36,7 +40,7 @@ def command(
     network = None if surrogate is None else ck.surrogate(surrogate)
     contents = page_contents(source, tests, specimen=specimen, surrogate=network)
     if to is not None:
-        typer.echo(f"wrote {write_page(contents, to, force=force)}")
+        typer.echo(f"wrote {write_page(contents, to)}")
         return
     _serve(contents, port, browser)
 

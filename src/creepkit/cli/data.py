@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
 from creepkit.reports.terminal import print_json
 
 DATA_SET_SUFFIXES = (".h5", ".hdf5")
@@ -24,14 +26,16 @@ def command(
     plots: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Draw inputs and a random handful of histories of a data set there."),
+        OutputPath("folder"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Which handful.")] = 0,
+    seed: Annotated[int, typer.Option(help="Which handful."), limits.SEED] = 0,
     reader: Annotated[
         str | None, typer.Option(help="Reader of measured tests; by default the one that accepts them.")
     ] = None,
     activation_energy: Annotated[
         float | None,
         typer.Option(metavar="J/MOL", help="To put a factor on the creep rate as a step of temperature [400e3]."),
+        limits.ENERGY,
     ] = None,
 ) -> None:
     """Describe a data set, or check measured tests."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from creepkit.cli.declared_options import OutputPath
 from creepkit.reports.terminal import ProgressBar
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ PLANTED_BULGE = EXAMPLE_DATA / "planted_bulge_test"
 
 
 def command(
-    to: Annotated[Path, typer.Option(help="Folder for results; made if needed.")] = Path("demo"),
+    to: Annotated[Path, typer.Option(help="Folder for results; made if needed."), OutputPath("folder")] = Path("demo"),
     uniaxial: Annotated[bool, typer.Option("--uniaxial", help="Simulated creep curves instead of both.")] = False,
 ) -> None:
     """Run the studies that ship: creep curves, a bulge test.

@@ -6,6 +6,7 @@ the specimen or a plugin brings it; `creepkit specimens NAME` lists them.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -30,26 +31,36 @@ COMPONENTS = "components"
 """The load of a material point, which --stress and --strain state with the names of components."""
 
 
+LOAD_TEXT = re.compile(r"([0-9.]+:)?[+-]?[0-9.]+([eE][+-]?[0-9]+)?")
+"""The value of a load: a number, or SECONDS:NUMBER."""
+
+
 class TestCommand(CommandWithDefaults):
     """A command that takes the loads and lengths of any specimen as options, beside its own."""
 
     __test__ = False  # not a test case, whatever its name says to pytest
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Keep options that are none of the command's own for the specimen; each has one value."""
+        """Keep options that are none of the command's own for the specimen; each has one value.
+
+        A number behind a flag makes it a load: `--force 250` is one, `--force` alone lets files be replaced.
+        """
         own = {name for param in self.params for name in (*param.opts, *param.secondary_opts)} | {"--help"}
         kept: list[str] = []
         others: dict[str, list[str]] = {}
-        waiting = iter(args)
-        for word in waiting:
+        waiting = list(args)
+        while waiting:
+            word = waiting.pop(0)
             name, separator, value = word.partition("=")
-            if not name.startswith("--") or name == "--" or name in own:
+            flag = name in own and name != "--help" and not _takes_value(self.params, name)
+            is_load = flag and (bool(separator) or bool(waiting and LOAD_TEXT.fullmatch(waiting[0])))
+            if not name.startswith("--") or name == "--" or (name in own and not is_load):
                 kept.append(word)
                 if name in own and not separator and _takes_value(self.params, name):
-                    kept += [value for value in (next(waiting, None),) if value is not None]
+                    kept += [waiting.pop(0)] if waiting else []
                 continue
             if not separator:
-                value = next(waiting, "")
+                value = waiting.pop(0) if waiting else ""
             others.setdefault(name[2:].replace("-", "_"), []).append(value)
         ctx.meta[SPECIMEN_OPTIONS] = others
         return list(super().parse_args(ctx, kept))

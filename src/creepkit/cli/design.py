@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.options import parsed_number
 from creepkit.reports.terminal import ProgressBar, print_json
 
@@ -32,31 +34,43 @@ def command(
             "law where the tests allow more than one.",
         ),
     ] = None,
-    budget: Annotated[float | None, typer.Option(metavar="HOURS", help="Oven hours for one run or several.")] = None,
+    budget: Annotated[
+        float | None, typer.Option(metavar="HOURS", help="Oven hours for one run or several."), limits.HOURS
+    ] = None,
     levels: Annotated[
         str | None, typer.Option(metavar="LOW:HIGH", help="What the rig can load: MPa, or a strain; 4:14.")
     ] = None,
-    longest: Annotated[float | None, typer.Option(metavar="HOURS", help="The rig's longest test.")] = None,
+    longest: Annotated[
+        float | None, typer.Option(metavar="HOURS", help="The rig's longest test."), limits.HOURS
+    ] = None,
     specimen: Annotated[
         str | None, typer.Option(metavar="NAME", help="Whose rig is described, where tests are of several specimens.")
     ] = None,
     temperature_c: Annotated[
-        list[float] | None, typer.Option(metavar="C", help="At which tests can be made; may be given several times.")
+        list[float] | None,
+        typer.Option(metavar="C", help="At which tests can be made; may be given several times."),
+        limits.CELSIUS,
     ] = None,
     dimension: Annotated[
         list[str] | None,
         typer.Option(metavar="LENGTH=MM,...", help="Test pieces that can be made: apex_thickness=0.44,0.5,0.58."),
     ] = None,
     tests_per_run: Annotated[
-        int | None, typer.Option(metavar="COUNT", help="Test pieces that the oven takes at once.")
+        int | None,
+        typer.Option(metavar="COUNT", help="Test pieces that the oven takes at once."),
+        limits.TESTS_IN_A_RUN,
     ] = None,
     setup_hours: Annotated[
-        float | None, typer.Option(metavar="HOURS", help="Of the oven for each run, beside its test.")
+        float | None, typer.Option(metavar="HOURS", help="Of the oven for each run, beside its test."), limits.RAMP
     ] = None,
-    frame_interval: Annotated[float | None, typer.Option(metavar="S", help="Seconds between frames.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the draws.")] = 0,
+    frame_interval: Annotated[
+        float | None, typer.Option(metavar="S", help="Seconds between frames."), limits.SECONDS
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the draws."), limits.SEED] = 0,
     plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a map of what tests tell, .png, .svg or .pdf.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a map of what tests tell, .png, .svg or .pdf."),
+        OutputPath("picture"),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -70,10 +84,7 @@ def command(
     from creepkit.inverse.ranking_document import read_fit_or_ranking
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.reports.design import design_to_json, print_design
-    from creepkit.reports.figures import check_figure_target
 
-    if plot is not None:
-        check_figure_target(plot)
     histories = ck.read_histories(tests)
     found = [read_fit_or_ranking(path) for path in fits]
     laws = [fit for one in found for fit in ((one,) if isinstance(one, Identification) else one.fits)]

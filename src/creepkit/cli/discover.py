@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.identification_options import (
     BoundOption,
     FixOption,
@@ -22,7 +24,7 @@ from creepkit.cli.identification_options import (
     setting_changes,
     surrogate_named,
 )
-from creepkit.cli.options import NUISANCE_SYNTAX, check_folder, parse_nuisances, parsed_number
+from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, parsed_number
 from creepkit.reports.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
@@ -38,7 +40,11 @@ def command(
         typer.Argument(metavar="FILE...", help="Measured files, folders or patterns; or identifications (.json)."),
     ],
     law: Annotated[str, typer.Option("--law", metavar="NAME", help="The law, without temperature.")] = "norton",
-    to: Annotated[Path, typer.Option(help="Folder for results; made if needed.")] = Path("discovered"),
+    to: Annotated[
+        Path,
+        typer.Option(help="Folder for results; made if needed."),
+        OutputPath("folder", ("temperature.json", "temperature.png", "law.tex", "law.py")),
+    ] = Path("discovered"),
     reader: Annotated[str | None, typer.Option(help="Reader to use; by default the one that accepts the file.")] = None,
     surrogate: SurrogateOption = None,
     only: OnlyOption = None,
@@ -52,7 +58,9 @@ def command(
         list[str] | None,
         typer.Option(metavar="PARAMETER:FORM=ODDS", help="Prior odds of a form, such as A:arrhenius=10."),
     ] = None,
-    within: Annotated[float, typer.Option(min=0.0, help="K; tests so near are at one temperature.")] = 5.0,
+    within: Annotated[
+        float, typer.Option(help="K; tests so near are at one temperature."), limits.KELVIN_DIFFERENCE
+    ] = 5.0,
     nuisance: Annotated[
         list[str] | None,
         typer.Option(
@@ -81,7 +89,6 @@ def command(
     from creepkit.api.identification import change_settings
     from creepkit.errors import FitError
 
-    check_folder(to)
     form_options: FormOptions = {"forms": parse_forms(form), "prior": parse_prior_odds(prior)}
     if all(name.endswith(".json") for name in files):
         if only or fix or bound or surrogate:
@@ -179,6 +186,6 @@ def write_temperature_law(temperature_law: TemperatureLaw, folder: Path) -> list
     temperature_law.plot(written[1])
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
         path = folder / f"law{suffix}"
-        ck.export(temperature_law.valued, language, to=path, force=True)
+        ck.export(temperature_law.valued, language, to=path)
         written.append(path)
     return written

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -21,17 +24,20 @@ def command(
     ],
     to: Annotated[str, typer.Option("--to", metavar="TARGET", help="latex, python, abaqus ...; or 'list' for all.")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File to write; by default it is printed.")
+        Path | None, typer.Option("--output", "-o", help="File to write; by default it is printed."), OutputPath()
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that exists.")] = False,
     value: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter's value, given or changed.")
     ] = None,
     stress_unit: Annotated[str, typer.Option(help="MPa, Pa, kPa, GPa, psi or ksi.")] = "MPa",
     time_unit: Annotated[str, typer.Option(help="s, min, h, day or year.")] = "s",
-    temperature_c: Annotated[float | None, typer.Option(help="A number in the place of the temperature, C.")] = None,
-    modulus_gpa: Annotated[float | None, typer.Option(help="Young's modulus, GPa, for targets that state it.")] = None,
-    poisson: Annotated[float, typer.Option(help="Poisson's ratio, beside the modulus.")] = 0.3,
+    temperature_c: Annotated[
+        float | None, typer.Option(help="A number in the place of the temperature, C."), limits.CELSIUS
+    ] = None,
+    modulus_gpa: Annotated[
+        float | None, typer.Option(help="Young's modulus, GPa, for targets that state it."), limits.GIGAPASCAL
+    ] = None,
+    poisson: Annotated[float, typer.Option(help="Poisson's ratio, beside the modulus."), limits.POISSON] = 0.3,
     name: Annotated[str, typer.Option(help="What the target is to call the law.")] = "",
 ) -> None:
     """Write a law with its values as text, or for a solver.
@@ -53,7 +59,6 @@ def command(
         units={"stress": stress_unit, "time": time_unit},
         temperature=None if temperature_c is None else temperature_c + ZERO_CELSIUS,
         to=output,
-        force=force,
     )
     typer.echo(text.rstrip("\n") if output is None else f"wrote {output}")
 

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from creepkit.cli.options import PAPER_SPECIMEN, check_folder, parsed_number
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.options import PAPER_SPECIMEN, parsed_number
 
 if TYPE_CHECKING:
     from creepkit.extraction import Extraction
@@ -24,7 +26,9 @@ def command(
         str | None, typer.Option(metavar="x=X_mm,...", help="Columns x, y, z, u, v, w of files of no known format.")
     ] = None,
     interval: Annotated[
-        float | None, typer.Option("--interval-s", metavar="S", help="Time between frames whose files hold none.")
+        float | None,
+        typer.Option("--interval-s", metavar="S", help="Time between frames whose files hold none."),
+        limits.SECONDS,
     ] = None,
     times: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Times of frames, a column in s, or in ms since 1970.")
@@ -48,46 +52,50 @@ def command(
         str | None, typer.Option(metavar="D1,E1", help="Names of what is found, as the record has them.")
     ] = None,
     load: Annotated[
-        float | None, typer.Option("--load-mpa", metavar="MPA", help="Constant load, for no record.")
+        float | None, typer.Option("--load-mpa", metavar="MPA", help="Constant load, for no record."), limits.MEGAPASCAL
     ] = None,
     temperature: Annotated[
-        float | None, typer.Option("--temperature-c", metavar="C", help="Constant temperature, for no record.")
+        float | None,
+        typer.Option("--temperature-c", metavar="C", help="Constant temperature, for no record."),
+        limits.CELSIUS,
     ] = None,
     modulus: Annotated[
-        float | None, typer.Option("--modulus-gpa", metavar="GPA", help="Young's modulus, for the history.")
+        float | None,
+        typer.Option("--modulus-gpa", metavar="GPA", help="Young's modulus, for the history."),
+        limits.GIGAPASCAL,
     ] = None,
     center: Annotated[
         list[str] | None, typer.Option(metavar="X,Y", help="Centre in mm, in the frames' axes; for several, repeat it.")
     ] = None,
-    window: Annotated[float | None, typer.Option(metavar="MM", help="Radius of the fitted window.")] = None,
+    window: Annotated[
+        float | None, typer.Option(metavar="MM", help="Radius of the fitted window."), limits.MILLIMETRE
+    ] = None,
     rings: Annotated[
         str | None, typer.Option(metavar="0,2,4", help="Radii, mm: means on rings in place of a fit.")
     ] = None,
     rest: Annotated[
         str | None, typer.Option(metavar="A-B", help="Frames at rest, where they are not to be found.")
     ] = None,
-    subset: Annotated[float, typer.Option("--subset", metavar="MM", help="Side of a subset, taken out.")] = 0.0,
-    to: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Write a history of each here.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")] = False,
+    subset: Annotated[
+        float, typer.Option("--subset", metavar="MM", help="Side of a subset, taken out."), limits.MILLIMETRE
+    ] = 0.0,
+    to: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Write a history of each here."), OutputPath("folder")
+    ] = None,
     plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a contact sheet, .png, .svg or .pdf.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a contact sheet, .png, .svg or .pdf."),
+        OutputPath("picture"),
     ] = None,
 ) -> None:
     """Extract measured histories from camera frames."""
     import creepkit as ck
     from creepkit.api.extraction import operator_of
     from creepkit.errors import HistoryError
-    from creepkit.files.writing import check_target
+    from creepkit.files.writing import check_folder_target, check_target
     from creepkit.records import ZERO_CELSIUS
-    from creepkit.reports.figures import check_figure_target
     from creepkit.reports.terminal import ProgressBar
 
-    if to is not None:
-        check_folder(to)
-    if plot is not None:
-        check_figure_target(plot, HistoryError)
-        if not center:
-            check_target(plot, HistoryError, force=force)
     if to is not None and record is None and (load is None or temperature is None):
         raise HistoryError(
             "a history needs what was imposed: give --record FILE, or --load-mpa and --temperature-c, beside --to"
@@ -111,8 +119,10 @@ def command(
         typer.echo(str(one))
     sheets = [plot if len(found) == 1 else plot.with_stem(f"{plot.stem}_{one.name}") for one in found] if plot else []
     files = [to / f"{one.name}.csv" for one in found] if to is not None else []
-    for path in (*sheets, *files):
-        check_target(path, HistoryError, force=force)
+    for path in sheets:
+        check_target(path, HistoryError)
+    if to is not None:
+        check_folder_target(to, HistoryError, tuple(path.name for path in files))
     histories = []
     for one in found if to is not None else ():  # all of them, before any is written
         if recorded is not None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.options import PAPER_SPECIMEN, parsed_number
 from creepkit.reports.terminal import ProgressBar
 
@@ -17,16 +19,20 @@ if TYPE_CHECKING:
 
 def command(
     law: Annotated[str, typer.Argument(metavar="LAW", help="Name of a law.")],
-    to: Annotated[Path | None, typer.Option(help="HDF5 file to write; its shards lie in FILE.parts.")] = None,
-    samples: Annotated[int | None, typer.Option(min=1, help="Accepted samples wanted.")] = None,
-    draws: Annotated[int | None, typer.Option(min=1, help="Or draws, whatever becomes of them.")] = None,
+    to: Annotated[
+        Path | None, typer.Option(help="HDF5 file to write; its shards lie in FILE.parts."), OutputPath("resumed")
+    ] = None,
+    samples: Annotated[int | None, typer.Option(help="Accepted samples wanted."), limits.SAMPLES] = None,
+    draws: Annotated[int | None, typer.Option(help="Or draws, whatever becomes of them."), limits.SAMPLES] = None,
     specimen: Annotated[str, typer.Option(help="Any specimen that says how its tests are loaded.")] = PAPER_SPECIMEN,
     domain: Annotated[
         str | None, typer.Option(help="conditioned (the default; most samples creep visibly) or paper.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the Sobol sequence.")] = 0,
-    interval: Annotated[float | None, typer.Option(help="s from frame to frame; 150 by default.")] = None,
-    end_h: Annotated[float | None, typer.Option(help="End of the tests, h; 12 by default.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the Sobol sequence."), limits.SEED] = 0,
+    interval: Annotated[
+        float | None, typer.Option(help="s from frame to frame; 150 by default."), limits.SECONDS
+    ] = None,
+    end_h: Annotated[float | None, typer.Option(help="End of the tests, h; 12 by default."), limits.HOURS] = None,
     ranges: Annotated[
         list[str] | None,
         typer.Option(
@@ -42,7 +48,9 @@ def command(
             "--unscreened", help="Simulate what bursts far too early by the reduced-order model, too (paper)."
         ),
     ] = False,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes; one for each core by default."), limits.WORKERS
+    ] = None,
     cluster: Annotated[str | None, typer.Option(metavar="URL", help="A dask scheduler, tcp://host:port.")] = None,
     part: Annotated[
         str | None, typer.Option(metavar="K/N", help="Simulate every N-th shard only, from the K-th on; do not merge.")

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from creepkit import limits
 from creepkit.cli.options import parse_weights, parsed_number
 
 if TYPE_CHECKING:
@@ -22,14 +23,18 @@ if TYPE_CHECKING:
     from creepkit.records import History, Nuisance, Predictor
 
 
-StartsOption = Annotated[int | None, typer.Option(min=1, help="Starts of the search; {settings.starts} by default.")]
+StartsOption = Annotated[
+    int | None, typer.Option(help="Starts of the search; {settings.starts} by default."), limits.STARTS
+]
 
 
-SeedOption = Annotated[int | None, typer.Option(min=0, help="Seed of the search; {settings.seed} by default.")]
+SeedOption = Annotated[int | None, typer.Option(help="Seed of the search; {settings.seed} by default."), limits.SEED]
 
 
 FramesOption = Annotated[
-    int | None, typer.Option(min=2, help="Frames of each test that are compared; {settings.frames} by default.")
+    int | None,
+    typer.Option(help="Frames of each test that are compared; {settings.frames} by default."),
+    limits.COMPARED_FRAMES,
 ]
 
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.identification_options import (
     BoundOption,
     FixOption,
@@ -23,7 +25,7 @@ from creepkit.cli.identification_options import (
     setting_changes,
     surrogate_named,
 )
-from creepkit.cli.options import NUISANCE_SYNTAX, check_folder, parse_nuisances, penalty_named, search_named
+from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, penalty_named, search_named
 from creepkit.reports.ranking import print_ranking, ranking_to_json
 from creepkit.reports.terminal import ProgressBar, print_json
 
@@ -53,7 +55,7 @@ def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
     best = ranking.best
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
         path = folder / f"{file_stem(best.law.name)}{suffix}"
-        ck.export(ranking, language, to=path, force=True)
+        ck.export(ranking, language, to=path)
         written.append(path)
     return written
 
@@ -71,7 +73,11 @@ def command(
             "--law", metavar="NAME", help="A law to fit, or a sum, norton+strain-hardening; may be given several times."
         ),
     ],
-    to: Annotated[Path, typer.Option(help="Folder for results; made if needed.")] = Path("identified"),
+    to: Annotated[
+        Path,
+        typer.Option(help="Folder for results; made if needed."),
+        OutputPath("folder", ("ranking.json", "ranking.png")),
+    ] = Path("identified"),
     reader: Annotated[str | None, typer.Option(help="Reader to use; by default the one that accepts the file.")] = None,
     temperature: Annotated[
         str, typer.Option(help="auto: an Arrhenius factor when the tests span several temperatures; or none.")
@@ -80,7 +86,9 @@ def command(
     fix: FixOption = None,
     bound: BoundOption = None,
     surrogate: SurrogateOption = None,
-    up_to: Annotated[float | None, typer.Option(help="Use frames up to this strain only, such as 0.05.")] = None,
+    up_to: Annotated[
+        float | None, typer.Option(help="Use frames up to this strain only, such as 0.05."), limits.STRAIN
+    ] = None,
     starts: StartsOption = None,
     seed: SeedOption = None,
     frames: FramesOption = None,
@@ -125,12 +133,10 @@ def command(
     """
     import creepkit as ck
     from creepkit.errors import FitError
+    from creepkit.files.writing import check_folder_target
 
     if temperature not in ("auto", "none"):
         raise FitError(f"--temperature {temperature} is not known; allowed are auto and none")
-    if up_to is not None and not up_to > 0:
-        raise FitError(f"--up-to {up_to:g} is not a strain above zero; write 0.05 for 5 %")
-    check_folder(to)
     candidate_laws = [ck.law(name) for name in dict.fromkeys(law)]
     histories = select_by_label(ck.read_histories(files, reader), only)
     if up_to is not None:
@@ -140,6 +146,10 @@ def command(
     if temperature == "auto":
         candidate_laws = [ck.with_arrhenius(candidate_law, histories) for candidate_law in candidate_laws]
     candidate_laws = change_laws(candidate_laws, fix, bound)
+    stems = [file_stem(candidate.name) for candidate in candidate_laws]
+    check_folder_target(
+        to, FitError, tuple(f"{s}{suffix}" for s in stems for suffix in (".json", ".png", ".tex", ".py"))
+    )
     changes = setting_changes(
         starts=starts,
         seed=seed,

@@ -7,14 +7,17 @@ from typing import Annotated
 
 import typer
 
+from creepkit.cli.declared_options import OutputPath
+
 
 def command(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of measured files.")],
     to: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The study file; by default study.toml in the folder.")
+        Path | None,
+        typer.Option(metavar="FILE", help="The study file; by default study.toml in the folder."),
+        OutputPath(),
     ] = None,
     reader: Annotated[str | None, typer.Option(help="Reader of the files; by default what accepts them.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite a study file that exists.")] = False,
 ) -> None:
     """Write a study file for a folder of data.
 
@@ -25,7 +28,7 @@ def command(
     from creepkit.studies.proposal import propose_study
 
     path = folder / "study.toml" if to is None else to
-    check_target(path, StudyError, force=force)
+    check_target(path, StudyError)
     proposal = propose_study(folder, path, reader)
     write_text(proposal.text, path, StudyError)
     for line in proposal.summary:

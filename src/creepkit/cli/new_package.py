@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -93,7 +94,7 @@ def _write_file(kind: PackageKind, name: str) -> str:
     """Write the module alone; say what to do next."""
     path = Path(f"{name.replace('-', '_')}.py")
     _check_absent(path)
-    write_text(_filled(kind.module, name), path, PluginError)
+    write_text(_filled(kind.module, name), path, PluginError, internal=True)  # that it is absent was checked
     check = _filled(kind.check, name, file=str(path))
     return (
         f"wrote {path}; next: edit {kind.edit}, then run '{check}', "
@@ -116,7 +117,7 @@ def _write_package(kind: PackageKind, name: str) -> str:
     }
     (folder / "tests").mkdir(parents=True)
     for path, text in texts.items():
-        write_text(text, folder / path, PluginError)
+        write_text(text, folder / path, PluginError, internal=True)  # in a new folder
     file = folder / f"{module}.py"
     check = _filled(kind.check, name, file=str(file))
     return (
@@ -145,5 +146,5 @@ def _filled(text: str, name: str, **more: str) -> str:
 
 def _check_absent(path: Path) -> None:
     """What exists is left as it is."""
-    if path.exists():
+    if os.path.lexists(path):
         raise PluginError(f"{path} exists already; it was left as it is, choose another name or move it")

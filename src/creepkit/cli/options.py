@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.api.searches import PENALTIES, SEARCHES, penalty_of_name, search_of_name
@@ -90,28 +88,6 @@ def parse_numbers(texts: Sequence[str], option: str, example: str) -> dict[str, 
         except ValueError:
             raise SolveError(f"{option} {text}: write NAME=NUMBER, such as {example}") from None
     return values
-
-
-def check_folder(folder: Path) -> None:
-    """Say now, not after all the work, that results cannot be written there."""
-    from creepkit.errors import FitError
-
-    existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
-    if not existing.is_dir():
-        raise FitError(f"--to {folder}: {existing} is a file; name a folder for the results")
-    if not os.access(existing, os.W_OK):
-        raise FitError(f"--to {folder}: {existing} cannot be written to; name another folder for the results")
-
-
-def check_file(option: str, path: Path) -> None:
-    """Say now, not after all the work, that a file cannot be written there."""
-    from creepkit.errors import SolveError
-    from creepkit.files.writing import check_target
-
-    check_target(path, SolveError)
-    folder = path.absolute().parent
-    if not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise SolveError(f"{option} {path}: {path.parent} is no folder that can be written to; name a file elsewhere")
 
 
 def parse_weights(text: str) -> Any:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit import limits
 from creepkit.cli.described_test import (
     check_modulus,
     check_options,
@@ -41,7 +42,7 @@ PressureOption = Annotated[
 
 
 ModulusOption = Annotated[
-    float | None, typer.Option(help="Young's modulus, GPa; a bulge and a prescribed strain need it.")
+    float | None, typer.Option(help="Young's modulus, GPa; a bulge and a prescribed strain need it."), limits.GIGAPASCAL
 ]
 
 
@@ -53,19 +54,7 @@ GeometryOption = Annotated[
 ControlOption = Annotated[str | None, typer.Option(help="Of a bar: load (held in each step) or stress (true).")]
 
 
-RampOption = Annotated[float | None, typer.Option(min=0, help="s in which each level of a load is reached.")]
-
-
-LONGEST_TEST = 1e9
-"""h."""
-
-
-def check_duration(hours: float) -> None:
-    """SolveError for what is no duration of a test in h."""
-    from creepkit.errors import SolveError
-
-    if not 0 < hours < LONGEST_TEST:
-        raise SolveError(f"--end-h {hours:g} is not a time above zero (and below {LONGEST_TEST:.0e} h)")
+RampOption = Annotated[float | None, typer.Option(help="s in which each level of a load is reached."), limits.RAMP]
 
 
 def parse_temperature(texts: Sequence[str]) -> float | Program:
@@ -128,7 +117,6 @@ def described_test(options: TestOptions) -> DescribedTest:
         if name in lengths:
             raise SolveError(f"--geometry {name}: {name} is given twice; keep one of them")
         lengths[name] = value
-    check_duration(options.end_h)
     loading = parse_loading(specimen, loads, options.control, options.ramp, 3600.0 * options.end_h)
     check_modulus(specimen, options.modulus_gpa, loads)
     return DescribedTest(specimen, loading, lengths)

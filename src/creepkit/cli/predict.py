@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.described_test import further_options
 from creepkit.cli.options import parse_numbers, parsed_number
 from creepkit.cli.planned_test import (
@@ -35,7 +37,7 @@ def command(
     tests: Annotated[
         list[str] | None, typer.Argument(metavar="[TESTS]...", help="Measured files, folders or patterns.")
     ] = None,
-    level: Annotated[float, typer.Option(help="Probability of bands and intervals.")] = 0.95,
+    level: Annotated[float, typer.Option(help="Probability of bands and intervals."), limits.PROBABILITY] = 0.95,
     target: Annotated[
         list[str] | None,
         typer.Option(metavar="OUTPUT=VALUE,...", help="Values the times to which are asked for; strain=0.01."),
@@ -52,7 +54,7 @@ def command(
         list[str] | None,
         typer.Option(metavar="[S:]C", help="Temperature, C; by default that of the fitted tests, if they had one."),
     ] = None,
-    end_h: Annotated[float | None, typer.Option(help="End of a planned test, h.")] = None,
+    end_h: Annotated[float | None, typer.Option(help="End of a planned test, h."), limits.HOURS] = None,
     modulus_gpa: ModulusOption = None,
     geometry: GeometryOption = None,
     control: ControlOption = None,
@@ -60,8 +62,12 @@ def command(
     label: Annotated[
         list[str] | None, typer.Option(metavar="NAME=VALUE", help="Label of a planned test, such as heat=X7.")
     ] = None,
-    draws: Annotated[int | None, typer.Option(help="Of the law and of all else; more make bands smoother.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Picture of the curves with their bands.")] = None,
+    draws: Annotated[
+        int | None, typer.Option(help="Of the law and of all else; more make bands smoother."), limits.BAND_DRAWS
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Picture of the curves with their bands."), OutputPath("picture")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the forecast as JSON.")] = False,
 ) -> None:
     """Forecast tests by an identified law.
@@ -72,11 +78,8 @@ def command(
     import creepkit as ck
     from creepkit.errors import FitError
     from creepkit.inverse.ranking_document import read_fit_or_ranking
-    from creepkit.reports.figures import check_figure_target
     from creepkit.reports.forecast import forecast_to_json
 
-    if plot is not None:
-        check_figure_target(plot)
     source = read_fit_or_ranking(fit)
     histories = ck.read_histories(tests) if tests else []
     described = {

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit.cli.declared_options import OutputPath
 from creepkit.reports.terminal import print_json
 
 if TYPE_CHECKING:
@@ -25,9 +26,13 @@ def command(
         str | None, typer.Option(metavar="A,B", help="Columns that nobody needs, such as load_kN,date.")
     ] = None,
     to: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Write each test there as CSV, in s, MPa, mm and K.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Write each test there as CSV, in s, MPa, mm and K."),
+        OutputPath("folder"),
     ] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the outputs over time.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw the outputs over time."), OutputPath("picture")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Show what measured files are understood to hold.
@@ -39,14 +44,11 @@ def command(
     from creepkit.readers.table_summary import summarise_tables
     from creepkit.reports import histories as report
     from creepkit.reports.data_quality import data_quality_to_json
-    from creepkit.reports.figures import check_figure_target
 
     records = _records(files, reader)
     if records:
         _show_records(records, to, plot, as_json)
         return
-    if plot is not None:
-        check_figure_target(plot, ck.errors.HistoryError)
     ignored = [name.strip() for name in (ignore or "").split(",") if name.strip()]
     found = ck.read_histories(files, reader=reader, ignore=ignored)
     general = {str(path) for path in files if path.is_file() and reader in (None, "csv", "xlsx")}
@@ -73,6 +75,7 @@ def command(
 def _write(histories: list[History], folder: Path) -> list[Path]:
     """Write each history; what cannot stand in the name of a file becomes a line."""
     import creepkit as ck
+    from creepkit.files.writing import check_folder_target
     from creepkit.readers.history_csv import history_text
     from creepkit.reports.figures import make_folder
 
@@ -81,6 +84,7 @@ def _write(histories: list[History], folder: Path) -> list[Path]:
         names = [f"{number}_{name}" for number, name in enumerate(names, 1)]
     for history in histories:
         history_text(history)  # an error of the last one must not leave the others written
+    check_folder_target(folder, ck.errors.HistoryError, tuple(f"{name}.csv" for name in names))
     make_folder(folder, ck.errors.HistoryError)
     return [ck.write_history(h, folder / f"{name}.csv") for h, name in zip(histories, names, strict=True)]
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.options import PAPER_SPECIMEN, parse_numbers
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ def command(
         list[str] | None,
         typer.Option(metavar="NAME=MM", help="A length of the test piece, such as apex_thickness=0.45."),
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="Picture of its points to write.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Picture of its points to write."), OutputPath("picture")] = None,
 ) -> None:
     """Train the reduced-order model of a test piece.
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit.cli.declared_options import OutputPath
+
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
@@ -22,9 +24,8 @@ def command(
         list[str] | None,
         typer.Option("--tests", metavar="TESTS", help="Their measured files, folders or patterns, for the curves."),
     ] = None,
-    to: Annotated[Path, typer.Option(help="File for the page.")] = Path("report.html"),
+    to: Annotated[Path, typer.Option(help="File for the page."), OutputPath()] = Path("report.html"),
     title: Annotated[str, typer.Option(help="Of the page.")] = "",
-    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that exists.")] = False,
 ) -> None:
     """Write results as a page to read, HTML.
 
@@ -32,12 +33,9 @@ def command(
     provenance. It prints, and opens anywhere. Identifications of the same tests are ranked.
     """
     import creepkit as ck
-    from creepkit.errors import ReportError
-    from creepkit.files.writing import check_target
 
-    check_target(to, ReportError, force=force)
     histories = ck.read_histories(tests) if tests else []
-    written = ck.report([_read(path, histories) for path in results], to, title=title, force=force)
+    written = ck.report([_read(path, histories) for path in results], to, title=title)
     typer.echo(f"wrote {written}", err=True)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit.cli.declared_options import OutputPath
 from creepkit.reports.terminal import ProgressBar, print_json, print_table, printable
 
 if TYPE_CHECKING:
@@ -26,7 +27,9 @@ def command(
         ),
     ] = None,
     to: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="For results, lock, exports and report; by default beside it.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="For results, lock, exports and report; by default beside it."),
+        OutputPath("folder"),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Make everything again.")] = False,
     locked: Annotated[

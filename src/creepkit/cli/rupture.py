@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.identification_options import OnlyOption, select_by_label
-from creepkit.cli.options import check_file, parsed_integer, parsed_number
+from creepkit.cli.options import parsed_integer, parsed_number
 from creepkit.reports.terminal import print_json
 
 HOURS_BY_SUFFIX = {"h": 1.0, "d": 24.0, "s": 1.0 / 3600.0, "": 1.0}
@@ -40,9 +42,11 @@ def command(
     degrees: Annotated[str, typer.Option(help="Degrees of polynomials of log stress that are tried.")] = "1,2,3",
     distribution: Annotated[str, typer.Option(help="Of rupture times: lognormal or weibull.")] = "lognormal",
     criterion: Annotated[str, typer.Option(help="Of the ranking: bic or aicc.")] = "bic",
-    level: Annotated[float, typer.Option(help="Probability of intervals and bounds.")] = 0.95,
-    to: Annotated[Path | None, typer.Option(help="File for the assessment, JSON.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Picture of isotherms and the master curve.")] = None,
+    level: Annotated[float, typer.Option(help="Probability of intervals and bounds."), limits.PROBABILITY] = 0.95,
+    to: Annotated[Path | None, typer.Option(help="File for the assessment, JSON."), OutputPath()] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Picture of isotherms and the master curve."), OutputPath("picture")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the assessment as JSON.")] = False,
 ) -> None:
     """Assess rupture tests by parametric methods.
@@ -51,13 +55,8 @@ def command(
     mean, of a new heat and of one test of it; what lies beyond three times the longest test is flagged.
     """
     import creepkit as ck
-    from creepkit.reports.figures import check_figure_target
     from creepkit.reports.rupture import rupture_to_json
 
-    if plot is not None:
-        check_figure_target(plot)
-    if to is not None:
-        check_file("--to", to)
     settings = ck.RuptureSettings(
         degrees=tuple(_degree(text) for text in degrees.split(",")),
         distribution=distribution,  # type: ignore[arg-type]

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.identification_options import (
     BoundOption,
     FixOption,
@@ -41,9 +43,11 @@ def command(
     compositions: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Table alloy,Fe,Ni,... below a line '# unit: wt.%'.")
     ] = None,
-    to: Annotated[Path, typer.Option(help="Folder for results; what it holds already is not done again.")] = Path(
-        "screened"
-    ),
+    to: Annotated[
+        Path,
+        typer.Option(help="Folder for results; what it holds already is not done again."),
+        OutputPath("folder", ("plate.csv", "plate.h5")),
+    ] = Path("screened"),
     surrogate: SurrogateOption = None,
     through: Annotated[
         str | None, typer.Option(metavar="NAME", help="Search sums through a surrogate, end with finite elements.")
@@ -72,7 +76,9 @@ def command(
     seed: SeedOption = None,
     frames: FramesOption = None,
     suspect_frames: SuspectFramesOption = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes; one for each core by default."), limits.WORKERS
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Identify the laws of all alloys of a plate.

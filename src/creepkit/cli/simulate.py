@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.cli.options import check_file, parse_numbers
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.options import parse_numbers
 from creepkit.cli.planned_test import (
     ControlOption,
     GeometryOption,
@@ -33,15 +35,11 @@ DEFAULT_FRAMES = 200
 """Of a specimen that does not say how long a frame takes."""
 
 
-MOST_FRAMES = 1_000_000
-"""Of one simulated test, as its history and its file are to fit into memory."""
-
-
 def command(
     ctx: typer.Context,
     law: Annotated[str, typer.Argument(metavar="LAW", help="Name of a law.")],
     value: Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="A parameter's value.")],
-    end_h: Annotated[float, typer.Option(help="End of the test, h.")],
+    end_h: Annotated[float, typer.Option(help="End of the test, h."), limits.HOURS],
     specimen: Annotated[
         str | None,
         typer.Option(help="bulge, point, relaxation, uniaxial or a plugin's; by default one that takes the load."),
@@ -56,10 +54,16 @@ def command(
     geometry: GeometryOption = None,
     control: ControlOption = None,
     ramp: RampOption = None,
-    points: Annotated[int | None, typer.Option(min=2, help="Number of frames; 200 of most specimens.")] = None,
-    every: Annotated[float | None, typer.Option(help="Or s from frame to frame; 150 of a bulge.")] = None,
-    to: Annotated[Path | None, typer.Option(help="CSV file to write; by default it is printed.")] = None,
-    picture: Annotated[Path | None, typer.Option(help="Picture of the section at the end, coloured by stress.")] = None,
+    points: Annotated[
+        int | None, typer.Option(help="Number of frames; 200 of most specimens."), limits.SIMULATED_FRAMES
+    ] = None,
+    every: Annotated[
+        float | None, typer.Option(help="Or s from frame to frame; 150 of a bulge."), limits.SECONDS
+    ] = None,
+    to: Annotated[Path | None, typer.Option(help="CSV file to write; by default it is printed."), OutputPath()] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Picture of the section at the end, coloured by stress."), OutputPath("picture")
+    ] = None,
 ) -> None:
     """Simulate a test of a bar, a dimple or another specimen.
 
@@ -77,12 +81,6 @@ def command(
     times = _frame_times(3600.0 * end_h, points, every, test.specimen)
     if picture is not None and not hasattr(test.specimen, "draws_section"):
         raise SolveError(f"--picture: specimen '{test.specimen.name}' has no section to draw; leave it out")
-    if picture is not None:
-        from creepkit.reports.figures import check_figure_target
-
-        check_figure_target(picture, SolveError)
-    if to is not None:
-        check_file("--to", to)
     run = ck.simulate(
         chosen,
         test.specimen.replace(**test.lengths) if test.lengths else test.specimen,  # type: ignore[attr-defined]
@@ -134,13 +132,12 @@ def _frame_times(end: float, points: int | None, every: float | None, specimen: 
         raise SolveError("--points and --every both say when frames are taken; give one of them")
     if points is None and every is None:
         every = getattr(specimen, "frame_interval", None)
-    if points is not None and points > MOST_FRAMES:
-        raise SolveError(f"--points {points} are too many frames; allowed are 2 to {MOST_FRAMES}")
     if every is None:
         return np.linspace(0.0, end, points or DEFAULT_FRAMES)
-    if not end / MOST_FRAMES <= every <= end:
+    if not end / limits.SIMULATED_FRAMES.high <= every <= end:
         raise SolveError(
-            f"--every {every:g} s is not a step of a test of {end:g} s (allowed are 1 to {MOST_FRAMES} frames)"
+            f"--every {every:g} s is not a step of a test of {end:g} s (allowed are 1 to "
+            f"{limits.SIMULATED_FRAMES.high} frames)"
         )
     frame_times = np.arange(0.0, end * (1 - 1e-9), every)
     return np.append(frame_times, end)

@@ -7,13 +7,19 @@ from typing import Annotated
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.options import parsed_integer
 from creepkit.reports.terminal import ProgressBar, print_json, print_table
 
 
 def command(
     data: Annotated[Path, typer.Argument(metavar="DATA", help="Data set that creepkit generate wrote.")],
-    to: Annotated[Path, typer.Option(help="Folder; a file for each training, those that are there are not redone.")],
+    to: Annotated[
+        Path,
+        typer.Option(help="Folder; a file for each training, those that are there are not redone."),
+        OutputPath("folder", ("sweep.png",)),
+    ],
     layers: Annotated[str, typer.Option(help="Numbers of layers, such as 1,2,3.")] = "1,2,3",
     hidden: Annotated[str, typer.Option(help="Widths, such as 64,128.")] = "64,128",
     cell: Annotated[str, typer.Option(help="gru, lstm or both: gru,lstm.")] = "gru",
@@ -21,12 +27,14 @@ def command(
         str | None, typer.Option(help="Numbers to learn from, such as 1000,2000; all by default.")
     ] = None,
     target: Annotated[str, typer.Option(help="value or log; see creepkit train.")] = "value",
-    epochs: Annotated[int, typer.Option(min=1, help="Passes over the training rows.")] = 100,
-    rate: Annotated[float, typer.Option(help="Rate of Adam at the beginning.")] = 1e-3,
+    epochs: Annotated[int, typer.Option(help="Passes over the training rows."), limits.EPOCHS] = 100,
+    rate: Annotated[float, typer.Option(help="Rate of Adam at the beginning."), limits.LEARNING_RATE] = 1e-3,
     schedule: Annotated[str, typer.Option(help="Of the rate: plateau, cosine or constant.")] = "plateau",
-    seed: Annotated[int, typer.Option(min=0, help="Of the split, the first weights and the order of rows.")] = 0,
+    seed: Annotated[int, typer.Option(help="Of the split, the first weights and the order of rows."), limits.SEED] = 0,
     device: Annotated[str, typer.Option(help="auto (a GPU where there is one), cpu or cuda.")] = "auto",
-    threads: Annotated[int | None, typer.Option(min=1, help="Of torch; one is quickest on a busy machine.")] = None,
+    threads: Annotated[
+        int | None, typer.Option(help="Of torch; one is quickest on a busy machine."), limits.THREADS
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
 ) -> None:
     """Train networks of several sizes.
@@ -75,6 +83,8 @@ def parse_whole_numbers(text: str, option: str) -> tuple[int, ...]:
         numbers = tuple(parsed_integer(part) for part in text.split(","))
     except ValueError:
         numbers = ()
-    if not numbers or min(numbers) < 1:
-        raise SurrogateError(f"{option} {text} is not understood; write whole numbers above zero, such as 1,2,3")
+    if not numbers or any(number not in limits.SAMPLES for number in numbers):
+        raise SurrogateError(
+            f"{option} {text:.40} is not understood; write {limits.SAMPLES}, with commas between them, such as 1,2,3"
+        )
     return numbers

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from creepkit import limits
+from creepkit.cli.declared_options import OutputPath
 from creepkit.reports.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
@@ -15,9 +17,11 @@ if TYPE_CHECKING:
 
 def command(
     data: Annotated[Path, typer.Argument(metavar="DATA", help="Data set that creepkit generate wrote.")],
-    to: Annotated[Path, typer.Option(help="File of the surrogate; a checkpoint lies beside it meanwhile.")],
-    hidden: Annotated[int | None, typer.Option(min=1, help="Width of a layer.")] = None,
-    layers: Annotated[int | None, typer.Option(min=1, help="Layers.")] = None,
+    to: Annotated[
+        Path, typer.Option(help="File of the surrogate; a checkpoint lies beside it meanwhile."), OutputPath("resumed")
+    ],
+    hidden: Annotated[int | None, typer.Option(help="Width of a layer."), limits.HIDDEN] = None,
+    layers: Annotated[int | None, typer.Option(help="Layers."), limits.LAYERS] = None,
     cell: Annotated[str | None, typer.Option(help="gru or lstm.")] = None,
     inputs: Annotated[
         str | None, typer.Option(help="Seen at each frame: load,mean_load,time,step; by default what the grid needs.")
@@ -26,16 +30,22 @@ def command(
         str | None, typer.Option(help="value, or log, of the first output, or as its record says.")
     ] = None,
     base: Annotated[str | None, typer.Option(help="none; or correct a model: reduced-order, reference-stress.")] = None,
-    epochs: Annotated[int | None, typer.Option(min=1, help="Passes over the training rows.")] = None,
-    batch: Annotated[int | None, typer.Option(min=1, help="Histories in a step.")] = None,
-    rate: Annotated[float | None, typer.Option(help="Rate of Adam at the beginning.")] = None,
+    epochs: Annotated[int | None, typer.Option(help="Passes over the training rows."), limits.EPOCHS] = None,
+    batch: Annotated[int | None, typer.Option(help="Histories in a step."), limits.BATCH] = None,
+    rate: Annotated[float | None, typer.Option(help="Rate of Adam at the beginning."), limits.LEARNING_RATE] = None,
     schedule: Annotated[str | None, typer.Option(help="Of the rate: plateau, cosine or constant.")] = None,
-    early_stop: Annotated[int | None, typer.Option(min=1, help="Stop after so many epochs without gain.")] = None,
-    clip: Annotated[float | None, typer.Option(help="Largest norm of the gradient.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the split, the first weights and the order of rows.")] = 0,
+    early_stop: Annotated[
+        int | None, typer.Option(help="Stop after so many epochs without gain."), limits.EPOCHS
+    ] = None,
+    clip: Annotated[float | None, typer.Option(help="Largest norm of the gradient."), limits.LARGEST_GRADIENT] = None,
+    seed: Annotated[int, typer.Option(help="Of the split, the first weights and the order of rows."), limits.SEED] = 0,
     device: Annotated[str, typer.Option(help="auto (a GPU where there is one), cpu or cuda.")] = "auto",
-    threads: Annotated[int | None, typer.Option(min=1, help="Of torch; one is quickest on a busy machine.")] = None,
-    plots: Annotated[Path | None, typer.Option(help="Folder for pictures; by default beside the file.")] = None,
+    threads: Annotated[
+        int | None, typer.Option(help="Of torch; one is quickest on a busy machine."), limits.THREADS
+    ] = None,
+    plots: Annotated[
+        Path | None, typer.Option(help="Folder for pictures; by default beside the file."), OutputPath("folder")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the errors as JSON.")] = False,
 ) -> None:
     """Train the paper's network on a data set.

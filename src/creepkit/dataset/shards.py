@@ -182,7 +182,7 @@ def _death_check(lock: ShardLock) -> Callable[[int], None]:
 
 def write_shard(job: GenerationJob, number: int, samples: Dataset) -> None:
     """Write the file of a shard."""
-    with write_hdf5(job.path(number), DatasetError, storage.WRITE_ADVICE) as file:
+    with write_hdf5(job.path(number), DatasetError, storage.WRITE_ADVICE, internal=True) as file:
         storage.write_header(file, samples)
         storage.append_samples(file, samples)
         file.attrs.update({"generation": job.fingerprint, "shard": number, "checksum": sample_checksum(samples)})
@@ -265,7 +265,8 @@ def merge_shards(job: GenerationJob, record: ProgressRecord, path: Path, progres
 
 def _write_merged(job: GenerationJob, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
     numbers, remaining = record.leading_run() or [], record.draws
-    with write_hdf5(path, DatasetError, storage.WRITE_ADVICE) as file:
+    # one that is there holds the first samples of the same data set, see is_complete()
+    with write_hdf5(path, DatasetError, storage.WRITE_ADVICE, force=True) as file:
         storage.write_header(file, job.header)
         for done, number in enumerate(numbers, start=1):
             samples = read_shard(job, number)

@@ -135,7 +135,7 @@ COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 
 
 def write_dataset(data: Dataset, path: str | Path) -> Path:
-    """Write a data set; the file is whole or absent, and one that is there is replaced."""
+    """Write a data set, whole or not at all; DatasetError for a file that creepkit did not write."""
     path = Path(path)
     with write_hdf5(path, DatasetError, WRITE_ADVICE) as file:
         write_header(file, data)

@@ -10,7 +10,7 @@ from creepkit.errors import ExportError
 from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, json_text, parse_json, read_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
-from creepkit.files.writing import check_target, write_text
+from creepkit.files.writing import write_text
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import Exporter, LawWithValues, exported_text
@@ -102,8 +102,7 @@ def read_law_file(path: str | Path) -> Identification | LawWithValues:
 def write_export(source: LawWithValues, exporter: Exporter, destination: str | Path, *, force: bool = False) -> Path:
     """Write the exporter's text to a file, whole or not at all, and return its path.
 
-    force : replace a file that exists; else that is an ExportError, and the file stays.
+    force : replace a file that creepkit did not write; else that is an ExportError, and the file stays.
     """
     text, path = exported_text(exporter, source), Path(destination)
-    check_target(path, ExportError, force=force)
-    return write_text(text, path, ExportError)
+    return write_text(text, path, ExportError, force=force)

@@ -18,7 +18,7 @@ import numpy as np
 from creepkit.errors import CreepkitError, quoted
 from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, check_readable
-from creepkit.files.writing import replace_on_success
+from creepkit.files.writing import ADVICE, replace_on_success
 
 LARGEST_COMPRESSION = 1032
 """Bytes that one of gzip's may stand for, at most; what lies outside chunks is not compressed at all."""
@@ -69,9 +69,17 @@ class FaultTolerantFile(io.FileIO):
 
 
 @contextmanager
-def write_hdf5(path: Path, error: type[CreepkitError], advice: str) -> Iterator[h5py.File]:
-    """A new file, open for writing, that takes the place of `path` when all of it is written."""
-    with replace_on_success(path, error, advice) as temporary, create_hdf5(temporary) as file:
+def write_hdf5(
+    path: Path, error: type[CreepkitError], advice: str = ADVICE, *, force: bool = False, internal: bool = False
+) -> Iterator[h5py.File]:
+    """A new file, open for writing, that takes the place of `path` when all of it is written.
+
+    advice : what to do when it cannot be written. force, internal : as of replace_on_success().
+    """
+    with (
+        replace_on_success(path, error, advice, force=force, internal=internal) as temporary,
+        create_hdf5(temporary) as file,
+    ):
         yield file
 
 

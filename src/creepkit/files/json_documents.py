@@ -56,9 +56,9 @@ def as_read_back(data: Any) -> Any:
     return json.loads(json.dumps(data))
 
 
-def write_json(data: Any, path: Path, kind: FileKind) -> Path:
-    """Write JSON-able data, whole or not at all."""
-    return write_text(json_text(data), path, kind.error)
+def write_json(data: Any, path: Path, kind: FileKind, *, internal: bool = False) -> Path:
+    """Write JSON-able data, whole or not at all; internal : in a folder that creepkit keeps for itself."""
+    return write_text(json_text(data), path, kind.error, internal=internal)
 
 
 def read_json(path: Path, kind: FileKind) -> Any:

@@ -20,12 +20,21 @@ HEADER_KEY = "creepkit"
 
 
 def write_safetensors(
-    path: str | Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], document: DocumentFormat
+    path: str | Path,
+    arrays: Mapping[str, NDArray[Any]],
+    header: Mapping[str, Any],
+    document: DocumentFormat,
+    *,
+    internal: bool = False,
 ) -> Path:
-    """Write arrays (...,) by name and a JSON-able header below the heading of its format."""
+    """Write arrays (...,) by name and a JSON-able header below the heading of its format.
+
+    internal : in a folder that creepkit keeps for itself, or under a name that only creepkit uses.
+    """
     text = compact_json({**document.heading, **header})
     contiguous = {name: np.array(array, order="C", copy=True) for name, array in arrays.items()}
-    return write_bytes(save(contiguous, metadata={HEADER_KEY: text}), Path(path), document.kind.error)
+    content = save(contiguous, metadata={HEADER_KEY: text})
+    return write_bytes(content, Path(path), document.kind.error, internal=internal)
 
 
 def read_safetensors(path: str | Path, document: DocumentFormat) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:

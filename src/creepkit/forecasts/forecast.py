@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creepkit import limits
 from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError, nearest
 from creepkit.forecasts.draws import check_tolerances, law_draws
@@ -92,8 +93,8 @@ def forecast(
     """
     if not isinstance(level, int | float) or not 0.5 <= level < 1.0:
         raise FitError(f"level is {level!r}; give a probability from 0.5 to below 1, such as 0.95")
-    if draws is not None and not (isinstance(draws, int) and 50 <= draws <= 100_000):
-        raise FitError(f"draws is {draws!r:.40}; allowed are whole numbers from 50 to 100000")
+    if draws is not None:
+        limits.check_number("draws", draws, limits.BAND_DRAWS, FitError)
     if not isinstance(tests, History) and not hasattr(tests, "__iter__"):
         raise FitError(f"tests are histories, found {tests!r:.60}; read_histories(path) returns them")
     histories = check_histories([tests] if isinstance(tests, History) else tests)

@@ -104,7 +104,7 @@ class FitFolder:
         linearised = None if fit.linearised is None else LINEARISED_CODEC.to_json(fit.linearised)
         content = {"identification": identification_to_json(fit), "linearised": linearised}
         self.folder.mkdir(parents=True, exist_ok=True)
-        write_json({**KEPT_FIT.heading, **content}, self.path(key), KEPT_FIT.kind)
+        write_json({**KEPT_FIT.heading, **content}, self.path(key), KEPT_FIT.kind, internal=True)
 
 
 Identify = TypeVar("Identify", bound=Callable[..., Identification])

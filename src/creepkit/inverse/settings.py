@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from creepkit import limits
 from creepkit.errors import FitError, nearest
 from creepkit.records import Nuisance
 
@@ -64,10 +65,14 @@ class IdentificationSettings:
     further_laws: int = 6
 
     def __post_init__(self) -> None:
-        for name, minimum in (("starts", 1), ("sobol_points", 1), ("frames", 2), ("seed", 0), ("further_laws", 0)):
-            value = getattr(self, name)
-            if int(value) != value or value < minimum:
-                raise FitError(f"{name} is {value!r}; it must be a whole number of at least {minimum}")
+        for name, allowed in (
+            ("starts", limits.STARTS),
+            ("sobol_points", limits.SOBOL_POINTS),
+            ("frames", limits.COMPARED_FRAMES),
+            ("seed", limits.SEED),
+            ("further_laws", limits.FURTHER_LAWS),
+        ):
+            limits.check_number(name, getattr(self, name), allowed, FitError)
         if self.loss not in LOSSES:
             raise FitError(f"loss '{self.loss}' is not known; allowed are {', '.join(LOSSES)}")
         if self.test_loss not in TEST_LOSSES:

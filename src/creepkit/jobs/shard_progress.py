@@ -20,8 +20,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TypeAlias
 
-import numpy as np
-
+from creepkit import limits
 from creepkit.errors import DatasetError
 from creepkit.jobs.worker_process import ShardedJob
 
@@ -110,8 +109,8 @@ class ProgressRecord:
 
     def __post_init__(self) -> None:
         for name, value in (("samples", self.samples), ("draws", self.draws)):
-            if value is not None and (not isinstance(value, int | np.integer) or value < 1):
-                raise DatasetError(f"{name} is {value!r}; ask for a whole number, at least one")
+            if value is not None:
+                limits.check_number(name, value, limits.SAMPLES, DatasetError)
         if (self.samples is None) == (self.draws is None):
             raise DatasetError("say either how many accepted samples are wanted (samples), or how many draws (draws)")
         if self.part is not None and not 1 <= self.part[0] <= self.part[1]:

@@ -10,6 +10,7 @@ import pickle
 import re
 import selectors
 import signal
+import socket
 import subprocess
 import time
 from collections import Counter
@@ -18,6 +19,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import IO, Any, Protocol
 
+from creepkit import limits
 from creepkit.arrays import usable_cores
 from creepkit.errors import CreepkitError, DatasetError
 from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task
@@ -32,6 +34,10 @@ ADDRESS = re.compile(r"inproc://.+|[a-z]+://.+:[0-9]+/?")
 
 CONNECT_TIMEOUT = 30
 """s, in which a scheduler answers."""
+
+
+WORKERLESS_TIMEOUT = 600
+"""s, within which a queue of jobs starts a worker."""
 
 
 LEAST_QUEUED = 8
@@ -51,6 +57,7 @@ class ClusterWorkers:
         self._size = thread_limit
         self._client: Any = None
         self._futures: dict[Any, int] = {}
+        self._last_worker = time.monotonic()
 
     def __enter__(self) -> ClusterWorkers:
         try:
@@ -59,13 +66,38 @@ class ClusterWorkers:
             raise DatasetError("--cluster needs dask; install it with: pip install 'creepkit[cluster]'") from None
         if not ADDRESS.fullmatch(self._address):  # a client of such an address takes a minute to go
             raise DatasetError(f"'{self._address}' is no address of a dask scheduler; write tcp://host:port")
+
+        class OwnClient(Client):
+            """A client that is closed by us: one that could not connect would be closed for a minute, and fail."""
+
+            def __del__(self) -> None:
+                """Nothing."""
+
+        self._check_reachable()
         try:
-            self._client = Client(  # type: ignore[no-untyped-call]
+            self._client = OwnClient(  # type: ignore[no-untyped-call]
                 self._address, timeout=CONNECT_TIMEOUT, set_as_default=False
             )
-        except (OSError, ValueError) as error:
-            raise DatasetError(f"no dask scheduler answers at {self._address}: {_one_line(error)}") from None
+        except Exception as error:  # whatever dask makes of what another kind of server says
+            raise self._silent(error) from None
         return self
+
+    def _check_reachable(self) -> None:
+        """DatasetError where nothing answers: a client of dask takes minutes for that, and fails in several ways."""
+        scheme, _, rest = self._address.partition("://")
+        host, _, port = rest.rstrip("/").rpartition(":")
+        if scheme == "inproc":
+            return
+        try:
+            socket.create_connection((host.strip("[]"), int(port)), CONNECT_TIMEOUT).close()
+        except (OSError, ValueError, OverflowError) as error:
+            raise self._silent(error) from None
+
+    def _silent(self, error: Exception) -> DatasetError:
+        return DatasetError(
+            f"no dask scheduler answers at {self._address}: {_one_line(error)}; check the "
+            "address, and that the scheduler runs"
+        )
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -87,6 +119,7 @@ class ClusterWorkers:
         """Wait for results, at most `timeout` s."""
         from distributed import wait
 
+        self._check_workers()
         if not self._futures:
             time.sleep(timeout)
             return []
@@ -94,6 +127,20 @@ class ClusterWorkers:
             wait(list(self._futures), timeout, "FIRST_COMPLETED")  # type: ignore[no-untyped-call]
         finished = [future for future in self._futures if future.done()]
         return [self._result(future, self._futures.pop(future)) for future in finished]
+
+    def _check_workers(self) -> None:
+        """DatasetError where the scheduler is gone, or has had no worker for WORKERLESS_TIMEOUT."""
+        if self._client.status not in ("running", "connecting"):
+            raise DatasetError(
+                f"the dask scheduler at {self._address} is gone; start it again, and the same call goes on from here"
+            )
+        if self._client.status == "running" and self._client.nthreads():
+            self._last_worker = time.monotonic()
+        elif time.monotonic() - self._last_worker > WORKERLESS_TIMEOUT:
+            raise DatasetError(
+                f"the dask scheduler at {self._address} has had no worker for {WORKERLESS_TIMEOUT} s; start workers "
+                "that reach it, and the same call goes on from here"
+            )
 
     def _result(self, future: Any, number: int) -> TaskResult:
         """The result of a task; that its workers died is a result too."""
@@ -195,8 +242,8 @@ class ThisProcess:
 
 def process_count(workers: int | None, error: type[CreepkitError] = DatasetError) -> int:
     """How many processes are meant: `workers`, or one for each core; `error` for what is no number of them."""
-    if workers is not None and (workers != int(workers) or workers < 1):
-        raise error(f"workers is {workers}; allowed are whole numbers above zero, or None for one on each core")
+    if workers is not None:
+        limits.check_number("workers", workers, limits.WORKERS, error)
     return workers or usable_cores()
 
 

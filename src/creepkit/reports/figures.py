@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 from textwrap import wrap
@@ -47,18 +46,16 @@ def make_folder(folder: Path, error_type: type[CreepkitError] = FitError) -> Non
 
 def check_figure_target(path: Path, error_type: type[CreepkitError] = FitError) -> None:
     """Raise an error of `error_type` where a figure could not be written to `path`; for before the work it shows."""
+    check_picture_format(path, error_type)
+    check_target(path, error_type)
+
+
+def check_picture_format(path: Path, error_type: type[CreepkitError] = FitError) -> None:
+    """Raise an error of `error_type` for a name that is not that of a picture."""
     from matplotlib.backend_bases import FigureCanvasBase
 
-    check_target(path, error_type)
-    folder, problem = path.absolute().parent, ""
     if path.suffix.lower().lstrip(".") not in FigureCanvasBase.get_supported_filetypes():
-        problem = f"'{path.suffix}' is no format of pictures"
-    elif not folder.is_dir():
-        problem = f"there is no folder {path.parent}"
-    elif not os.access(folder, os.W_OK):
-        problem = f"the folder {path.parent} is not open to writing"
-    if problem:
-        raise error_type(f"{path}: the plot cannot be written ({problem}); name a .png, .svg or .pdf file")
+        raise error_type(f"{path}: '{path.suffix}' is no format of pictures; name a .png, .svg or .pdf file")
 
 
 def save_figure(figure: Figure, path: str | Path | None, error_type: type[CreepkitError] = FitError) -> Figure:
@@ -73,7 +70,7 @@ def save_figure(figure: Figure, path: str | Path | None, error_type: type[Creepk
             text.set_parse_math(False)
     if path is not None:
         target = Path(path)
-        check_figure_target(target, error_type)
+        check_picture_format(target, error_type)
         resolution = min(RESOLUTION, LARGEST_PIXELS / max(figure.get_size_inches()))
         with replace_on_success(target, error_type) as temporary:
             figure.savefig(temporary, dpi=resolution, format=target.suffix.lower().lstrip("."))

@@ -65,7 +65,7 @@ CODEC = RecordCodec(
 
 def write_result(result: AlloyResult, path: Path) -> Path:
     """Write the result of an alloy; the file is whole or absent."""
-    return write_json({**ALLOY_RESULT.heading, **CODEC.to_json(result)}, path, ALLOY_RESULT.kind)
+    return write_json({**ALLOY_RESULT.heading, **CODEC.to_json(result)}, path, ALLOY_RESULT.kind, internal=True)
 
 
 def read_result(path: Path) -> AlloyResult:
@@ -77,15 +77,12 @@ def read_result(path: Path) -> AlloyResult:
         raise FitError(f"{path}: {error}; {ALLOY_RESULT.remedy}") from None
 
 
-WRITE_ADVICE = "choose a file in a folder that exists and has space"
-
-
 HDF5_FORMAT, HDF5_LAYOUT, HDF5_UNITS = "creepkit-plate", 1, "MPa, mm, s, K"
 
 
 def write_plate(plate: ScreeningResult, path: Path) -> Path:
     """Write the file; it is whole or absent."""
-    with write_hdf5(path, FitError, WRITE_ADVICE) as file:
+    with write_hdf5(path, FitError) as file:
         file.attrs.update({"format": HDF5_FORMAT, "layout": HDF5_LAYOUT, "units": HDF5_UNITS})
         for k, result in enumerate(plate.results):
             group = file.create_group(f"alloys/{k:04d}")

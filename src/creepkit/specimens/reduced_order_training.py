@@ -204,7 +204,7 @@ def _keep(basis: ReducedBasis, path: Path | None) -> None:
         return
     arrays = {"modes": basis.modes, "points": basis.points, "factors": basis.factors}
     with suppress(OSError, CreepkitError):
-        write_safetensors(path, arrays, {"sha256": _checksum(arrays)}, _FORMAT)
+        write_safetensors(path, arrays, {"sha256": _checksum(arrays)}, _FORMAT, internal=True)
 
 
 def _read(path: Path | None, model: FiniteElementModel) -> ReducedBasis | None:

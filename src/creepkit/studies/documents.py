@@ -219,7 +219,7 @@ class ResultFolder:
         if files:
             self.identified.mkdir(parents=True, exist_ok=True)
         for one in files:
-            write_bytes(one.text.encode(), self.identified / one.name, StudyError)
+            write_bytes(one.text.encode(), self.identified / one.name, StudyError, internal=True)
         for path in set(self.identified.glob("*.json")) - {self.identified / one.name for one in files}:
             path.unlink(missing_ok=True)
 
@@ -234,17 +234,15 @@ class ResultFolder:
                 path.unlink(missing_ok=True)
 
     @property
-    def outputs(self) -> dict[str, list[str]]:
-        """{name of an export or report beside the study: sha256 of what it has written, or began to write, there}."""
+    def outputs(self) -> tuple[str, ...]:
+        """Names of exports and reports that the study has written beside it, or began to; they are no data."""
         found = self._load(OUTPUTS, OUTPUTS)
-        return {n: h for n, h in found.items() if isinstance(h, list)} if isinstance(found, dict) else {}
+        return tuple(name for name in found if isinstance(name, str)) if isinstance(found, list | dict) else ()
 
-    def add_output(self, name: str, sha256: str) -> None:
-        """Note that a file of this content is the study's own; what is there may be the last one still."""
-        outputs = self.outputs
-        hashes = [*(one for one in outputs.get(name, []) if one != sha256), sha256][-2:]
-        if hashes != outputs.get(name):
-            self._save(OUTPUTS, OUTPUTS, {**outputs, name: hashes})
+    def add_output(self, name: str) -> None:
+        """Note the name of a file that is written beside the study."""
+        if name not in self.outputs:
+            self._save(OUTPUTS, OUTPUTS, [*self.outputs, name])
 
     def prune_fits(self, asked: Collection[str]) -> int:
         """Remove the identifications but those of these keys; how many were removed."""
@@ -273,7 +271,7 @@ class ResultFolder:
     def _save(self, stage: str, key: str, result: Any) -> None:
         self.folder.mkdir(parents=True, exist_ok=True)
         content = {**STAGE_RESULT.heading, "stage": stage, "key": key, "result": result}
-        write_json(content, self.path(stage), STAGE_RESULT.kind)
+        write_json(content, self.path(stage), STAGE_RESULT.kind, internal=True)
 
 
 def file_name(text: str) -> str:

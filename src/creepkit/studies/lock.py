@@ -79,7 +79,7 @@ def _stage(record: StageRecord, known: Any) -> Any:
 
 def write_lock(content: Any, path: Path) -> Path:
     """Write study.lock, whole or not at all."""
-    return write_json(content, path, STUDY_LOCK.kind)
+    return write_json(content, path, STUDY_LOCK.kind, internal=True)
 
 
 def read_lock(path: Path) -> dict[str, Any]:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.files.writing import write_bytes
+from creepkit.files.writing import check_target, is_listed, write_text
 from creepkit.reports.attachments import read_attachments
 from creepkit.studies.documents import ResultFolder, key_of
 from creepkit.studies.execution import StageRecord
@@ -41,9 +40,7 @@ def write_page(
     try:
         from creepkit.reports.html import report_html
 
-        if _is_report_of(path, file.text):
-            kept.add_output(path.name, sha256_of(path))
-        write_own(kept, path, report_html(result.report_contents()))
+        write_own(kept, path, report_html(result.report_contents()), own=_is_report_of(path, file.text))
     except Exception as error:  # what was found is there without a page
         what = str(error) if isinstance(error, CreepkitError) else f"{type(error).__name__}: {error}"
         record = StageRecord("report", "report", "", "failed", key, " ".join(what.split()))
@@ -54,28 +51,21 @@ def write_page(
     return replace(result, stages=(*result.stages, StageRecord("report", "report", "", "made", key)), report=path)
 
 
-def write_own(kept: ResultFolder, path: Path, text: str) -> None:
-    """Write a file beside the study; StudyError for one that exists and that the study has not written as it is.
+def write_own(kept: ResultFolder, path: Path, text: str, *, own: bool = False) -> None:
+    """Write a file beside the study; StudyError for one that creepkit has not written as it is.
 
-    Its hash is noted before it is written, so that a process that dies in between leaves nothing foreign.
+    own : what is there is known to be the study's, whatever the list of written files says.
     """
-    content = text.encode()
-    digest = hashlib.sha256(content).hexdigest()
-    if os.path.lexists(path) and not kept.overwrite:
-        own = [*kept.outputs.get(path.name, []), digest]
-        if path.is_symlink() or not path.is_file() or sha256_of(path) not in own:
-            raise StudyError(
-                f"{path}: exists, and this study has not written it as it is; choose another name in the study file, "
-                "or overwrite it by --force"
-            )
-    kept.add_output(path.name, digest)
-    write_bytes(content, path, StudyError)
+    force = own or kept.overwrite
+    check_target(path, StudyError, force=force)
+    kept.add_output(path.name)  # before it is written: the next run must not take it for data
+    write_text(text, path, StudyError, force=force)
 
 
 def _is_report_of(path: Path, text: str) -> bool:
-    """Whether a file is a report that carries this study file: the list of what was written may be lost."""
+    """Whether a file is a report that carries this study file, where the list of what was written is lost."""
     try:
-        return path.is_file() and read_attachments(path).get("study.toml") == text.encode()
+        return path.is_file() and not is_listed(path) and read_attachments(path).get("study.toml") == text.encode()
     except CreepkitError:
         return False
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.errors import StudyError, nearest
+from creepkit.files.writing import check_target
 from creepkit.reports.attachments import problem_of_name, same_name
 from creepkit.studies import arguments
 from creepkit.studies.camera_stages import CameraStages
@@ -190,7 +191,11 @@ class Study:
         stages = Stages(self.file, inputs, self.root).all()
         self._check_exports(stages, folder, files)
         execution.histories = inputs.histories
-        execution.run(stages, needed_stages(stages, kinds), read_others="report" in kinds)
+        wanted = needed_stages(stages, kinds)
+        for stage in stages:
+            if stage.file and stage.name in wanted:  # now, not after all the work
+                check_target(folder / stage.file, StudyError, force=kept.overwrite)
+        execution.run(stages, wanted, read_others="report" in kinds)
         write_lock(lock_of(self.file, self._hash, files, execution.records, before), lock_path)
         if before is not None:
             changes += changed_results(before, execution.records)

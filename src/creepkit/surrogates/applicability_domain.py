@@ -52,6 +52,13 @@ class ApplicabilityDomain:
         vectors = (self.low, self.high, self.margin, self.mean, self.scale)
         if any(v.shape != (inputs,) for v in vectors) or self.whitening.shape[:1] != (inputs,):
             raise SurrogateError(f"the domain of a surrogate: its arrays do not belong to {inputs} inputs; train again")
+        numbers = (*vectors, self.whitening, np.asarray(self.limit))
+        ordered = (self.low <= self.high).all() and (self.scale > 0).all() and (self.margin >= 0).all()
+        if any(np.isnan(one).any() for one in numbers) or not ordered or not self.limit > 0:
+            raise SurrogateError(
+                "the domain of a surrogate: a number is missing, a range not from low to high, or a scale, margin or "
+                "limit not above zero, so that nothing would lie outside; train again"
+            )
 
     @classmethod
     def from_rows(cls, names: Sequence[str], rows: Floats, margin: ArrayLike = DEFAULT_MARGIN) -> ApplicabilityDomain:

@@ -6,6 +6,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from creepkit.errors import CreepkitError, SurrogateError, nearest
 from creepkit.files.json_documents import check_keys
 from creepkit.records import Predictor, SupportsReducedOrderModel, known_specimens
@@ -56,6 +58,9 @@ def load_surrogate(path: str | Path) -> Surrogate:
         known = {name: value for name, value in header["metadata"].items() if name != "law_class"}
         metadata = CODEC.from_json(SurrogateMetadata, known, "metadata")
         surrogate = recipe.surrogate(weights, metadata)
+        infinite = [name for name, one in weights.items() if not np.isfinite(np.asarray(one, dtype=float)).all()]
+        if infinite:
+            raise SurrogateError(f"its weights '{infinite[0]}' are not finite; train it again")
     except CreepkitError as error:
         raise SurrogateError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
     except (KeyError, TypeError, ValueError, RuntimeError, AttributeError):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
+from creepkit import limits
 from creepkit.errors import SurrogateError, nearest
 from creepkit.records import Specimen, outputs_of
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
@@ -57,20 +58,16 @@ class ParameterGru:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "inputs", tuple(self.inputs))
-        for name, largest in (("hidden", 4096), ("layers", 32)):
-            value = getattr(self, name)
-            if value != int(value) or not 1 <= value <= largest:
-                raise SurrogateError(f"ParameterGru: {name} is {value}; allowed are whole numbers from 1 to {largest}")
+        for name, allowed in (("hidden", limits.HIDDEN), ("layers", limits.LAYERS)):
+            limits.check_number(f"ParameterGru: {name}", getattr(self, name), allowed, SurrogateError)
         choices = {
             "cell": ("gru", "lstm"),
             "target": ("value", "log", "record"),
             "base": ("none", "reduced-order", "reference-stress"),
         }
-        for name, allowed in choices.items():
-            if getattr(self, name) not in allowed:
-                raise SurrogateError(
-                    f"ParameterGru: {name} is '{getattr(self, name)}'; allowed are {', '.join(allowed)}"
-                )
+        for name, words in choices.items():
+            if getattr(self, name) not in words:
+                raise SurrogateError(f"ParameterGru: {name} is '{getattr(self, name)}'; allowed are {', '.join(words)}")
         for name in self.inputs:
             if name not in SERIES_INPUTS:
                 raise SurrogateError(f"ParameterGru: there is no input '{name}': {nearest(name, SERIES_INPUTS)}")

@@ -38,6 +38,7 @@ from creepkit.surrogates.surrogate import (
     observation_derivative,
     observed_outputs,
     prediction_frames,
+    warn_of_unknown_domain,
 )
 
 if TYPE_CHECKING:
@@ -220,7 +221,9 @@ class ParameterSurrogate(Surrogate):
     def _status(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Ints:
         """(candidates, tests): complete, or outside the domain."""
         outside = np.zeros(query.constants.shape[:2], bool)
-        if self.metadata.domain is not None:
+        if self.metadata.domain is None:
+            warn_of_unknown_domain(self)
+        else:
             outside = self.metadata.domain.outside(self._domain_inputs(query, histories, frames))
         return np.where(outside, int(Status.OUTSIDE_DOMAIN), int(Status.COMPLETE)).astype(np.int64)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from numpy.typing import NDArray
 
+from creepkit import limits
 from creepkit.errors import SurrogateError
 from creepkit.jobs.shard_progress import ProgressCallback as ProgressCallback
 
@@ -52,11 +53,15 @@ class Training:
     samples: int | None = None
 
     def __post_init__(self) -> None:
-        names = ("epochs", "batch", "patience", "early_stop", "samples")
-        whole = {name: getattr(self, name) for name in names}
-        for name, value in whole.items():
-            if value is not None and (value != int(value) or value < 1):
-                raise SurrogateError(f"training: {name} is {value}; allowed are whole numbers above zero")
+        for name, allowed in (
+            ("epochs", limits.EPOCHS),
+            ("batch", limits.BATCH),
+            ("patience", limits.EPOCHS),
+            ("early_stop", limits.EPOCHS),
+            ("samples", limits.SAMPLES),
+        ):
+            if (value := getattr(self, name)) is not None:
+                limits.check_number(f"training: {name}", value, allowed, SurrogateError)
         if self.schedule not in ("plateau", "cosine", "constant"):
             raise SurrogateError(f"training: schedule is '{self.schedule}'; allowed are plateau, cosine and constant")
         if not 0 < self.rate <= 1 or not (self.clip is None or self.clip > 0):

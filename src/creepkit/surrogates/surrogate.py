@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -10,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import SurrogateError
+from creepkit.errors import SurrogateError, SurrogateWarning
 from creepkit.presentation import Presentable
 from creepkit.records import (
     History,
@@ -50,6 +52,21 @@ def check_applicable(
     for history in histories:
         check_history(metadata, history)
     check_nuisances(nuisances, known_nuisances, "this surrogate", SurrogateError)
+
+
+def warn_of_unknown_domain(surrogate: Surrogate) -> None:
+    """SurrogateWarning, once for each surrogate, where it does not say where its training rows lie."""
+    if surrogate not in _WARNED:
+        _WARNED.add(surrogate)
+        warnings.warn(
+            f"{surrogate.title}: its file states no domain, so that answers far from its training are not recognised; "
+            "train it again, or confirm what is found by the specimen itself",
+            SurrogateWarning,
+            stacklevel=2,
+        )
+
+
+_WARNED: weakref.WeakSet[Surrogate] = weakref.WeakSet()
 
 
 def check_history(metadata: SurrogateMetadata, history: History) -> None:

@@ -60,7 +60,7 @@ def write_weights(
     path: str | Path, weights: Weights, header: Mapping[str, Any], document: DocumentFormat = SURROGATE
 ) -> Path:
     """Write weights (...,) by name with a JSON-able header; the file is whole or absent."""
-    return write_safetensors(path, weights, header, document)
+    return write_safetensors(path, weights, header, document, internal=document is CHECKPOINT)
 
 
 def read_weights(path: str | Path, document: DocumentFormat = SURROGATE) -> tuple[Weights, dict[str, Any]]:

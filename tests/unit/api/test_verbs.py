@@ -12,6 +12,7 @@ import creepkit as ck
 from creepkit.errors import ExportError, HistoryError, LawError, SolveError
 from creepkit.records import History, LawWithValues, Prediction, Status
 from creepkit.registry import default_registry
+from helpers.written_files import names_in
 
 READERS = """
 from dataclasses import dataclass
@@ -208,7 +209,7 @@ def test_export_writes_the_text_it_returns(tmp_path: Path) -> None:
     text = ck.export(law, "latex", values, to=tmp_path / "law.tex")
 
     assert (tmp_path / "law.tex").read_text() == text
-    assert [path.name for path in tmp_path.iterdir()] == ["law.tex"]
+    assert names_in(tmp_path) == ["law.tex"]
     with pytest.raises(ExportError, match="there is no exporter 'latx': did you mean 'latex'"):
         ck.export(law, "latx", values)
     with pytest.raises(LawError, match="needs a value for n"):

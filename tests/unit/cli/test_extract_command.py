@@ -61,9 +61,9 @@ def test_rings_about_a_given_centre(exports):
         (("--rings", "0;2"), "--rings 0;2: write numbers with commas between them"),
         (("--rest", "5"), "--rest 5: write the first and the last frame at rest, counted from 0, as in --rest 0-39"),
         (("--center", "5"), "--center 5: write X,Y in mm"),
-        (("--interval-s", "-1"), "--interval-s -1: give the time between frames, s, above zero"),
+        (("--interval-s", "-1"), "--interval-s -1: allowed are numbers above 0 up to"),
         (("--specimen", "uniaxial"), "specimen 'uniaxial' does not say how cameras see its surface"),
-        (("--plot", "sheet.txt"), "the plot cannot be written ('.txt' is no format of pictures)"),
+        (("--plot", "sheet.txt"), "'.txt' is no format of pictures"),
         ((), "their times are not known, or do not rise"),
     ],
 )

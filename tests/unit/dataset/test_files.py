@@ -1,7 +1,6 @@
 """Data sets in files: what is written is read, with h5py alone too; what is something else is said in a sentence."""
 
 import json
-import os
 import subprocess
 import sys
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ from creepkit.dataset.simulation import rounded_outputs, simulate_rows
 from creepkit.errors import DatasetError
 from creepkit.files.writing import replace_on_success
 from helpers.planted_sampling import BAR, GRID, Planted, Raising, strain, stress_of
+from helpers.written_files import names_in
 
 
 def simulated(tmp_path, design=None, first=0, rows=32, seed=0, specimen=BAR):
@@ -97,7 +97,7 @@ def test_what_is_written_is_read(data, tmp_path):
     assert again.reason_names == ("accepted", "strong", "visible", "raising")
     assert again.design_document == data.design_document
     assert again.provenance == data.provenance
-    assert os.listdir(tmp_path) == ["a.h5"]
+    assert names_in(tmp_path) == ["a.h5"]
 
 
 def test_only_accepted_samples_may_be_read(data, tmp_path):
@@ -278,7 +278,7 @@ def test_a_writing_that_fails_leaves_what_was_there(data, tmp_path):
     with pytest.raises(DatasetError, match="No space left on device; free some space and start again"):
         half_written(path)
     assert path.read_bytes() == before
-    assert os.listdir(tmp_path) == ["a.h5"]
+    assert names_in(tmp_path) == ["a.h5"]
 
 
 def test_long_attributes_are_no_trouble(data, tmp_path):

@@ -22,6 +22,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import PressureJump
 from helpers.steady_rate_predictor import Steady, planted
+from helpers.written_files import names_in
 
 T_REF = 1023.15
 TRUE = NORTON.with_temperature(n=linear(T_REF)).times(arrhenius(T_REF))
@@ -148,7 +149,7 @@ def test_the_command_on_saved_identifications(alone, tmp_path, monkeypatch):
     assert answer["forms"] == {"A": "arrhenius", "n": "linear"}
     assert answer["judged_by"] == "points"
     names = {"temperature.json", "temperature.png", "law.tex", "law.py"}
-    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+    assert {*names_in(tmp_path / "out")} == names
 
 
 @pytest.mark.parametrize(

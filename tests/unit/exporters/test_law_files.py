@@ -13,6 +13,7 @@ from creepkit.exporters import write_export
 from creepkit.exporters.builtin import creepkit_exporters
 from creepkit.exporters.latex import LatexExporter, latex_number
 from creepkit.exporters.law_files import JsonExporter, read_valued_law
+from creepkit.files.writing import RECORD
 from creepkit.language import CreepLaw, Param, State, activated, arrhenius, linear, parameters, states, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
@@ -211,18 +212,18 @@ VALUED = LawWithValues(NORTON, {"A": 1e-16, "n": 5}, NOTES)
 def test_a_file_is_written_whole(tmp_path):
     path = write_export(VALUED, JsonExporter(), tmp_path / "norton.json")
     assert read_valued_law(path.read_text(encoding="utf-8")).law == NORTON
-    assert [p.name for p in tmp_path.iterdir()] == ["norton.json"]
+    assert {p.name for p in tmp_path.iterdir()} == {RECORD, "norton.json"}
 
 
 def test_a_file_that_exists_stays_unless_forced(tmp_path):
     path = tmp_path / "norton.json"
     path.write_text("old")
-    with pytest.raises(ExportError, match="norton.json exists already and was left as it is"):
+    with pytest.raises(ExportError, match="norton.json: cannot be written: it is there, and creepkit did not write it"):
         write_export(VALUED, JsonExporter(), path)
     assert path.read_text() == "old"
     write_export(VALUED, JsonExporter(), path, force=True)
     assert read_valued_law(path.read_text(encoding="utf-8")) == VALUED
-    assert [p.name for p in tmp_path.iterdir()] == ["norton.json"]
+    assert {p.name for p in tmp_path.iterdir()} == {RECORD, "norton.json"}
 
 
 def test_a_refused_export_leaves_the_old_file(tmp_path):
@@ -234,7 +235,7 @@ def test_a_refused_export_leaves_the_old_file(tmp_path):
 
 
 def test_a_folder_that_does_not_exist_is_named(tmp_path):
-    with pytest.raises(ExportError, match="missing/norton.json: cannot be written: No such file"):
+    with pytest.raises(ExportError, match="missing/norton.json: cannot be written: there is no folder"):
         write_export(VALUED, JsonExporter(), tmp_path / "missing" / "norton.json")
 
 

@@ -21,6 +21,7 @@ from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance
 from helpers.steady_rate_predictor import Steady, planted
+from helpers.written_files import names_in
 
 LAW = NORTON.times(arrhenius(T_ref=1073.15))
 TRUTH = {"A": 1e-16, "n": 5.2, "Q": 350e3}
@@ -100,7 +101,7 @@ def test_round_trip_through_json(fit, tmp_path):
     assert str(again) == str(fit)
     assert again.law == fit.law
     assert identification_to_json(again) == identification_to_json(fit)
-    assert [p.name for p in tmp_path.iterdir()] == ["fit.json"]
+    assert names_in(tmp_path) == ["fit.json"]
 
 
 def test_damaged_files_are_refused_in_one_sentence(fit, tmp_path):

@@ -9,6 +9,7 @@ from creepkit.errors import HistoryError
 from creepkit.language import Elastic, wachtman
 from creepkit.readers.history_csv import HISTORY_CSV, history_text, write_history
 from creepkit.records import History, PressureJump, Program, RecordedLoading, StressSteps, constant_stress
+from helpers.written_files import names_in
 
 TIMES = np.array([0.1, 1 / 3, 7e5])
 BULGE = {"amplitude": [0.1, 0.2, 1 / 7], "width": [3.6, 3.5, 3.4], "shape": [2.0, 1.9, 2.1]}
@@ -61,7 +62,7 @@ def test_round_trip(history: History, tmp_path: Path):
     assert_same(history, back)
     assert back.source == str(path)
     assert history_text(back) == path.read_text()
-    assert [p.name for p in tmp_path.iterdir()] == ["x.csv"]
+    assert names_in(tmp_path) == ["x.csv"]
 
 
 def test_modulus_of_temperature_is_written_at_the_temperature_of_the_test(tmp_path):
@@ -104,4 +105,4 @@ def test_old_file_survives_a_failed_writing(tmp_path):
     path.mkdir()  # a folder in the place of the file, which cannot be replaced by one
     with pytest.raises(HistoryError, match=r"x.csv: cannot be written: it is a folder"):
         write_history(HISTORIES[0], path)
-    assert [p.name for p in tmp_path.iterdir()] == ["x.csv"]
+    assert names_in(tmp_path) == ["x.csv"]

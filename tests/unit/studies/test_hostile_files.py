@@ -12,6 +12,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import CreepkitError, StudyError
+from creepkit.files.writing import RECORD
 from creepkit.reports.attachments import embed
 from creepkit.reports.contents import Attachment
 from creepkit.studies.carried_study import study_of_report
@@ -50,7 +51,9 @@ def forge(study: Path, pattern: str, change: Callable[[Any], object]) -> None:
 
 
 def files_of(folder: Path) -> set[str]:
-    return {str(path.relative_to(folder)) for path in folder.rglob("*") if "study.results" not in path.parts}
+    return {
+        str(path.relative_to(folder)) for path in folder.rglob("*") if not {"study.results", RECORD} & {*path.parts}
+    }
 
 
 def test_a_forged_result_neither_writes_elsewhere_nor_changes_numbers(study: Path, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import StudyError
+from creepkit.files.writing import RECORD
 from creepkit.studies.carried_study import study_of_report
 from helpers.study_runs import ONE_FIT, STUDY, numbers, states
 
@@ -21,8 +22,11 @@ def test_a_report_whose_notes_were_deleted_is_still_the_studys_own(study: Path, 
         for one in gone:
             (study.parent / "study.results" / f"{one}.json").unlink()
         first.report.write_text(first.report.read_text() + "<!-- older -->")
+        (study.parent / RECORD).unlink()
         assert states(ck.Study.load(study).run())["report"] == "made"
     (study.parent / "study.results" / "outputs.json").unlink()
+    first.report.write_text(first.report.read_text() + "<!-- edited -->")
+    assert states(ck.Study.load(study).run())["report"] == "failed"
     first.report.write_text("of somebody else")
     (study.parent / "study.results" / "report.json").unlink()
     assert states(ck.Study.load(study).run())["report"] == "failed"

@@ -184,7 +184,7 @@ def test_a_run_that_is_killed_anywhere_goes_on_to_the_same_result(tmp_path: Path
 def test_files_that_a_study_has_not_written_stay(study: Path, tmp_path: Path) -> None:
     own = tmp_path / "law_A.py"
     own.write_text("mine")
-    with pytest.raises(StudyError, match="this study has not written it"):
+    with pytest.raises(StudyError, match="creepkit did not write it as it is now"):
         ck.Study.load(study).run()
     assert own.read_text() == "mine"
     own.unlink()
@@ -192,7 +192,7 @@ def test_files_that_a_study_has_not_written_stay(study: Path, tmp_path: Path) ->
     text = own.read_text()
     assert "def " in text
     own.write_text("changed")
-    with pytest.raises(StudyError, match="not written it as it is"):
+    with pytest.raises(StudyError, match="creepkit did not write it as it is now"):
         ck.Study.load(study).run()
     assert own.read_text() == "changed"
     assert ck.Study.load(study).run(only="export", force=True).failures == ()

@@ -18,6 +18,7 @@ from creepkit.surrogates.training import train
 from creepkit.surrogates.training_loop import epochs_since_best, learning_rate
 from creepkit.surrogates.training_rows import dataset_fingerprint, training_split
 from helpers.planted_datasets import bars
+from helpers.written_files import names_in
 
 SMALL = ParameterGru(hidden=8, layers=1, training=Training(epochs=6, batch=16, rate=1e-2))
 
@@ -53,7 +54,7 @@ def test_resumed_is_bit_for_bit_uninterrupted(data: Dataset, tmp_path: Path) -> 
     assert resumed.metadata.curves == whole.metadata.curves
     pairs = zip(resumed.weights.values(), whole.weights.values(), strict=True)
     assert all(np.array_equal(a, b) for a, b in pairs)
-    assert [p.name for p in tmp_path.iterdir()] == ["m.safetensors"]
+    assert names_in(tmp_path) == ["m.safetensors"]
 
 
 def test_a_training_leaves_the_generator_of_others_alone(data: Dataset) -> None:

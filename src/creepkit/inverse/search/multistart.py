@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
+from creepkit import limits
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.bounds import LOG_RATE_BOUNDS, Bounds
@@ -37,6 +38,12 @@ class MultiStart:
 
     def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
         """The minima of all starts, best first; a sum's best single term stands behind the best."""
+        for name, value, allowed in (
+            ("starts", self.starts, limits.STARTS),
+            ("draws", self.draws, limits.SOBOL_POINTS),
+        ):
+            if value is not None:
+                limits.check_number(f"multi-start: {name}", value, allowed, FitError)
         starts, draws = self.starts or problem.settings.starts, self.draws or default_draws(problem)
         screened = screened_starts(problem, starts=starts, draws=draws)
         problem.check_predicted(np.array(screened))  # from where nothing is predicted, no direction leads away

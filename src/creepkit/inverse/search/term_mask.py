@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from creepkit import limits
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, nearest
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -202,9 +203,7 @@ def _one_per_mask(minima: list[Minimum]) -> list[Minimum]:
 
 
 def check_whole_numbers(search: str, values: Mapping[str, float], minimum_values: Mapping[str, int]) -> None:
-    """Refuse settings of a search that must be whole numbers of at least so many."""
+    """Refuse settings of a search that must be whole numbers of at least so many, and of SEARCH_STEPS at most."""
     for name, value in values.items():
-        if value != int(value) or value < minimum_values[name]:
-            raise FitError(
-                f"{search}: {name} is {value!r}; it must be a whole number of at least {minimum_values[name]}"
-            )
+        allowed = limits.Limits(minimum_values[name], limits.SEARCH_STEPS.high)
+        limits.check_number(f"{search}: {name}", value, allowed, FitError)

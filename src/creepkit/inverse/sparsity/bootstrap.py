@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import beta
 
+from creepkit import limits
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.observation_vector import ObservationVector
@@ -72,8 +73,7 @@ def selection_frequencies(
 
     optimum : (unknowns,) x of the penalised fit on all data.
     """
-    if resamples < 1:
-        raise FitError(f"resamples is {resamples}; at least one draw is needed")
+    limits.check_number("resamples", resamples, limits.RESAMPLES, FitError)
     problem, selections = reductions.problem, []
     for k, weights in enumerate(
         bootstrap_weights(problem.problem.observations, resamples, np.random.default_rng(seed))

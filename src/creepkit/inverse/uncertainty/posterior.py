@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from creepkit import limits
 from creepkit.arrays import ArrayLike, Bools, Floats, single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predictor_for_law
@@ -299,6 +300,8 @@ def sample_posterior(
     walkers : an even number of at least twice the parameters. using : another predictor of the same tests than the
         fit's, such as a surrogate where the fit's is a finite element model.
     """
+    limits.check_number("walkers", walkers, limits.WALKERS, FitError)
+    limits.check_number("steps", steps, limits.WALKER_STEPS, FitError)
     emcee, size = _import_emcee(), fit.u.size
     if walkers % 2 or walkers < 2 * size + 2 or steps < 10:
         raise FitError(

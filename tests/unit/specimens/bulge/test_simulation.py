@@ -230,5 +230,5 @@ def test_outputs_and_pressure_are_drawn_over_time(burst: BulgeRun, tmp_path: Pat
 
 
 def test_a_picture_that_cannot_be_written_is_said(run: BulgeRun, tmp_path: Path) -> None:
-    with pytest.raises(SolveError, match=r"the plot cannot be written .*; name a .png, .svg or .pdf file"):
+    with pytest.raises(SolveError, match="cannot be written|is no format of pictures"):
         run.section(path=tmp_path / "none" / "section.png")

@@ -1,0 +1,142 @@
+"""What ends the command line beside errors of ours: a fault of creepkit, no memory, no reader of the output.
+
+A fault of creepkit is one line, exit code 70, and a file with all that a report needs; nothing is sent anywhere.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import tempfile
+import traceback
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+FAULT, NO_READER = 70, 141
+"""Exit codes: EX_SOFTWARE of sysexits.h; and 128 + SIGPIPE, with which the shell reports programs of a closed pipe."""
+
+
+def failure_sentence(error: BaseException) -> tuple[str, int]:
+    """One line about an exception that nobody foresaw, and the exit code."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this; give less at once, or take a machine with more", 1
+    what = " ".join(str(error).split())[:200]
+    kind = type(error).__name__
+    where = _written_report(error)
+    file = f" with the file {where}" if where else "; --debug shows more, and no file could be written"
+    what = f"internal error ({kind}{': ' if what else ''}{what})"
+    return f"{what}; this is a fault of creepkit: report it {_address()}{file}", FAULT
+
+
+def _written_report(error: BaseException) -> Path | None:
+    """A file in a folder of its own, which nobody else can read; None where none can be written."""
+    try:
+        path = Path(tempfile.mkdtemp(prefix="creepkit-error-")) / "report.txt"
+        lines = [
+            f"creepkit {_version()}, Python {sys.version.split()[0]}, {platform.platform()}",
+            f"command: {' '.join(map(repr, sys.argv))}",
+            "",
+            *traceback.format_exception(error),
+        ]
+        path.write_text("\n".join(lines), encoding="utf-8", errors="backslashreplace")
+    except Exception:  # a second failure must not hide the first
+        return None
+    return path
+
+
+def _version() -> str:
+    import creepkit
+
+    return str(creepkit.__version__)
+
+
+def _address() -> str:
+    """Where faults are reported, as the installed package says."""
+    from importlib.metadata import PackageNotFoundError, metadata
+
+    try:
+        urls = [text.partition(", ") for text in metadata("creepkit").get_all("Project-URL") or ()]
+    except PackageNotFoundError:
+        urls = []
+    known = {name.strip().lower(): url for name, _, url in urls}
+    for name in ("issues", "bug tracker", "repository", "source", "homepage"):
+        if name in known:
+            return f"at {known[name]}"
+    return "to its authors"
+
+
+def prepare_streams() -> None:
+    """Have all three standard streams open, and write what their encoding lacks as its code instead of failing.
+
+    A stream that the shell closed is /dev/null: else the next file that is opened would take its number, and what C
+    libraries print would go into that file.
+    """
+    try:
+        while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+            pass
+        os.close(descriptor)
+    except OSError:
+        pass
+    if sys.stdin is None:
+        sys.stdin = open(os.devnull, encoding="utf-8")  # noqa: SIM115 (open to the end)
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        stream = getattr(sys, name)
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def print_warnings_plainly() -> None:
+    """Have warnings of creepkit printed as one line without the place in the code."""
+    others = warnings.formatwarning
+
+    def formatted(
+        message: Warning | str, category: type[Warning], filename: str, lineno: int, line: str | None = None
+    ) -> str:
+        if category.__module__ == "creepkit.errors":
+            return f"creepkit: {' '.join(str(message).split())}\n"
+        return others(message, category, filename, lineno, line)
+
+    warnings.formatwarning = formatted
+
+
+def run_to_the_end(run: Callable[[], None]) -> None:
+    """Run the command line; SystemExit with the code of its end, after all of its output is written."""
+    code: object = 0
+    try:
+        run()
+    except SystemExit as end:
+        code = end.code
+    except KeyboardInterrupt:  # before the command began, which says so itself
+        code = 130
+    except BrokenPipeError:
+        code = NO_READER
+    except Exception as error:
+        if "--debug" in sys.argv:
+            raise
+        sentence, code = failure_sentence(error)
+        _say(sentence)
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        code = NO_READER
+    except OSError as error:
+        _say(f"standard output: {error.strerror}; free some space and start again")
+        code = code or 1
+    else:
+        sys.exit(code)  # type: ignore[arg-type]
+    with suppress(OSError, ValueError):  # Python flushes once more at its end, and would print a traceback
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(code)  # type: ignore[arg-type]
+
+
+def _say(sentence: str) -> None:
+    try:
+        sys.stderr.write(f"creepkit: {sentence}\n")
+        sys.stderr.flush()
+    except OSError:
+        pass

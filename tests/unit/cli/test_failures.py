@@ -1,0 +1,111 @@
+"""How the command line ends where nobody foresaw it: one line, an exit code, a file for the report, no traceback."""
+
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import creepkit as ck
+from helpers.command_line import creepkit, one_line
+
+CREEPKIT = (sys.executable, "-m", "creepkit")
+LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="devices and closed streams are those of Linux")
+
+
+def test_a_fault_is_one_line_and_a_private_file(monkeypatch, tmp_path):
+    def fault(*_, **__):
+        raise ZeroDivisionError("two\nlines \x1b[2J")
+
+    monkeypatch.setattr(ck, "law", fault)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    result = creepkit("simulate", "norton", "--set", "A=1", "--end-h", "1")
+    assert result.exit_code == 70
+    assert result.stderr.count("\n") == 1
+    assert result.stderr.startswith(
+        "creepkit: internal error (ZeroDivisionError: two lines \\u001b[2J); this is a fault"
+    )
+    (report,) = tmp_path.glob("creepkit-error-*/report.txt")
+    assert str(report) in result.stderr
+    assert stat.S_IMODE(report.parent.stat().st_mode) == 0o700
+    assert "in fault" in report.read_text()
+    assert isinstance(
+        creepkit("--debug", "simulate", "norton", "--set", "A=1", "--end-h", "1").exception, ZeroDivisionError
+    )
+
+
+def test_no_memory_is_no_fault(monkeypatch):
+    def full(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr(ck, "law", full)
+    assert "not enough memory" in one_line(creepkit("simulate", "norton", "--set", "A=1", "--end-h", "1"))
+
+
+@LINUX
+def test_streams_that_are_closed_full_or_without_reader():
+    def ended(shell, code):
+        run = subprocess.run(
+            ["bash", "-o", "pipefail", "-c", shell, *CREEPKIT], capture_output=True, text=True, check=False
+        )
+        assert run.returncode in code, run.stderr
+        return run.stderr
+
+    assert ended('"$0" "$@" laws >&-', {0}) == ""
+    full = ended('"$0" "$@" laws >/dev/full', {1})
+    assert full.startswith("creepkit: ")
+    assert "No space left on device" in full
+    assert full.count("\n") == 1
+    assert ended('"$0" "$@" laws | true', {1, 141}) == ""  # rich ends by 1
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
+def test_a_narrow_encoding_shows_codes(encoding, tmp_path):
+    environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0", "LANG": "C", "LC_ALL": "C"}
+    for words in (("laws",), ("read", str(tmp_path / "Prüfung_α.csv")), ("--help",)):
+        run = subprocess.run([*CREEPKIT, *words], capture_output=True, env=environment, check=False)
+        assert b"Traceback" not in run.stderr
+        assert run.returncode == (1 if words[0] == "read" else 0)
+        (run.stdout + run.stderr).decode(encoding)
+
+
+@LINUX
+def test_without_a_home_or_a_cache_or_a_known_user(tmp_path):
+    """As in a container that runs under any number of a user; the cache folder is none."""
+    words = (
+        "simulate",
+        "norton",
+        "--set",
+        "A=1e-16",
+        "--set",
+        "n=4",
+        "--stress",
+        "60",
+        "--end-h",
+        "1",
+        "--points",
+        "3",
+    )
+    environment = {"PATH": "/usr/bin", "PYTHONPATH": os.environ.get("PYTHONPATH", ""), "CREEPKIT_CACHE": "/proc/none"}
+    program = (
+        "import pwd, sys\n"
+        "def unknown(number): raise KeyError(number)\n"
+        "pwd.getpwuid = unknown\n"
+        "from creepkit.cli import main; main()"
+    )
+    start = [sys.executable, "-c", program, *words]
+    run = subprocess.run(start, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert "Traceback" not in run.stderr
+    assert run.returncode == 0, run.stderr
+    assert "time" in run.stdout
+
+
+def test_a_report_names_the_address_of_the_project():
+    from creepkit.cli.failures import failure_sentence
+
+    sentence, code = failure_sentence(KeyError("x"))
+    assert code == 70
+    assert "report it " in sentence
+    Path(sentence.rpartition("file ")[2]).unlink()

@@ -1,0 +1,185 @@
+"""Which files are replaced: those that creepkit wrote and nobody changed; no others without force."""
+
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from creepkit.errors import ExportError
+from creepkit.files.writing import (
+    RECORD,
+    check_folder_target,
+    check_target,
+    is_foreign,
+    overwriting,
+    replace_on_success,
+    write_bytes,
+    write_text,
+)
+from helpers.command_line import creepkit, one_line
+
+FOREIGN = "creepkit did not write it as it is now"
+SIMULATE = ("simulate", "norton", "--set", "A=1e-16", "--set", "n=4", "--stress", "60", "--end-h", "1", "--points", "5")
+
+
+def test_a_file_of_ours_is_written_again_until_it_is_changed(tmp_path):
+    path = write_text("first", tmp_path / "note", ExportError)
+    write_text("second", path, ExportError)
+    path.write_text("first")  # what creepkit wrote under this name once
+    write_text("third", path, ExportError)
+    path.write_text("third, and my remarks")
+    with pytest.raises(ExportError, match=FOREIGN):
+        write_text("fourth", path, ExportError)
+    assert path.read_text() == "third, and my remarks"
+    write_text("fourth", path, ExportError, force=True)
+    assert not is_foreign(path)
+
+
+def test_a_file_of_somebody_else_stays(tmp_path):
+    path = tmp_path / "measured.csv"
+    path.write_text("1,2")
+    with pytest.raises(ExportError, match=FOREIGN):
+        check_target(path, ExportError)
+    with overwriting():
+        check_target(path, ExportError)
+        write_text("3,4", path, ExportError)
+    write_text("5,6", path, ExportError)
+    copy = tmp_path / "copy.csv"
+    copy.write_text("5,6")  # the same content under another name is somebody else's
+    with pytest.raises(ExportError, match=FOREIGN):
+        check_target(copy, ExportError)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="links and owners are those of POSIX")
+def test_nothing_is_written_through_links(tmp_path):
+    (tmp_path / "target").write_text("mine")
+    (tmp_path / "link").symlink_to("target")
+    (tmp_path / "dangling").symlink_to("none")
+    for name in ("link", "dangling"):
+        with pytest.raises(ExportError, match="it is a symbolic link to .*, and nothing is written through links"):
+            write_text("new", tmp_path / name, ExportError, force=True)
+    assert not (tmp_path / "none").exists()
+    os.link(write_text("old", tmp_path / "one", ExportError), tmp_path / "other")
+    write_text("new", tmp_path / "one", ExportError)
+    assert [(tmp_path / name).read_text() for name in ("target", "one", "other")] == ["mine", "new", "old"]
+
+
+def test_devices_folders_and_missing_folders_are_refused_even_by_force(tmp_path):
+    for path, problem in (
+        (Path("/dev/null"), "device"),
+        (tmp_path, "it is a folder"),
+        (tmp_path / "none" / "note", "there is no folder"),
+        (tmp_path / ("n" * 300), "File name too long"),
+        (tmp_path / "null\0byte", "cannot be written"),
+    ):
+        with pytest.raises(ExportError, match=problem):
+            check_target(path, ExportError, force=True)
+    write_text("long", tmp_path / ("n" * 255), ExportError)
+
+
+def test_permissions_are_kept_and_read_only_files_stay(tmp_path):
+    path = write_text("old", tmp_path / "note", ExportError)
+    path.chmod(0o600)
+    write_text("new", path, ExportError)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    path.chmod(0o444)
+    with pytest.raises(ExportError, match="it is there and read-only"):
+        write_text("newer", path, ExportError)
+    write_text("newer", path, ExportError, force=True)
+    assert path.read_text() == "newer"
+
+
+def test_a_list_that_is_damaged_or_a_link_makes_no_file_ours(tmp_path):
+    path = write_text("old", tmp_path / "note", ExportError)
+    lines = (tmp_path / RECORD).read_bytes()
+    (tmp_path / RECORD).write_bytes(b"\xff\0 garbage\n" * 10)
+    assert is_foreign(path)
+    (tmp_path / RECORD).unlink()
+    (tmp_path / "elsewhere").write_bytes(lines)
+    (tmp_path / RECORD).symlink_to("elsewhere")
+    assert is_foreign(path)
+    write_text("new", path, ExportError, force=True)
+    assert (tmp_path / "elsewhere").read_bytes() == lines
+
+
+def test_the_list_is_that_of_sha256sum_whatever_the_name(tmp_path):
+    for name in ("plain", "back\\slash", "line\nend", "\udcff"):
+        path = write_text(name.encode("utf-8", "replace").decode(), tmp_path / name, ExportError)
+        assert not is_foreign(path)
+    check = subprocess.run(["sha256sum", "--check", "--quiet", RECORD], cwd=tmp_path, capture_output=True, check=False)
+    assert (check.returncode, check.stderr) == (0, b"")
+
+
+def test_a_long_list_keeps_the_last_content_of_each_name(tmp_path):
+    path = write_text("old", tmp_path / "note", ExportError)
+    others = "".join(f"{k:064x}  other\n" for k in range(20_000))
+    (tmp_path / RECORD).write_text(others + (tmp_path / RECORD).read_text())
+    write_text("new", path, ExportError)
+    assert (tmp_path / RECORD).stat().st_size < 1000
+    assert not is_foreign(path)
+
+
+def test_what_happens_meanwhile_is_kept_and_so_is_the_result(tmp_path):
+    path = tmp_path / "fit.json"
+
+    def write() -> None:
+        with overwriting("beside"), replace_on_success(path, ExportError) as temporary:
+            temporary.write_text("result")
+            path.write_text("mine")
+
+    with pytest.raises(ExportError, match=r"left as it is; the result is .*fit-2\.json"):
+        write()
+    assert (path.read_text(), (tmp_path / "fit-2.json").read_text()) == ("mine", "result")
+
+
+def test_a_folder_is_checked_with_what_goes_into_it(tmp_path):
+    check_folder_target(tmp_path / "new" / "deeper", ExportError, ("a",))
+    (tmp_path / "a").write_text("mine")
+    with pytest.raises(ExportError, match=FOREIGN):
+        check_folder_target(tmp_path, ExportError, ("a",))
+    with pytest.raises(ExportError, match="is no folder; name a folder for the results"):
+        check_folder_target(tmp_path / "a" / "b", ExportError)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of a process are those of Linux")
+def test_a_full_disk_leaves_the_old_file(tmp_path):
+    """A limit on the size of files stands for the disk: both are OSErrors of write()."""
+    path = write_text("old", tmp_path / "note", ExportError)
+    program = (
+        "import resource, signal; from pathlib import Path; from creepkit.errors import ExportError\n"
+        "from creepkit.files.writing import write_bytes\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN); resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000))\n"
+        "try: write_bytes(b'x' * 10000, Path('note'), ExportError)\n"
+        "except ExportError as error: print(error)"
+    )
+    run = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert run.stdout == "note: cannot be written: File too large; free some space and start again\n"
+    assert path.read_text() == "old"
+    assert sorted(os.listdir(tmp_path)) == [RECORD, "note"]
+
+
+def test_two_writers_leave_one_whole_file_that_is_ours(tmp_path):
+    program = (
+        "from pathlib import Path; from creepkit.errors import ExportError; from creepkit.files.writing import "
+        "write_bytes; import sys\n"
+        "for k in range(40): write_bytes(sys.argv[1].encode() * 100_000, Path('note'), ExportError)"
+    )
+    runs = [subprocess.Popen([sys.executable, "-c", program, letter], cwd=tmp_path) for letter in "ab"]
+    assert [run.wait() for run in runs] == [0, 0]
+    assert (tmp_path / "note").read_bytes() in (b"a" * 100_000, b"b" * 100_000)
+    assert not is_foreign(tmp_path / "note")
+    assert sorted(os.listdir(tmp_path)) == [RECORD, "note"]
+    write_bytes(b"c", tmp_path / "note", ExportError)
+
+
+def test_the_command_line_does_not_destroy_a_measured_file(tmp_path):
+    path = tmp_path / "measured.csv"
+    path.write_text("time_h,strain\n0,0\n")
+    assert FOREIGN in one_line(creepkit(*SIMULATE, "--to", str(path)))
+    assert path.read_text() == "time_h,strain\n0,0\n"
+    for words in (("--force",), ()):  # once it is ours, the same command is made again as it is
+        assert creepkit(*SIMULATE, "--to", str(path), *words).exit_code == 0
+    assert "--force 250" not in path.read_text()
