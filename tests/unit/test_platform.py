@@ -56,9 +56,9 @@ def unguarded(node, guards=()):
     """Names of the module `os` and `signal` that Windows lacks, in code that does not ask for them."""
     if isinstance(node, ast.If | ast.IfExp):
         guards = (*guards, ast.dump(node.test))
-    if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-        if node.attr in ONLY_UNIX_CALLS.get(node.value.id, ()) and not any(node.attr in guard for guard in guards):
-            yield f"{node.value.id}.{node.attr}", node.lineno
+    module = node.value.id if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) else ""
+    if module and node.attr in ONLY_UNIX_CALLS.get(module, ()) and not any(node.attr in guard for guard in guards):
+        yield f"{module}.{node.attr}", node.lineno
     for child in ast.iter_child_nodes(node):
         yield from unguarded(child, guards)
 
@@ -111,20 +111,7 @@ def test_no_path_of_one_system_is_written_down() -> None:
     assert not wrong
 
 
-SIMULATE = """
-import creepkit as ck, tempfile, json, os
-from creepkit.jobs.shard_progress import ShardLock
-from pathlib import Path
-run = ck.simulate("norton", ck.specimen("uniaxial"), {{"A": 1e-16, "n": 5.0}}, loading=ck.ConstantLoad(80.0),
-                  elastic=ck.Elastic(E=150e3), times=range(0, 3601, 600))
-with tempfile.TemporaryDirectory() as folder:
-    with ShardLock(Path(folder) / "1.lock") as lock:
-        lock.record_start(3)
-        print(json.dumps([lock.held, run.status == "complete"]))
-"""
-
-
-@pytest.mark.parametrize("absent", [sorted(NOT_ON_WINDOWS)], ids=["as on Windows"])
+@pytest.mark.parametrize("absent", [sorted(NOT_ON_WINDOWS - {"posix"})], ids=["as on Windows"])
 def test_it_works_without_the_modules_that_windows_lacks(absent, tmp_path) -> None:
     head = HIDDEN.format(
         modules=absent,
@@ -292,7 +279,11 @@ def test_every_text_file_is_opened_in_a_stated_encoding() -> None:
                 continue
             name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
             named = {keyword.arg for keyword in node.keywords}
-            if name in ("read_text", "write_text") and isinstance(node.func, ast.Attribute) and "encoding" not in named:
+            if (
+                name in ("read_text", "write_text")
+                and "encoding" not in named
+                and not node.args[name == "write_text" :]
+            ):
                 wrong.append((module, node.lineno))
             if name == "open" and isinstance(node.func, ast.Name) and "encoding" not in named:
                 modes = [a.value for a in node.args[1:2] if isinstance(a, ast.Constant)]
@@ -319,7 +310,9 @@ def spreadsheet(tmp_path):
 
 
 def posterior(tmp_path):
-    return lambda: ck.sample_posterior(None)  # type: ignore[arg-type]
+    from creepkit.inverse.uncertainty.posterior import sample_posterior
+
+    return lambda: sample_posterior(None)  # type: ignore[arg-type]
 
 
 def cluster(tmp_path):
@@ -362,11 +355,5 @@ def test_only_declared_packages_are_imported() -> None:
             names += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
             imported |= {name.partition(".")[0] for name in names}
     outside = imported - set(sys.stdlib_module_names) - {"creepkit", "__future__"}
-    indirect = {
-        "click": "typer",
-        "markupsafe": "jinja2",
-        "mpmath": "sympy",
-        "sklearn": "pysindy",
-        "pydantic_core": "pydantic",
-    }
+    indirect = {"click": "typer", "markupsafe": "jinja2", "mpmath": "sympy", "pydantic_core": "pydantic"}
     assert {indirect.get(name, name) for name in outside} <= declared
