@@ -253,7 +253,7 @@ ONCE_EACH = (
 )
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "ascii", "cp437"])
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
 def test_what_is_printed_fits_into_old_encodings(encoding, tmp_path) -> None:
     program = (
         "import json, sys\nfrom creepkit.cli.app import app\n"
