@@ -18,11 +18,6 @@ with tarfile.open(distribution) as archive:
     in_source = {name.partition("/")[2] for name in archive.getnames()}
 TOP = {"hatch_build.py", "LICENSE", "README.md", "CHANGELOG.md", "CITATION.cff", "pyproject.toml"}
 wanted = {name for name in files if name.startswith("src/")} | TOP
-    "hatch_build.py",
-    "LICENSE",
-    "README.md",
-    "pyproject.toml",
-}
 
 problems = [
     *(f"the wheel lacks {name}" for name in sorted(package - in_wheel)),
