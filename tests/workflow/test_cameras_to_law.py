@@ -112,3 +112,80 @@ def test_from_frames_and_a_record_to_a_law(laboratory, monkeypatch, tmp_path):
     found = answer["laws"][0]["parameters"]["A"]
     assert found["low"] < LAW["A"] < found["high"]
     assert found["value"] == pytest.approx(LAW["A"], rel=0.15)
+
+
+STUDY = """
+[[record]]
+name = "rig"
+file = "record.csv"
+time_zone = "America/Chicago"
+
+[[camera]]
+name = "plate 3"
+frames = "frames"
+columns = { x = "PX [mm]", y = "PY [mm]", z = "PZ [mm]", u = "DX [mm]", v = "DY [mm]", w = "DZ [mm]" }
+times = "times.csv"
+subset_mm = 1.2
+record = "rig"
+modulus_GPa = 150
+alloy = "X"
+
+[identification]
+laws = ["norton"]
+fix = { n = 5 }
+starts = 1
+frames = 5
+
+[report]
+attach_MB = 50
+"""
+TEST = "plate 3 D1"
+
+
+def states(result):
+    return {one.name: one.state for one in result.stages}
+
+
+def test_a_study_goes_from_frames_and_a_record_to_a_law_and_to_its_report(laboratory, tmp_path):
+    for name in ("frames", "times.csv", "record.csv"):
+        (tmp_path / name).symlink_to(laboratory / name)
+    file = tmp_path / "study.toml"
+    file.write_text(STUDY)
+    said = []
+    result = ck.Study.load(file).run(progress=lambda task, done, total, note: said.append((task, note)))
+    assert result.failures == ()
+    assert set(states(result).values()) == {"made"}
+    assert any(task == "extraction of plate 3" and "frames" in note for task, note in said)
+    low, high = result.imposed[TEST].alignment.lag_interval
+    assert low < -LAG < high
+    (history,) = result.histories
+    assert (history.name, history.alloy, history.elastic.E) == (TEST, "X", 1.5e5)
+    found = next(one for one in result.rankings[""].best.estimates if one.name == "A")
+    assert found.low < LAW["A"] < found.high
+    (left_out,) = (one for one in result.exclusions if one.frames == (30,))
+    assert left_out.reason.startswith("unreadable, frames as the camera counts them: f_030.csv:2:")
+
+    page = result.report.read_text()
+    assert len(page) < 8_000_000
+    for text in ('id="extraction"', 'id="imposed"', "95 % interval", "f_030.csv:2:", "frames/f_000.csv"):
+        assert text in page
+    lock = json.loads((tmp_path / "study.lock").read_text())
+    assert {"record.csv", "times.csv", "frames/f_030.csv"} <= set(lock["inputs"])
+    assert lock["stages"]["record of plate 3"]["numbers"]["1"]["lag_s"] == pytest.approx(-LAG, abs=10)
+
+    again = ck.Study.load(file).run()
+    assert set(states(again).values()) == {"kept"}
+    assert again.changes == ()
+    assert np.array_equal(again.histories[0].times, history.times)
+    assert again.extractions[TEST].noise.correlation == result.extractions[TEST].noise.correlation
+
+    file.write_text(STUDY.replace('time_zone = "America/Chicago"', 'time_zone = "America/New_York"'))
+    moved = ck.Study.load(file).run(only="extraction")
+    assert states(moved)["extraction of plate 3"] == "kept"  # the frames are not read again for it
+    assert states(moved)["record of plate 3"] in ("made", "failed")
+
+    file.write_text(STUDY.replace("modulus_GPa", 'channels = ["D1: Press.", "D1: Tmp."]\nmodulus_GPa'))
+    failed = ck.Study.load(file).run()
+    assert states(failed) == {"extraction of plate 3": "kept", "record of plate 3": "failed", "report": "made"}
+    assert "there is no channel 'D1: Tmp.'; did you mean 'D1: Temp.'?" in failed.failures[0].sentence
+    assert "This report is not complete" in failed.report.read_text()

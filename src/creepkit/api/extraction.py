@@ -5,19 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from creepkit.errors import HistoryError
-from creepkit.records import Loading, Program, SupportsSurfaceObservation
+from creepkit.records import Loading, Program, RecordedLoading, SupportsSurfaceObservation
 from creepkit.registry.arguments import resolve_predictor
 
 if TYPE_CHECKING:
     from creepkit.extraction import Extraction
     from creepkit.extraction.domes import Centers
-    from creepkit.records import Frames, Specimen
+    from creepkit.instruments.imposed import Imposed
+    from creepkit.records import Frames, History, InstrumentRecord, Specimen
+
+WATCHED = "bulge"
+"""The specimen that cameras are taken to watch where none is named."""
 
 
 def extract(
     frames: Frames,
-    specimen: Specimen | str = "bulge",
+    specimen: Specimen | str = WATCHED,
     *,
     operator: str | None = None,
     centers: Centers | None = None,
@@ -56,6 +62,46 @@ def operator_of(specimen: Specimen | str, window: float | None = None, radii: Se
     if window is not None and len(radii):
         raise HistoryError("a window and rings were given: means on rings have no window; leave one of them out")
     return _watched(specimen).surface_operator(window, radii)
+
+
+def imposed_on(
+    extraction: Extraction,
+    record: InstrumentRecord,
+    channels: Sequence[str] | None = None,
+    *,
+    lag: float | None = None,
+    search: tuple[float, float] | None = None,
+    camera_start: float | None = None,
+) -> Imposed:
+    """What an instrument recorded of a test piece, over the time of its frames, after the clocks were aligned.
+
+    channels : of load and temperature; None: those that the record's format has for the name of the extraction.
+    lag : s by which the record's clock is known to be ahead; None to find it, as ck.align_clocks does with search and
+    camera_start.
+    """
+    import creepkit as ck
+    from creepkit.instruments.clock_alignment import nominal_zero
+    from creepkit.records import ClockAlignment
+
+    times = extraction.times + extraction.first_time
+    names = None if channels is None else (channels[0], channels[1])
+    if lag is not None:
+        alignment = ClockAlignment.stated(lag, zero=nominal_zero(record, times, camera_start))
+    else:
+        signal = np.where(extraction.used, next(iter(extraction.outputs.values())), np.nan)
+        pattern = record.channel_patterns.get(extraction.load_name, "{}")
+        channel = pattern.replace("{}", extraction.name) if names is None else names[0]
+        alignment = ck.align_clocks(record, channel, times, signal, search=search, camera_start=camera_start)
+    return ck.imposed(record, extraction.name if names is None else names, times, alignment)
+
+
+def history_of(extraction: Extraction, under: Imposed) -> History:
+    """The test as a history, under what was imposed."""
+    return extraction.history_under(
+        RecordedLoading(under.load, extraction.load_name),
+        under.temperature,
+        time_zero=float(under.time_zero) - extraction.first_time,
+    )
 
 
 def _watched(specimen: Specimen | str) -> SupportsSurfaceObservation:

@@ -77,6 +77,11 @@ def read_frames(
     return Frames(name, moments, frame, first.format.title, columns.confidence_unit, missing)
 
 
+def frame_files(path: FramePath, formats: Sequence[CameraFormat], format: FormatLike = None) -> list[Path]:
+    """The files that read_frames reads, in order; one file may hold all frames."""
+    return _files(path, _candidates(format, formats), chosen=format is not None)
+
+
 def _candidates(format: FormatLike, formats: Sequence[CameraFormat]) -> tuple[CameraFormat, ...]:
     if format is None:
         return tuple(formats)

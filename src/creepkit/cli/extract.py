@@ -134,28 +134,17 @@ def command(
 
 def _under_record(one: Extraction, recorded: InstrumentRecord, channels: str | None) -> History:
     """The history under what an instrument record says of a test piece, after the clocks were aligned."""
-    import numpy as np
-
-    import creepkit as ck
+    from creepkit.api.extraction import history_of, imposed_on
     from creepkit.errors import HistoryError
-    from creepkit.records import RecordedLoading
 
-    signal = np.where(one.used, next(iter(one.outputs.values())), np.nan)
-    times = one.times + one.first_time
-    named = tuple(name.strip() for name in channels.split(",")) if channels is not None else ()
-    if channels is not None and len(named) != 2:
+    named = tuple(name.strip() for name in channels.split(",")) if channels is not None else None
+    if named is not None and len(named) != 2:
         raise HistoryError(f"--channels is '{channels}'; name two channels of the record: --channels P1,T1")
-    channel = named[0] if named else recorded.channel_patterns.get(one.load_name, "{}").replace("{}", one.name)
-    alignment = ck.align_clocks(recorded, channel, times, signal)
-    typer.echo(f"  {one.name}: {alignment}")
-    imposed = ck.imposed(recorded, (named[0], named[1]) if named else one.name, times, alignment)
-    for note in imposed.notes:
+    under = imposed_on(one, recorded, named)
+    typer.echo(f"  {one.name}: {under.alignment}")
+    for note in under.notes:
         typer.echo(f"  {note}")
-    return one.history_under(
-        RecordedLoading(imposed.load, one.load_name),
-        imposed.temperature,
-        time_zero=float(imposed.time_zero) - one.first_time,
-    )
+    return history_of(one, under)
 
 
 class _Times(NamedTuple):

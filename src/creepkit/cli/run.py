@@ -21,8 +21,8 @@ def command(
         list[str] | None,
         typer.Option(
             metavar="STAGE",
-            help="quality, identification, temperature, rupture, forecast, design, export or report, with what it "
-            "needs; may be given several times.",
+            help="extraction, record, quality, identification, temperature, rupture, forecast, design, export or "
+            "report, with what it needs; may be given several times.",
         ),
     ] = None,
     to: Annotated[

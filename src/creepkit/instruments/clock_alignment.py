@@ -137,7 +137,7 @@ def align_clocks(
     """
     search = _checked_arguments(record, channel, search, (drift, camera_start))
     times, displacements = _checked_frames(record, frame_times, displacement)
-    zero = _nominal_zero(record, times, camera_start)
+    zero = nominal_zero(record, times, camera_start)
     task = _Task(
         driving_record(record, channel),
         times - zero,
@@ -206,8 +206,11 @@ def _checked_frames(record: InstrumentRecord, frame_times: ArrayLike, displaceme
     return times, values
 
 
-def _nominal_zero(record: InstrumentRecord, times: Floats, camera_start: float | None) -> float:
-    """Camera time at which the record's time is zero if both clocks are right, or, not knowing, by the first frame."""
+def nominal_zero(record: InstrumentRecord, times: Floats, camera_start: float | None) -> float:
+    """Camera time at which the record's time is zero if both clocks are right, or, not knowing, by the first frame.
+
+    times : (frames,) s on the camera's clock. camera_start : unix time, s, of its zero.
+    """
     absolute = times[0] > UNIX_TIME
     if absolute and camera_start is not None:
         raise HistoryError(f"frame_times begin with {times[0]:g} s, which is a unix time; leave camera_start away")

@@ -303,20 +303,32 @@ def _exponent_at_zero(term: sympy.Expr, variable: sympy.Symbol) -> sympy.Expr:
     """The limit of x d(ln f)/dx at x -> 0+, with time and strain zero elsewhere."""
     summands = [s for s in sympy.Add.make_args(term) if s.has(variable)]
     result = sympy.Add(*(_limit(variable * in_sympy_functions(sympy.diff(s, variable)), variable) for s in summands))
+    if _is_undefined(result):
+        return sympy.S.Zero
     result = result.subs({time: 0, strain: 0})
     return sympy.S.Zero if _is_undefined(result) else result
 
 
+MOST_DIFFERENTIATIONS, MOST_OPERATIONS = 3, 300
+"""Of a quotient whose numerator and denominator vanish; the limits of sympy may take hours."""
+
+
 def _limit(slope: sympy.Expr, variable: sympy.Symbol) -> sympy.Expr:
+    """The value at zero, of 0/0 by the rule of l'Hospital; NaN where that finds none."""
     at_zero = slope.subs(variable, 0)
-    if not _is_undefined(at_zero):
+    if not _is_undefined(at_zero) or slope.count_ops() > MOST_OPERATIONS:
         return at_zero
-    positive = {s: sympy.Dummy(s.name, positive=True) for s in slope.free_symbols}
-    original_symbols = {d: s for s, d in positive.items()}
-    try:
-        return sympy.limit(slope.xreplace(positive), positive[variable], 0, "+").xreplace(original_symbols)
-    except (NotImplementedError, ValueError):
-        return sympy.S.NaN
+    above, below = sympy.fraction(sympy.together(slope))
+    for _ in range(MOST_DIFFERENTIATIONS):
+        if above.count_ops() + below.count_ops() > MOST_OPERATIONS:
+            break
+        first, second = above.subs(variable, 0), below.subs(variable, 0)
+        if second != 0:
+            return first / second
+        if first != 0:
+            break
+        above, below = sympy.diff(above, variable), sympy.diff(below, variable)
+    return sympy.S.NaN
 
 
 def _is_undefined(expression: sympy.Expr) -> bool:

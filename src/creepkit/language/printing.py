@@ -33,7 +33,7 @@ def arrhenius_exponent(exponent: sympy.Expr) -> ArrheniusExponent | None:
     if polynomial is None or polynomial.degree() != 1:
         return None
     slope, start = polynomial.coeff_monomial(per_T), polynomial.coeff_monomial(1)
-    T_ref = -slope / start if start != 0 else sympy.S.Zero
+    T_ref = sympy.S.Zero if start.is_zero else -slope / start  # 0.0 differs from 0 in sympy
     if not (T_ref.is_Number and T_ref > 0):
         return None
     number, remainder = (-slope * GAS_CONSTANT).as_coeff_Mul()

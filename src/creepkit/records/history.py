@@ -104,8 +104,11 @@ class History:
         temperatures = (
             self.temperature.values if isinstance(self.temperature, Program) else np.array([float(self.temperature)])
         )
-        if not ((temperatures > 0) & (temperatures < 1e4)).all():
-            raise HistoryError(f"{origin}: a temperature of {temperatures.min():g} K is not above 0 and below 10000 K")
+        possible = (temperatures > 0) & (temperatures < 1e4)
+        if not possible.all():
+            raise HistoryError(
+                f"{origin}: a temperature of {temperatures[~possible][0]:g} K is not above 0 and below 10000 K"
+            )
         if not isinstance(self.temperature, Program):
             freeze(self, "temperature", float(self.temperature))
         if not callable(getattr(self.loading, "program", None)):

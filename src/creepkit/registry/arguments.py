@@ -104,6 +104,12 @@ def read_frames(
     return camera_reading.read_frames(path, formats, format, times)
 
 
+def frame_files(path: camera_reading.FramePath, format: camera_reading.FormatLike = None) -> list[Path]:
+    """The files that read_frames reads of a folder, a file, a pattern or a list, in order."""
+    formats = [entry.value for entry in default_registry().cameras().values()]
+    return camera_reading.frame_files(path, formats, format)
+
+
 def read_record(path: str | Path, format: str | None = None, **options: Unpack[RecordOptions]) -> InstrumentRecord:
     """Read the record of an instrument: channels of pressure, temperature and others over one clock.
 

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from creepkit.experiments.planned_design import Design
     from creepkit.extraction.extraction import Extraction
     from creepkit.forecasts.forecast import Forecast
+    from creepkit.instruments.imposed import Imposed
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.quality.flags import DataQuality
@@ -104,7 +105,8 @@ class ReportContents:
 
     title : of the page. groups : one for each material. quality : what is suspect in the tests. exclusions : what was
     left out. temperature, forecasts, design, rupture, extractions : results of the other stages by a title of their
-    own, which is the name of their group or of their file. exports : laws to download. failures : of stages.
+    own, which is the name of their group or of their file. imposed : {test: what its
+    instrument recorded}. exports : laws to download. failures : of stages.
     attachments : study, lock and data. notes : further remarks, one sentence each.
     """
 
@@ -117,6 +119,7 @@ class ReportContents:
     design: Mapping[str, Design] = field(default_factory=dict)
     rupture: Mapping[str, RuptureAssessment] = field(default_factory=dict)
     extractions: Mapping[str, Extraction] = field(default_factory=dict)
+    imposed: Mapping[str, Imposed] = field(default_factory=dict)
     exports: tuple[ExportedFile, ...] = ()
     failures: tuple[StageFailure, ...] = ()
     provenance: ReportProvenance = field(default_factory=ReportProvenance)
@@ -124,7 +127,7 @@ class ReportContents:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        _freeze(self, "temperature", "forecasts", "design", "rupture", "extractions")
+        _freeze(self, "temperature", "forecasts", "design", "rupture", "extractions", "imposed")
 
 
 class ReportSource(Protocol):

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import nearest
 from creepkit.readers.vocabulary import split_unit
 from creepkit.records import (
     ZERO_CELSIUS,
-    History,
     Nuisance,
     Predictor,
     Program,
@@ -22,7 +21,7 @@ from creepkit.records import (
     outputs_of,
 )
 from creepkit.records.quantities import LENGTH, QuantityKind
-from creepkit.studies.model import ForecastPart, NuisancePart, Step
+from creepkit.studies.model import NuisancePart, Step
 from creepkit.studies.study_file import StudyFile
 
 if TYPE_CHECKING:
@@ -76,24 +75,50 @@ def laws_of(file: StudyFile) -> list[CreepLaw]:
         return [law.fix(**{n: v for n, v in part.fix.items() if n in law.names}) for law in laws]
 
 
-def predictor_of(file: StudyFile) -> Predictor | None:
-    """What predicts the tests: the specimen of the study, or a surrogate; None for the specimens that tests name."""
+def predictor_of(file: StudyFile, root: Path | None) -> Predictor | None:
+    """What predicts the tests: the specimen of the study, or a surrogate; None for the specimens that tests name.
+
+    root : folder of files that a report carried, in which `..` is written `up`.
+    """
     import creepkit as ck
 
-    model, specimen = file.model, None
-    if model.specimen is not None:
-        with file.at("specimen", "name"):
-            specimen = ck.specimen(model.specimen.name)
-        lengths = lengths_of(file, ("specimen", "lengths"), model.specimen.lengths, specimen)
-        untyped: Any = specimen
-        with file.at("specimen", "lengths"):
-            specimen = untyped.replace(**lengths) if lengths else specimen
+    model = file.model
+    specimen = None if model.specimen is None else specimen_of_study(file)
     named = None if model.identification is None else model.identification.predictor
     if named in (None, "specimen"):
         return specimen
-    beside = file.path.parent / plain_path(file, ("identification", "predictor"), str(named))
+    beside = predictor_path(file, root)
     with file.at("identification", "predictor"):
-        return ck.surrogate(beside if beside.is_file() else str(named))
+        return ck.surrogate(beside if beside is not None else str(named))
+
+
+def predictor_path(file: StudyFile, root: Path | None) -> Path | None:
+    """The file of the study's predictor; None where it has none, or it is known by its name."""
+    part = file.model.identification
+    if part is None or part.predictor is None:
+        return None
+    plain = plain_path(file, ("identification", "predictor"), part.predictor)
+    path = file.path.parent / plain if root is None else root / carried_name(plain)
+    return path if path.is_file() else None
+
+
+def specimen_of_study(file: StudyFile) -> Specimen:
+    """The specimen of the table [specimen], with its lengths."""
+    import creepkit as ck
+
+    part = file.model.specimen
+    assert part is not None
+    with file.at("specimen", "name"):
+        specimen = ck.specimen(part.name)
+    lengths = lengths_of(file, ("specimen", "lengths"), part.lengths, specimen)
+    untyped: Any = specimen
+    with file.at("specimen", "lengths"):
+        return untyped.replace(**lengths) if lengths else specimen
+
+
+def carried_name(path: PurePosixPath) -> str:
+    """The name under which a report carries a file: plain parts only."""
+    return str(PurePosixPath(*("up" if part == ".." else part for part in path.parts)))
 
 
 def plain_path(file: StudyFile, key: tuple[str | int, ...], text: str) -> PurePosixPath:
@@ -196,83 +221,6 @@ def temperature_of(file: StudyFile, key: tuple[str | int, ...], steps: Sequence[
         raise file.error(key, "nothing is said of the time before; give the first level from_h = 0")
     with file.at(*key):
         return levels[0][1] if len(levels) == 1 else Program.steps(levels)
-
-
-def planned_test(file: StudyFile, number: int, temperature: float | Program | None) -> History:
-    """The planned test of a forecast; temperature : K, where the study gives none.
-
-    StudyError where a test cannot be made of what is said.
-    """
-    import creepkit as ck
-    from creepkit.api.planned_tests import planned_history, stepped_load
-
-    part, place = file.model.forecast[number], ("forecast", number)
-    specimen = _specimen_of(file, number, part)
-    kinds = {load.name: load.kind for load in loads_of(specimen)}
-    ((key, steps),) = part.load.items()
-    name, unit = quantity(file, (*place, "load", key), kinds)
-    end = HOUR * float(part.end_h or 0.0)
-    with file.at(*place, "load", key):
-        levels = [(start, kinds[name].convert(level, unit, "it", name)) for start, level in steps_of(steps)]
-        load = next(one for one in loads_of(specimen) if one.name == name)
-        loading = stepped_load(name, load, levels, control=part.control, ramp=part.ramp_s, end=end)
-    if part.temperature_C is not None:
-        temperature = temperature_of(file, (*place, "temperature_C"), part.temperature_C)
-    if temperature is None:
-        raise file.error(place, "the fitted tests were made at several temperatures; give temperature_C")
-    if part.modulus_GPa is None and "modulus" in getattr(specimen, "conditions", {}):
-        raise file.error(place, f"specimen '{specimen.name}' needs modulus_GPa, such as 150")
-    with file.at(*place):
-        return planned_history(
-            specimen,
-            loading,
-            end,
-            temperature=temperature,
-            elastic=None if part.modulus_GPa is None else ck.Elastic(1e3 * part.modulus_GPa),
-            lengths=lengths_of(file, (*place, "lengths"), part.lengths, specimen),
-            name=part.name,
-        ).replace(labels=dict(part.labels))
-
-
-def _specimen_of(file: StudyFile, number: int, part: ForecastPart) -> Specimen:
-    """The specimen of a planned test: as named, as the study says, else the first that takes its load."""
-    import creepkit as ck
-
-    place = ("forecast", number)
-    if part.specimen is not None:
-        with file.at(*place, "specimen"):
-            return ck.specimen(part.specimen)
-    if file.model.specimen is not None:
-        with file.at("specimen", "name"):
-            return ck.specimen(file.model.specimen.name)
-    key = next(iter(part.load))
-    known: dict[str, QuantityKind] = {}
-    specimens: dict[str, Specimen] = ck.available("specimens")
-    for specimen in specimens.values():
-        kinds = {load.name: load.kind for load in loads_of(specimen)}
-        known |= kinds
-        found = split_unit(key, kinds)
-        if found is not None and found[1] in kinds[found[0]].units:
-            return specimen
-    quantity(file, (*place, "load", key), known)
-    raise file.error((*place, "load", key), "no specimen takes such a load")
-
-
-def check_forecast(file: StudyFile, number: int) -> None:
-    """StudyError for a forecast that is neither of measured tests nor of a planned one, or of both."""
-    part, place = file.model.forecast[number], ("forecast", number)
-    planned = ("load", "end_h", "temperature_C", "lengths", "modulus_GPa", "control", "ramp_s", "specimen", "labels")
-    given = [name for name in planned if getattr(part, name) not in (None, {})]
-    if part.tests:
-        if given:
-            raise file.error((*place, given[0]), "describes a planned test, and tests are given; leave one of them out")
-        return
-    if len(part.load) != 1:
-        found = "none" if not part.load else " and ".join(part.load)
-        raise file.error((*place, "load"), f"a planned test has one load, such as {{ stress_MPa = 80 }}, found {found}")
-    if part.end_h is None:
-        raise file.error(place, "a planned test needs its end: end_h, such as 100")
-    planned_test(file, number, ZERO_CELSIUS + 20.0 if part.temperature_C is None else None)
 
 
 def numbers_by_output(file: StudyFile, key: tuple[str | int, ...], given: Mapping[str, Any]) -> dict[str, Any]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from creepkit.errors import StudyError
+from creepkit.extraction.extraction import Extraction
+from creepkit.extraction.noise import NoiseEstimate
 from creepkit.files.file_names import hashed_stem
 from creepkit.files.json_documents import (
     DocumentFormat,
@@ -118,18 +120,36 @@ class ResultCodec:
             return replace(fit, histories=tests, predictor=fit.predictor or self.predictor, linearised=linearised)
 
         values: dict[Any, ValueCodec] = {
+            NoiseEstimate: ValueCodec(_noise_to_json, _noise_from_json),
             CreepLaw: LAW_CODEC,
             History: ValueCodec(to_json, from_json),
             Identification: ValueCodec(_fit_to_json, fit_from_json),
         }
         from creepkit.inverse.selection.challenges import Challenge
 
-        return RecordCodec(values=values, names={"Challenge": Challenge}, default_range=ANY_NUMBER)
+        omitted: dict[type, tuple[str, ...]] = {Extraction: ("history",)}
+        return RecordCodec(omitted, values=values, names={"Challenge": Challenge}, default_range=ANY_NUMBER)
 
 
 def _fit_to_json(fit: Identification) -> dict[str, Any]:
     linearised = None if fit.linearised is None else LINEARISED_CODEC.to_json(fit.linearised)
     return {"identification": identification_to_json(fit), "linearised": linearised}
+
+
+def _noise_to_json(noise: NoiseEstimate) -> dict[str, Any]:
+    """Noise with its correlations as a list, for their names are pairs."""
+    data = {f.name: PLAIN.to_json(getattr(noise, f.name)) for f in fields(noise) if f.name != "correlation"}
+    return {**data, "correlation": [[*pair, value] for pair, value in noise.correlation.items()]}
+
+
+def _noise_from_json(data: Any, source: str) -> NoiseEstimate:
+    hints = get_type_hints(NoiseEstimate)
+    problem = "it is no object" if not isinstance(data, dict) else check_keys(data, tuple(hints), "noise")
+    if problem:
+        raise RecordError(f"noise cannot be read: {problem}")
+    values = {n: PLAIN.from_json(hint, data[n], n) for n, hint in hints.items() if n != "correlation"}
+    pairs = PLAIN.from_json(list[tuple[str, str, float]], data["correlation"], "correlation")
+    return NoiseEstimate(**values, correlation={(a, b): value for a, b, value in pairs})
 
 
 def planned_to_json(history: History) -> dict[str, Any]:

@@ -98,7 +98,7 @@ class Execution:
     """One run over the stages of a study.
 
     folder : of kept results. histories : the tests. asked : keys of the identifications that the stages rest on.
-    progress : called as progress(task, done, total, note).
+    progress : called as progress(task, done, total, note). documents : {stage: what was written of its result}.
     """
 
     folder: ResultFolder
@@ -107,18 +107,27 @@ class Execution:
     asked: set[str] = field(default_factory=set)
     records: list[StageRecord] = field(default_factory=list)
     results: Any = field(default_factory=LazyResults)
+    documents: dict[str, Any] = field(default_factory=dict)
 
     @property
     def failures(self) -> tuple[StageFailure, ...]:
         """Stages that failed, with their reasons."""
         return tuple(StageFailure(one.name, one.sentence) for one in self.records if one.state == "failed")
 
-    def run(self, stages: Sequence[Stage], wanted: Collection[str]) -> None:
-        """Carry out the stages of these names, each behind those that it needs."""
+    def run(self, stages: Sequence[Stage], wanted: Collection[str], *, read_others: bool = False) -> None:
+        """Carry out the stages of these names, each behind those that it needs.
+
+        read_others : whether results of other stages, where they are kept of the same inputs, are read for a report.
+        """
         for number, stage in enumerate(stages, 1):
             key = self._key(stage)
             if stage.name not in wanted:
-                self._record(stage, "left out", key)
+                kept = self._read(stage, key) if read_others and all(n in self.results for n in stage.needs) else None
+                if kept is not None:
+                    self._record(stage, "kept", key, "was not asked for; the report shows what was kept of it", kept)
+                    continue
+                lacking = "was not asked for, and nothing of these inputs is kept: the report lacks it"
+                self._record(stage, "left out", key, lacking if read_others else "")
                 self._note_fits(self.folder.load(stage.name, key))
                 continue
             failed = [name for name in stage.needs if name not in self.results]
@@ -161,6 +170,8 @@ class Execution:
             return None
         numbers: dict[str, Any] = data["numbers"]
         self._note_fits(data)
+        if stage.document is not None:
+            self.documents[stage.name] = data.get("document")
         if stage.record is None:
             self.results.defer(stage.name, lambda: self._made(stage, _no_tick))
             return numbers
@@ -206,6 +217,8 @@ class Execution:
         remark = ""
         try:
             record = {} if stage.record is None else {"record": self._codec(stage).to_json(result)}
+            if stage.document is not None:
+                self.documents[stage.name] = record["document"] = stage.document(result)
             self.folder.save(stage.name, key, {"numbers": numbers, "fits": fits, **record})
         except RecordError as error:  # of what a plugin brought
             remark = f"is made again in each run, for it cannot be stored: {' '.join(str(error).split())}"

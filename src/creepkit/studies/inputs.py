@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -18,7 +19,7 @@ from creepkit.inverse.history_checks import SUSPECT_LABEL, truncated_at_strain
 from creepkit.records import ZERO_CELSIUS, History
 from creepkit.records.history_selection import select_tests
 from creepkit.reports.contents import Exclusion
-from creepkit.studies.arguments import HOUR, plain_path
+from creepkit.studies.arguments import HOUR, carried_name, plain_path
 from creepkit.studies.study_file import StudyFile
 
 DATA_FILE = FileKind("a data file", StudyError, "name files of tests", maximum_bytes=2_000_000_000)
@@ -87,8 +88,11 @@ def resolve_paths(file: StudyFile, key: tuple[str | int, ...], texts: Sequence[s
         try:
             matches = [path] if path.exists() else _matches(base, relative)
         except OSError as error:  # a folder that may not be entered, a name too long
+            refused = (
+                "" if error.filename in (None, str(path)) else f", for {_relative(Path(error.filename), base)} cannot"
+            )
             raise file.error(
-                place, f"'{text}' cannot be read ({error.strerror}); check its name and who may read it"
+                place, f"'{text}' cannot be read{refused} ({error.strerror}); check its name and who may read it"
             ) from None
         if not matches:
             raise file.error(place, f"there is no file or folder '{text}' beside the study, and none matches it")
@@ -97,21 +101,25 @@ def resolve_paths(file: StudyFile, key: tuple[str | int, ...], texts: Sequence[s
 
 
 def _matches(base: Path, pattern: PurePosixPath) -> list[Path]:
-    """Files that match a pattern; parts before its first star lead to a folder."""
-    parts = pattern.parts
-    first = next((k for k, part in enumerate(parts) if set(part) & set("*?[")), None)
-    if first is None:
-        return []
+    """Files and folders that match a pattern; OSError for a folder on the way that cannot be read."""
+    found = [base]
+    for part in pattern.parts:
+        if not set(part) & set("*?["):
+            found = [one / part for one in found if _is_there(one / part)]
+            continue
+        entries = ((one, sorted(os.listdir(one))) for one in found if one.is_dir())
+        matching = (one / name for one, names in entries for name in names if fnmatchcase(name, part))
+        found = list(islice(matching, MOST_FILES + 1))
+    return found if found != [base] else []
+
+
+def _is_there(path: Path) -> bool:
+    """Whether there is such a file; OSError where nobody may look, which Path.exists answers otherwise since 3.13."""
     try:
-        found = base.joinpath(*parts[:first]).glob(str(PurePosixPath(*parts[first:])))
-        return sorted(islice(found, MOST_FILES + 1))
-    except (ValueError, NotImplementedError, OSError):
-        return []
-
-
-def carried_name(path: PurePosixPath) -> str:
-    """The name under which a report carries a file: plain parts only."""
-    return str(PurePosixPath(*("up" if part == ".." else part for part in path.parts)))
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
 
 
 def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_out: Sequence[Path]) -> list[InputFile]:
@@ -134,7 +142,6 @@ def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_
 
 def _files_below(file: StudyFile, folder: Path) -> Iterator[Path]:
     """All files of a folder; StudyError where a folder in it cannot be read, for its files would be left out."""
-    import os
 
     def refuse(error: OSError) -> None:
         raise file.error(
@@ -147,8 +154,6 @@ def _files_below(file: StudyFile, folder: Path) -> Iterator[Path]:
 
 
 def _relative(path: Path, base: Path) -> str:
-    import os.path
-
     return os.path.relpath(path, base).replace("\\", "/")
 
 
@@ -164,18 +169,30 @@ def sha256_of(path: Path) -> str:
 # ---- tests ---------------------------------------------------------------------------------------------------------
 
 
-def read_inputs(file: StudyFile, paths: Sequence[Path]) -> StudyInputs:
-    """The tests of a study: read, chosen, with what is left out, in groups."""
+def read_inputs(file: StudyFile, paths: Sequence[Path], watched: Sequence[History], *, complete: bool) -> StudyInputs:
+    """The tests of a study: read, chosen, with what is left out, in groups.
+
+    watched : tests of cameras. complete : whether no camera failed; else tests may be missing.
+    """
     import creepkit as ck
 
     data = file.model.data
-    with file.at("data", "reader" if data.reader is not None else "files"):
-        measured = ck.read_histories(list(paths), data.reader, data.ignore)
+    measured: list[History] = []
+    if paths:
+        with file.at("data", "reader" if data.reader is not None else "files"):
+            measured = ck.read_histories(list(paths), data.reader, data.ignore)
+    names = {history.name for history in measured}
+    for one in watched:
+        if one.name in names:
+            raise file.error(("data", "files"), f"hold a test '{one.name}', as a camera does; give that another name")
+    measured += watched
+    if not measured and not complete:
+        return StudyInputs((), (), ())
     chosen = measured
     if data.only:
         with file.at("data", "only"):
             chosen = select_tests(measured, **_labels(file, data.only))
-    histories, exclusions = _excluded(file, chosen)
+    histories, exclusions = _excluded(file, chosen, complete)
     if data.suspect_frames == "exclude":
         sound = ck.exclude_suspect_frames(histories)
         exclusions += [
@@ -206,7 +223,7 @@ def _labels(file: StudyFile, only: dict[str, list[Any]]) -> dict[str, list[Any]]
     return labels
 
 
-def _excluded(file: StudyFile, histories: Sequence[History]) -> tuple[list[History], list[Exclusion]]:
+def _excluded(file: StudyFile, histories: Sequence[History], complete: bool) -> tuple[list[History], list[Exclusion]]:
     """The histories without what the study excludes."""
     remaining = list(histories)
     exclusions: list[Exclusion] = []
@@ -214,6 +231,8 @@ def _excluded(file: StudyFile, histories: Sequence[History]) -> tuple[list[Histo
         if part.from_h is not None and part.to_h is not None and not part.from_h < part.to_h:
             raise file.error(("exclude", k, "to_h"), f"{part.to_h:g} h does not lie after from_h, {part.from_h:g} h")
         named = [h for h in histories if fnmatchcase(h.name, part.test)]
+        if not named and not complete:
+            continue  # it may be of a camera that failed
         if not named:
             names = [h.name for h in histories]
             raise file.error(("exclude", k, "test"), f"there is no test '{part.test}'; {nearest(part.test, names)}")

@@ -80,9 +80,15 @@ def _output_weights(value: Any) -> Any:
     raise PydanticCustomError("misfit", "must be a word such as noise, or numbers by output such as { strain = 1 }")
 
 
+def _channels(value: Any) -> Any:
+    """Load and temperature of all test pieces as those of the name ""; else by name."""
+    return {"": value} if isinstance(value, list) else value
+
+
 LevelOrSteps = Annotated[list[Step], BeforeValidator(_level_or_steps), Field(min_length=1, max_length=MOST_ITEMS)]
 Labels = Annotated[list[Any], BeforeValidator(_label_values)]
 OneOrMore = Annotated[SomeTexts, BeforeValidator(_one_or_more)]
+ChannelPair = Annotated[list[Text], Field(min_length=2, max_length=2)]
 Bounds = Annotated[list[Annotated[float, Field(ge=-1e100, le=1e100)]], Field(min_length=2, max_length=2)]
 
 
@@ -94,18 +100,76 @@ class StudyPart(Part):
 
 
 class DataPart(Part):
-    """[data]: files of tests, patterns or folders, relative to the study file.
+    """[data]: files of tests, patterns or folders, relative to the study file; none where cameras give the tests.
 
     only : values of labels that tests must have. up_to_strain : frames beyond it are left out.
     """
 
-    files: OneOrMore
+    files: Annotated[Texts, BeforeValidator(_one_or_more)] = []
     reader: Text | None = None
     ignore: Texts = []
     only: dict[Text, Labels] = {}
     up_to_strain: Positive | None = None
     suspect_frames: Literal["exclude", "keep"] = "exclude"
     check_quality: bool = True
+
+
+class RecordPart(Part):
+    """[[record]]: what an instrument recorded of loads and temperatures, and what its file does not say, as in
+    ck.read_record.
+    """
+
+    name: Text
+    file: Text
+    format: Text | None = None
+    time: Text = ""
+    date: Text = ""
+    time_unit: Text = ""
+    date_order: Text = ""
+    time_zone: Text = ""
+    every: Annotated[int, Field(ge=1, le=100_000)] = 1
+    units: dict[Text, Text] = {}
+    pressure_reference: Literal["gauge", "absolute"] | None = None
+    ambient_pressure_MPa: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
+    missing: Texts = []
+
+
+class CameraPart(Part):
+    """[[camera]]: frames of a surface, what is made of them as in ck.extract, and what was imposed meanwhile.
+
+    frames : a folder, a pattern or files in their order. names, centers_mm : of the test pieces in the field of view.
+    record, channels : a [[record]], and load and temperature of all test pieces or of each by its name. lag_s : of the
+    record's clock, where it is known and not to be found; search_s, camera_start : as in ck.align_clocks. load,
+    temperature_C : where there is no record, counted from the first load.
+    """
+
+    name: Text
+    frames: OneOrMore
+    format: Text | None = None
+    columns: dict[Text, Text] = {}
+    times: Text | None = None
+    interval_s: Annotated[float, Field(gt=0.0, lt=1e9)] | None = None
+    specimen: Text | None = None
+    operator: Text | None = None
+    window_mm: Positive | None = None
+    rings_mm: Numbers | None = None
+    names: Texts = []
+    centers_mm: Annotated[list[Bounds], Field(max_length=MOST_ITEMS)] = []
+    rest_frames: Text | None = None
+    subset_mm: Annotated[float, Field(ge=0.0)] = 0.0
+    record: Text | None = None
+    channels: Annotated[dict[str, ChannelPair], BeforeValidator(_channels)] = {}
+    lag_s: float | None = None
+    search_s: Bounds | None = None
+    camera_start: Text | None = None
+    load: dict[Text, LevelOrSteps] = {}
+    ramp_s: Annotated[float, Field(ge=0.0)] | None = None
+    temperature_C: LevelOrSteps | None = None
+    modulus_GPa: Positive | None = None
+    poisson: Annotated[float, Field(gt=-1.0, lt=0.5)] = 0.3
+    lengths: dict[Text, Positive] = {}
+    alloy: Text | None = None
+    labels: dict[Text, Text] = {}
 
 
 class ExcludePart(Part):
@@ -204,7 +268,8 @@ class RupturePart(Part):
 class ForecastPart(Part):
     """[[forecast]]: measured tests by their files, or a planned one by its load, temperature and end.
 
-    load : as { stress_MPa = 80 } or steps; lengths as { thickness_mm = 0.5 }; targets as { strain = [0.01] }.
+    load : as { stress_MPa = 80 } or steps, of components as
+    { stress_11_MPa = 60, strain_12 = 0 }; lengths as { thickness_mm = 0.5 }; targets as { strain = [0.01] }.
     """
 
     name: Text
@@ -266,10 +331,12 @@ class ReportPart(Part):
 
 
 class StudyModel(Part):
-    """A whole study file; every table but [data] may be missing."""
+    """A whole study file; every table but [data], or but [[camera]], may be missing."""
 
     study: StudyPart = StudyPart()
-    data: DataPart
+    record: Annotated[list[RecordPart], Field(max_length=100)] = []
+    camera: Annotated[list[CameraPart], Field(max_length=100)] = []
+    data: DataPart = DataPart()
     exclude: Annotated[list[ExcludePart], Field(max_length=MOST_ITEMS)] = []
     specimen: SpecimenPart | None = None
     identification: IdentificationPart | None = None

@@ -23,7 +23,21 @@ MISSING = Missing()
 def numbers_of(kind: StageKind, result: Any) -> dict[str, Any]:
     """The numbers of a result by name, as JSON holds them."""
     found: dict[str, Any]
-    if kind == "identification":
+    if kind == "extraction":
+        found = {
+            one.name: {
+                "frames": int(one.used.sum()),
+                "centre": one.center,
+                **{name: float(values[one.used][-1]) for name, values in one.outputs.items() if one.used.any()},
+            }
+            for one in result.tests
+        }
+    elif kind == "record":
+        found = {
+            f"{k + 1}": {"lag_s": one.alignment.lag, "interval_s": one.alignment.lag_interval, "zero_s": one.time_zero}
+            for k, one in enumerate(result.tests)
+        }
+    elif kind == "identification":
         found = {"weights": {one.fit.law.name: one.weight for one in result.laws}}
         found["values"] = {one.fit.law.name: one.fit.values for one in result.laws}
     elif kind == "temperature":

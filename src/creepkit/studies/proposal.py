@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os.path
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,8 +15,10 @@ from creepkit.inverse.duration import duration_known, followed_duration, needs_d
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import ZERO_CELSIUS, History, dimensions_of, load_unit
+from creepkit.studies.camera_proposal import CameraProposal, proposed_cameras, text_of_cameras
 from creepkit.studies.folders import folders_with_tests
 from creepkit.studies.study_file import parse_study
+from creepkit.studies.toml_text import comment, one_line, quoted, quoted_list, study_part
 
 SECONDARY_LAWS = ("norton", "strain-hardening", "time-hardening")
 SEVERAL_STRESSES_LAW = "hyperbolic-sine"
@@ -146,14 +147,27 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
 
     if not folder.is_dir():
         raise StudyError(f"{folder}: there is no such folder; name the one that holds the measured files")
-    names, tests, problems = _readable(folder, path, reader)
     base = os.path.relpath(folder, path.absolute().parent).replace("\\", "/")
+    try:
+        names, tests, problems = _readable(folder, path, reader)
+    except StudyError:
+        cameras = proposed_cameras(folder, path, (), base)
+        if not cameras.lines:
+            raise
+        text = text_of_cameras(folder, cameras, SECONDARY_LAWS)
+        parse_study(path, text)
+        return StudyProposal(text, cameras.summary)
+    cameras = proposed_cameras(folder, path, [folder / name for name in names], base)
+    known = {str(one) for one in cameras.files}
+    problems = [one for one in problems if one.split(":")[0] not in known]
     files = [name if base == "." else base if name == "." else f"{base}/{name}" for name in names]
     quality = ck.check_data_quality([history for history in tests if history.outputs])
     summary = DataSummary.of(tests)
-    text = _text(folder, files, reader, summary, quality, problems)
+    text = _text(folder, files, reader, summary, quality, problems, cameras)
     parse_study(path, text)  # what is written must be valid
-    return StudyProposal(text, (*summary.lines, *(f"not read: {line}" for line in problems[:MOST_REMARKS])))
+    return StudyProposal(
+        text, (*summary.lines, *cameras.summary, *(f"not read: {line}" for line in problems[:MOST_REMARKS]))
+    )
 
 
 def _readable(folder: Path, path: Path, reader: str | None) -> tuple[list[str], list[History], list[str]]:
@@ -220,15 +234,6 @@ def candidate_laws(summary: DataSummary) -> list[str]:
 # ---- the text ------------------------------------------------------------------------------------------------------
 
 
-def quoted(text: str) -> str:
-    """A text as TOML holds it."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _list(texts: Iterable[str]) -> str:
-    return f"[{', '.join(map(quoted, texts))}]"
-
-
 def _text(
     folder: Path,
     files: Sequence[str],
@@ -236,16 +241,11 @@ def _text(
     summary: DataSummary,
     quality: DataQuality,
     problems: Sequence[str],
+    cameras: CameraProposal,
 ) -> str:
     parts = [
-        [
-            "# A study: from measured files to a report. Carry it out: creepkit run study.toml",
-            "# Paths are relative to this file. All tables but [data] may be left out; units stand in names of keys.",
-            "",
-            "[study]",
-            f"title = {quoted(_one_line(folder.absolute().name) or 'creep study')}  # say what it is about",
-            "seed = 0  # of all random draws",
-        ],
+        study_part(folder),
+        list(cameras.lines),
         _data_part(files, reader, summary, problems),
         _exclude_part(quality),
     ]
@@ -260,16 +260,8 @@ def _text(
     return "\n\n".join("\n".join(lines) for lines in parts if lines) + "\n"
 
 
-def _one_line(text: str) -> str:
-    return "".join(character if character.isprintable() else "?" for character in text)[:200]
-
-
-def _comment(text: str) -> str:
-    return f"# {_one_line(text)}"
-
-
 def _data_part(files: Sequence[str], reader: str | None, summary: DataSummary, problems: Sequence[str]) -> list[str]:
-    lines = [*map(_comment, summary.lines), "[data]", f"files = {_list(files)}"]
+    lines = [*map(comment, summary.lines), "[data]", f"files = {quoted_list(files)}"]
     lines += [f"reader = {quoted(reader)}"] if reader is not None else []
     lines += ['# ignore = ["load_kN", "date"]  # columns that nobody needs']
     if len(summary.temperatures) > 1:
@@ -277,7 +269,7 @@ def _data_part(files: Sequence[str], reader: str | None, summary: DataSummary, p
             f"# only = {{ temperature_C = [{summary.temperatures[0] - ZERO_CELSIUS:.0f}] }}  # these tests alone"
         )
     lines.append('suspect_frames = "exclude"  # frames that unload, fall or lie apart; or "keep"')
-    return [*lines, *(_comment(f"not read: {line}") for line in problems[:MOST_REMARKS])]
+    return [*lines, *(comment(f"not read: {line}") for line in problems[:MOST_REMARKS])]
 
 
 def _exclude_part(quality: DataQuality) -> list[str]:
@@ -285,7 +277,7 @@ def _exclude_part(quality: DataQuality) -> list[str]:
     lines = []
     flags = [one for one in quality if len(one.tests) == 1 and one.kind not in FRAME_FLAG_KINDS]
     for flag in flags[:MOST_REMARKS]:
-        lines += [_comment(str(flag)), "# [[exclude]]", f"# test = {quoted(_one_line(flag.history))}"]
+        lines += [comment(str(flag)), "# [[exclude]]", f"# test = {quoted(one_line(flag.history))}"]
         if flag.frames:
             text = frame_ranges_text(flag.frames).partition(" ")[2]
             lines.append(f"# frames = {quoted(text)}")
@@ -304,7 +296,7 @@ def _identification_part(summary: DataSummary) -> list[str]:
         lines.append("# All tests are at one load: how rates depend on stress they do not say.")
     if not all(map(duration_known, summary.tests)):
         lines.append("# Minimum rates of tests of unknown duration cannot judge laws that depend on strain or time.")
-    lines += ["[identification]", f"laws = {_list(laws)}  # creepkit laws lists all"]
+    lines += ["[identification]", f"laws = {quoted_list(laws)}  # creepkit laws lists all"]
     with_alpha = [name for name in laws if "alpha" in ck.law(name).names]
     if with_alpha and not set(with_alpha) - set(TERTIARY_LAWS):
         lines.append("fix = { alpha = 0 }  # tests under tension do not say how damage depends on the principal stress")
@@ -343,7 +335,7 @@ def _predictor_lines(summary: DataSummary) -> list[str]:
 
 def _temperature_part(summary: DataSummary) -> list[str]:
     if len(summary.temperatures) < FEWEST_TEMPERATURES:
-        return [_comment(f"[temperature] needs {FEWEST_TEMPERATURES} temperatures or more.")]
+        return [comment(f"[temperature] needs {FEWEST_TEMPERATURES} temperatures or more.")]
     return ["[temperature]", '# forms = { n = ["constant", "linear"] }', "within_K = 5  # tests so near are at one"]
 
 

@@ -37,7 +37,9 @@ MOST_IDENTIFIED = 1_000_000
 if TYPE_CHECKING:
     from creepkit.discovery.discover import TemperatureStudy
     from creepkit.experiments.planned_design import Design
+    from creepkit.extraction.extraction import Extraction
     from creepkit.forecasts.forecast import Forecast
+    from creepkit.instruments.imposed import Imposed
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.quality import DataQuality
     from creepkit.records import History
@@ -53,6 +55,8 @@ class StudyResult:
     changes : what differs from the study.lock that was there, one sentence each. files : that were read.
     measured : all tests as the files hold them. file, lock_path : the study, and the lock of this run.
     asked : keys of the identifications that the stages rest on. pruned : how many others were removed.
+    extractions, imposed : {test of a camera: what its frames gave, and what its instrument recorded}.
+    documents : {stage: its result as JSON-able data, which other commands read}.
     """
 
     title: str
@@ -68,6 +72,9 @@ class StudyResult:
     lock_path: Path | None = None
     asked: frozenset[str] = field(default=frozenset(), repr=False)
     pruned: int = 0
+    extractions: Mapping[str, Extraction] = field(default_factory=dict, repr=False)
+    imposed: Mapping[str, Imposed] = field(default_factory=dict, repr=False)
+    documents: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def histories(self) -> tuple[History, ...]:
@@ -117,8 +124,13 @@ class StudyResult:
 
     @cached_property
     def identified(self) -> tuple[ExportedFile, ...]:
-        """Identifications and rankings as the files that other commands read."""
-        return tuple(identified_files(self.rankings))
+        """Identifications, rankings and temperature laws as the files that other commands read."""
+        from creepkit.files.json_documents import json_text
+        from creepkit.studies.documents import file_name
+
+        documents = ((file_name(stage), data) for stage, data in self.documents.items() if data is not None)
+        laws = [ExportedFile(f"{name}.json", "temperature law", json_text(data)) for name, data in documents]
+        return (*identified_files(self.rankings), *laws)
 
     def _names(self, kind: str) -> list[tuple[str, str]]:
         return [(one.name, one.group) for one in self.stages if one.kind == kind and one.name in self.results]
@@ -144,6 +156,7 @@ def contents_of(result: StudyResult) -> ReportContents:
         for group in result.groups
     )
     attached, notes = attachments_of(result)
+    notes = (*notes, *(f"{one.name} {one.sentence}" for one in result.stages if one.state == "left out"))
     carried = result.identified
     if sum(len(one.text) for one in carried) > MOST_IDENTIFIED:
         carried, folder = (), f"{file.path.stem}.results/identified"
@@ -157,6 +170,8 @@ def contents_of(result: StudyResult) -> ReportContents:
         forecasts=dict(result.forecasts),
         design=_titled(result.designs),
         rupture=_titled(result.rupture),
+        extractions=result.extractions,
+        imposed=result.imposed,
         exports=(*result.exports, *carried),
         failures=result.failures,
         provenance=ReportProvenance(

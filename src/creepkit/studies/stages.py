@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from creepkit.errors import StudyError
+from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.fingerprints import predictor_fingerprint
 from creepkit.inverse.kept_fits import history_digest
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, with_arrhenius
@@ -15,6 +15,7 @@ from creepkit.records import ZERO_CELSIUS, History, Predictor
 from creepkit.reports.contents import ExportedFile
 from creepkit.studies import arguments
 from creepkit.studies.inputs import StudyInputs, TestGroup, resolve_paths
+from creepkit.studies.planned_tests import check_forecast, planned_test
 from creepkit.studies.study_file import StudyFile
 
 if TYPE_CHECKING:
@@ -24,10 +25,23 @@ if TYPE_CHECKING:
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.language import CreepLaw
 
-StageKind = Literal["quality", "identification", "temperature", "rupture", "forecast", "design", "export", "report"]
+StageKind = Literal[
+    "extraction",
+    "record",
+    "quality",
+    "identification",
+    "temperature",
+    "rupture",
+    "forecast",
+    "design",
+    "export",
+    "report",
+]
 
 
 STAGE_KINDS: tuple[StageKind, ...] = (
+    "extraction",
+    "record",
     "quality",
     "identification",
     "temperature",
@@ -55,6 +69,7 @@ class Stage:
     settings : JSON-able data of all that decides the result beside what it `needs`, names of other stages.
     make : from the results of these, with something to report progress to. record : class of the result, by which a
         file is read; None where the result is made again from identifications that are kept.
+    document : what of a result that no record can be read from is written down, as JSON-able data.
     predictor : of identifications that its file holds. file : that an export is written to, "" for other stages.
     """
 
@@ -65,6 +80,7 @@ class Stage:
     make: Callable[[Results, Tick], Any]
     needs: tuple[str, ...] = ()
     record: Any = None
+    document: Callable[[Any], Any] | None = None
     predictor: Predictor | None = field(default=None, repr=False)
     file: str = ""
 
@@ -84,6 +100,8 @@ class Stages:
 
     def all(self) -> list[Stage]:
         """In the order in which they are made; those of a table that the study has not are missing."""
+        if not self.inputs.groups:  # of cameras whose stages failed
+            return []
         model = self.file.model
         stages = [self._quality()] if model.data.check_quality else []
         for kind, stage_of in (
@@ -151,7 +169,7 @@ class Stages:
         from creepkit.studies.identification import identified_laws, search_of
 
         model = self.file.model
-        part, using, settings = model.identification, arguments.predictor_of(self.file), self._settings
+        part, using, settings = model.identification, arguments.predictor_of(self.file, self.root), self._settings
         assert part is not None
         laws = [fitted for _, fitted in self._laws(group)]
         search, penalty = search_of(part)
@@ -185,7 +203,11 @@ class Stages:
     def _temperature(self, group: TestGroup) -> Stage:
         import creepkit as ck
 
-        part, using, settings = self.file.model.temperature, arguments.predictor_of(self.file), self._settings
+        part, using, settings = (
+            self.file.model.temperature,
+            arguments.predictor_of(self.file, self.root),
+            self._settings,
+        )
         assert part is not None
         place = ("temperature",)
         law = None
@@ -225,7 +247,8 @@ class Stages:
             self._digests(group.histories),
         ]
         needs = (need,) if need else ()
-        return Stage(stage_name("temperature", group.name), "temperature", group.name, described, make, needs)
+        name = stage_name("temperature", group.name)
+        return Stage(name, "temperature", group.name, described, make, needs, document=_temperature_document)
 
     def _law_without_temperature(self, ranking: Ranking, group: TestGroup) -> CreepLaw:
         """The candidate that is best; where another law was found to be, the best of the candidates."""
@@ -264,7 +287,7 @@ class Stages:
         from creepkit.forecasts.forecast import Forecast
 
         part, place = self.file.model.forecast[number], ("forecast", number)
-        arguments.check_forecast(self.file, number)
+        check_forecast(self.file, number)
         groups = self._groups_of(place, part.group)
         if len(groups) > 1:
             names = " or ".join(f"'{group.name}'" for group in groups)
@@ -288,7 +311,7 @@ class Stages:
             if not tests:
                 low, high = ranking.best.ranges["temperature"]
                 usual = 0.5 * (low + high) if high - low <= ISOTHERMAL_RANGE else None
-                tests = [arguments.planned_test(self.file, number, usual)]
+                tests = [planned_test(self.file, number, usual)]
             return ck.forecast(ranking, tests, progress=tick, **how)
 
         described = [part.model_dump(), self._digests(measured)]
@@ -346,6 +369,16 @@ class Stages:
         name = f"export {number + 1}{f' of {group.name}' if group.name else ''}: {part.target}"
         described = [part.model_dump(), file]
         return Stage(name, "export", group.name, described, make, (need,), ExportedFile, file=file)
+
+
+def _temperature_document(result: Any) -> Any:
+    """The temperature law of a study of temperature, as `creepkit discover --to` writes it."""
+    from creepkit.discovery.temperature_law import temperature_law_to_json
+
+    try:
+        return temperature_law_to_json(result.temperature_law)
+    except CreepkitError:  # of a plugin's law, which cannot be stored
+        return None
 
 
 def needed_stages(stages: Sequence[Stage], kinds: Sequence[str]) -> set[str]:

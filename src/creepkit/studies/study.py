@@ -13,11 +13,14 @@ from typing import TYPE_CHECKING
 from creepkit.errors import StudyError, nearest
 from creepkit.reports.attachments import problem_of_name, same_name
 from creepkit.studies import arguments
+from creepkit.studies.camera_stages import CameraStages
+from creepkit.studies.cameras import CameraFiles, StudyCameras
 from creepkit.studies.documents import ResultFolder
 from creepkit.studies.execution import Execution, running_alone
 from creepkit.studies.inputs import InputFile, input_files, read_inputs, resolve_paths
 from creepkit.studies.lock import changed_results, differences, lock_if_any, lock_of, write_lock
 from creepkit.studies.page import lock_path_of, write_own, write_page
+from creepkit.studies.planned_tests import check_forecast
 from creepkit.studies.result import StudyResult
 from creepkit.studies.stages import STAGE_KINDS, Stage, Stages, needed_stages
 from creepkit.studies.study_file import StudyFile, read_study_file
@@ -63,7 +66,7 @@ class Study:
             raise file.error(
                 ("data", "reader"), f"there is no reader '{model.data.reader}'; {nearest(model.data.reader, readers)}"
             )
-        arguments.predictor_of(file)
+        arguments.predictor_of(file, self.root)
         arguments.settings_of(file)
         if model.identification is not None:
             arguments.laws_of(file)
@@ -72,7 +75,7 @@ class Study:
                 ck.law(model.temperature.law)
         arguments.check_names(file)
         for k, part in enumerate(model.forecast):
-            arguments.check_forecast(file, k)
+            check_forecast(file, k)
             names = [one.name for one in model.forecast[:k]]
             if part.name in names:
                 raise file.error(("forecast", k, "name"), f"two forecasts are called '{part.name}'; rename one of them")
@@ -85,13 +88,15 @@ class Study:
                     ("export", k, "target"),
                     f"there is no target '{export.target}'; {nearest(export.target, exporters)}",
                 )
+        self.cameras.check()
         self._check_outputs()
 
     def _check_outputs(self) -> None:
         """StudyError for data files that there are not, and for files that would replace data or be written twice."""
         import creepkit as ck
 
-        file, model, data = self.file, self.file.model, self.paths
+        file, model = self.file, self.file.model
+        data = [*self.paths, *(path for camera in self.camera_files for path in camera.all)]
         places: list[tuple[tuple[str | int, ...], str]] = [
             (("export", k, "file"), one.file or f"law{ck.available('exporters')[one.target].suffix}")
             for k, one in enumerate(model.export)
@@ -108,6 +113,16 @@ class Study:
                 raise file.error(
                     key, f"'{name}' would be among the data files; give file = another name, or name those more exactly"
                 )
+
+    @property
+    def cameras(self) -> StudyCameras:
+        """The cameras of the study."""
+        return StudyCameras(self.file, self.root)
+
+    @cached_property
+    def camera_files(self) -> list[CameraFiles]:
+        """Files of each camera."""
+        return self.cameras.files()
 
     @cached_property
     def paths(self) -> list[Path]:
@@ -159,25 +174,30 @@ class Study:
         if progress is not None:
             progress("reading", 0, 1, "")
         files = self._input_files(folder, kept, lock_path)
-        inputs = read_inputs(self.file, self.paths)
-        if progress is not None:
-            progress("reading", 1, 1, f"{len(inputs.histories)} tests in {len(files)} files")
-        stages = Stages(self.file, inputs, self.root).all()
-        self._check_exports(stages, folder, files)
         now = lock_of(self.file, self._hash, files, [])
         changes = [] if before is None else differences(before, now)
         if locked and (before is None or changes):
             what = changes[0] if changes else "there is no lock"
             raise StudyError(f"{lock_path}: the study cannot be repeated exactly: {what}; leave --locked out")
-        execution = Execution(kept, inputs.histories, progress)
-        execution.run(stages, needed_stages(stages, kinds))
+        execution = Execution(kept, (), progress)
+        cameras = CameraStages(self.cameras)
+        watched = cameras.stages(self.camera_files, files)
+        execution.run(watched, [stage.name for stage in watched])  # whatever is asked for is made of their tests
+        complete = not execution.failures
+        inputs = read_inputs(self.file, self.paths, cameras.histories(execution.results), complete=complete)
+        if progress is not None:
+            progress("reading", 1, 1, f"{len(inputs.histories)} tests in {len(files)} files")
+        stages = Stages(self.file, inputs, self.root).all()
+        self._check_exports(stages, folder, files)
+        execution.histories = inputs.histories
+        execution.run(stages, needed_stages(stages, kinds), read_others="report" in kinds)
         write_lock(lock_of(self.file, self._hash, files, execution.records, before), lock_path)
         if before is not None:
             changes += changed_results(before, execution.records)
         result = StudyResult(
             self.file.model.study.title,
             inputs.groups,
-            inputs.exclusions,
+            (*cameras.flagged(execution.results), *inputs.exclusions),
             tuple(execution.records),
             tuple(files),
             tuple(changes),
@@ -186,6 +206,9 @@ class Study:
             file=self.file,
             lock_path=lock_path,
             asked=frozenset(execution.asked),
+            extractions=cameras.extractions(execution.results),
+            imposed=cameras.imposed(execution.results),
+            documents=dict(execution.documents),
         )
         kept.write_identified(result.identified)
         for stage in stages:
@@ -221,12 +244,11 @@ class Study:
         own += [folder / one.file for one in model.export if one.file is not None]
         own += [] if model.report is None else [folder / model.report.file]
         own += [folder / name for name in kept.outputs]
-        paths = [*self.paths]
+        paths = [*self.paths, *(path for camera in self.camera_files for path in camera.all)]
         for k, part in enumerate(model.forecast):
             paths += resolve_paths(self.file, ("forecast", k, "tests"), part.tests, self.root) if part.tests else []
-        if model.identification is not None and model.identification.predictor is not None:
-            beside = self.path.parent / model.identification.predictor
-            paths += [beside] if beside.is_file() else []
+        predictor = arguments.predictor_path(self.file, self.root)
+        paths += [] if predictor is None else [predictor]
         return input_files(self.file, paths, self.root, own)
 
 

@@ -96,7 +96,18 @@ def parse_study(path: Path, text: str) -> StudyFile:
         model = StudyModel.model_validate(data)
     except ValidationError as error:
         raise StudyError(_sentence(path, error, lines)) from None
+    if not model.data.files and not model.camera:
+        raise StudyError(f"{path}:{_no_tests(data, lines)}")
     return StudyFile(path, text, model)
+
+
+def _no_tests(data: Mapping[str, Any], lines: Mapping[KeyPath, int]) -> str:
+    """What a study lacks that names neither files of tests nor cameras, with its line."""
+    if "data" not in data:
+        return f"1: the study has no 'data', which it needs; {EXAMPLES['data']}"
+    if "files" not in data["data"]:
+        return f"{line_of(('data',), lines)}: [data] has no 'files', which it needs; {EXAMPLES['files']}"
+    return f"{line_of(('data', 'files'), lines)}: [data] files is [], and needs 1 or more entries"
 
 
 def _refuse_long_keys(path: Path, text: str) -> None:
@@ -184,8 +195,10 @@ def _problem(error: Any, key: KeyPath) -> str:
 
 
 EXAMPLES = {
-    "data": 'add the table [data] with files = ["*.csv"]',
+    "data": 'add the table [data] with files = ["*.csv"], or a [[camera]] with frames = "frames"',
     "files": 'write files = ["*.csv"]',
+    "frames": 'write frames = "folder of frames"',
+    "file": 'write file = "record.csv"',
     "laws": 'write laws = ["norton"]',
     "reason": 'write reason = "why it is left out"',
     "target": 'write target = "latex"',

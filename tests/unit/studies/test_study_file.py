@@ -27,6 +27,50 @@ up_to_strain = 0.1
 suspect_frames = "keep"
 check_quality = true
 
+[[record]]
+name = "rig"
+file = "record.csv"
+format = "csv"
+time = "Clock"
+date = "Day"
+time_unit = "s"
+date_order = "day first"
+time_zone = "+01:00"
+every = 2
+units = { P1 = "bar" }
+pressure_reference = "absolute"
+ambient_pressure_MPa = 0.1
+missing = ["OL"]
+
+[[camera]]
+name = "plate"
+frames = ["frames/*.csv"]
+format = "dice"
+columns = { x = "X" }
+times = "times.csv"
+interval_s = 10
+specimen = "bulge"
+operator = "field 0-7.5 mm"
+window_mm = 7
+rings_mm = [0, 2]
+names = ["D1"]
+centers_mm = [[1, -2]]
+rest_frames = "0-9"
+subset_mm = 1
+record = "rig"
+channels = ["P1", "T1"]
+lag_s = 3
+search_s = [-10, 10]
+camera_start = "2025-08-18T18:51:53+02:00"
+load = { pressure_bar = 5 }
+ramp_s = 5
+temperature_C = 777
+modulus_GPa = 150
+poisson = 0.3
+lengths = { apex_thickness_mm = 0.5 }
+alloy = "X"
+labels = { heat = "7" }
+
 [[exclude]]
 test = "a*"
 reason = "why"
@@ -226,7 +270,15 @@ def test_values_of_a_wrong_type_are_refused_with_their_line():
                 assert "\n" not in told
             else:
                 allowed = {"only", "fix", "ignore", "tests", "without_nuisances", "load", "weights", "laws", "files"}
-                allowed |= {"methods", "tensile_strengths", "temperature_C", "parameters", "targets"}
+                allowed |= {
+                    "methods",
+                    "tensile_strengths",
+                    "temperature_C",
+                    "parameters",
+                    "targets",
+                    "frames",
+                    "channels",
+                }
                 assert key in allowed, (key, wrong)
     assert refused > 300
 

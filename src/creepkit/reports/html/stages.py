@@ -30,6 +30,7 @@ from creepkit.reports.html.elements import (
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import findings_of
 from creepkit.reports.html.test_details import NOT_STATED, table_of_details
+from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.rupture import rupture_text, strength_rows
 from creepkit.reports.rupture_plot import rupture_figure
 from creepkit.reports.temperature_law import plot_temperature_law, temperature_law_text, temperature_study_text
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from creepkit.experiments.planned_design import Design
     from creepkit.extraction.extraction import Extraction
     from creepkit.forecasts.forecast import Forecast
+    from creepkit.instruments.imposed import Imposed
     from creepkit.quality.flags import DataQuality
     from creepkit.records import History
     from creepkit.reports.contents import ReportContents
@@ -135,9 +137,10 @@ def _selections(contents: ReportContents) -> Iterator[str]:
 
 
 def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[PageSection]:
-    """Extraction, temperature, rupture, forecasts and further tests, where there are such results."""
+    """Extraction, records, temperature, rupture, forecasts and further tests, where there are such results."""
     stages: tuple[tuple[str, str, Mapping[str, Any], Callable[[str, Any, PageFigures], list[Block]]], ...] = (
         ("extraction", "Extraction from camera frames", contents.extractions, _extraction_blocks),
+        ("imposed", "Loads and temperatures from instrument records", contents.imposed, _imposed_blocks),
         ("temperature", "Trends with temperature", contents.temperature, _temperature_blocks),
         ("rupture", "Rupture", contents.rupture, _rupture_blocks),
         ("forecasts", "Forecasts", contents.forecasts, _forecast_blocks),
@@ -171,6 +174,22 @@ def _extraction_blocks(name: str, extraction: Extraction, figures: PageFigures) 
         "in red.",
     )
     return [picture, Verbatim("What was extracted, and how well", printable_lines(extraction_text(extraction)))]
+
+
+def _imposed_blocks(name: str, under: Imposed, figures: PageFigures) -> list[Block]:
+    """The alignment of the clocks with its interval, and how well programs follow the record."""
+    alignment = under.alignment
+    low, high = alignment.lag_interval
+    lag = f"The clock of the record is ahead of that of the camera by {number(alignment.lag, 5)} s"
+    found = (
+        f"(95 % interval {number(low, 5)} to {number(high, 5)} s), found from the changes of load in "
+        f"{alignment.frames} frames."
+    )
+    return [
+        Paragraph(f"{lag} {found}" if alignment.lags.size else f"{lag}, as was stated."),
+        Verbatim("Alignment of the clocks", printable_lines(alignment_text(alignment))),
+        Verbatim("What was imposed", printable_lines(imposed_text(under))),
+    ]
 
 
 def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Block]:

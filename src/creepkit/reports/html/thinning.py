@@ -30,8 +30,9 @@ TOLERANCE = 0.3
 """Distance from the chord below which a point is left out, in the same unit."""
 
 
-MOST_MARKS = 3000
-"""Marks of a collection above which it becomes a picture of pixels: a map of measured points."""
+MOST_MARKS, FEW_MARKS = 3000, 300
+"""Marks of a figure above which its collections, but for those of few marks, become pictures of pixels: maps of
+measured points."""
 
 
 def thin_figure(figure: Figure) -> None:
@@ -44,8 +45,9 @@ def thin_figure(figure: Figure) -> None:
         _thin_line(line, scale)
     for band in figure.findobj(PolyCollection):
         _thin_band(band, scale)
-    for marks in figure.findobj(PathCollection):
-        if np.size(marks.get_offsets()) > 2 * MOST_MARKS:
+    counts = {marks: np.size(marks.get_offsets()) // 2 for marks in figure.findobj(PathCollection)}
+    for marks, count in counts.items():
+        if sum(counts.values()) > MOST_MARKS and count > FEW_MARKS:
             marks.set_rasterized(True)
 
 
