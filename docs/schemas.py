@@ -116,7 +116,7 @@ class StudySchema(GenerateJsonSchema):
 
     def function_before_schema(self, schema: Any) -> dict[str, Any]:
         """What the model makes of a value before it checks it, and the value itself."""
-        after, before = super().function_before_schema(schema), SHORT_FORMS[schema["function"]["function"].__name__]
+        after, before = super().function_before_schema(schema), SHORT_FORMS.get(schema["function"]["function"].__name__, {})
         return {"anyOf": [before, after]} if before else {}
 
 

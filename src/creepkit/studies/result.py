@@ -128,7 +128,7 @@ class StudyResult:
         from creepkit.files.json_documents import json_text
         from creepkit.studies.documents import file_name
 
-        documents = ((file_name(stage), data) for stage, data in self.documents.items() if data is not None)
+        documents = ((hashed_stem(stage), data) for stage, data in self.documents.items() if data is not None)
         laws = [ExportedFile(f"{name}.json", "temperature law", json_text(data)) for name, data in documents]
         return (*identified_files(self.rankings), *laws)
 
