@@ -48,8 +48,7 @@ class CoreBuildHook(BuildHookInterface):
             if version == "editable":
                 compilation.compile_core(ROOT / "build" / "core")
             else:
-                folder = ROOT / "build" / "wheel"
-                library = compilation.compile_core(folder / "objects", folder)
+                library = compilation.compile_core(ROOT / "build" / "core", ROOT / "build" / "wheel")
                 build_data["force_include"][str(library)] = f"creepkit/core/{library.name}"
         except compilation.CompilationError as error:
             sys.exit(str(error))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -40,29 +39,26 @@ if TYPE_CHECKING:
 def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
     """Write JSON and plot of every law, the ranking's plot, and the best law as LaTeX and Python; returns the paths."""
     import creepkit as ck
+    from creepkit.files.file_names import LAW_SIGNS, numbered_stems
     from creepkit.inverse.ranking_document import write_ranking_document
 
     folder.mkdir(parents=True, exist_ok=True)
     written, weights = [], {}
-    for entry in ranking.laws:
-        name = file_stem(entry.fit.law.name)
+    ranking_name, *names = numbered_stems(
+        ["ranking", *(entry.fit.law.name for entry in ranking.laws)], "law", LAW_SIGNS
+    )
+    for name, entry in zip(names, ranking.laws, strict=True):
         written.append(entry.fit.save(folder / f"{name}.json"))
         weights[f"{name}.json"] = entry.weight
         entry.fit.plot(folder / f"{name}.png")
         written.append(folder / f"{name}.png")
-    ranking.plot(folder / "ranking.png")
-    written += [folder / "ranking.png", write_ranking_document(weights, folder / "ranking.json")]
-    best = ranking.best
+    ranking.plot(folder / f"{ranking_name}.png")
+    written += [folder / f"{ranking_name}.png", write_ranking_document(weights, folder / f"{ranking_name}.json")]
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
-        path = folder / f"{file_stem(best.law.name)}{suffix}"
+        path = folder / f"{names[0]}{suffix}"
         ck.export(ranking, language, to=path)
         written.append(path)
     return written
-
-
-def file_stem(name: str) -> str:
-    """A law's name as a file name."""
-    return re.sub(r"[^A-Za-z0-9.=-]+", "-", name).strip("-") or "law"
 
 
 def command(
@@ -133,6 +129,7 @@ def command(
     """
     import creepkit as ck
     from creepkit.errors import FitError
+    from creepkit.files.file_names import LAW_SIGNS, numbered_stems
     from creepkit.files.writing import check_folder_target
 
     if temperature not in ("auto", "none"):
@@ -146,7 +143,7 @@ def command(
     if temperature == "auto":
         candidate_laws = [ck.with_arrhenius(candidate_law, histories) for candidate_law in candidate_laws]
     candidate_laws = change_laws(candidate_laws, fix, bound)
-    stems = [file_stem(candidate.name) for candidate in candidate_laws]
+    _, *stems = numbered_stems(["ranking", *(candidate.name for candidate in candidate_laws)], "law", LAW_SIGNS)
     check_folder_target(
         to, FitError, tuple(f"{s}{suffix}" for s in stems for suffix in (".json", ".png", ".tex", ".py"))
     )

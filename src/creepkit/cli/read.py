@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -75,13 +74,14 @@ def command(
 def _write(histories: list[History], folder: Path) -> list[Path]:
     """Write each history; what cannot stand in the name of a file becomes a line."""
     import creepkit as ck
+    from creepkit.files.file_names import file_stem
     from creepkit.files.writing import check_folder_target
     from creepkit.readers.history_csv import history_text
     from creepkit.reports.figures import make_folder
 
-    names = [re.sub(r"[^\w.+-]+", "_", history.name).strip(".") or "test" for history in histories]
-    if len(set(names)) < len(names):
-        names = [f"{number}_{name}" for number, name in enumerate(names, 1)]
+    stems = [file_stem(history.name, "test", signs=r"\w.+-", gap="_") for history in histories]
+    distinct = len({stem.casefold() for stem in stems}) == len(stems)
+    names = stems if distinct else [f"{number}_{stem}" for number, stem in enumerate(stems, 1)]
     for history in histories:
         history_text(history)  # an error of the last one must not leave the others written
     check_folder_target(folder, ck.errors.HistoryError, tuple(f"{name}.csv" for name in names))

@@ -162,6 +162,7 @@ class RecordCodec:
 
     def _schema(self, hint: Any, allowed: NumberRange) -> CoreSchema:
         """The schema of what JSON holds of values with an annotation."""
+        hint = _without_alias(hint)
         origin, arguments = get_origin(hint), get_args(hint)
         if hint in self.values:
             return plain(partial(validators.foreign_value, self.values[hint].from_json))
@@ -236,8 +237,15 @@ _SCHEMAS: dict[Any, CoreSchema] = dict.fromkeys((Any, object), schemas.any_schem
 _SCHEMAS |= {bool: schemas.bool_schema(), str: schemas.str_schema()}
 
 
+def _without_alias(hint: Any) -> Any:
+    """What an alias of a type stands for, with its arguments: newer releases of NumPy define NDArray as one."""
+    alias = get_origin(hint)
+    return alias.__value__[get_args(hint)] if hasattr(alias, "__value__") else getattr(hint, "__value__", hint)
+
+
 def _json_kind(hint: Any) -> str:
     """The name of the type that values with an annotation have in JSON, behind a bar."""
+    hint = _without_alias(hint)
     if hint is str or get_origin(hint) is Literal or _is_a(hint, enum.Enum):
         return "|str"
     if _is_a(hint, bool | int | float):

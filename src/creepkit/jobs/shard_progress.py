@@ -8,13 +8,13 @@ result, and counts once.
 from __future__ import annotations
 
 import errno
-import fcntl
 import itertools
 import os
 import stat
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -22,10 +22,11 @@ from typing import TypeAlias
 
 from creepkit import limits
 from creepkit.errors import DatasetError
+from creepkit.files.locking import lock_file
 from creepkit.jobs.worker_process import ShardedJob
 
-UNSUPPORTED_LOCK_ERRORS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
-"""Errors of file systems without locks."""
+OPEN_FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_NOINHERIT", "O_BINARY"))
+"""Neither through a link to another file, nor waiting for a pipe; a flag counts where the system has it."""
 
 
 MOST_DIGITS = 19
@@ -42,19 +43,18 @@ class ShardLock:
         self._path = path
         self._file = -1
         self._recorded_deaths = b""
+        self._removed_at_exit = False
         self.held = False
         self.deaths: Counter[int] = Counter()
 
     def __enter__(self) -> ShardLock:
-        # neither through a link to another file, nor waiting for a pipe
-        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-        self._file = os.open(self._path, flags, 0o666)
+        self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | OPEN_FLAGS, 0o666)
         if not stat.S_ISREG(os.fstat(self._file).st_mode):
             os.close(self._file)
             raise OSError(errno.EINVAL, f"{self._path.name} is no regular file", str(self._path))
-        self.held = _locked(self._file)
+        self.held = lock_file(self._file)
         if self.held:
-            lines = os.pread(self._file, 1 << 20, 0).split()
+            lines = os.read(self._file, 1 << 20).split()
             self.deaths = Counter(int(line) for line in lines if line.isdigit() and len(line) < MOST_DIGITS)
             self._recorded_deaths = b"".join(b"%d\n" % row for row in self.deaths.elements())
         return self
@@ -62,11 +62,15 @@ class ShardLock:
     def record_start(self, sample: int) -> None:
         """Note that a sample is being simulated now."""
         os.ftruncate(self._file, len(self._recorded_deaths))
-        os.pwrite(self._file, b"%d\n" % sample, len(self._recorded_deaths))
+        os.lseek(self._file, len(self._recorded_deaths), os.SEEK_SET)
+        os.write(self._file, b"%d\n" % sample)
 
     def remove(self) -> None:
-        """Take the file away: the shard is done."""
-        self._path.unlink(missing_ok=True)
+        """Take the file away: the shard is done; on Windows, where an open file stays, after it is closed."""
+        try:
+            self._path.unlink(missing_ok=True)
+        except PermissionError:
+            self._removed_at_exit = True
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -74,17 +78,9 @@ class ShardLock:
         if self.held:  # what ends here, be it by an error, has not died
             os.ftruncate(self._file, len(self._recorded_deaths))
         os.close(self._file)
-
-
-def _locked(file: int) -> bool:
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError as error:
-        if error.errno not in UNSUPPORTED_LOCK_ERRORS:
-            raise
-    return True
+        if self._removed_at_exit:
+            with suppress(OSError):  # another process may have opened it since
+                self._path.unlink()
 
 
 MOST_DRAWS_WITHOUT_ACCEPTED = 16384

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import json
 import pickle
+import queue
 import re
-import selectors
 import signal
 import socket
 import subprocess
+import threading
 import time
 from collections import Counter
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -265,14 +266,18 @@ class WorkerDeaths:
         return f"its worker process died {times} times, the last time by {result.text}; is there memory enough?"
 
 
-@dataclass
+@dataclass(eq=False)
 class WorkerProcess:
-    """A worker process. task : the one it does, None when it is idle. ready : whether it has started."""
+    """A worker process. task : the one it does, None when it is idle. ready : whether it has started.
+
+    reader : the thread that reads its output.
+    """
 
     popen: subprocess.Popen[bytes]
     task: int | None = None
     ready: bool = False
     buffer: bytes = b""
+    reader: threading.Thread | None = None
 
 
 class ProcessWorkers:
@@ -282,7 +287,7 @@ class ProcessWorkers:
         self._setup_message = setup_message(job)
         self._size = processes
         self._processes: list[WorkerProcess] = []
-        self._selector = selectors.DefaultSelector()
+        self._outputs: queue.SimpleQueue[tuple[WorkerProcess, bytes]] = queue.SimpleQueue()
 
     @property
     def free_slots(self) -> int:
@@ -298,7 +303,12 @@ class ProcessWorkers:
 
     def results(self, timeout: float) -> list[TaskResult]:
         """Wait for results, at most `timeout` s."""
-        return [result for key, _ in self._selector.select(timeout) for result in self._read_results(key.data)]
+        outputs = []
+        with suppress(queue.Empty):
+            outputs.append(self._outputs.get(timeout=timeout))
+            while True:
+                outputs.append(self._outputs.get_nowait())
+        return [result for process, data in outputs for result in self._read_results(process, data)]
 
     def __enter__(self) -> ProcessWorkers:
         return self
@@ -315,13 +325,22 @@ class ProcessWorkers:
         popen = start_worker()
         process = WorkerProcess(popen)
         self._processes.append(process)
-        self._selector.register(_pipe(popen.stdout), selectors.EVENT_READ, process)
+        process.reader = threading.Thread(target=self._forward_output, args=(process,), daemon=True)
+        process.reader.start()
         _send(popen, self._setup_message)
         return process
 
-    def _read_results(self, process: WorkerProcess) -> list[TaskResult]:
+    def _forward_output(self, process: WorkerProcess) -> None:
+        """Pass on what a process writes; a thread does so, for Windows cannot wait for several pipes at once."""
+        with suppress(OSError, ValueError):
+            while data := _pipe(process.popen.stdout).read(1 << 16):
+                self._outputs.put((process, data))
+        self._outputs.put((process, b""))
+
+    def _read_results(self, process: WorkerProcess, data: bytes) -> list[TaskResult]:
         """Results that a process reports; the end of its output means that it died."""
-        data = _pipe(process.popen.stdout).read(1 << 16)
+        if process not in self._processes:
+            return []
         if not data:
             return self._after_death(process)
         *lines, process.buffer = (process.buffer + data).split(b"\n")
@@ -340,14 +359,18 @@ class ProcessWorkers:
 
     def _close(self, process: WorkerProcess) -> int:
         self._processes.remove(process)
-        self._selector.unregister(_pipe(process.popen.stdout))
-        for pipe in (process.popen.stdin, process.popen.stdout):
-            _pipe(pipe).close()
+        with suppress(OSError):  # a task that it was given and never read
+            _pipe(process.popen.stdin).close()
         try:
-            return process.popen.wait(TERMINATION_TIMEOUT)
+            code = process.popen.wait(TERMINATION_TIMEOUT)
         except subprocess.TimeoutExpired:
             process.popen.kill()
-            return process.popen.wait()
+            code = process.popen.wait()
+        if process.reader is not None:
+            process.reader.join(TERMINATION_TIMEOUT)
+            if not process.reader.is_alive():  # else a process that the worker started has the pipe still
+                _pipe(process.popen.stdout).close()
+        return code
 
 
 def _send(popen: subprocess.Popen[bytes], data: bytes) -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from creepkit.files.file_names import LAW_SIGNS, numbered_stems
 from creepkit.reports.contents import ExportedFile
 
 if TYPE_CHECKING:
@@ -22,25 +22,20 @@ def identified_files(rankings: Mapping[str, Ranking]) -> list[ExportedFile]:
     from creepkit.inverse.ranking_document import ranking_to_document
 
     files: list[ExportedFile] = []
-    taken: set[str] = set()
-    for group, ranking in rankings.items():
-        prefix = f"{group}_" if len(rankings) > 1 else ""
+    prefixes = {group: f"{group}_" if len(rankings) > 1 else "" for group in rankings}
+    texts = [
+        prefixes[group] + name
+        for group, ranking in rankings.items()
+        for name in (*(one.fit.law.name for one in ranking.laws), "ranking")
+    ]
+    names = (f"{stem}.json" for stem in numbered_stems(texts, "law", LAW_SIGNS))
+    for ranking in rankings.values():
         weights: dict[str, float] = {}
         for one in ranking.laws:
-            name = _file_name(f"{prefix}{one.fit.law.name}", taken)
+            name = next(names)
             weights[name] = one.weight
             text = json_text(identification_to_json(one.fit))
             files.append(ExportedFile(name, f"identification of {one.fit.law.name}, read by ck.load", text))
-        name, text = _file_name(f"{prefix}ranking", taken), json_text(ranking_to_document(weights))
+        name, text = next(names), json_text(ranking_to_document(weights))
         files.append(ExportedFile(name, "ranking, with the identifications in the same folder", text))
     return files
-
-
-def _file_name(text: str, taken: set[str]) -> str:
-    """A name that any system can save, and that no other file has."""
-    stem = re.sub(r"[^A-Za-z0-9._=-]+", "-", text).strip("-_.")[:80] or "law"
-    name, number = f"{stem}.json", 2
-    while name.lower() in taken:
-        name, number = f"{stem}-{number}.json", number + 1
-    taken.add(name.lower())
-    return name

@@ -6,7 +6,6 @@ asked for or in doubt.
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from creepkit.errors import CreepkitError
+from creepkit.files.file_names import hashed_stem
 from creepkit.inverse.composite_predictor import predictor_for_law, underlying_specimen
 from creepkit.inverse.confirmation import Confirmation, confirm, outside_domain
 from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash, single_threaded
@@ -141,12 +141,8 @@ class ScreeningJob:
 
     def path(self, number: int) -> Path:
         """The file of an alloy's result: its name where that can be a file name, else with the beginning of a hash."""
-        name = self.alloys[number].name
-        file_name = re.sub(r"[^A-Za-z0-9.=+-]+", "-", name).strip("-.")
-        is_valid_name = file_name == name and [a.name.lower() for a in self.alloys].count(name.lower()) == 1
-        return self.folder / (
-            f"{file_name}.json" if is_valid_name else f"{file_name or 'alloy'}_{short_hash(name.encode())[:6]}.json"
-        )
+        names = [alloy.name for alloy in self.alloys]
+        return self.folder / f"{hashed_stem(names[number], 'alloy', names)}.json"
 
     def fingerprint(self, number: int) -> str:
         """SHA-256, shortened, of the tests of an alloy and of how they are identified."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any, get_type_hints
 from creepkit.errors import StudyError
 from creepkit.extraction.extraction import Extraction
 from creepkit.extraction.noise import NoiseEstimate
+from creepkit.files.file_names import hashed_stem
 from creepkit.files.json_documents import (
     DocumentFormat,
     canonical_json,
@@ -225,7 +225,7 @@ class ResultFolder:
 
     def path(self, stage: str) -> Path:
         """The file of a stage."""
-        return self.folder / f"{file_name(stage)}.json"
+        return self.folder / f"{hashed_stem(stage)}.json"
 
     def clear(self, *, everything: bool) -> None:
         """Remove files that a process left half written when it died, or all results. No other process may write."""
@@ -272,9 +272,3 @@ class ResultFolder:
         self.folder.mkdir(parents=True, exist_ok=True)
         content = {**STAGE_RESULT.heading, "stage": stage, "key": key, "result": result}
         write_json(content, self.path(stage), STAGE_RESULT.kind, internal=True)
-
-
-def file_name(text: str) -> str:
-    """A name as part of a file's; with the beginning of a hash where signs were lost."""
-    plain = re.sub(r"[^A-Za-z0-9.=+-]+", "-", text).strip("-.")[:80]
-    return plain if plain == text and plain else f"{plain or 'x'}_{short_hash(text.encode())[:6]}"

@@ -125,10 +125,10 @@ class StudyResult:
     @cached_property
     def identified(self) -> tuple[ExportedFile, ...]:
         """Identifications, rankings and temperature laws as the files that other commands read."""
+        from creepkit.files.file_names import hashed_stem
         from creepkit.files.json_documents import json_text
-        from creepkit.studies.documents import file_name
 
-        documents = ((file_name(stage), data) for stage, data in self.documents.items() if data is not None)
+        documents = ((hashed_stem(stage), data) for stage, data in self.documents.items() if data is not None)
         laws = [ExportedFile(f"{name}.json", "temperature law", json_text(data)) for name, data in documents]
         return (*identified_files(self.rankings), *laws)
 

@@ -338,7 +338,7 @@ class Stages:
 
     def _export(self, number: int, group: TestGroup) -> Stage:
         import creepkit as ck
-        from creepkit.studies.documents import file_name
+        from creepkit.files.file_names import hashed_stem
 
         part, place = self.file.model.export[number], ("export", number)
         table: StageKind = "temperature" if part.law == "temperature" else "identification"
@@ -352,7 +352,7 @@ class Stages:
         file = part.file or f"law{exporter.suffix}"
         if several:
             stem, dot, suffix = file.rpartition(".")
-            file = f"{stem or suffix}_{file_name(group.name)}{dot}{suffix if stem else ''}"
+            file = f"{stem or suffix}_{hashed_stem(group.name)}{dot}{suffix if stem else ''}"
         units = {"stress": part.stress_unit, "time": part.time_unit}
         with self.file.at(*place):
             ck.Units(**units)

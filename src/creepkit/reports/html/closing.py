@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import base64
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from creepkit.files.file_names import file_stem
 from creepkit.reports.attachments import problem_of_name
 from creepkit.reports.html.elements import (
     Block,
@@ -64,8 +64,9 @@ def _export_blocks(exports: Sequence[ExportedFile]) -> list[Block]:
 
 def file_name(name: str) -> str:
     """A name under which any system can save a file: letters, digits, dots, hyphens and underscores."""
-    plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name).lstrip("._")[-100:]
-    return plain or "file.txt"
+    stem, dot, suffix = name.rpartition(".")
+    plain = file_stem(stem or suffix, signs="A-Za-z0-9._-", gap="_")
+    return f"{plain}.{file_stem(suffix, 'txt', signs='A-Za-z0-9', gap='')}" if dot and stem else plain
 
 
 def _address(text: str) -> str:

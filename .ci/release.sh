@@ -1,0 +1,49 @@
+#!/usr/bin/env bash
+# What is published, built and tried as a stranger would: source distribution and wheel, twice from two folders, byte for
+# byte equal; the wheels of creepkit and of its plugins, installed into an empty environment with the lowest versions
+# that are declared and no extra; their tests, run from outside the source tree.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+here=$PWD
+python=$here/.venv/bin/python
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct)} OMP_NUM_THREADS=1
+
+echo "source distribution and wheels, from two folders"
+mkdir "$folder/first" "$folder/second"
+# The checkout's own compilation serves for the first, a new one in a folder of another name for the second.
+"$python" -m hatchling build --target sdist --target wheel --directory "$folder/first" >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
+tar --extract --gzip --file "$folder"/first/creepkit-*.tar.gz --directory "$folder"
+cd "$folder"/creepkit-*/
+"$python" -m hatchling build --target sdist --target wheel --directory "$folder/second" >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
+cd "$here"
+for plugin in plugins/*/; do
+    cp -R "$plugin" "$folder/plugin"
+    (cd "$plugin" && "$python" -m hatchling build --target wheel --directory "$folder/first" >/dev/null 2>&1)
+    (cd "$folder/plugin" && "$python" -m hatchling build --target wheel --directory "$folder/second" >/dev/null 2>&1)
+    rm -rf "$folder/plugin"
+done
+diff --recursive "$folder/first" "$folder/second"
+"$python" .ci/wheel_content.py "$folder"/first/creepkit-*.whl "$folder"/first/creepkit-*.tar.gz
+
+echo "the wheels in an empty environment, with the lowest versions that are declared"
+"$python" .ci/lower_bounds.py >"$folder/lowest.txt"
+"$python" -m venv "$folder/env"
+pip="$folder/env/bin/python -m pip --disable-pip-version-check --quiet"
+if ! $pip install --constraint "$folder/lowest.txt" "$folder"/first/*.whl pytest hypothesis 2>"$folder/log"; then
+    cat "$folder/log"
+    [ -z "${CI:-}" ] || exit 1
+    echo "the lowest versions cannot be had here; the wheels are not tried"
+    exit 0
+fi
+$pip check
+mkdir "$folder/outside" "$folder/empty"
+cp -R tests "$folder/outside"
+cp pyproject.toml "$folder/outside"  # for the settings of pytest
+cd "$folder/outside"
+"$folder/env/bin/python" -m pytest -q -p no:cacheprovider \
+    tests/conformance/test_registered_laws.py tests/unit/core tests/unit/files tests/unit/language
+cd "$folder/empty"
+env -i HOME="$folder/empty" PATH="$folder/env/bin" creepkit demo --uniaxial >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
+tail -n 2 "$folder/log"

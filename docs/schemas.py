@@ -1,0 +1,156 @@
+"""Write the schemas of the files in docs/reference/schemas: `python docs/schemas.py`.
+
+They are made from the models that read the files: of study files the tables, of other documents the records. A test
+compares them with what is there.
+"""
+
+from __future__ import annotations
+
+import enum
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, is_dataclass
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+from pydantic.json_schema import GenerateJsonSchema
+
+from creepkit.files.json_documents import DocumentFormat
+from creepkit.files.record_codec import RecordCodec
+from creepkit.inverse import identification_document
+from creepkit.inverse.identification import Identification
+from creepkit.language import CreepLaw, law_codec
+from creepkit.studies.model import StudyModel
+
+FOLDER = Path(__file__).parent / "reference" / "schemas"
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+SIMPLE: dict[Any, Any] = {bool: {"type": "boolean"}, str: {"type": "string"}, int: {"type": "integer"}, Any: {}}
+NUMBER = {"anyOf": [{"type": "number"}, {"type": "null"}, {"enum": ["inf", "-inf"]}]}
+"""NaN is written as null, infinities as texts."""
+
+
+SHORT_FORMS: dict[str, Any] = {
+    "_level_or_steps": {"type": "number"},
+    "_one_or_more": {"type": "string"},
+    "_label_values": {},
+    "_output_weights": {},
+}
+"""What a study file may hold in place of what a function of its model makes of it; anything, where that is empty."""
+
+
+class Schemas:
+    """Schemas of records, each a definition of its own."""
+
+    def __init__(self, codec: RecordCodec) -> None:
+        self._codec = codec
+        self.definitions: dict[str, Any] = {}
+
+    def of(self, hint: Any) -> Any:
+        """The schema of what JSON holds of values with an annotation."""
+        origin, arguments = get_origin(hint), get_args(hint)
+        if hint is CreepLaw:
+            law = Schemas(law_codec._CODEC)
+            reference = law.of(law_codec.LawDocument)
+            whole = document_schema(law_codec.LAW, law_codec._CODEC, law_codec.LawDocument)
+            inner = {key: whole[key] for key in ("type", "properties", "required", "additionalProperties")}
+            self.definitions |= law.definitions | {"LawDocument": inner}
+            return reference
+        if hint in SIMPLE:
+            return SIMPLE[hint]
+        if hint is float:
+            return NUMBER
+        if origin in (Union, UnionType):
+            return {"anyOf": [{"type": "null"} if kind is NoneType else self.of(kind) for kind in arguments]}
+        if origin is Literal:
+            return {"enum": list(arguments)}
+        if isinstance(hint, type) and issubclass(hint, enum.Enum):
+            return {"enum": list(hint.__members__)}
+        if isinstance(hint, type) and issubclass(hint, tuple):
+            parts = [self.of(part) for part in get_type_hints(hint).values()]
+            return {"type": "array", "prefixItems": parts, "minItems": len(parts), "maxItems": len(parts)}
+        if origin is np.ndarray or hasattr(origin, "__value__"):
+            return {"type": "array"}
+        if isinstance(origin, type) and issubclass(origin, Mapping):
+            return {"type": "object", "additionalProperties": self.of(arguments[1])}
+        if isinstance(origin, type) and issubclass(origin, Sequence):
+            if origin is tuple and arguments[-1] is not ...:
+                parts = [self.of(part) for part in arguments]
+                return {"type": "array", "prefixItems": parts, "minItems": len(parts), "maxItems": len(parts)}
+            return {"type": "array", "items": self.of(arguments[0])}
+        return self._record(hint) if is_dataclass(hint) and isinstance(hint, type) else {}
+
+    def _record(self, record: type) -> Any:
+        name = record.__name__.strip("_")
+        if name not in self.definitions:
+            self.definitions[name] = {}
+            hints, stored = self._codec._hints(record), self._codec._stored_fields(record)
+            self.definitions[name] = {
+                "type": "object",
+                "properties": {f.name: self.of(hints[f.name]) for f in stored},
+                "required": [f.name for f in stored if f.default is MISSING and f.default_factory is MISSING],
+                "additionalProperties": False,
+            }
+        return {"$ref": f"#/$defs/{name}"}
+
+
+def document_schema(document: DocumentFormat, codec: RecordCodec, record: type) -> dict[str, Any]:
+    """The schema of a document: its format and version, then the fields of the record."""
+    schemas = Schemas(codec)
+    schemas.of(record)
+    own = schemas.definitions.pop(record.__name__.strip("_"))
+    heading = {"format": {"const": document.name}, "version": {"const": document.version}}
+    return {
+        "$schema": DIALECT,
+        "title": f"{document.name}, version {document.version}",
+        **own,
+        "properties": {**heading, **own["properties"]},
+        "required": [*heading, *own["required"]],
+        "$defs": dict(sorted(schemas.definitions.items())),
+    }
+
+
+class StudySchema(GenerateJsonSchema):
+    """Of the tables of a study file, where a short form stands for a list."""
+
+    def function_before_schema(self, schema: Any) -> dict[str, Any]:
+        """What the model makes of a value before it checks it, and the value itself."""
+        after, before = (
+            super().function_before_schema(schema),
+            SHORT_FORMS.get(schema["function"]["function"].__name__, {}),
+        )
+        return {"anyOf": [before, after]} if before else {}
+
+
+def schemas() -> dict[str, dict[str, Any]]:
+    """{name of the file: schema}."""
+    study = {
+        "$schema": DIALECT,
+        **StudyModel.model_json_schema(schema_generator=StudySchema),
+        "title": "a study file, as TOML",
+    }
+    identification = document_schema(
+        identification_document.IDENTIFICATION, identification_document.CODEC, Identification
+    )
+    return {
+        "study.schema.json": study,
+        "identification.schema.json": identification,
+        "law.schema.json": document_schema(law_codec.LAW, law_codec._CODEC, law_codec.LawDocument),
+    }
+
+
+def text_of(schema: dict[str, Any]) -> str:
+    """The content of its file."""
+    return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
+
+
+def main() -> None:
+    """Write them all."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for name, schema in schemas().items():
+        (FOLDER / name).write_text(text_of(schema), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

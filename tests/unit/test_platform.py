@@ -1,0 +1,359 @@
+"""Systems other than Linux, as far as Linux can stand in for them: what a system lacks is taken away here."""
+
+import ast
+import errno
+import itertools
+import os
+import subprocess
+import sys
+from pathlib import Path, PureWindowsPath
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import creepkit as ck
+from creepkit.files import locking
+from creepkit.files.file_names import DEVICE_NAMES, file_stem, hashed_stem, numbered_stems
+from creepkit.jobs.shard_progress import ShardLock
+from helpers import source_tree
+from helpers.paths import ROOT
+
+NOT_ON_WINDOWS = {"fcntl", "grp", "posix", "pty", "pwd", "resource", "syslog", "termios", "tty", "curses", "readline"}
+"""Modules of the standard library that Windows lacks."""
+
+NOT_ON_UNIX = {"msvcrt", "winreg", "winsound", "nt"}
+
+ONLY_UNIX_CALLS = {
+    "os": {
+        "fork", "getuid", "geteuid", "getgid", "getegid", "setsid", "killpg", "mkfifo", "chown", "lchown", "statvfs",
+        "getloadavg", "sched_getaffinity", "uname", "pread", "pwrite", "O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC",
+        "O_DIRECTORY", "sysconf", "wait", "openpty", "nice", "WIFSIGNALED",
+    },
+    "signal": {"SIGHUP", "SIGKILL", "SIGWINCH", "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGPIPE", "alarm", "pthread_kill"},
+    "selectors": {"DefaultSelector", "PollSelector", "EpollSelector"},
+}  # fmt: skip
+"""Names that Windows lacks, or, of selectors, that wait for sockets only there."""
+
+HIDDEN = """
+import builtins, os, signal, sys
+absent = {modules!r}
+imported = builtins.__import__
+def without(name, *rest, **options):
+    if name.partition(".")[0] in absent:
+        raise ImportError(name)
+    return imported(name, *rest, **options)
+for name in absent:
+    sys.modules[name] = None
+for module, names in ((os, {os_names!r}), (signal, {signal_names!r})):
+    for name in names:
+        if hasattr(module, name):
+            delattr(module, name)
+"""
+
+
+def unguarded(node, guards=()):
+    """Names of the module `os` and `signal` that Windows lacks, in code that does not ask for them."""
+    if isinstance(node, ast.If | ast.IfExp):
+        guards = (*guards, ast.dump(node.test))
+    module = node.value.id if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) else ""
+    if module and node.attr in ONLY_UNIX_CALLS.get(module, ()) and not any(node.attr in guard for guard in guards):
+        yield f"{module}.{node.attr}", node.lineno
+    for child in ast.iter_child_nodes(node):
+        yield from unguarded(child, guards)
+
+
+def early_returns(function):
+    """What a function asks before all else: `if not hasattr(...): return`."""
+    return [
+        ast.dump(one.test) for one in function.body if isinstance(one, ast.If) and isinstance(one.body[-1], ast.Return)
+    ]
+
+
+def test_no_module_imports_what_one_system_alone_has() -> None:
+    wrong = []
+    for module in source_tree.modules():
+        for node in ast.walk(source_tree.tree(module)):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
+            wrong += [(module, name) for name in names if name.partition(".")[0] in NOT_ON_WINDOWS | NOT_ON_UNIX]
+    assert not wrong, "guard it as files/locking.py does"
+
+
+def test_no_module_calls_what_windows_lacks_without_asking() -> None:
+    wrong = []
+    for module in source_tree.modules():
+        tree = source_tree.tree(module)
+        asked = {
+            line: guard
+            for function in ast.walk(tree)
+            if isinstance(function, ast.FunctionDef)
+            for guard in early_returns(function)
+            for line in range(function.lineno, (function.end_lineno or 0) + 1)
+        }
+        wrong += [
+            (module, name, line) for name, line in unguarded(tree) if name.partition(".")[2] not in asked.get(line, "")
+        ]
+    assert not wrong
+
+
+def test_no_path_of_one_system_is_written_down() -> None:
+    wrong = []
+    for module in source_tree.modules():
+        tree = source_tree.tree(module)
+        texts = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}  # docstrings
+        wrong += [
+            (module, node.value)
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in texts
+            if node.value.startswith(("/tmp", "/proc", "/dev/", "/usr", "/home", "/var", "/etc"))
+        ]
+    assert not wrong
+
+
+@pytest.mark.parametrize("absent", [sorted(NOT_ON_WINDOWS - {"posix"})], ids=["as on Windows"])
+def test_it_works_without_the_modules_that_windows_lacks(absent, tmp_path) -> None:
+    head = HIDDEN.format(
+        modules=absent,
+        os_names=sorted(ONLY_UNIX_CALLS["os"] - {"sysconf", "uname", "fork"}),  # of the test's own libraries
+        signal_names=["SIGHUP", "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGPIPE", "SIGWINCH"],
+    )
+    program = head + (
+        "from pathlib import Path\n"
+        "from typer.testing import CliRunner\n"
+        "from creepkit.cli.app import app\n"
+        "from creepkit.jobs.shard_progress import ShardLock\n"
+        "steps = [['laws'], ['generate', 'norton', '--specimen', 'uniaxial', '--draws', '4', '--interval', '2400',\n"
+        "         '--seed', '1', '--workers', '1', '--to', 'set.h5'], ['data', 'set.h5'],\n"
+        "         ['app', 'norton', '--to', 'page.html']]\n"
+        "for words in steps:\n"
+        "    result = CliRunner().invoke(app, words)\n"
+        "    assert result.exit_code == 0, (words, result.output, result.exception)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "set.h5").is_file()
+
+
+class BytesLocked:
+    """msvcrt.locking: bytes at the place of a descriptor; one holder, who may be this process as well."""
+
+    LK_NBLCK = 2
+
+    def __init__(self) -> None:
+        self.held: dict[tuple[int, int], int] = {}
+
+    def locking(self, file: int, mode: int, count: int) -> None:
+        assert (mode, count) == (self.LK_NBLCK, 1)
+        place = os.fstat(file).st_ino, os.lseek(file, 0, os.SEEK_CUR)
+        if self.held.setdefault(place, file) != file:
+            raise OSError(errno.EACCES, "Permission denied")
+
+
+def test_locks_of_windows_keep_the_content_readable_and_the_second_out(tmp_path, monkeypatch) -> None:
+    system = BytesLocked()
+    monkeypatch.setattr(locking, "fcntl", None)
+    monkeypatch.setattr(locking, "msvcrt", system)
+    with ShardLock(tmp_path / "1.lock") as first, ShardLock(tmp_path / "1.lock") as second:
+        assert first.held
+        assert not second.held
+        first.record_start(7)
+        assert (tmp_path / "1.lock").read_bytes() == b"7\n"
+    assert [place for _, place in system.held] == [locking.LOCKED_BYTE]
+    assert (tmp_path / "1.lock").stat().st_size == 0
+
+
+def test_a_lock_file_that_cannot_go_while_it_is_open_goes_later(tmp_path, monkeypatch) -> None:
+    unlink, lock = Path.unlink, ShardLock(tmp_path / "1.lock")
+    open_files = {tmp_path / "1.lock"}
+
+    def as_on_windows(path, missing_ok=False):
+        if path in open_files:
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        unlink(path, missing_ok=missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", as_on_windows)
+    close = os.close
+    monkeypatch.setattr(os, "close", lambda file: (open_files.clear(), close(file))[1])
+    with lock:
+        lock.remove()
+        assert (tmp_path / "1.lock").exists()
+    assert not (tmp_path / "1.lock").exists()
+
+
+def test_without_locks_of_any_kind_work_goes_on(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(locking, "fcntl", None)
+    monkeypatch.setattr(locking, "msvcrt", None)
+    with ShardLock(tmp_path / "1.lock") as lock:
+        assert lock.held
+
+
+# ---- names of files ------------------------------------------------------------------------------------------------
+
+
+def is_savable(name: str) -> bool:
+    """Whether Windows can save a file of this name, by the rules that Microsoft states for names."""
+    reserved = PureWindowsPath(name).is_reserved() or name.split(".")[0].casefold() in DEVICE_NAMES
+    return not (reserved or set(name) & set('<>:"/\\|?*') or name.endswith((".", " ")) or len(name) > 200)
+
+
+@given(st.text(max_size=300), st.sampled_from([".json", ".csv"]))
+def test_any_text_gives_a_name_that_any_system_can_save(text, suffix) -> None:
+    for stem in (file_stem(text), hashed_stem(text), *numbered_stems([text, text.upper()])):
+        assert stem
+        assert is_savable(stem + suffix)
+        assert not any(ord(sign) < 32 for sign in stem)
+
+
+@given(st.lists(st.sampled_from(["Norton", "norton", "NORTON", "a/b", "a:b", "CON", "con", "x.", "x", "norton-2"])))
+def test_names_differ_by_more_than_case(texts) -> None:
+    names = numbered_stems(texts)
+    assert len({name.casefold() for name in names}) == len(texts)
+    hashed = [hashed_stem(text, others=texts) for text in dict.fromkeys(texts)]
+    assert len({name.casefold() for name in hashed}) == len(hashed)
+
+
+@pytest.mark.parametrize("name", ["CON", "nul", "Aux", "COM1", "lpt9", "con.1", "PRN.2024"])
+def test_names_of_devices_are_changed(name) -> None:
+    assert not is_savable(name + ".csv")
+    assert is_savable(file_stem(name) + ".csv")
+
+
+def test_tests_of_difficult_names_are_written_apart(tmp_path) -> None:
+    from creepkit.cli.read import _write
+
+    history = ck.read_histories(ck.example_data("planted creep curves"))[0]
+    from dataclasses import replace
+
+    names = ["CON", "bar A", "bar a", "Prüfling 3", "a/b:c"]
+    paths = _write([replace(history, name=name) for name in names], tmp_path / "out")
+    assert len({path.name.casefold() for path in paths}) == len(names)
+    assert all(is_savable(path.name) for path in paths)
+    assert len(list((tmp_path / "out").iterdir())) == len(names)
+
+
+def test_long_paths_are_written_and_read(tmp_path) -> None:
+    folder = tmp_path.joinpath(*itertools.repeat("f" * 60, 8))  # beyond the 260 signs of old Windows
+    folder.mkdir(parents=True)
+    run = ck.read_histories(ck.example_data("planted creep curves"))[0]
+    path = ck.write_history(run, folder / f"{'n' * 80}.csv")
+    assert len(str(path)) > 500
+    assert ck.read_histories(path)[0].times.size == run.times.size
+
+
+# ---- terminals -----------------------------------------------------------------------------------------------------
+
+ONCE_EACH = (
+    ["--help"],
+    ["laws"],
+    ["specimens"],
+    ["plugins"],
+    ["laws", "combined"],
+    ["export", "norton", "--to", "list"],
+)
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+def test_what_is_printed_fits_into_old_encodings(encoding, tmp_path) -> None:
+    program = (
+        "import json, sys\nfrom creepkit.cli.app import app\n"
+        f"for words in {ONCE_EACH!r}:\n"
+        "    try:\n        app(words)\n    except SystemExit as end:\n        assert not end.code, (words, end.code)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"},
+        cwd=tmp_path,
+        capture_output=True,
+    )
+    assert done.returncode == 0, done.stderr.decode(encoding, "replace")
+    assert done.stdout.decode(encoding)
+
+
+def test_every_text_file_is_opened_in_a_stated_encoding() -> None:
+    """The encoding of Windows is another one by default."""
+    wrong = []
+    for module in source_tree.modules():
+        for node in ast.walk(source_tree.tree(module)):
+            if not isinstance(node, ast.Call):
+                continue
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            named = {keyword.arg for keyword in node.keywords}
+            if (
+                name in ("read_text", "write_text")
+                and "encoding" not in named
+                and not node.args[name == "write_text" :]
+            ):
+                wrong.append((module, node.lineno))
+            if name == "open" and isinstance(node.func, ast.Name) and "encoding" not in named:
+                modes = [a.value for a in node.args[1:2] if isinstance(a, ast.Constant)]
+                wrong += [(module, node.lineno)] if not (modes and "b" in modes[0]) else []
+    assert not wrong
+
+
+# ---- what may be missing -------------------------------------------------------------------------------------------
+
+
+def extras() -> dict[str, list[str]]:
+    """{extra: modules} of pyproject.toml; those for developers apart."""
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    wanted = project["optional-dependencies"]
+    return {name: [one.partition(">")[0] for one in wanted[name]] for name in wanted if name != "dev"}
+
+
+def spreadsheet(tmp_path):
+    path = tmp_path / "curves.xlsx"
+    path.write_bytes(b"PK\x03\x04")
+    return lambda: ck.read_histories(path)
+
+
+def posterior(tmp_path):
+    from creepkit.inverse.uncertainty.posterior import sample_posterior
+
+    return lambda: sample_posterior(None)  # type: ignore[arg-type]
+
+
+def cluster(tmp_path):
+    from creepkit.jobs.worker_pools import ClusterWorkers
+
+    class Job:
+        def on_one_thread(self):
+            return self
+
+    return lambda: ClusterWorkers(Job(), "tcp://127.0.0.1:1").__enter__()
+
+
+USES = {"excel": spreadsheet, "mcmc": posterior, "cluster": cluster}
+
+
+def test_every_extra_is_tried() -> None:
+    assert USES.keys() == extras().keys()
+
+
+@pytest.mark.parametrize("extra", sorted(USES))
+def test_an_extra_that_is_missing_is_named_in_a_sentence(extra, tmp_path, monkeypatch) -> None:
+    use = USES[extra](tmp_path)
+    for module in extras()[extra]:
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(ck.errors.CreepkitError, match=rf"pip install 'creepkit\[{extra}\]'"):
+        use()
+
+
+def test_only_declared_packages_are_imported() -> None:
+    """What the sources import is of the standard library, declared, or of an extra."""
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {one.partition(">")[0].replace("-", "_") for one in project["dependencies"]}
+    declared |= {module for modules in extras().values() for module in modules}
+    imported = set()
+    for module in source_tree.modules():
+        for node in ast.walk(source_tree.tree(module)):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
+            imported |= {name.partition(".")[0] for name in names}
+    outside = imported - set(sys.stdlib_module_names) - {"creepkit", "__future__"}
+    indirect = {"click": "typer", "markupsafe": "jinja2", "mpmath": "sympy", "pydantic_core": "pydantic"}
+    assert {indirect.get(name, name) for name in outside} <= declared
