@@ -112,7 +112,8 @@ def _readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
         entries = sorted(path.iterdir())
     except OSError as error:
         raise HistoryError(f"{path}: the folder cannot be read ({error.strerror}); name another one") from None
-    files = [file for file in entries if file.is_file() and any(accepts_path(r, file) for r in readers)]
+    visible = [file for file in entries if file.is_file() and file.name[0] != "."]
+    files = [file for file in visible if any(accepts_path(reader, file) for reader in readers)]
     return files or [path]
 
 

@@ -141,7 +141,7 @@ def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_
 
 
 def _files_below(file: StudyFile, folder: Path) -> Iterator[Path]:
-    """All files of a folder; StudyError where a folder in it cannot be read, for its files would be left out."""
+    """All files of a folder but hidden ones; StudyError where a folder in it cannot be read, for its files would be left out."""
 
     def refuse(error: OSError) -> None:
         raise file.error(
@@ -149,8 +149,9 @@ def _files_below(file: StudyFile, folder: Path) -> Iterator[Path]:
             f"folder {error.filename} cannot be read ({error.strerror}); make it readable, or move it",
         )
 
-    for parent, _, names in os.walk(folder, onerror=refuse):
-        yield from (Path(parent, name) for name in names)
+    for parent, folders, names in os.walk(folder, onerror=refuse):
+        folders[:] = [name for name in folders if name[0] != "."]
+        yield from (Path(parent, name) for name in names if name[0] != ".")
 
 
 def _relative(path: Path, base: Path) -> str:
@@ -295,7 +296,8 @@ def _groups(file: StudyFile, histories: Sequence[History]) -> list[TestGroup]:
         )
     by_value: dict[str, list[History]] = {}
     for history in histories:
-        value = getattr(history, label) if label in ("alloy", "specimen") else history.labels.get(label, "")
+        stated = getattr(history, label) if label in ("alloy", "specimen") else ""
+        value = stated or history.labels.get(label, "")
         by_value.setdefault(value or NOT_STATED, []).append(history)
     if len(by_value) == 1 and (part is None or part.group_by is None):
         return [TestGroup("", tuple(histories))]

@@ -150,13 +150,17 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
     )
 
 
+def _visible_files(folder: Path) -> list[Path]:
+    return sorted(one for one in folder.iterdir() if one.is_file() and one.name[0] != ".")
+
+
 def _readable(folder: Path, path: Path, reader: str | None) -> tuple[list[str], list[History], list[str]]:
     """Patterns of the files that hold tests, these tests, and a sentence for each other file."""
     import creepkit as ck
 
     try:
         whole = ck.read_histories([folder], reader)
-        files = [one for one in sorted(folder.iterdir()) if one.is_file() and one != path]
+        files = [one for one in _visible_files(folder) if one != path]
         sources = {Path(history.source.partition(" (")[0]).name for history in whole}
         if not all(file.name in sources for file in files if file.suffix == _suffix(sources)):
             return ["."], whole, []
@@ -166,7 +170,7 @@ def _readable(folder: Path, path: Path, reader: str | None) -> tuple[list[str], 
     tests: list[History] = []
     read: list[Path] = []
     problems: list[str] = []
-    for file in sorted(one for one in folder.iterdir() if one.is_file() and one != path):
+    for file in (one for one in _visible_files(folder) if one != path):
         try:
             found = ck.read_histories([file], reader)
         except CreepkitError as error:
