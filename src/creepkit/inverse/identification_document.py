@@ -141,6 +141,10 @@ def read_identification(path: str | Path) -> Identification:
     return identification_from_json(read_json(Path(path), IDENTIFICATION.kind), str(path))
 
 
+COVARIANCE_ROUNDING = 1e-6
+"""By which a correlation may be asymmetric, or its eigenvalues below zero: inverses of nearly singular matrices are so."""
+
+
 def identification_from_json(data: Any, source: str = "identification") -> Identification:
     """Rebuild an identification from JSON-able data; FitError, in one sentence, says what is wrong with other data."""
     content = check_heading(data, source, IDENTIFICATION)
@@ -160,7 +164,9 @@ def identification_from_json(data: Any, source: str = "identification") -> Ident
     covariance = fit.covariance.reshape(size, size)
     scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     correlation = covariance / np.maximum(np.outer(scale, scale), 1e-300)
-    if size and (not np.allclose(covariance, covariance.T, rtol=1e-8) or np.linalg.eigvalsh(correlation)[0] < -1e-8):
+    # Of the correlation: variances of well and of hardly determined parameters lie many powers of ten apart.
+    asymmetry = np.max(np.abs(correlation - correlation.T), initial=0.0)
+    if size and (asymmetry > COVARIANCE_ROUNDING or np.linalg.eigvalsh(correlation)[0] < -COVARIANCE_ROUNDING):
         raise FitError(f"{source}: covariance is not symmetric and positive semi-definite; the file is damaged")
     if fit.rate_scatter is not None:
         unknowns, tests = size + len(fit.nuisances), [m.name for m in fit.tests]

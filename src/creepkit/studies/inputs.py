@@ -141,7 +141,7 @@ def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_
 
 
 def _files_below(file: StudyFile, folder: Path) -> Iterator[Path]:
-    """All files of a folder but hidden ones; StudyError where a folder in it cannot be read, for its files would be left out."""
+    """All visible files of a folder; StudyError where a folder in it cannot be read, for its files would be missing."""
 
     def refuse(error: OSError) -> None:
         raise file.error(
