@@ -26,7 +26,7 @@ from scipy.ndimage import gaussian_filter
 
 import creepkit as ck
 from creepkit.extraction.noise import patch_numbers
-from creepkit.fem.mesh import surface_interpolation
+from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.records import Frames, SurfacePoints
 from creepkit.specimens.bulge.camera_points import observe_surface
 

@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter
 
 import creepkit as ck
 from creepkit.arrays import Floats
-from creepkit.fem.mesh import surface_interpolation
+from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.records import CameraFrame, Frames
 from creepkit.specimens.bulge.observation import Observation
 

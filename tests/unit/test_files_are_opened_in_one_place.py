@@ -34,6 +34,7 @@ ALLOWED = {
     "creepkit.kernels.compilation open": "the cache of compiled laws, whose owner is checked on opening",
     "creepkit.inverse.kept_fits read_bytes": "sources of the package",
     "creepkit.specimens.reduced_order_training read_bytes": "sources of the package",
+    "creepkit.cli.failures open": "the null device, in place of a stream that is closed",
     "creepkit.cli.demo read_text": "example data of the package",
     "creepkit.jobs.worker_process fdopen": "the output of a worker, a pipe to its parent",
     "creepkit.jobs.shard_progress open": "a lock that creepkit makes, written and never read",

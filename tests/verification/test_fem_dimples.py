@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from creepkit.fem.mesh import surface_interpolation
 from creepkit.fem.simulation import LoadHistory, Simulation
+from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.language import CreepLaw
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from creepkit.fem.mesh import discretize, surface_interpolation
+from creepkit.fem.mesh import discretize
 from creepkit.fem.mesh_files import read_input_deck, read_mesh
+from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING

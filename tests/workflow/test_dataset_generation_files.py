@@ -66,6 +66,7 @@ def test_a_target_that_is_something_else_is_refused_before_any_work(tmp_path, wh
     with pytest.raises(DatasetError, match=r"a\.h5: not an HDF5 file"):
         run_here(to)
     assert to.read_text() == "precious"
+    to.unlink()
     storage.write_dataset(whole, to)
     with pytest.raises(
         DatasetError, match=r"holds another data set \(there and here seed is 0 and 1\); choose another name"
@@ -118,13 +119,13 @@ def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
 @pytest.mark.parametrize(
     ("how", "message"),
     [
-        ({"samples": 0}, "samples is 0; ask for a whole number, at least one"),
-        ({"samples": 2.5}, "samples is 2.5; ask for a whole number"),
+        ({"samples": 0}, "samples is 0; allowed are whole numbers from 1 to"),
+        ({"samples": 2.5}, "samples is 2.5; allowed are whole numbers from 1 to"),
         ({"seed": 1.5}, "seed is 1.5; allowed are whole numbers from zero on"),
         ({"seed": -1}, "seed is -1; allowed"),
         ({"samples": None}, "say either how many accepted samples"),
         ({"draws": 5}, "say either how many accepted samples"),
-        ({"workers": 0}, "workers is 0; allowed are whole numbers above zero"),
+        ({"workers": 0}, "workers is 0; allowed are whole numbers from 1 to 1024"),
         ({"part": (3, 2)}, "part 3/2 is none; allowed are 1/N to N/N"),
         ({"cluster": "scheduler"}, "'scheduler' is no address of a dask scheduler; write tcp://host:port"),
         ({"cluster": "tcp://127.0.0.1:9"}, "no dask scheduler answers at tcp://127.0.0.1:9"),

@@ -114,5 +114,9 @@ def _check_numbers(
 def option_name(name: str, parameters: Mapping[str, inspect.Parameter]) -> str:
     """How a parameter of a command is written on the command line."""
     info = _declared(parameters[name].annotation, ParameterInfo)
-    words = [word for word in getattr(info, "param_decls", None) or () if word.startswith("--")]
+    declared = (
+        getattr(info, "default", None),
+        *(getattr(info, "param_decls", None) or ()),
+    )  # the first is the default to typer
+    words = [word for word in declared if isinstance(word, str) and word.startswith("--")]
     return words[0] if words else f"--{name.replace('_', '-')}"

@@ -34,7 +34,7 @@ class ${class_name}Specimen(ck.PerTest):
 
     name = "$name"
     title = "$title"
-    outputs = (ck.OutputPath("elongation", "length", noise=0.002),)  # mm
+    outputs = (ck.Output("elongation", "length", noise=0.002),)  # mm
     loads = (ck.Load("force", "force"),)  # N
 
     def one(self, law, values, history, nuisances):

@@ -95,12 +95,16 @@ def create_hdf5(path: Path) -> Iterator[h5py.File]:
 
 
 @contextmanager
-def open_hdf5(path: Path, kind: FileKind) -> Iterator[h5py.File]:
-    """A file open for reading; the error of `kind` when there is none, it is no HDF5, damaged, or points elsewhere."""
+def open_hdf5(path: Path, kind: FileKind, *, bounded: bool = True) -> Iterator[h5py.File]:
+    """A file open for reading; the error of `kind` when there is none, it is no HDF5, damaged, or points elsewhere.
+
+    bounded : whether an array that says to be larger than its bytes can be is refused; False where the caller looks at
+        the sizes of the arrays that it reads, and leaves others alone.
+    """
     check_readable(path, kind)
     try:
         with h5py.File(path, "r") as file:
-            _check_links(file, path, kind)
+            _check_links(file, path, kind, bounded)
             yield file
     except MemoryError:
         raise kind.error(f"{path}: holds more than there is memory for") from None
@@ -117,7 +121,7 @@ def write_names(group: h5py.Group, name: str, words: tuple[str, ...]) -> None:
     group.attrs.create(name, np.array(words, dtype=object), dtype=h5py.string_dtype())
 
 
-def _check_links(file: h5py.File, path: Path, kind: FileKind) -> None:
+def _check_links(file: h5py.File, path: Path, kind: FileKind, bounded: bool) -> None:
     """Raise the error of `kind` for a file that would have HDF5 open other files, or that has no end."""
     groups: list[h5py.Group] = [file]
     visited, most = 0, raised(MAXIMUM_OBJECTS)
@@ -138,15 +142,21 @@ def _check_links(file: h5py.File, path: Path, kind: FileKind) -> None:
             if isinstance(item, h5py.Group):
                 groups.append(item)
             elif isinstance(item, h5py.Dataset):
-                _check_array(item, path, kind)
+                _check_place(item, path, kind)
+                if bounded:
+                    _check_size(item, path, kind)
 
 
-def _check_array(array: h5py.Dataset, path: Path, kind: FileKind) -> None:
-    """Raise the error of `kind` for an array that lies in other files, or says to be larger than its bytes can be."""
+def _check_place(array: h5py.Dataset, path: Path, kind: FileKind) -> None:
+    """Raise the error of `kind` for an array that lies in other files."""
     if array.external or array.is_virtual:
         raise kind.error(
             f"{path}: the array '{quoted(array.name)}' lies in other files, which are not opened; {kind.advice}"
         )
+
+
+def _check_size(array: h5py.Dataset, path: Path, kind: FileKind) -> None:
+    """Raise the error of `kind` for an array that says to be larger than its bytes can be."""
     stored = array.id.get_storage_size()
     allowed = stored * LARGEST_COMPRESSION if array.chunks else stored
     if array.nbytes > max(allowed, _ALWAYS_ALLOWED_BYTES):

@@ -142,7 +142,7 @@ def read_identification(path: str | Path) -> Identification:
 
 
 COVARIANCE_ROUNDING = 1e-6
-"""By which a correlation may be asymmetric, or have eigenvalues below zero, as inverses of near singular matrices do."""
+"""By which a correlation may be asymmetric, or have eigenvalues below zero; inverses of near singular matrices do."""
 
 
 def identification_from_json(data: Any, source: str = "identification") -> Identification:

@@ -98,6 +98,8 @@ def test_what_cannot_be_shown_is_one_sentence(histories, tmp_path):
     with pytest.raises(FitError, match="'bulg'"):
         page_contents("norton", specimen="bulg")
     ck.interactive_page("norton", tmp_path / "page.html")
+    ck.interactive_page("norton", tmp_path / "page.html")
+    (tmp_path / "page.html").write_text("changed since")
     with pytest.raises(ExportError, match="creepkit did not write it"):
         ck.interactive_page("norton", tmp_path / "page.html")
 

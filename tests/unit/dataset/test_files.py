@@ -335,7 +335,7 @@ def enormous(file):
         (lambda file: file["time_grid"].attrs.__delitem__("relative"), "cannot be read, it seems damaged"),
         (lambda file: file.__setitem__("marks", h5py.ExternalLink("b.h5", "/values")), "is a link to elsewhere"),
         (lambda file: file.__setitem__("marks", h5py.SoftLink("/values")), "is a link to elsewhere"),
-        (lambda file: file.create_dataset("x", (4,), "i4", external="x.bin"), "'x' lies in other files"),
+        (lambda file: file.create_dataset("x", (4,), "i4", external="x.bin"), "'/x' lies in other files"),
         (lambda file: file.__setitem__("failures/again", file["failures"]), "links in a circle"),
         (lambda file: file.__delitem__("time_grid"), "cannot be read, it seems damaged"),
         (lambda file: file.__delitem__("failures"), "cannot be read, it seems damaged"),

@@ -7,7 +7,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
-from creepkit.fem.mesh import surface_interpolation
+from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.records import CameraFrame, Frames
 from helpers.virtual_camera import Dimple, VirtualCamera, simulated_dimple
 

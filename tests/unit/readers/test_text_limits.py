@@ -13,7 +13,10 @@ COLUMNS = ",".join(f"c{k} strain (%)" for k in range(2000))
 REFUSED = {
     "columns": (f"{HEAD}time_h,{COLUMNS}\n0{',0' * 2000}\n", "x.csv:3: number of columns 2001, more than 2000"),
     "line": (f"{HEAD}{FRAMES}{',' * 1_000_001}\n", "x.csv:7: the line has more than 1000000 characters"),
-    "keys": ("".join(f"# label k{k}: 1\n" for k in range(1001)) + FRAMES, "x.csv:1001: number of keys 1001 above"),
+    "keys": (
+        "".join(f"# label k{k}: 1\n" for k in range(1001)) + FRAMES,
+        "x.csv:1001: number of keys above the table 1001",
+    ),
     "list": (HEAD + "".join(f"# zz{k}qq: 1\n" for k in range(900)) + FRAMES, "x.csv:3: unknown key .* and 894 more$"),
     "escape": (f"# name: \x1b[2J\n{HEAD}{FRAMES}", r"x.csv:1: the character U\+001B cannot be printed"),
     "control": (f"{HEAD}# label a: \x9bb\n{FRAMES}", r"x.csv:3: the character U\+009B cannot be printed"),

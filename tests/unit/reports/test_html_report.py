@@ -240,6 +240,7 @@ def test_the_verb_takes_results_and_keeps_existing_files(tmp_path: Path) -> None
     html = path.read_text(encoding="utf-8")
     assert "<title>Bars &amp; rods</title>" in html
     assert 'download="strain-hardening_law.f"' in html
+    path.write_text(html + "<!-- a remark by hand -->", encoding="utf-8")
     with pytest.raises(ReportError, match="creepkit did not write it"):
         ck.report(ranking(), path)
     with pytest.raises(ReportError, match="found int"):

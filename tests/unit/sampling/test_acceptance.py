@@ -45,5 +45,5 @@ def test_the_figure_is_written(tmp_path):
     assert (tmp_path / "rates.png").stat().st_size > 10_000
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
     assert legend[0] == f"in the useful window: {100 * found.useful.mean():.1f} %"
-    with pytest.raises(DatasetError, match="cannot be written"):
+    with pytest.raises(DatasetError, match="is no format of pictures"):
         found.plot(tmp_path / "rates.nonsense")

@@ -241,7 +241,7 @@ def test_compositions_may_lie_beside_the_tests(tmp_path):
         ({"penalty": Sqrt}, "penalty is Sqrt; write L2\\(\\), GroupL2"),
         ({"penalty": Sqrt()}, "a penalty reduces the dense law, and there is none"),
         ({"settings": IdentificationSettings(loss="huber")}, "loss 'huber' does not go with weights 'likelihood'"),
-        ({"workers": 0}, "workers is 0; allowed are whole numbers above zero"),
+        ({"workers": 0}, "workers is 0; allowed are whole numbers from 1 to 1024"),
     ],
 )
 def test_what_is_given_is_checked_before_any_work(how, message):

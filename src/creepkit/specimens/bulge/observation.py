@@ -18,7 +18,11 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, frozen
 from creepkit.errors import SolveError, nearest
-from creepkit.fem.mesh import SurfaceInterpolation, checked_surface_radii, surface_interpolation_with_slopes
+from creepkit.fem.surface_interpolation import (
+    SurfaceInterpolation,
+    checked_surface_radii,
+    surface_interpolation_with_slopes,
+)
 from creepkit.records import Output
 from creepkit.specimens.bulge.outputs import OBSERVED, RING_OUTPUTS
 from creepkit.specimens.bulge.ring_displacements import ProfileOutputs, RingDisplacements, checked_ring_radii

@@ -13,8 +13,8 @@ from creepkit import kernels
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
-from creepkit.fem.mesh import surface_interpolation
 from creepkit.fem.simulation import simulate
+from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.presentation import present
 from creepkit.records import History, Status
 from creepkit.specimens.bulge.finite_elements import solver_settings

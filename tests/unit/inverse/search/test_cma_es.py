@@ -64,7 +64,7 @@ def test_progress_is_told():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (dict(iterations=0), "CMA-ES: iterations is 0; it must be a whole number of at least 1"),
+        (dict(iterations=0), "CMA-ES: iterations is 0; allowed are whole numbers from 1 to"),
         (dict(population=2), "population is 2"),
         (dict(restarts=-1), "restarts is -1"),
         (dict(initial_step_size=0), "initial_step_size is 0 of the width"),

@@ -245,7 +245,7 @@ def test_a_parameter_shared_with_another_term_does_not_rest():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (dict(particles=1), "particles is 1; it must be a whole number of at least 2"),
+        (dict(particles=1), "particles is 1; allowed are whole numbers from 2 to"),
         (dict(iterations=2.5), "iterations is 2.5"),
         (dict(patience=0), "patience is 0"),
         (dict(form="best"), "form is 'best'; allowed are constriction and inertia"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError, SolveError
-from creepkit.fem.mesh import surface_interpolation
+from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.records import SurfacePoints
 from creepkit.specimens.bulge.camera_points import observe_surface, surface_center
 from creepkit.specimens.bulge.field_fit import fit_field, paper_parameters

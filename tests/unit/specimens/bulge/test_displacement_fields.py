@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.fem.mesh import surface_interpolation
+from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.specimens.bulge.field_fit import fit_field
 from creepkit.specimens.bulge.observation import Observation
 from helpers.bulge_profiles import cross, profile_with_apex

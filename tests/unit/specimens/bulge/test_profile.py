@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import SolveError
-from creepkit.fem.mesh import surface_interpolation
+from creepkit.fem.surface_interpolation import surface_interpolation
 
 
 def test_interpolation_is_exact_for_parabolas_and_nodal():
