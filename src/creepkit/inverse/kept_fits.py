@@ -21,6 +21,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.files.json_documents import (
     DocumentFormat,
@@ -41,7 +42,7 @@ from creepkit.records import Predictor
 
 KEPT_FIT = DocumentFormat(
     "creepkit-kept-fit",
-    1,
+    2,
     FileKind("a kept identification", FitError, "remove it: it is made again", maximum_bytes=200_000_000),
     remedy="remove it: it is made again",
 )
@@ -67,7 +68,36 @@ def code_fingerprint() -> str:
     return digest.hexdigest()[:16]
 
 
-LINEARISED_CODEC = RecordCodec(default_range=ANY_NUMBER)
+PLAIN = RecordCodec(default_range=ANY_NUMBER)
+
+
+def kept_to_json(fit: Identification) -> dict[str, Any]:
+    """An identification with what files of identifications leave out and rankings need, as JSON-able data."""
+    linearised = None if fit.linearised is None else PLAIN.to_json(fit.linearised)
+    changes = [PLAIN.to_json(effect.residual_change) for effect in fit.unmodelled]
+    return {"identification": identification_to_json(fit), "linearised": linearised, "residual_changes": changes}
+
+
+def kept_from_json(data: Any, source: str) -> Identification:
+    """The identification of kept_to_json(), without tests and predictor; FitError or RecordError for other data."""
+    problem = "it is no object" if not isinstance(data, dict) else check_keys(data, KEPT_PARTS, "identification")
+    if problem:
+        raise RecordError(problem)
+    fit = identification_from_json(data["identification"], source)
+    stored = data["linearised"]
+    linearised = None if stored is None else PLAIN.from_json(LinearisedProblem, stored)
+    changes = PLAIN.from_json(list[Floats], data["residual_changes"], "residual_changes")
+    if len(changes) != len(fit.unmodelled):
+        raise RecordError("residual_changes are not those of the unmodelled effects")
+    unmodelled = tuple(
+        # JSON holds no shape of empty arrays
+        replace(effect, residual_change=change) if change.size else effect
+        for effect, change in zip(fit.unmodelled, changes, strict=True)
+    )
+    return replace(fit, linearised=linearised, unmodelled=unmodelled)
+
+
+KEPT_PARTS = ("identification", "linearised", "residual_changes")
 
 
 @dataclass
@@ -90,21 +120,15 @@ class FitFolder:
         """The identification of a key, as it was when it was made; None where there is none that can be read."""
         try:
             content = check_heading(read_json(self.path(key), KEPT_FIT.kind), str(self.path(key)), KEPT_FIT)
-            if check_keys(content, ("identification", "linearised"), "kept identification"):
-                return None
-            fit = identification_from_json(content["identification"], str(self.path(key)))
-            stored = content["linearised"]
-            linearised = None if stored is None else LINEARISED_CODEC.from_json(LinearisedProblem, stored)
+            fit = kept_from_json(content, str(self.path(key)))
         except (FitError, RecordError):
             return None
-        return replace(fit, histories=tuple(histories), predictor=predictor, linearised=linearised)
+        return replace(fit, histories=tuple(histories), predictor=predictor)
 
     def save(self, key: str, fit: Identification) -> None:
         """Write an identification, whole or not at all."""
-        linearised = None if fit.linearised is None else LINEARISED_CODEC.to_json(fit.linearised)
-        content = {"identification": identification_to_json(fit), "linearised": linearised}
         self.folder.mkdir(parents=True, exist_ok=True)
-        write_json({**KEPT_FIT.heading, **content}, self.path(key), KEPT_FIT.kind, internal=True)
+        write_json({**KEPT_FIT.heading, **kept_to_json(fit)}, self.path(key), KEPT_FIT.kind, internal=True)
 
 
 Identify = TypeVar("Identify", bound=Callable[..., Identification])

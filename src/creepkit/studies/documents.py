@@ -24,9 +24,8 @@ from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError, Va
 from creepkit.files.writing import write_bytes
 from creepkit.inverse.fingerprints import short_hash
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
-from creepkit.inverse.kept_fits import LINEARISED_CODEC, code_fingerprint, history_digest
-from creepkit.inverse.variance_components import LinearisedProblem
+from creepkit.inverse.identification_document import LAW_CODEC
+from creepkit.inverse.kept_fits import code_fingerprint, history_digest, kept_from_json, kept_to_json
 from creepkit.language import CreepLaw, Elastic
 from creepkit.records import (
     History,
@@ -46,7 +45,7 @@ FITS_FOLDER = "fits"
 
 STAGE_RESULT = DocumentFormat(
     "creepkit-stage-result",
-    1,
+    2,
     FileKind("a result of a stage", StudyError, "remove it: it is made again", maximum_bytes=500_000_000),
     remedy="remove it: it is made again",
 )
@@ -107,33 +106,23 @@ class ResultCodec:
             return planned_from_json(data)
 
         def fit_from_json(data: Any, source: str) -> Identification:
-            problem = check_keys(data, ("identification", "linearised"), "identification")
-            if problem:
-                raise StudyError(problem)
-            fit = identification_from_json(data["identification"], source)
-            stored = data["linearised"]
-            linearised = None if stored is None else LINEARISED_CODEC.from_json(LinearisedProblem, stored)
+            fit = kept_from_json(data, source)
             names = [one.name for one in fit.tests]
             if not all(name in by_name for name in names):
                 raise StudyError("its tests are not those of the study")
             tests = tuple(by_name[name] for name in names)
-            return replace(fit, histories=tests, predictor=fit.predictor or self.predictor, linearised=linearised)
+            return replace(fit, histories=tests, predictor=fit.predictor or self.predictor)
 
         values: dict[Any, ValueCodec] = {
             NoiseEstimate: ValueCodec(_noise_to_json, _noise_from_json),
             CreepLaw: LAW_CODEC,
             History: ValueCodec(to_json, from_json),
-            Identification: ValueCodec(_fit_to_json, fit_from_json),
+            Identification: ValueCodec(kept_to_json, fit_from_json),
         }
         from creepkit.inverse.selection.challenges import Challenge
 
         omitted: dict[type, tuple[str, ...]] = {Extraction: ("history",)}
         return RecordCodec(omitted, values=values, names={"Challenge": Challenge}, default_range=ANY_NUMBER)
-
-
-def _fit_to_json(fit: Identification) -> dict[str, Any]:
-    linearised = None if fit.linearised is None else LINEARISED_CODEC.to_json(fit.linearised)
-    return {"identification": identification_to_json(fit), "linearised": linearised}
 
 
 def _noise_to_json(noise: NoiseEstimate) -> dict[str, Any]:
