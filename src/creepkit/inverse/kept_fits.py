@@ -33,6 +33,7 @@ from creepkit.files.json_documents import (
 )
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError
+from creepkit.files.writing import is_foreign
 from creepkit.inverse.composite_predictor import predictors_for_law
 from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.identification import Identification
@@ -104,12 +105,13 @@ KEPT_PARTS = ("identification", "linearised", "residual_changes")
 class FitFolder:
     """Identifications as files of a folder, and how many of them were made and read since.
 
-    keys : of those made or read, in their order.
+    altered : how many were not as they were written, and so not read. keys : of those made or read, in their order.
     """
 
     folder: Path
     made: int = 0
     read: int = 0
+    altered: int = 0
     keys: list[str] = field(default_factory=list)
 
     def path(self, key: str) -> Path:
@@ -117,7 +119,10 @@ class FitFolder:
         return self.folder / f"{key}.json"
 
     def load(self, key: str, histories: Any, predictor: Predictor) -> Identification | None:
-        """The identification of a key, as it was when it was made; None where there is none that can be read."""
+        """The identification of a key, as it was when it was made; None where there is none."""
+        if is_foreign(self.path(key)):
+            self.altered += 1
+            return None
         try:
             content = check_heading(read_json(self.path(key), KEPT_FIT.kind), str(self.path(key)), KEPT_FIT)
             fit = kept_from_json(content, str(self.path(key)))
@@ -128,7 +133,7 @@ class FitFolder:
     def save(self, key: str, fit: Identification) -> None:
         """Write an identification, whole or not at all."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        write_json({**KEPT_FIT.heading, **kept_to_json(fit)}, self.path(key), KEPT_FIT.kind, internal=True)
+        write_json({**KEPT_FIT.heading, **kept_to_json(fit)}, self.path(key), KEPT_FIT.kind, force=True)
 
 
 Identify = TypeVar("Identify", bound=Callable[..., Identification])
