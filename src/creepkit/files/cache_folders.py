@@ -93,22 +93,8 @@ def check_own(path: Path, status: os.stat_result) -> None:
         return
     if status.st_uid not in (os.geteuid(), 0):
         raise SharedFolderError(f"{path} belongs to another user")
-    is_open_to_group = status.st_mode & stat.S_IWGRP and not _is_own_group(status.st_gid)
-    if is_open_to_group or status.st_mode & stat.S_IWOTH:
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         raise SharedFolderError(f"{path} can be written by other users")
-
-
-@cache
-def _is_own_group(number: int) -> bool:
-    """Whether a group is that of one user alone, ours: many systems give each user one, and files that it may write."""
-    try:
-        import grp
-        import pwd
-
-        user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(number)
-    except (ImportError, KeyError):
-        return False
-    return user.pw_gid == number and group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name}
 
 
 def is_marked(folder: Path) -> bool:

@@ -179,18 +179,3 @@ def test_the_temporary_folder_goes_with_its_process(tmp_path: Path) -> None:
     assert done.stdout == "True\n"
     assert done.stderr.count("CacheWarning") == 1
     assert list((tmp_path / "temporary").iterdir()) == []
-
-
-@OWNERS
-def test_a_group_of_one_user_alone_may_write(tmp_path: Path) -> None:
-    """As the folders of many systems have it, whose users begin with umask 002."""
-    import grp
-    import pwd
-
-    user = pwd.getpwuid(os.geteuid())
-    group = grp.getgrgid(user.pw_gid)
-    if group.gr_name != user.pw_name or set(group.gr_mem) - {user.pw_name}:
-        pytest.skip("this user has no group alone")
-    assert cache_folder("kernels") is not None
-    (tmp_path / ".cache" / "creepkit").chmod(0o770)
-    assert cache_folder("kernels") == tmp_path / ".cache" / "creepkit" / "kernels"
