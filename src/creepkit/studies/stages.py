@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.fingerprints import predictor_fingerprint
@@ -39,18 +39,7 @@ StageKind = Literal[
 ]
 
 
-STAGE_KINDS: tuple[StageKind, ...] = (
-    "extraction",
-    "record",
-    "quality",
-    "identification",
-    "temperature",
-    "rupture",
-    "forecast",
-    "design",
-    "export",
-    "report",
-)
+STAGE_KINDS: tuple[StageKind, ...] = get_args(StageKind)
 """In the order in which they are made; `creepkit run --only` takes these names."""
 
 
