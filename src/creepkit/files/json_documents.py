@@ -56,9 +56,9 @@ def as_read_back(data: Any) -> Any:
     return json.loads(json.dumps(data))
 
 
-def write_json(data: Any, path: Path, kind: FileKind, *, internal: bool = False) -> Path:
-    """Write JSON-able data, whole or not at all; internal : in a folder that creepkit keeps for itself."""
-    return write_text(json_text(data), path, kind.error, internal=internal)
+def write_json(data: Any, path: Path, kind: FileKind, *, force: bool = False, internal: bool = False) -> Path:
+    """Write JSON-able data, whole or not at all; force, internal : as files.writing.write_text() takes them."""
+    return write_text(json_text(data), path, kind.error, force=force, internal=internal)
 
 
 def read_json(path: Path, kind: FileKind) -> Any:

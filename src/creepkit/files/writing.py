@@ -5,8 +5,7 @@ folder, RECORD, a line `SHA256  NAME` for each content as `sha256sum` prints it:
 not in it. Any other file is replaced by force alone. The list is ours when it is a regular file of our user; without
 it nothing is lost: a file is then taken for a foreign one.
 
-Files in folders that creepkit keeps for itself (shards, kept results, caches) are `internal`: always replaced, and
-listed nowhere.
+Files in folders that creepkit keeps for itself (shards, caches) are `internal`: always replaced, and listed nowhere.
 """
 
 from __future__ import annotations
@@ -151,6 +150,13 @@ def is_foreign(path: Path) -> bool:
         return path.is_file() and (digest_of(path), path.name) not in _written(path.parent)
     except OSError:
         return True
+
+
+def written_files(folder: Path, pattern: str = "*") -> list[Path]:
+    """Files of a folder, no links, that are as creepkit wrote them."""
+    known = _written(folder)
+    files = (path for path in folder.glob(pattern) if not path.is_symlink() and path.is_file())
+    return [path for path in files if (digest_of(path), path.name) in known]
 
 
 def is_listed(path: Path) -> bool:

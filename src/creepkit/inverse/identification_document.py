@@ -122,7 +122,10 @@ CODEC = RecordCodec(
     values={CreepLaw: LAW_CODEC},
     names={"Sparsity": Sparsity, **dict.fromkeys(("PenaltyPath", "SearchTrace", "LinearisedProblem"), object)},
 )
-"""Of identifications; histories, search trace and linearised problem are not stored; the predictor by its documents."""
+"""Of identifications; histories, search trace, linearised problem and changes of residuals are not stored.
+
+The predictor is, by its documents.
+"""
 
 
 def identification_to_json(fit: Identification) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.files.json_documents import (
     DocumentFormat,
@@ -32,6 +33,7 @@ from creepkit.files.json_documents import (
 )
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError
+from creepkit.files.writing import is_foreign
 from creepkit.inverse.composite_predictor import predictors_for_law
 from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.identification import Identification
@@ -41,7 +43,7 @@ from creepkit.records import Predictor
 
 KEPT_FIT = DocumentFormat(
     "creepkit-kept-fit",
-    1,
+    2,
     FileKind("a kept identification", FitError, "remove it: it is made again", maximum_bytes=200_000_000),
     remedy="remove it: it is made again",
 )
@@ -67,19 +69,49 @@ def code_fingerprint() -> str:
     return digest.hexdigest()[:16]
 
 
-LINEARISED_CODEC = RecordCodec(default_range=ANY_NUMBER)
+PLAIN = RecordCodec(default_range=ANY_NUMBER)
+
+
+def kept_to_json(fit: Identification) -> dict[str, Any]:
+    """An identification with what files of identifications leave out and rankings need, as JSON-able data."""
+    linearised = None if fit.linearised is None else PLAIN.to_json(fit.linearised)
+    changes = [PLAIN.to_json(effect.residual_change) for effect in fit.unmodelled]
+    return {"identification": identification_to_json(fit), "linearised": linearised, "residual_changes": changes}
+
+
+def kept_from_json(data: Any, source: str) -> Identification:
+    """The identification of kept_to_json(), without tests and predictor; FitError or RecordError for other data."""
+    problem = "it is no object" if not isinstance(data, dict) else check_keys(data, KEPT_PARTS, "identification")
+    if problem:
+        raise RecordError(problem)
+    fit = identification_from_json(data["identification"], source)
+    stored = data["linearised"]
+    linearised = None if stored is None else PLAIN.from_json(LinearisedProblem, stored)
+    changes = PLAIN.from_json(list[Floats], data["residual_changes"], "residual_changes")
+    if len(changes) != len(fit.unmodelled):
+        raise RecordError("residual_changes are not those of the unmodelled effects")
+    unmodelled = tuple(
+        # JSON holds no shape of empty arrays
+        replace(effect, residual_change=change) if change.size else effect
+        for effect, change in zip(fit.unmodelled, changes, strict=True)
+    )
+    return replace(fit, linearised=linearised, unmodelled=unmodelled)
+
+
+KEPT_PARTS = ("identification", "linearised", "residual_changes")
 
 
 @dataclass
 class FitFolder:
     """Identifications as files of a folder, and how many of them were made and read since.
 
-    keys : of those made or read, in their order.
+    altered : how many were not as they were written, and so not read. keys : of those made or read, in their order.
     """
 
     folder: Path
     made: int = 0
     read: int = 0
+    altered: int = 0
     keys: list[str] = field(default_factory=list)
 
     def path(self, key: str) -> Path:
@@ -87,24 +119,21 @@ class FitFolder:
         return self.folder / f"{key}.json"
 
     def load(self, key: str, histories: Any, predictor: Predictor) -> Identification | None:
-        """The identification of a key, as it was when it was made; None where there is none that can be read."""
+        """The identification of a key, as it was when it was made; None where there is none."""
+        if is_foreign(self.path(key)):
+            self.altered += 1
+            return None
         try:
             content = check_heading(read_json(self.path(key), KEPT_FIT.kind), str(self.path(key)), KEPT_FIT)
-            if check_keys(content, ("identification", "linearised"), "kept identification"):
-                return None
-            fit = identification_from_json(content["identification"], str(self.path(key)))
-            stored = content["linearised"]
-            linearised = None if stored is None else LINEARISED_CODEC.from_json(LinearisedProblem, stored)
+            fit = kept_from_json(content, str(self.path(key)))
         except (FitError, RecordError):
             return None
-        return replace(fit, histories=tuple(histories), predictor=predictor, linearised=linearised)
+        return replace(fit, histories=tuple(histories), predictor=predictor)
 
     def save(self, key: str, fit: Identification) -> None:
         """Write an identification, whole or not at all."""
-        linearised = None if fit.linearised is None else LINEARISED_CODEC.to_json(fit.linearised)
-        content = {"identification": identification_to_json(fit), "linearised": linearised}
         self.folder.mkdir(parents=True, exist_ok=True)
-        write_json({**KEPT_FIT.heading, **content}, self.path(key), KEPT_FIT.kind, internal=True)
+        write_json({**KEPT_FIT.heading, **kept_to_json(fit)}, self.path(key), KEPT_FIT.kind, force=True)
 
 
 Identify = TypeVar("Identify", bound=Callable[..., Identification])

@@ -76,7 +76,7 @@ class UnmodelledEffect:
     rate_change : of ln of the rate at the reference point, by one standard deviation in each test.
     like_hardening : the size, in the same unit, that looks most like the hardening of the law itself, NaN where it has
         none, and hardening_correlation : how much like it, in the residuals, 1 for the same.
-    residual_change : (tests, observations) -, of the residuals, by one standard deviation; not saved.
+    residual_change : (tests, observations) -, of the residuals, by one standard deviation; saved in kept fits alone.
     """
 
     kind: str

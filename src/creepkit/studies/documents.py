@@ -21,12 +21,11 @@ from creepkit.files.json_documents import (
 )
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError, ValueCodec
-from creepkit.files.writing import write_bytes
+from creepkit.files.writing import is_foreign, is_listed, write_bytes, written_files
 from creepkit.inverse.fingerprints import short_hash
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
-from creepkit.inverse.kept_fits import LINEARISED_CODEC, code_fingerprint, history_digest
-from creepkit.inverse.variance_components import LinearisedProblem
+from creepkit.inverse.identification_document import LAW_CODEC
+from creepkit.inverse.kept_fits import code_fingerprint, history_digest, kept_from_json, kept_to_json
 from creepkit.language import CreepLaw, Elastic
 from creepkit.records import (
     History,
@@ -41,12 +40,12 @@ from creepkit.records import (
 )
 from creepkit.reports.contents import ExportedFile
 
-FITS_FOLDER = "fits"
+FITS_FOLDER, IDENTIFIED_FOLDER = "fits", "identified"
 
 
 STAGE_RESULT = DocumentFormat(
     "creepkit-stage-result",
-    1,
+    2,
     FileKind("a result of a stage", StudyError, "remove it: it is made again", maximum_bytes=500_000_000),
     remedy="remove it: it is made again",
 )
@@ -107,33 +106,23 @@ class ResultCodec:
             return planned_from_json(data)
 
         def fit_from_json(data: Any, source: str) -> Identification:
-            problem = check_keys(data, ("identification", "linearised"), "identification")
-            if problem:
-                raise StudyError(problem)
-            fit = identification_from_json(data["identification"], source)
-            stored = data["linearised"]
-            linearised = None if stored is None else LINEARISED_CODEC.from_json(LinearisedProblem, stored)
+            fit = kept_from_json(data, source)
             names = [one.name for one in fit.tests]
             if not all(name in by_name for name in names):
                 raise StudyError("its tests are not those of the study")
             tests = tuple(by_name[name] for name in names)
-            return replace(fit, histories=tests, predictor=fit.predictor or self.predictor, linearised=linearised)
+            return replace(fit, histories=tests, predictor=fit.predictor or self.predictor)
 
         values: dict[Any, ValueCodec] = {
             NoiseEstimate: ValueCodec(_noise_to_json, _noise_from_json),
             CreepLaw: LAW_CODEC,
             History: ValueCodec(to_json, from_json),
-            Identification: ValueCodec(_fit_to_json, fit_from_json),
+            Identification: ValueCodec(kept_to_json, fit_from_json),
         }
         from creepkit.inverse.selection.challenges import Challenge
 
         omitted: dict[type, tuple[str, ...]] = {Extraction: ("history",)}
         return RecordCodec(omitted, values=values, names={"Challenge": Challenge}, default_range=ANY_NUMBER)
-
-
-def _fit_to_json(fit: Identification) -> dict[str, Any]:
-    linearised = None if fit.linearised is None else LINEARISED_CODEC.to_json(fit.linearised)
-    return {"identification": identification_to_json(fit), "linearised": linearised}
 
 
 def _noise_to_json(noise: NoiseEstimate) -> dict[str, Any]:
@@ -194,9 +183,26 @@ def key_of(parts: Mapping[str, Any]) -> str:
     return short_hash(canonical_json(parts))
 
 
+def digest_of_result(data: Any) -> str:
+    """Hash of what is kept of a result: the same wherever and whenever it is made, of the same numbers."""
+    parts = ("numbers", "record", "document")
+    return short_hash(canonical_json(_timeless({name: data[name] for name in parts if name in data})))
+
+
+def _timeless(data: Any) -> Any:
+    """Data without the times at which identifications were made."""
+    if isinstance(data, Mapping):
+        items = ((name, _timeless(item)) for name, item in data.items())
+        return {n: {k: v for k, v in i.items() if k != "when"} if n == "provenance" else i for n, i in items}
+    return [_timeless(item) for item in data] if isinstance(data, list | tuple) else data
+
+
 @dataclass(frozen=True)
 class ResultFolder:
     """The folder in which results of stages are kept, one file each.
+
+    What is written there is listed with its hash (see files.writing): what something else wrote or changed is neither
+    read nor removed.
 
     overwrite : whether files beside the study that it has not written may be replaced.
     """
@@ -212,15 +218,15 @@ class ResultFolder:
     @property
     def identified(self) -> Path:
         """Folder of the identifications and rankings as other commands read them."""
-        return self.folder / "identified"
+        return self.folder / IDENTIFIED_FOLDER
 
     def write_identified(self, files: Sequence[ExportedFile]) -> None:
         """Write identifications and rankings, and remove those of an earlier run that there are no longer."""
         if files:
             self.identified.mkdir(parents=True, exist_ok=True)
         for one in files:
-            write_bytes(one.text.encode(), self.identified / one.name, StudyError, internal=True)
-        for path in set(self.identified.glob("*.json")) - {self.identified / one.name for one in files}:
+            write_bytes(one.text.encode(), self.identified / one.name, StudyError, force=True)
+        for path in set(written_files(self.identified, "*.json")) - {self.identified / one.name for one in files}:
             path.unlink(missing_ok=True)
 
     def path(self, stage: str) -> Path:
@@ -229,8 +235,8 @@ class ResultFolder:
 
     def clear(self, *, everything: bool) -> None:
         """Remove files that a process left half written when it died, or all results. No other process may write."""
-        for folder in (self.folder, self.fits):
-            for path in (*folder.glob(".*.part"), *(folder.glob("*.json") if everything else ())):
+        for folder in (self.folder, self.fits, self.identified):
+            for path in (*folder.glob(".*.part"), *(written_files(folder, "*.json") if everything else ())):
                 path.unlink(missing_ok=True)
 
     @property
@@ -246,10 +252,15 @@ class ResultFolder:
 
     def prune_fits(self, asked: Collection[str]) -> int:
         """Remove the identifications but those of these keys; how many were removed."""
-        gone = [path for path in self.fits.glob("*.json") if path.stem not in asked]
+        gone = [path for path in written_files(self.fits, "*.json") if path.stem not in asked]
         for path in gone:
             path.unlink(missing_ok=True)
         return len(gone)
+
+    def is_altered(self, stage: str, *, readable: bool) -> bool:
+        """Whether the file of a stage is not as it was written. readable : whether it can be read for all that."""
+        path = self.path(stage)
+        return is_foreign(path) and (readable or is_listed(path))
 
     def load(self, stage: str, key: str) -> Any:
         """The data of a stage; None where there are none, of another key, or made by other code of this package."""
@@ -271,4 +282,4 @@ class ResultFolder:
     def _save(self, stage: str, key: str, result: Any) -> None:
         self.folder.mkdir(parents=True, exist_ok=True)
         content = {**STAGE_RESULT.heading, "stage": stage, "key": key, "result": result}
-        write_json(content, self.path(stage), STAGE_RESULT.kind, internal=True)
+        write_json(content, self.path(stage), STAGE_RESULT.kind, force=True)

@@ -17,11 +17,21 @@ from creepkit.inverse.kept_fits import COMPUTING, keep_fits
 from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text
 from creepkit.records import History
 from creepkit.reports.contents import ExportedFile, StageFailure
-from creepkit.studies.documents import FITS_FOLDER, ResultCodec, ResultFolder, key_of
+from creepkit.studies.documents import (
+    FITS_FOLDER,
+    IDENTIFIED_FOLDER,
+    ResultCodec,
+    ResultFolder,
+    digest_of_result,
+    key_of,
+)
 from creepkit.studies.numbers import numbers_of
 from creepkit.studies.stages import Stage
 
 RUNNING_LOCK = "running.lock"
+
+
+CHANGED = "was made again, for what was kept of it had been changed since it was written"
 
 
 _log = logging.getLogger("creepkit.studies")
@@ -32,9 +42,9 @@ class StageRecord:
     """How a stage of a run ended.
 
     name, kind, group : of the stage. state : "made", "kept" from an earlier run, "failed", or "left out" where it was
-    not asked for. key : hash of all that decides its result. sentence : why it failed, or
-    cannot be kept. numbers : of its result, which
-    study.lock records.
+    not asked for. key : hash of all that decides its result. sentence : why it failed, cannot be kept, or was made
+    again. numbers : of its result, and sha256 : of all of it, "" where there is none, which study.lock records.
+    needs : the stages that it was made from.
     """
 
     name: str
@@ -44,6 +54,8 @@ class StageRecord:
     key: str
     sentence: str = ""
     numbers: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    sha256: str = ""
+    needs: tuple[str, ...] = ()
 
 
 class LazyResults:
@@ -73,7 +85,7 @@ class LazyResults:
 @contextmanager
 def running_alone(folder: Path) -> Iterator[None]:
     """StudyError where another process is carrying out the same study; the system frees the lock of one that dies."""
-    for one in (folder, folder / FITS_FOLDER):
+    for one in (folder, folder / FITS_FOLDER, folder / IDENTIFIED_FOLDER):
         if one.is_symlink():
             raise StudyError(f"{one}: is a link, and results are kept in a folder of the study's own; remove the link")
     try:
@@ -99,6 +111,8 @@ class Execution:
 
     folder : of kept results. histories : the tests. asked : keys of the identifications that the stages rest on.
     progress : called as progress(task, done, total, note). documents : {stage: what was written of its result}.
+    stated : {stage: what study.lock says of it}. locked : StudyError for a kept result that is not that of the lock.
+    digests : {stage: hash of its result}.
     """
 
     folder: ResultFolder
@@ -108,6 +122,9 @@ class Execution:
     records: list[StageRecord] = field(default_factory=list)
     results: Any = field(default_factory=LazyResults)
     documents: dict[str, Any] = field(default_factory=dict)
+    stated: Mapping[str, Any] = field(default_factory=dict)
+    locked: bool = False
+    digests: dict[str, str] = field(default_factory=dict)
 
     @property
     def failures(self) -> tuple[StageFailure, ...]:
@@ -128,7 +145,7 @@ class Execution:
                     continue
                 lacking = "was not asked for, and nothing of these inputs is kept: the report lacks it"
                 self._record(stage, "left out", key, lacking if read_others else "")
-                self._note_fits(self.folder.load(stage.name, key))
+                self._note_unread(stage, key)
                 continue
             failed = [name for name in stage.needs if name not in self.results]
             if failed:
@@ -140,7 +157,8 @@ class Execution:
                 self._record(stage, "kept", key, numbers=numbers)
                 self._report(stage, 1, 1, "kept from before")
                 continue
-            self._make(stage, key)
+            remark = CHANGED if self.folder.is_altered(stage.name, readable=self._data(stage, key) is not None) else ""
+            self._make(stage, key, remark)
 
     def _key(self, stage: Stage) -> str:
         keys = {one.name: one.key for one in self.records}
@@ -151,7 +169,10 @@ class Execution:
     def _record(
         self, stage: Stage, state: Any, key: str, sentence: str = "", numbers: Mapping[str, Any] | None = None
     ) -> None:
-        self.records.append(StageRecord(stage.name, stage.kind, stage.group, state, key, sentence, numbers or {}))
+        sha256 = self.digests.get(stage.name, "")
+        self.records.append(
+            StageRecord(stage.name, stage.kind, stage.group, state, key, sentence, numbers or {}, sha256, stage.needs)
+        )
 
     def _report(self, stage: Stage, done: int, total: int, note: str) -> None:
         if self.progress is not None:
@@ -165,11 +186,12 @@ class Execution:
 
         A record is read at once, for its file may be damaged; what is no record is made again when it is asked for.
         """
-        data = self.folder.load(stage.name, key)
-        if not isinstance(data, dict) or not isinstance(data.get("numbers"), dict):
+        data = self._data(stage, key)
+        if self._is_altered(stage, key, data) or data is None:
             return None
         numbers: dict[str, Any] = data["numbers"]
         self._note_fits(data)
+        self.digests[stage.name] = digest_of_result(data)
         if stage.document is not None:
             self.documents[stage.name] = data.get("document")
         if stage.record is None:
@@ -185,12 +207,42 @@ class Execution:
         self.results.set(stage.name, result)
         return numbers
 
+    def _data(self, stage: Stage, key: str) -> dict[str, Any] | None:
+        """What the file of a stage holds, where it was made of what its needs are now."""
+        data = self.folder.load(stage.name, self._content_key(stage, key))
+        return data if isinstance(data, dict) and isinstance(data.get("numbers"), dict) else None
+
+    def _content_key(self, stage: Stage, key: str) -> str:
+        """Hash of all that decides a result, the results that it is made from included."""
+        return key_of({"key": key, "needs": [self.digests.get(name, "") for name in stage.needs]})
+
+    def _is_altered(self, stage: Stage, key: str, data: dict[str, Any] | None) -> bool:
+        """Whether a kept result is not the one that was written; under --locked, StudyError for that."""
+        known = self.stated.get(stage.name)
+        known = known if isinstance(known, dict) and known.get("key") == key else {}
+        stated = known.get("sha256") if data is not None else None
+        same = data is not None and stated is not None and digest_of_result(data) == stated
+        altered = not same and self.folder.is_altered(stage.name, readable=data is not None)
+        if self.locked and (altered or (stated is not None and not same)):
+            raise StudyError(
+                f"{self.folder.path(stage.name)}: the study cannot be repeated exactly: what was kept of {stage.name} "
+                "is not what study.lock states; leave --locked out, and it is made again"
+            )
+        return altered
+
+    def _note_unread(self, stage: Stage, key: str) -> None:
+        """Note what the result of a stage that was not asked for rests on, and its hash for those made from it."""
+        data = self._data(stage, key)
+        if data is not None:
+            self._note_fits(data)
+            self.digests[stage.name] = digest_of_result(data)
+
     def _note_fits(self, data: Any) -> None:
         """Note the identifications that a kept result was made from."""
         keys = data.get("fits") if isinstance(data, dict) else None
         self.asked.update(str(key) for key in (keys if isinstance(keys, list) else ()))
 
-    def _make(self, stage: Stage, key: str) -> None:
+    def _make(self, stage: Stage, key: str, remark: str) -> None:
         start = time.monotonic()
         begun: dict[str, float] = {}
 
@@ -201,9 +253,11 @@ class Execution:
             )
             self._report(stage, min(done, total), total, f"{task}{left}")
 
+        self.digests.pop(stage.name, None)
         fits: list[str] = []
+        altered: list[int] = []
         try:
-            result = self._made(stage, tick, fits)
+            result = self._made(stage, tick, fits, altered)
         except Exception as error:  # of a plugin, too: the other stages go on
             what = str(error) if isinstance(error, CreepkitError) else f"{type(error).__name__}: {error}"
             _log.debug("%s failed", stage.name, exc_info=error)
@@ -214,19 +268,32 @@ class Execution:
             raise KeyboardInterrupt
         self.results.set(stage.name, result)
         numbers = numbers_of(stage.kind, result)
-        remark = ""
+        if sum(altered):
+            remark = CHANGED
+        kept: dict[str, Any] = {"numbers": numbers}
         try:
             record = {} if stage.record is None else {"record": self._codec(stage).to_json(result)}
             if stage.document is not None:
                 self.documents[stage.name] = record["document"] = stage.document(result)
-            self.folder.save(stage.name, key, {"numbers": numbers, "fits": fits, **record})
+            kept |= record
+            self.folder.save(stage.name, self._content_key(stage, key), {**kept, "fits": fits})
         except RecordError as error:  # of what a plugin brought
             remark = f"is made again in each run, for it cannot be stored: {' '.join(str(error).split())}"
+        self.digests[stage.name] = digest_of_result(kept)
         self._record(stage, "made", key, remark, numbers)
         self._report(stage, 1, 1, f"done in {duration_text(time.monotonic() - start)}")
 
-    def _made(self, stage: Stage, tick: Callable[[str, int, int], None], fits: list[str] | None = None) -> Any:
-        """The result. fits : to which the keys of the identifications that it rests on are added."""
+    def _made(
+        self,
+        stage: Stage,
+        tick: Callable[[str, int, int], None],
+        fits: list[str] | None = None,
+        altered: list[int] | None = None,
+    ) -> Any:
+        """The result. fits : to which the keys of the identifications that it rests on are added.
+
+        altered : to which the number of kept identifications is added that were not as they were written.
+        """
         with keep_fits(self.folder.fits) as kept:
             try:
                 return stage.make(self.results, tick)
@@ -235,6 +302,8 @@ class Execution:
                 self.asked.update(keys)
                 if fits is not None:
                     fits += keys
+                if altered is not None:
+                    altered.append(kept.altered)
 
 
 def _check_export(stage: Stage, export: ExportedFile) -> None:

@@ -74,7 +74,7 @@ def _stage(record: StageRecord, known: Any) -> Any:
     if record.state == "left out" and isinstance(known, dict) and known.get("key") == record.key:
         return known
     state = {"failed": "failed", "left out": "left out"}.get(record.state, "done")
-    return {"key": record.key, "state": state, "numbers": dict(record.numbers)}
+    return {"key": record.key, "state": state, "numbers": dict(record.numbers), "sha256": record.sha256 or None}
 
 
 def write_lock(content: Any, path: Path) -> Path:
@@ -117,14 +117,23 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
 def changed_results(before: Mapping[str, Any], records: Sequence[StageRecord]) -> list[str]:
     """Numbers that a run gives otherwise than the lock has them, though all that decides them is the same."""
     found = []
+    same = {one.name for one in records if _sha256(before, one.name) in ("", one.sha256)}
     for one in records:
         old = before["stages"].get(one.name)
+        if one.kind == "export" and one.sha256 and one.name not in same and same.issuperset(one.needs):
+            found.append(f"result of {one.name}: its text is another one than the lock states")
         if isinstance(old, dict) and old.get("key") == one.key and one.state in ("made", "kept"):
             found += [
                 f"result of {one.name}: {_change_of(name, a, b)}"
                 for name, a, b in changed_numbers(old.get("numbers", {}), one.numbers)
             ]
     return found
+
+
+def _sha256(lock: Mapping[str, Any], stage: str) -> str:
+    """The hash of a result that a lock states; "" where it states none."""
+    known = lock["stages"].get(stage)
+    return str(known.get("sha256") or "") if isinstance(known, dict) else ""
 
 
 def _change_of(name: str, old: Any, new: Any) -> str:

@@ -27,7 +27,7 @@ def write_page(
     """The result with its report written, unless the same one is there; one that cannot be is a stage that failed."""
     assert file.model.report is not None
     path, lock_path = folder / file.model.report.file, lock_path_of(file, folder)
-    parts = [(one.name, one.state == "failed", one.key, one.sentence) for one in result.stages]
+    parts = [(one.name, one.state == "failed", one.key, one.sha256, _shown_sentence(one)) for one in result.stages]
     exclusions = [(one.test, list(one.frames), one.reason) for one in result.exclusions]
     hashes = [[one.name, one.sha256] for one in result.files] + [["lock", sha256_of(lock_path)]]
     settings = [hashlib.sha256(file.text.encode()).hexdigest(), hashes, exclusions]
@@ -49,6 +49,11 @@ def write_page(
     if progress is not None:
         progress("report", 1, 1, str(path))
     return replace(result, stages=(*result.stages, StageRecord("report", "report", "", "made", key)), report=path)
+
+
+def _shown_sentence(record: StageRecord) -> str:
+    """What a page says of a stage; how a sound result came about it does not."""
+    return record.sentence if record.state in ("failed", "left out") else ""
 
 
 def write_own(kept: ResultFolder, path: Path, text: str, *, own: bool = False) -> None:

@@ -180,7 +180,7 @@ class Study:
         if locked and (before is None or changes):
             what = changes[0] if changes else "there is no lock"
             raise StudyError(f"{lock_path}: the study cannot be repeated exactly: {what}; leave --locked out")
-        execution = Execution(kept, (), progress)
+        execution = Execution(kept, (), progress, stated={} if before is None else before["stages"], locked=locked)
         cameras = CameraStages(self.cameras)
         watched = cameras.stages(self.camera_files, files)
         execution.run(watched, [stage.name for stage in watched])  # whatever is asked for is made of their tests
@@ -196,9 +196,11 @@ class Study:
             if stage.file and stage.name in wanted:  # now, not after all the work
                 check_target(folder / stage.file, StudyError, force=kept.overwrite)
         execution.run(stages, wanted, read_others="report" in kinds)
-        write_lock(lock_of(self.file, self._hash, files, execution.records, before), lock_path)
         if before is not None:
             changes += changed_results(before, execution.records)
+        if locked and changes:
+            raise StudyError(f"{lock_path}: the study cannot be repeated exactly: {changes[0]}; leave --locked out")
+        write_lock(lock_of(self.file, self._hash, files, execution.records, before), lock_path)
         result = StudyResult(
             self.file.model.study.title,
             inputs.groups,
