@@ -11,7 +11,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
 from creepkit.forecasts.bands import band_of_draws
 from creepkit.forecasts.drawn_law import DrawnLaw, drawn_law
-from creepkit.forecasts.draws import SOURCES, LawDraws
+from creepkit.forecasts.draws import SOURCES, LawDraws, has_sampled_draws
 from creepkit.forecasts.measured_test import TestScore, score_test
 from creepkit.forecasts.results import (
     CHOICE_OF_LAW,
@@ -37,6 +37,7 @@ from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.uncertainty.importance_sampling import UNCERTAIN_VERDICTS
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
 from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, is_logarithmic, output_unit
 
@@ -75,7 +76,8 @@ def forecast_test(
         score, problem = _score(drawn, (history, banded), predictor, outputs)
         notes += [problem] if problem else []
     includes = _includes(drawn, best, outputs)
-    return TestForecast(history, outputs, times, includes, _extrapolation(banded, predictor, best), score, tuple(notes))
+    extrapolation, caution = _extrapolation(banded, predictor, best), _caution([one.draws for one in drawn])
+    return TestForecast(history, outputs, times, includes, extrapolation, score, tuple(notes), caution)
 
 
 MOST_TIMES = 300
@@ -246,7 +248,9 @@ def _score(
 def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, OutputForecast]) -> dict[str, str]:
     """{part of the band: its size in words}."""
     fit = best.draws.fit
-    parts = {LAW: "posterior covariance of its parameters, within their bounds"}
+    sampled = has_sampled_draws(best.draws.fit)
+    whence = "samples of the posterior of its parameters" if sampled else "posterior covariance of its parameters"
+    parts = {LAW: f"{whence}, within their bounds"}
     if len(drawn) > 1:
         parts[CHOICE_OF_LAW] = ", ".join(f"{one.draws.fit.law.name} ({one.weight:.2g})" for one in drawn)
     for level, variance in best.own_variances.items():
@@ -336,6 +340,19 @@ def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputFo
             f"its {level} was fitted and creeps {factor:.3g} times as fast as the law says (± {100 * sd:.2g} %)"
         )
     return notes
+
+
+def _caution(laws: Sequence[LawDraws]) -> str:
+    """Why a band may hold what the tests exclude: Gaussian draws of values that they do not determine; else ""."""
+    for draws in laws:
+        open_ = [e.name for e in draws.fit.estimates if e.verdict in UNCERTAIN_VERDICTS]
+        if open_ and not has_sampled_draws(draws.fit):
+            return (
+                f"the band is not that of the tests, and may be far too wide: they do not determine {', '.join(open_)}, "
+                f"and its draws are Gaussian about the values, not compared with the tests; {100 * draws.outside:.0f} % "
+                "of them lay outside the bounds of the law and were left out"
+            )
+    return ""
 
 
 FEW_TESTS = 5

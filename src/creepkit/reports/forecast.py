@@ -36,6 +36,7 @@ def _test_lines(test: TestForecast) -> list[str]:
     lines = [f"{test.name}: {test.history.condition}"]
     lines += [f"  {_end_text(one)}" for one in test.outputs.values()]
     lines += [f"  {_time_text(one, float(test.history.times[-1]))}" for one in test.times]
+    lines += [f"  {test.caution}"] if test.caution else []
     if test.score is not None:
         lines += [f"  {line}" for line in score_lines(test.score)]
     leading = next(iter(test.outputs.values()), None)
@@ -131,6 +132,7 @@ def forecast_rows(forecast: Forecast) -> list[tuple[str, ...]]:
             inside += [f"{t.event}: {_hours(t.measured)}" for t in test.times if math.isfinite(t.measured)]
             measured, explained = "\n".join(inside), f"{100 * test.score.explained:.0f} %"
         end = "" if leading is None else _end_text(leading).replace(" at ", "\nat ", 1)
+        end += f"\n{test.caution}" if test.caution else ""
         rows.append((test.name, test.history.condition, end, times, measured, explained, test.extrapolation or "no"))
     return rows
 
@@ -160,6 +162,7 @@ def _test_to_json(test: TestForecast) -> dict[str, Any]:
         "includes": dict(test.includes),
         "extrapolation": test.extrapolation,
         "notes": list(test.notes),
+        "caution": test.caution,
         "score": None if test.score is None else _score_to_json(test.score),
     }
 

@@ -152,8 +152,8 @@ def positive_semidefinite(covariance: Floats) -> Floats:
     Rounding makes some where the data hardly determine a combination of unknowns.
     """
     sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    scaled = covariance / np.outer(sd, sd)
-    values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    covariance = 0.5 * (covariance + covariance.T)
+    values, vectors = np.linalg.eigh(covariance / np.outer(sd, sd))
     if values[0] >= 0.0:
         return covariance
     repaired = (vectors * np.maximum(values, 0.0)) @ vectors.T
