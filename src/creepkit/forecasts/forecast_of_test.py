@@ -347,10 +347,11 @@ def _caution(laws: Sequence[LawDraws]) -> str:
     for draws in laws:
         open_ = [e.name for e in draws.fit.estimates if e.verdict in UNCERTAIN_VERDICTS]
         if open_ and not has_sampled_draws(draws.fit):
+            outside = f"{100 * draws.outside:.0f} % of them"
             return (
-                f"the band is not that of the tests, and may be far too wide: they do not determine {', '.join(open_)}, "
-                f"and its draws are Gaussian about the values, not compared with the tests; {100 * draws.outside:.0f} % "
-                "of them lay outside the bounds of the law and were left out"
+                f"the band is not that of the tests, and may be far too wide: they do not determine {', '.join(open_)}"
+                f", and its draws are Gaussian about the values, not compared with the tests; {outside} "
+                "lay outside the bounds of the law and were left out"
             )
     return ""
 

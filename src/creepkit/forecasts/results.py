@@ -72,7 +72,7 @@ class TestForecast:
     """The forecast of one test.
 
     outputs : {name: its curve and band}. times : to targets and to rupture. score : of a measured test, else None.
-    includes : what the bands are made of, with sizes. caution : why bands are not those of the tests, "" where they are.
+    includes : what the bands are made of, with sizes. caution : why bands are not those of the tests, or "".
     extrapolation : beyond the fitted ranges, in one sentence, or "".
     """
 
