@@ -9,8 +9,8 @@ by 0.08 between tests of a heat; tests are stopped at a given time (run-outs). A
 and 1e4 and 1e5 h. The table gives the share of sets whose 95 % bounds of the mean hold the planted strength, and the
 mean share of 400 drawn new heats, and of 400 drawn tests of new heats, whose own strength lies within theirs; wherever
 a bound is missing it counts as infinite. The method that was planted is fitted alone, with its own degree; "average"
-fits all three methods with polynomials of degree 1 to 3, as far as the tests are enough for them. Each row has sets of its own; a
-share of 95 % of n sets has a standard error of 22 % / sqrt(n).
+fits all three methods with polynomials of degree 1 to 3, as far as the tests are enough for them. Each row
+has sets of its own; a share of 95 % of n sets has a standard error of 22 % / sqrt(n).
 """
 
 from __future__ import annotations

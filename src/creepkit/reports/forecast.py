@@ -26,7 +26,9 @@ def forecast_text(forecast: Forecast) -> str:
     """What is forecast by which laws, then a paragraph for each test."""
     names = ", ".join(name if len(forecast.laws) == 1 else f"{name} ({w:.2g})" for name, w in forecast.laws.items())
     names += f" ({forecast.left_out} more of too little weight)" if forecast.left_out else ""
-    lines = [f"by {names}: {100 * forecast.level:g} % bands and intervals of single tests"]
+    lines = [f"by {names}: {100 * forecast.level:g} % bands and intervals of single tests, if the law is right"]
+    if forecast.rejected:
+        lines.append("the law does not explain the tests: this probability is not earned")
     for test in forecast.tests:
         lines += ["", *_test_lines(test)]
     return "\n".join(lines)
@@ -142,6 +144,7 @@ def forecast_to_json(forecast: Forecast) -> dict[str, Any]:
     return {
         "laws": dict(forecast.laws),
         "level": forecast.level,
+        "rejected": forecast.rejected,
         "tests": [_test_to_json(test) for test in forecast.tests],
     }
 

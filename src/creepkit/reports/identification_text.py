@@ -8,10 +8,12 @@ from dataclasses import asdict
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
+from creepkit.inverse.extrapolation import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.nuisance_plausibility import NUISANCE_UNITS
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import is_length_nuisance, is_logarithmic, kind_and_start, output_unit
+from creepkit.reports.stress_exponents import reference_sentences
 
 if TYPE_CHECKING:
     from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
@@ -63,15 +65,7 @@ def _values(fit: Identification) -> list[str]:
 
 
 def _reference(fit: Identification) -> list[str]:
-    r = fit.reference
-    rate, low, high = (float(v) for v in fit.rate(r.stress, warn=False))
-    n, exponent_low, exponent_high = (float(v) for v in fit.local_exponent(r.stress, warn=False))
-    qualifier = " of virgin material" if fit.law.states else ""
-    return [
-        f"  rate{qualifier} at {r.stress:.4g} MPa, {r.temperature:.0f} K, strain {r.strain:.2g}, {r.time:.3g} s: "
-        f"{rate:.3g} [{low:.3g}, {high:.3g}] 1/s",
-        f"  local stress exponent there: {n:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]",
-    ]
+    return [f"  {line}" for line in reference_sentences(fit)]
 
 
 def _tests(count: int) -> str:
@@ -120,7 +114,7 @@ def _minimum_rates(fit: Identification) -> list[str]:
     within_interval = sum(r.low <= r.measured <= r.high for _, _, r in rows)
     lines = [
         f"  minimum rates of {_tests(len(rows))} without frames: predicted over measured {text}; {within_interval} "
-        f"within the 95 % interval of a single test; rates between tests scatter by {100 * fit.noise_model.rate:.0f} %"
+        f"within the 95 % interval of a single test{_if_the_law_holds(fit)}; rates between tests scatter by {100 * fit.noise_model.rate:.0f} %"
     ]
     if len(rows) > LISTED_TESTS:
         return lines
@@ -144,12 +138,18 @@ def _ruptures(fit: Identification) -> list[str]:
         within_interval = sum(r.low <= r.measured <= r.high for _, _, r in ruptures if not r.censored)
         line += (
             f"; time predicted over measured {min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}; "
-            f"{within_interval} within the 95 % interval of a single test"
+            f"{within_interval} within the 95 % interval of a single test{_if_the_law_holds(fit)}"
         )
     if censored:
         unexpected = sum(r.predicted < r.measured for r in censored)
         line += f"; {len(censored)} stopped before, of which {unexpected or 'none'} should have broken"
     return [line, *(_rupture_table(ruptures) if len(ruptures) <= LISTED_TESTS else [])]
+
+
+def _if_the_law_holds(fit: Identification) -> str:
+    """The condition of intervals of single tests."""
+    rejected = fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy"
+    return ", which is not earned: the law does not explain the tests" if rejected else ", if the law holds"
 
 
 def _rupture_table(ruptures: Sequence[tuple[str, str, RuptureComparison]]) -> list[str]:
@@ -243,11 +243,7 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
         lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {e.low:.4g} to {e.high:.4g}, {e.verdict}")
-    units = {"stress": "MPa", "temperature": "K", "strain": "", "time": "s"}
-    covered = (
-        f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip() for name, (low, high) in fit.ranges.items()
-    )
-    lines.append(f"valid within the tests: {', '.join(covered)}")
+    lines += _range_lines(fit)
     rate_scatter = f"rates of single tests scatter by {100 * fit.noise_model.rate:.0f} % (one sd)"
     logarithmic = logarithmic_output(fit)
     errors_text = [f"rms of ln {logarithmic} {fit.rms:.3g}"] if logarithmic in fit.errors else []
@@ -258,6 +254,32 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
     ]
     adequacy_text = [] if fit.adequacy is None else [f"the law {fit.adequacy}"]
     return [*lines, "; ".join([*errors_text, rate_scatter]), *adequacy_text, *fit.notes]
+
+
+def _range_lines(fit: Identification) -> list[str]:
+    """The range of the tests, and at which temperatures not all of its stresses were tested."""
+    units = {"stress": "MPa", "temperature": "K", "strain": "", "time": "s"}
+    covered = (
+        f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip() for name, (low, high) in fit.ranges.items()
+    )
+    lines = [f"range of the tests: {', '.join(covered)}"]
+    at_temperatures = stresses_at_temperatures(fit)
+    low, high = fit.ranges["stress"]
+    tolerance = 1.0 + SAME_STRESS
+    part = [(T, s) for T, s in at_temperatures if s[0] > low * tolerance or s[1] * tolerance < high]
+    if part:
+        named = "; ".join(
+            f"{T:.4g} K {s[0]:.4g}{f' to {s[1]:.4g}' if s[1] > s[0] * tolerance else ''} MPa"
+            for T, s in at_temperatures[:MOST_TEMPERATURES_NAMED]
+        )
+        more = len(at_temperatures) - MOST_TEMPERATURES_NAMED
+        others = f"; and {more} more temperatures" if more > 0 else ""
+        lines.append(f"not every combination of stress and temperature in this range was tested: at {named}{others}")
+    return lines
+
+
+MOST_TEMPERATURES_NAMED = 12
+"""Temperatures whose stresses an exported text states."""
 
 
 def rupture_rows(fit: Identification) -> list[tuple[str, str, RuptureComparison]]:

@@ -153,13 +153,12 @@ def test_findings_come_first_and_say_what_was_found() -> None:
             "tests",
             "ranking",
             "nuisances",
-            "sliders",
             "data",
             "exclusions",
             "forecasts",
             "exports",
         ),
-        *("methods", "provenance", "missing"),
+        *("methods", "sliders", "provenance", "missing"),
     ]
 
 

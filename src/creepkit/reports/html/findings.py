@@ -13,8 +13,8 @@ from creepkit.inverse.uncertainty.laplace_approximation import cut_intervals
 from creepkit.inverse.unmodelled_effects import TAKEN_FOR_GRANTED
 from creepkit.reports.html.elements import Block, Formula, Items, Paragraph, Table, number, plural, sentence
 from creepkit.reports.html.law_tables import ENDS_AT_BOUND, credible_values, titled_law
-from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.ranking import equivalents_among_remaining
+from creepkit.reports.stress_exponents import constant_load_sentence, reference_sentences
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -88,6 +88,8 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     blocks += [_values(fit), _point(fit)]
     if fit.adequacy is not None and found.ranking is not None:
         blocks.append(Paragraph(sentence(f"the law {fit.adequacy}")))
+    conditional = constant_load_sentence(fit)
+    blocks += [Paragraph(sentence(conditional))] if conditional else []
     undetermined = _undetermined(fit)
     if undetermined:
         blocks += [Paragraph("What these tests do not determine, given this law:"), Items(undetermined)]
@@ -128,17 +130,9 @@ def _values(fit: Identification) -> Table:
 
 
 def _point(fit: Identification) -> Paragraph:
-    """Rate and local exponent at the reference point."""
-    r = fit.reference
-    rate = [number(float(v), 3) for v in fit.rate(r.stress, warn=False)]
-    exponent = [number(float(v), 3) for v in fit.local_exponent(r.stress, warn=False)]
-    virgin = " of virgin material" if fit.law.states else ""
-    return Paragraph(
-        f"Amid the tests, at {number(r.stress)} MPa, {r.temperature:.0f} K, a strain of {number(r.strain, 2)} and "
-        f"{number(r.time / SECONDS_PER_HOUR, 3)} h, the creep rate{virgin} is {rate[0]} per second (95 % interval "
-        f"{rate[1]} to {rate[2]}) and the local stress exponent is {exponent[0]} ({exponent[1]} to {exponent[2]})."
-        f"{_assumed_duration(fit)}"
-    )
+    """Rate and stress exponent at the reference point, and which derivative the exponent is."""
+    lines = [*reference_sentences(fit, lambda v, digits: number(v, digits))]
+    return Paragraph(" ".join(f"{line[:1].upper()}{line[1:]}." for line in lines) + _assumed_duration(fit))
 
 
 def _assumed_duration(fit: Identification) -> str:

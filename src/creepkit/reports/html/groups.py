@@ -107,13 +107,16 @@ def _table_of_tests(fit: Identification) -> Table:
             )
         )
     columns = (
-        *("test", "condition", "values compared", "χ² without own rate"),
+        *("test", "condition", "values compared", "mean square misfit / noise²"),
         *("relative squared error", "offset", "rate × law", "weight"),
     )
     caption = (
-        "Tests: mean square misfit over the noise of a frame (1: noise alone) with the same rates for all tests; error "
-        "of the first output, and its offset; the test's own factor on the rate, which the misfit leaves out. Whether "
-        "the law explains the tests is judged with that factor, so that its chi-square is the smaller one"
+        "Tests: mean square misfit over the squared noise of a frame (1: noise alone), with the law's own rate for "
+        "every test; relative squared error of the first output (sum of squared differences over that about the mean "
+        "of the test), and its offset; the test's own factor on the rate, which the misfit leaves out; weight of the "
+        "test in the fit (1: as any other, less for one far from the others). Whether the law explains the tests is "
+        "judged by another number, the reduced chi-square of the findings, with the tests' own rates. A dash: the law "
+        "predicts no value at some of the frames, as after a rupture that it puts too early"
     )
     return Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6, 7))
 
@@ -129,8 +132,19 @@ def _table_of_ruptures(fit: Identification) -> Table:
         )
         for name, condition, r in rupture_rows(fit)
     ]
-    columns = ("test", "condition", "lasted, h", "by the law, h", "95 % interval of a single test, h")
-    return Table("Rupture times; > marks tests that were stopped before", columns, rows, numeric=(2, 3, 4))
+    columns = (
+        "test",
+        "condition",
+        "lasted, h",
+        "by the law, h",
+        "95 % interval of a single test if the law is right, h",
+    )
+    rejected = fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy"
+    earned = (
+        ". The law does not explain the tests: the probability of these intervals is not earned" if rejected else ""
+    )
+    caption = f"Rupture times; > marks tests that were stopped before{earned}"
+    return Table(caption, columns, rows, numeric=(2, 3, 4))
 
 
 def _of(found: GroupFindings) -> str:

@@ -27,6 +27,7 @@ from creepkit.reports.html.findings import GroupFindings, findings_of, verdict_b
 from creepkit.reports.html.groups import group_sections
 from creepkit.reports.html.sliders import fragment_style, script_policy, slider_sections
 from creepkit.reports.html.stages import data_section, stage_sections, strength_blocks
+from creepkit.reports.stress_exponents import rate_and_exponent
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -55,10 +56,9 @@ def report_html(contents: ReportContents) -> str:
     sections = [
         _findings_section(contents, found),
         *_group_sections(found, figures),
-        *slider_sections(found),
         data_section(contents),
         *stage_sections(contents, figures),
-        *closing_sections(contents, found),
+        *closing_sections(contents, found, slider_sections(found)),
     ]
     shown = [section for section in map(_without_empty, sections) if not section.empty]
     return _template().render(
@@ -154,8 +154,7 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
     rows = []
     for one in found:
         fit, r = one.fit, one.fit.reference
-        rate = [number(float(v), 3) for v in fit.rate(r.stress, warn=False)]
-        exponent = [number(float(v), 3) for v in fit.local_exponent(r.stress, warn=False)]
+        rate, exponent = ([number(v, 3) for v in one] for one in rate_and_exponent(fit))
         weight = "–" if one.ranking is None else f"{one.ranking.laws[0].weight:.2f}"
         adequacy = "?" if fit.adequacy is None else "yes" if fit.adequacy.explains else "no"
         adequacy = "?" if fit.adequacy is not None and fit.adequacy.verdict == "cannot be judged" else adequacy
@@ -179,10 +178,10 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
         "decisive",
         "at MPa",
         "creep rate there, 1/s",
-        "local exponent",
+        "stress exponent",
     )
     caption = (
-        "Materials, with 95 % intervals. Decisive: one law has more than 95 % of the weight, explains the tests, and "
+        "Materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests. Decisive: one law has more than 95 % of the weight, explains the tests, and "
         "no other law or effect that was tried does so too; the verdict of each material says what is missing"
     )
     return Table(caption, columns, rows, numeric=(2, 5, 6, 7))

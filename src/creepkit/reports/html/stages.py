@@ -265,8 +265,14 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> lis
     laws = ", ".join(f"{law} ({weight:.2g})" for law, weight in forecast.laws.items())
     blocks: list[Block] = [
         Paragraph(
-            f"By {laws}: bands and intervals hold a measured value of a single test with a probability of "
-            f"{100 * forecast.level:g} %."
+            f"By {laws}: if the law is right, bands and intervals hold a measured value of a single test with a "
+            f"probability of {100 * forecast.level:g} %."
+            + (
+                " The law does not explain the tests, so that this probability is not earned: treat the bands as a "
+                "lower bound of the uncertainty."
+                if forecast.rejected
+                else ""
+            )
         ),
         _forecast_table(forecast),
     ]
