@@ -123,6 +123,11 @@ class Adequacy:
         return self.verdict == "explains"
 
     @property
+    def rejects(self) -> bool:
+        """Whether the law leaves what noise does not explain, so that its values describe the law and not the tests."""
+        return self.verdict == "leaves a discrepancy"
+
+    @property
     def explains_plausibly(self) -> bool:
         """Whether it explains them with nuisances of plausible size."""
         return self.explains and not self.implausible
@@ -279,7 +284,7 @@ def adequacy_with_remedies(
     """The same, with those of the unmodelled effects named with which the law would explain the tests."""
     known = KnownNoise.of_histories(problem.observations, histories)
     adequacy = adequacy_of(problem, linear, noise_model, predictor_errors, histories, known)
-    if adequacy.verdict != "leaves a discrepancy":
+    if not adequacy.rejects:
         return adequacy
     remedies = [
         effect.description

@@ -80,7 +80,7 @@ def test_without_a_law_no_script_is_run() -> None:
 
 def test_sentences_have_powers_of_ten_and_signs_as_they_are_printed() -> None:
     assert sentence("p < 1e-12, 4.2e-05 +- 3e-07 of test-1e-05.csv") == (
-        "P < 10⁻¹², 4.2 × 10⁻⁵ ± 3 × 10⁻⁷ of test-1e-05.csv."
+        "p < 10⁻¹², 4.2 × 10⁻⁵ ± 3 × 10⁻⁷ of test-1e-05.csv."
     )
 
 

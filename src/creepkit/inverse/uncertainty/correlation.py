@@ -126,7 +126,8 @@ def _undetermined_sentence(fit: Identification, group: list[int]) -> str:
     if len(group) == 1:
         estimate, relative_width = fit.estimates[group[0]], float(_relative_widths(fit)[group[0]])
         interval = f"[{estimate.low:.3g}, {estimate.high:.3g}]"
-        return f"the parameter {names[0]} is not determined: its interval {interval} fills {relative_width:.0%} of its bounds"
+        fills = f"its interval {interval} fills {relative_width:.0%} of its bounds"
+        return f"the parameter {names[0]} is not determined: {fills}"
     sentence = f"the parameters {', '.join(names[:-1])} and {names[-1]} are not determined singly"
     combination = _best_determined_combination(fit, group)
     return f"{sentence}; their combination {combination} is" if combination else sentence

@@ -169,7 +169,7 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
             Items([sentence(str(challenge)) for challenge in ranking.challenges]),
         ]
     if ranking.failed:
-        blocks.append(Items([sentence(f"{name}: {reason}") for name, reason in ranking.failed.items()]))
+        blocks.append(Items([sentence(f"the law {name}: {reason}") for name, reason in ranking.failed.items()]))
     if drawn and ranking.best.tests:
         blocks.append(
             figures.picture(
