@@ -42,7 +42,8 @@ PAYLOADS = (
     f"$(touch {CANARY})", f'"; system("touch {CANARY}"); "', f"`touch {CANARY}`",
     f"</script><script>require('fs').writeFileSync('{CANARY}','')</script>", f"\\input{{{CANARY}}}",
     f'x\n#include "{CANARY}.h"', f'x\n      call system("touch {CANARY}")', f"*/ int x = touch_{CANARY}; /*",
-    f'"""\nimport os; os.system("touch {CANARY}")\n"""', f"x ??/\n system({CANARY}) ??/", f"x & \n! & call system({CANARY})",
+    f'"""\nimport os; os.system("touch {CANARY}")\n"""', f"x ??/\n system({CANARY}) ??/",
+    f"x & \n! & call system({CANARY})",
     "%s%n%x {0.__class__} {{7*7}}", f"__import__('os').system('touch {CANARY}')", f"x\u2028import os; {CANARY}",
     "x\r      call abort()", "trailing backslash \\", "]]><x/>&bad;<!--", "\x00\x1b[2J",
 )  # fmt: skip

@@ -38,7 +38,7 @@ from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.reference_conditions import reference_stresses
-from creepkit.inverse.uncertainty.importance_sampling import UNCERTAIN_VERDICTS
+from creepkit.inverse.uncertainty.laplace_approximation import ONE_SIDED
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
 from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, is_logarithmic, output_unit
 
@@ -290,7 +290,7 @@ UNITS = {"temperature": "K", "temperature drift": "K"}
 
 
 def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked: Sequence[TimeForecast]) -> str:
-    """What of the test, or of a time that is stated of it, lies outside the region of the fitted tests; "" if nothing."""
+    """What of the test, or of a time stated of it, lies outside the region of the fitted tests; "" if nothing."""
     fit, temperatures = best.draws.fit, history.temperature_program().at(history.times)
     stresses = reference_stresses(history, predictor)
     point = {"stress": stresses[stresses > 0], "temperature": temperatures, "time": history.times[-1:]}
@@ -374,7 +374,7 @@ def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputFo
 def _caution(laws: Sequence[LawDraws]) -> str:
     """Why a band may hold what the tests exclude: Gaussian draws of values that they do not determine; else ""."""
     for draws in laws:
-        open_ = [e.name for e in draws.fit.estimates if e.verdict in UNCERTAIN_VERDICTS]
+        open_ = [e.name for e in draws.fit.estimates if e.verdict not in ("determined", ONE_SIDED)]
         if open_ and not has_sampled_draws(draws.fit):
             outside = f"{100 * draws.outside:.0f} % of them"
             return (

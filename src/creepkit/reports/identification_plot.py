@@ -399,4 +399,6 @@ def _residual_title(fit: Identification, output: str, noise: float, first: bool)
     sd = f"{float(np.median(sizes)):.2g}{' ' + unit if unit else ''}"
     chi_square = fit.errors[output].chi_square
     lead = "measured less identified, grey: ±2 sd of frame noise\n" if first else ""
-    return f"{lead}{output.replace('_', ' ')}: noise sd {sd}, mean square misfit / noise² {chi_square:.3g}"
+    judged = fit.adequacy is None or fit.adequacy.judges(output)
+    misfit = f", mean square misfit / noise² {chi_square:.3g}" if judged else " as the fit estimated it"
+    return f"{lead}{output.replace('_', ' ')}: noise sd {sd}{misfit}"

@@ -14,6 +14,7 @@ from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTU
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import is_length_nuisance, is_logarithmic, kind_and_start, output_unit
 from creepkit.reports.stress_exponents import reference_sentences
+from creepkit.reports.tests_apart import apart_sentence
 
 if TYPE_CHECKING:
     from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
@@ -31,11 +32,12 @@ def identification_text(fit: Identification) -> str:
     """The law, its values with 95 % intervals, the scatter between tests, and what is not determined."""
     lines = [
         f"{fit.law.title or fit.law.name}",
+        *(["  this law does not fit the tests (see below): what follows are values of this law alone"] * rejected(fit)),
         *(f"  {label}: {expression_text(term)}" for label, term in fit.law.terms.items()),
         *(f"  {equation}" for equation in state_equations(fit.law)),
         "",
         *_values(fit),
-        *_reference(fit),
+        *([] if rejected(fit) else _reference(fit)),
         "",
         *_strains(fit),
         *_minimum_rates(fit),
@@ -49,17 +51,24 @@ def identification_text(fit: Identification) -> str:
     return "\n".join(lines)
 
 
+def rejected(fit: Identification) -> bool:
+    """Whether the tests reject the law, so that what it says of them, rates and exponents, is not theirs."""
+    return fit.adequacy is not None and fit.adequacy.rejects
+
+
 def _adequacy(fit: Identification) -> list[str]:
-    """Whether the law explains the tests, on a line of its own."""
-    return [] if fit.adequacy is None else ["", f"  the law {fit.adequacy}"]
+    """Whether the law explains the tests, and which tests lie apart from it, each on a line of its own."""
+    lines = [] if fit.adequacy is None else ["", f"  the law {fit.adequacy}"]
+    apart = apart_sentence(fit)
+    return [*lines, f"  {apart}"] if apart else lines
 
 
 def _values(fit: Identification) -> list[str]:
     width, lines = max(len(e.name) for e in fit.estimates) if fit.estimates else 4, []
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
-        note = "" if e.verdict == "determined" else f"   <- {e.verdict} by these data"
-        note = "   <- at its bound" if e.verdict == "at its bound" else note
+        note = "" if e.verdict == "determined" else f"   <- {e.verdict}"
+        note += " by these data" if e.verdict == "not determined" else ""
         lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{e.low:.4g}, {e.high:.4g}]{unit}{note}")
     return lines
 
@@ -114,7 +123,8 @@ def _minimum_rates(fit: Identification) -> list[str]:
     within_interval = sum(r.low <= r.measured <= r.high for _, _, r in rows)
     lines = [
         f"  minimum rates of {_tests(len(rows))} without frames: predicted over measured {text}; {within_interval} "
-        f"within the 95 % interval of a single test{_if_the_law_holds(fit)}; rates between tests scatter by {100 * fit.noise_model.rate:.0f} %"
+        f"within the 95 % interval of a single test{_if_the_law_holds(fit)}; "
+        f"rates between tests scatter by {100 * fit.noise_model.rate:.0f} %"
     ]
     if len(rows) > LISTED_TESTS:
         return lines
@@ -240,9 +250,10 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
     """
     lines = [f"identified with creepkit {fit.provenance.get('creepkit', '')} from {_tests(len(fit.tests))}"]
     lines += [f"verdict on the law: {verdict}"] if verdict else []
+    said = "if the law held, which the tests reject" if rejected(fit) else ""
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
-        lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {e.low:.4g} to {e.high:.4g}, {e.verdict}")
+        lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {e.low:.4g} to {e.high:.4g}, {said or e.verdict}")
     lines += _range_lines(fit)
     rate_scatter = f"rates of single tests scatter by {100 * fit.noise_model.rate:.0f} % (one sd)"
     logarithmic = logarithmic_output(fit)
@@ -253,6 +264,7 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
         if name != logarithmic
     ]
     adequacy_text = [] if fit.adequacy is None else [f"the law {fit.adequacy}"]
+    adequacy_text += [text] if (text := apart_sentence(fit)) else []
     return [*lines, "; ".join([*errors_text, rate_scatter]), *adequacy_text, *fit.notes]
 
 

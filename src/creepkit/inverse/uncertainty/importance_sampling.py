@@ -18,6 +18,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.composite_predictor import reduced_order_model_of, search_predictor_of
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.uncertainty.laplace_approximation import AT_BOUND
 from creepkit.inverse.uncertainty.posterior import Posterior
 from creepkit.records import Predictor
 
@@ -41,12 +42,21 @@ LEAST_EFFECTIVE_SIZE = 40.0
 """Effective number of samples below which they say nothing."""
 
 
-UNCERTAIN_VERDICTS = ("at its bound", "not determined")
+SAMPLED_WIDTH = 0.8
+"""Width of an interval, before bounds cut it, over that of the bounds from which on it is sampled."""
 
 
 def needs_samples(fit: Identification) -> bool:
-    """Whether some value lies at its bound or is not determined."""
-    return any(estimate.verdict in UNCERTAIN_VERDICTS for estimate in fit.estimates)
+    """Whether some value lies at its bound, or its interval nearly fills the bounds."""
+    for one in fit.estimates:
+        param = fit.law.table[one.name]
+        low, high = (param.to_internal(bound) for bound in param.bounds)
+        value, start, end = (param.to_internal(v) for v in (one.value, one.low, one.high))
+        at_bound = min(value - low, high - value) <= AT_BOUND * (high - low)
+        half = max(value - start, end - value)  # of the interval as it was: a bound cuts one side at most, or both
+        if at_bound or 2.0 * half >= SAMPLED_WIDTH * (high - low):
+            return True
+    return False
 
 
 def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Identification:

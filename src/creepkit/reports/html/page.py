@@ -27,6 +27,7 @@ from creepkit.reports.html.findings import GroupFindings, findings_of, verdict_b
 from creepkit.reports.html.groups import group_sections
 from creepkit.reports.html.sliders import fragment_style, script_policy, slider_sections
 from creepkit.reports.html.stages import data_section, stage_sections, strength_blocks
+from creepkit.reports.identification_text import rejected
 from creepkit.reports.stress_exponents import rate_and_exponent
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def report_html(contents: ReportContents) -> str:
     sections = [
         _findings_section(contents, found),
         *_group_sections(found, figures),
-        data_section(contents),
+        data_section(contents, found),
         *stage_sections(contents, figures),
         *closing_sections(contents, found, slider_sections(found)),
     ]
@@ -166,8 +167,8 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
                 adequacy,
                 "–" if one.decisive is None else "yes" if one.decisive else "no",
                 number(r.stress, 3),
-                f"{rate[0]} ({rate[1]} to {rate[2]})",
-                f"{exponent[0]} ({exponent[1]} to {exponent[2]})",
+                "–" if rejected(fit) else f"{rate[0]} ({rate[1]} to {rate[2]})",
+                "–" if rejected(fit) else f"{exponent[0]} ({exponent[1]} to {exponent[2]})",
             )
         )
     columns = (
@@ -181,8 +182,9 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
         "stress exponent",
     )
     caption = (
-        "Materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests. Decisive: one law has more than 95 % of the weight, explains the tests, and "
-        "no other law or effect that was tried does so too; the verdict of each material says what is missing"
+        "Materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests, of laws that fit "
+        "the tests. Decisive: one law has more than 95 % of the weight, explains the tests, and no other law or effect "
+        "that was tried does so too; the verdict of each material says what is missing"
     )
     return Table(caption, columns, rows, numeric=(2, 5, 6, 7))
 
