@@ -92,6 +92,8 @@ BENCHMARKS = {
     "rate_tables": Benchmark(20, needs=DATA),
     "reader_fuzz": Benchmark(40),
     "large_files": Benchmark(3),
+    "adverse_surroundings": Benchmark(25),
+    "code_execution": Benchmark(5),
 }
 """{name of the program: what it costs and how it is run}."""
 

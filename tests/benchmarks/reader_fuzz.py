@@ -60,6 +60,8 @@ def outcome(sample: ReaderSample, good: object, seed: int, folder: Path) -> tupl
         result = sample.read(path)
         signal.setitimer(signal.ITIMER_PROF, 0.0)
     except CreepkitError as error:
+        if found := unforeseen(error):
+            return changed.kind, *found
         text = str(error)
         sound = "\n" not in text and len(text) < 2000 and str(folder) in text
         return changed.kind, "refused" if sound else "traceback", "" if sound else text[:300]
@@ -75,6 +77,24 @@ def outcome(sample: ReaderSample, good: object, seed: int, folder: Path) -> tupl
     if gap and sample.decided(result) == sample.decided(good):
         return changed.kind, "wrong acceptance", gap[:300]
     return changed.kind, "read", ""
+
+
+def unforeseen(error: BaseException) -> tuple[str, str] | None:
+    """Outcome and detail of an error that only stands for one that nobody has foreseen; None where it is foreseen.
+
+    creepkit turns whatever a reader raises into one sentence, and gives what it was as its cause.
+    """
+    from creepkit.errors import CreepkitError
+
+    below: BaseException | None = error
+    while below is not None:
+        if isinstance(below, MemoryError):
+            return "memory", str(error)[-200:]
+        cause = below.__cause__
+        if cause is not None and not isinstance(cause, (CreepkitError, OSError, UnicodeError)):
+            return "traceback", f"{type(cause).__name__}: {error}"[:400]
+        below = cause or below.__context__
+    return None
 
 
 def work(name: str, first: int, last: int, folder: Path) -> None:

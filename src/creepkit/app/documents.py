@@ -112,7 +112,20 @@ def law_document(page_law: PageLaw, end: float) -> dict[str, Any]:
         "rate_point": rate_point(page_law.fit),
         "covariance": None if page_law.fit is None else _covariance(page_law.fit),
         "undetermined": [] if page_law.fit is None else list(_undetermined(page_law.fit)),
+        "judged": "" if page_law.fit is None else judged_text(page_law.fit),
     }
+
+
+def judged_text(fit: Identification) -> str:
+    """What the identification found of the misfit, which it takes otherwise than the page does; "" for nothing."""
+    scatter = f"; these scatter by {100.0 * fit.noise_model.rate:.2g} %" if fit.noise_model.rate > 0.0 else ""
+    if fit.adequacy is None or not fit.adequacy.outputs:
+        return ""
+    chi_square = fit.adequacy.chi_square
+    return (
+        f"At its optimum the identification found {np.sqrt(chi_square):.2g} times the noise (reduced chi-square "
+        f"{chi_square:.3g}): it counts a rate and an offset of each test's own as scatter between tests{scatter}."
+    )
 
 
 def law_code_name(page_law: PageLaw) -> str:
@@ -138,6 +151,8 @@ def _covariance(fit: Identification) -> list[list[float]] | None:
 
 def _undetermined(fit: Identification) -> Sequence[str]:
     try:
+        if fit.adequacy is not None and fit.adequacy.rejects:
+            return (f"this law does not fit the tests: it {fit.adequacy}",)
         return fit.undetermined()
     except (CreepkitError, np.linalg.LinAlgError, ValueError):
         return ()
@@ -265,10 +280,16 @@ def _thinned(program: Program) -> list[list[float | None]]:
 
 
 def _noise(history: History, output: str, contents: PageContents) -> float | None:
-    """Standard deviation of a frame in the unit of the output: stated, else estimated by the fit, else the record's."""
+    """Standard deviation of a frame in the unit of the output: stated, else estimated by the fit, else the record's.
+
+    None where the fit says that its noise is not known well enough to judge a law by it.
+    """
     stated = history.standard_deviation.get(output)
     if stated is not None and np.isfinite(stated).any() and float(np.nanmedian(stated)) > 0.0:
         return float(np.nanmedian(stated))
+    fit = contents.laws[0].fit
+    if fit is not None and fit.adequacy is not None and not fit.adequacy.judges(output):
+        return None
     for one in _test_fits(history, contents):
         for fitted in one.outputs:
             if fitted.output == output and 0.0 < fitted.noise < math.inf:

@@ -28,10 +28,11 @@ from creepkit.cameras.text_files import (
     table_in_range,
 )
 from creepkit.cameras.time_files import read_frame_times
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.files.reading import read_bytes
 from creepkit.records import CameraFrame, Frames
 from creepkit.records.camera_format import TIME_UNITS, CameraFormat
+from creepkit.records.plugin_calls import call_on_file
 
 MOST_LOOKED_AT = 10
 """Files of one name, but for its numbers, whose heads decide whether they are frames."""
@@ -57,6 +58,12 @@ def read_frames(
     formats : those that are known. format : the one to take, its name, or {quantity: column}; None: that of the head.
     times : (frames,) s, increasing, or a file of them; None: as the files say, NaN where they do not.
     """
+    return call_on_file(lambda: _frames(path, formats, format, times), f"{quoted(path, 300)}: read_frames()")
+
+
+def _frames(
+    path: FramePath, formats: Sequence[CameraFormat], format: FormatLike, times: ArrayLike | str | Path | None
+) -> Frames:
     candidates = _candidates(format, formats)
     files = _files(path, candidates, chosen=format is not None)
     first = recognise(files[0], candidates, chosen=format is not None)
@@ -68,6 +75,9 @@ def read_frames(
     moments = _times_of_files(first.format, tables, columns) if stated is None else stated
 
     def frame(index: int) -> CameraFrame:
+        return call_on_file(lambda: read_frame(index), f"{tables.source(index)}: reading frame {index}")
+
+    def read_frame(index: int) -> CameraFrame:
         table = tables.table(index)
         own = columns if table.names == columns.names else columns_of(first.format, table.names, tables.source(index))
         values = table.numbers(own.positions)

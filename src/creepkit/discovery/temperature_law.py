@@ -21,7 +21,7 @@ from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
-from creepkit.inverse.uncertainty.laplace_approximation import Estimate
+from creepkit.inverse.uncertainty.laplace_approximation import Estimate, verdict_of_interval
 from creepkit.inverse.uncertainty.mixture_distribution import MixtureDistribution
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
@@ -91,10 +91,6 @@ CODEC = RecordCodec(
 
 NOTED_OVERDISPERSION = 1.5
 """Inflation of covariances from which a note is made."""
-
-
-UNDETERMINED_FRACTION = 0.8
-"""Fraction of the bounds from which an interval that fills it says that the parameter is not determined."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,11 +274,7 @@ def _estimate(name: str, form: CandidateForm, candidates: Sequence[CandidateLaw]
     _, low, high = (float(end) for end in mixture.interval())
     lower_bound, upper_bound = (param.to_internal(b) for b in param.bounds)
     value, low, high = (float(np.clip(v, lower_bound, upper_bound)) for v in (value, low, high))
-    verdict = "determined"
-    if high - low >= UNDETERMINED_FRACTION * (upper_bound - lower_bound):
-        verdict = "not determined"
-    elif min(value - lower_bound, upper_bound - value) <= 1e-4 * (upper_bound - lower_bound):
-        verdict = "at its bound"
+    verdict = verdict_of_interval(value, (low, high), (lower_bound, upper_bound))
     from_internal = param.from_internal
     return Estimate(name, from_internal(value), from_internal(low), from_internal(high), param.unit, verdict)
 

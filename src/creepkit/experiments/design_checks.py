@@ -105,7 +105,7 @@ def notes_of(laws: Sequence[Identification], rigs: Sequence[Rig]) -> tuple[str, 
             "intervals after further tests may differ from what is expected here by a factor of two"
         )
     for fit in laws:
-        if fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy":
+        if fit.adequacy is not None and fit.adequacy.rejects:
             notes.append(
                 f"{fit.law.name} does not explain the tests that were made: what a test is expected to tell holds for "
                 "laws that do; find one first"

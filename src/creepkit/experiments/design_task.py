@@ -48,7 +48,7 @@ class DesignTask:
         best = self.laws[0]
         if self.goal != "law":
             return ""
-        if best.adequacy is not None and best.adequacy.verdict == "leaves a discrepancy":
+        if best.adequacy is not None and best.adequacy.rejects:
             return (
                 f"no test is proposed: {best.law.name}, the best law, does not explain the tests that were made; find "
                 "a law that does, or ask for goal='parameters'"

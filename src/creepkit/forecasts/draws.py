@@ -62,12 +62,14 @@ class LawDraws:
     """Draws of the unknowns of one identification and of the effects of its heats and laboratories.
 
     joint : (draws, unknowns + effects) x = (u, e), then ln factors (see RateScatter.groups). scatter_sd : (draws,
-    levels) of ln rate, the scatter that each draw belongs to.
+    levels) of ln rate, the scatter that each draw belongs to. outside : share of the draws of a Gaussian that lay
+    outside the bounds of the law, for which others were drawn; 0 of samples.
     """
 
     fit: Identification
     joint: Floats
     scatter_sd: Floats
+    outside: float = 0.0
 
     @property
     def count(self) -> int:
@@ -83,17 +85,43 @@ class LawDraws:
 def law_draws(fit: Identification, count: int, rng: np.random.Generator) -> LawDraws:
     """`count` draws of the unknowns of an identification and of the effects of its heats and laboratories.
 
-    Draws outside the bounds of the law are drawn again: moved to a bound one by one, parameters that compensate each
-    other would no longer do so.
+    Where values lie at their bounds or are not determined, the unknowns of the law are its samples of the posterior,
+    which the tests do not contradict. Of a Gaussian, draws outside the bounds of the law are drawn again: moved to a
+    bound one by one, parameters that compensate each other would no longer do so.
     """
+    if has_sampled_draws(fit):
+        return _sampled_draws(fit, count, rng)
     drawn = [_joint_draws(fit, count, rng)]
     while sum(one.count for one in drawn) < count and len(drawn) < MOST_BATCHES:
         drawn.append(_joint_draws(fit, count, rng))
-    if not any(one.count for one in drawn):
+    none_within = not any(one.count for one in drawn)
+    if none_within:
         drawn = [_joint_draws(fit, count, rng, within_bounds=False)]
-    chosen = np.arange(count) % sum(one.count for one in drawn)
+    made = sum(one.count for one in drawn)
+    outside = 1.0 if none_within else 1.0 - made / (count * len(drawn))
+    chosen = np.arange(count) % made
     joint = np.concatenate([one.joint for one in drawn])[chosen]
-    return LawDraws(fit, joint, np.concatenate([one.scatter_sd for one in drawn])[chosen])
+    return LawDraws(fit, joint, np.concatenate([one.scatter_sd for one in drawn])[chosen], outside)
+
+
+def has_sampled_draws(fit: Identification) -> bool:
+    """Whether the unknowns of the law are drawn from samples of its posterior.
+
+    Those do not know effects of heats, of laboratories and of what tests share, which are drawn together with the law.
+    """
+    shared = bool(fit.scatter_of_rates.groups) or any(n.scope != "test" for n in fit.nuisances)
+    return fit.samples is not None and not shared
+
+
+def _sampled_draws(fit: Identification, count: int, rng: np.random.Generator) -> LawDraws:
+    """Draws with unknowns of the law from its samples; nuisances of single tests stay at their estimates."""
+    assert fit.samples is not None
+    posterior = fit.scatter_of_rates.posterior
+    nodes = rng.permutation(systematic(posterior.weight, count, rng))
+    samples = len(fit.samples)
+    joint = np.tile(fit.x, (count, 1))
+    joint[:, : fit.u.size] = fit.samples[rng.permutation(systematic(np.full(samples, 1.0 / samples), count, rng))]
+    return LawDraws(fit, joint, posterior.sd[nodes])
 
 
 def _joint_draws(fit: Identification, count: int, rng: np.random.Generator, *, within_bounds: bool = True) -> LawDraws:

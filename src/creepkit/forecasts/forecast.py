@@ -46,13 +46,15 @@ class Forecast(Presentable):
 
     laws : {law: weight}; left_out : how many laws of a ranking have too little weight to count.
     level : probability that a pointwise band holds a measured value, a simultaneous band a whole curve, and an interval
-    a time, of a single test. tests : one forecast each.
+    a time, of a single test, if the law is right. tests : one forecast each.
+    rejected : whether the law of most weight does not explain its tests, so that this probability is not earned.
     """
 
     laws: Mapping[str, float]
     level: float
     tests: tuple[TestForecast, ...]
     left_out: int = 0
+    rejected: bool = False
 
     def __getitem__(self, test: str) -> TestForecast:
         """The forecast of one test, by name."""
@@ -131,7 +133,9 @@ def forecast(
     if progress is not None:
         progress("tests", len(histories), len(histories))
     given = len(source.fits) if isinstance(source, ModelAverage) else len(getattr(source, "laws", weighted))
-    return Forecast(_named_weights(weighted), level, tuple(made), given - len(weighted))
+    adequacy = weighted[0][0].adequacy
+    rejected = adequacy is not None and adequacy.verdict == "leaves a discrepancy"
+    return Forecast(_named_weights(weighted), level, tuple(made), given - len(weighted), rejected)
 
 
 def _predictor(

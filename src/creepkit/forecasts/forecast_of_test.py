@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
 from creepkit.forecasts.bands import band_of_draws
 from creepkit.forecasts.drawn_law import DrawnLaw, drawn_law
-from creepkit.forecasts.draws import SOURCES, LawDraws
+from creepkit.forecasts.draws import SOURCES, LawDraws, has_sampled_draws
 from creepkit.forecasts.measured_test import TestScore, score_test
 from creepkit.forecasts.results import (
     CHOICE_OF_LAW,
@@ -32,11 +33,12 @@ from creepkit.forecasts.variance_shares import (
     offset_draws,
     variance_shares,
 )
-from creepkit.inverse.extrapolation import extrapolation_text
+from creepkit.inverse.extrapolation import HOUR, extrapolation_text, outside_combinations
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.uncertainty.laplace_approximation import ONE_SIDED
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
 from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, is_logarithmic, output_unit
 
@@ -75,7 +77,9 @@ def forecast_test(
         score, problem = _score(drawn, (history, banded), predictor, outputs)
         notes += [problem] if problem else []
     includes = _includes(drawn, best, outputs)
-    return TestForecast(history, outputs, times, includes, _extrapolation(banded, predictor, best), score, tuple(notes))
+    extrapolation = _extrapolation(banded, predictor, best, times)
+    caution = _caution([one.draws for one in drawn])
+    return TestForecast(history, outputs, times, includes, extrapolation, score, tuple(notes), caution)
 
 
 MOST_TIMES = 300
@@ -246,7 +250,9 @@ def _score(
 def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, OutputForecast]) -> dict[str, str]:
     """{part of the band: its size in words}."""
     fit = best.draws.fit
-    parts = {LAW: "posterior covariance of its parameters, within their bounds"}
+    sampled = has_sampled_draws(best.draws.fit)
+    whence = "samples of the posterior of its parameters" if sampled else "posterior covariance of its parameters"
+    parts = {LAW: f"{whence}, within their bounds"}
     if len(drawn) > 1:
         parts[CHOICE_OF_LAW] = ", ".join(f"{one.draws.fit.law.name} ({one.weight:.2g})" for one in drawn)
     for level, variance in best.own_variances.items():
@@ -283,7 +289,8 @@ UNITS = {"temperature": "K", "temperature drift": "K"}
 """Of dimensions; others are relative."""
 
 
-def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw) -> str:
+def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked: Sequence[TimeForecast]) -> str:
+    """What of the test, or of a time stated of it, lies outside the region of the fitted tests; "" if nothing."""
     fit, temperatures = best.draws.fit, history.temperature_program().at(history.times)
     stresses = reference_stresses(history, predictor)
     point = {"stress": stresses[stresses > 0], "temperature": temperatures, "time": history.times[-1:]}
@@ -292,11 +299,37 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw) -> st
     if "strain" in best.central.outputs:
         strain = at_times(best.central, history.times).of("strain")[0]
         point["strain"] = np.array([np.nanmax(strain, initial=0.0)])
-    text = extrapolation_text(fit.ranges, point, NEARBY)
+    parts = [extrapolation_text(fit.ranges, point, NEARBY).removeprefix("extrapolated: ")]
+    if "stress" not in extrapolated_names(parts[0]) and point["stress"].size == stresses[stresses > 0].size:
+        grid = [(float(s), float(T)) for s in point["stress"] for T in np.unique(np.round(temperatures, 1))]
+        conditions = np.array(grid, float).reshape(-1, 2)
+        parts.append(outside_combinations(fit, conditions[:, 0], conditions[:, 1]))
+    parts += _extrapolated_times(fit, history, asked)
+    parts = [part for part in parts if part]
+    text = f"extrapolated: {', '.join(parts)}" if parts else ""
     low, high = fit.ranges["temperature"]
     celsius = float(temperatures.max())
     meant = celsius < low - FAR and low - FAR < celsius + ZERO_CELSIUS < high + FAR
     return f"{text}; temperatures are in K: is {celsius:g} C meant, {celsius + ZERO_CELSIUS:g} K?" if meant else text
+
+
+def extrapolated_names(text: str) -> list[str]:
+    """Which quantities a sentence on an extrapolation begins its parts with."""
+    return [name for name in ("stress", "temperature", "time", "strain") if re.search(rf"(^|, ){name} [0-9]", text)]
+
+
+def _extrapolated_times(fit: Identification, history: History, asked: Sequence[TimeForecast]) -> list[str]:
+    """Of each time that is stated whether it, or the strain that is reached then, lies beyond the tests."""
+    longest, largest = fit.ranges["time"][1], fit.ranges["strain"][1]
+    parts = []
+    for one in asked:
+        if np.isfinite(one.value) and one.value > (1.0 + NEARBY["time"]) * longest:
+            parts.append(f"{one.event} after {one.value / HOUR:.3g} h (the longest test: {longest / HOUR:.3g} h)")
+        elif one.output == "strain" and one.target > (1.0 + NEARBY["strain"]) * largest:
+            parts.append(f"{one.event} (the tests reach {largest:.3g})")
+        elif not one.output and np.isfinite(one.value) and not any(m.rupture is not None for m in fit.tests):
+            parts.append(f"{one.event} (no test broke)")
+    return parts
 
 
 def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputForecast]) -> list[str]:
@@ -336,6 +369,20 @@ def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputFo
             f"its {level} was fitted and creeps {factor:.3g} times as fast as the law says (± {100 * sd:.2g} %)"
         )
     return notes
+
+
+def _caution(laws: Sequence[LawDraws]) -> str:
+    """Why a band may hold what the tests exclude: Gaussian draws of values that they do not determine; else ""."""
+    for draws in laws:
+        open_ = [e.name for e in draws.fit.estimates if e.verdict not in ("determined", ONE_SIDED)]
+        if open_ and not has_sampled_draws(draws.fit):
+            outside = f"{100 * draws.outside:.0f} % of them"
+            return (
+                f"the band is not that of the tests, and may be far too wide: they do not determine {', '.join(open_)}"
+                f", and its draws are Gaussian about the values, not compared with the tests; {outside} "
+                "lay outside the bounds of the law and were left out"
+            )
+    return ""
 
 
 FEW_TESTS = 5

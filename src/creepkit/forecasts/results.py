@@ -72,7 +72,8 @@ class TestForecast:
     """The forecast of one test.
 
     outputs : {name: its curve and band}. times : to targets and to rupture. score : of a measured test, else None.
-    includes : what the bands are made of, with sizes. extrapolation : beyond the fitted ranges, in one sentence, or "".
+    includes : what the bands are made of, with sizes. caution : why bands are not those of the tests, or "".
+    extrapolation : beyond the fitted ranges, in one sentence, or "".
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
@@ -84,6 +85,7 @@ class TestForecast:
     extrapolation: str = ""
     score: TestScore | None = None
     notes: tuple[str, ...] = ()
+    caution: str = ""
 
     @property
     def name(self) -> str:

@@ -36,6 +36,7 @@ from creepkit.instruments.record_tables import (
     numbered_lines,
 )
 from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
+from creepkit.records.plugin_calls import call_on_file
 
 TIME_NAMES = (
     *("time", "timestamp", "time stamp", "datetime", "date time", "date/time", "date and time", "t", "clock", "zeit"),
@@ -63,7 +64,13 @@ def read_record(
         raise HistoryError(f"read_record() takes the path of a file, found {path!r:.40}")
     if format is not None and not isinstance(format, str):
         raise HistoryError(f"format is {format!r:.40}; give the name of an instrument format")
-    path = Path(path).expanduser()
+    file = Path(path).expanduser()
+    return call_on_file(lambda: _record(file, formats, format, given), f"{file}: read_record()")
+
+
+def _record(
+    path: Path, formats: Sequence[InstrumentFormat], format: str | None, given: ReadingOptions
+) -> InstrumentRecord:
     parts = numbered_lines(path)
     ahead = next(parts, [])
     head = find_head(path, ahead)

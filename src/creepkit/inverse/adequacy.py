@@ -45,18 +45,14 @@ IMPLAUSIBLE_CHI_SQUARE = 0.05
 LARGEST_SCATTER = 1.0
 """Of ln rate between tests, a factor of 2.7: more is no scatter of one alloy."""
 
-
 TREND_SIGNIFICANCE, FEWEST_TREND_TESTS = 0.01, 5
 """p-value below which rates of tests bend over the stress, and the tests that it takes to see that."""
-
 
 NOTEWORTHY_EXPECTATION = 1.05
 """Mean reduced chi-square of a right law from which on it is said beside the one that was found."""
 
-
 LARGEST_SHOWN_P_VALUE = 0.99
 """p-values above are shown as such: the least of several times their number is cut at 1."""
-
 
 AdequacyVerdict = Literal["explains", "leaves a discrepancy", "cannot be judged"]
 
@@ -122,6 +118,15 @@ class Adequacy:
         """Whether the law explains the tests to their noise."""
         return self.verdict == "explains"
 
+    def judges(self, output: str) -> bool:
+        """Whether the noise of an output is known well enough to judge a law by."""
+        return any(one.output == output for one in self.outputs)
+
+    @property
+    def rejects(self) -> bool:
+        """Whether the law leaves what noise does not explain: its values describe the law and not the tests."""
+        return self.verdict == "leaves a discrepancy"
+
     @property
     def explains_plausibly(self) -> bool:
         """Whether it explains them with nuisances of plausible size."""
@@ -133,7 +138,7 @@ class Adequacy:
         if not self.implausible:
             return ""
         more = len(self.implausible) - 1
-        others = f" (and {more} more such {'nuisance' if more == 1 else 'nuisances'})" if more else ""
+        others = f" (and {more} more such nuisance{'s' * (more > 1)})" if more else ""
         return f" only with {self.implausible[0].description}{others}"
 
     @property
@@ -151,9 +156,8 @@ class Adequacy:
     @property
     def _p_value_text(self) -> str:
         """The p-value; where it is the least of several, how many."""
-        p = self.p_value
-        comparisons = 1 + len(self.outputs) if len(self.outputs) > 1 else 1
-        several = f" (Bonferroni, {comparisons} comparisons)" if comparisons > 1 else ""
+        p, count = self.p_value, len(self.outputs)
+        several = f" (Bonferroni, {count + 1} comparisons)" if count > 1 else ""
         if p > LARGEST_SHOWN_P_VALUE:
             return f"p > {LARGEST_SHOWN_P_VALUE:g}{several}"
         if p <= 1e-12:
@@ -179,10 +183,8 @@ class Adequacy:
                 scatter = f", with rates of tests that scatter by {100 * self.rate_scatter:.2g} %"
             if self.chi_square < IMPLAUSIBLE_CHI_SQUARE:
                 scatter += " (far larger than what the frames show: check its unit)"
-            return (
-                f"explains the tests to their {source} noise{self.qualification}{scatter}: "
-                f"{self._chi_square_text}, {self._p_value_text}{correlated}"
-            )
+            found = f"{self._chi_square_text}, {self._p_value_text}{correlated}"
+            return f"explains the tests to their {source} noise{self.qualification}{scatter}: {found}"
         parts = [
             f"{o.discrepancy:.2g}{' ' + output_unit(o.output) if output_unit(o.output) else ''} of {o.output} "
             f"({o.discrepancy_in_noises:.2g} times its {o.noise_source} noise)"
@@ -196,8 +198,8 @@ class Adequacy:
         where = f"; most in {self.largest}" if self.largest is not None else ""
         if self.remedies:
             where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
-        left = " and ".join(parts) or "more than noise"
-        return f"leaves {left} unexplained ({self._chi_square_text}, {self._p_value_text}){where}"
+        rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained"
+        return f"{rest} ({self._chi_square_text}, {self._p_value_text}){where}"
 
 
 def adequacy_of(
@@ -279,7 +281,7 @@ def adequacy_with_remedies(
     """The same, with those of the unmodelled effects named with which the law would explain the tests."""
     known = KnownNoise.of_histories(problem.observations, histories)
     adequacy = adequacy_of(problem, linear, noise_model, predictor_errors, histories, known)
-    if adequacy.verdict != "leaves a discrepancy":
+    if not adequacy.rejects:
         return adequacy
     remedies = [
         effect.description

@@ -16,6 +16,7 @@ from creepkit.files.delimited_text import (
     decode_text,
     detect_dialect,
     split_line,
+    split_lines,
     table_of_numbers,
     text_lines,
 )
@@ -210,17 +211,20 @@ def _grid_of_lines(path: Path, lines: Sequence[str]) -> CellGrid:
         problem = "holds a header but no table" if any(line.strip() for line in lines) else "is empty"
         raise HistoryError(f"{path}: the file {problem}; write a line of columns such as time_s,strain_pct, then rows")
     head = lines[:start]
-    numbered = [(k, line) for k, line in enumerate(lines[start:], start + 1) if line.strip() and not is_comment(line)]
-    dialect = detect_dialect((line for _, line in numbered), str(path), _stated_decimal(path, head))
+    numbered, comments = list[tuple[int, str]](), list[tuple[int, str]]()
+    for number, line in enumerate(lines[start:], start + 1):
+        if line and not line.isspace():
+            (comments if line[0] in _BEFORE_COMMENT and is_comment(line) else numbered).append((number, line))
+    dialect = detect_dialect([line for _, line in numbered], str(path), _stated_decimal(path, head))
     _refuse_many_texts(path, len(numbered) * len(split_line(lines[start], dialect, f"{path}:{start + 1}")))
-    comments = [(k, line) for k, line in enumerate(lines[start:], start + 1) if is_comment(line)]
     late = _late_entries(path, comments, dialect)
     rows = []
-    for number, line in numbered:
-        cells = split_line(line, dialect, f"{path}:{number}")
-        _refuse_many(f"{path}:{number}", len(cells), 0)
-        _refuse_long_cells(f"{path}:{number}", line, cells)
-        if any(cells):
+    for number, line, cells in split_lines(numbered, dialect, path):
+        if len(cells) > MAXIMUM_COLUMNS:
+            _refuse_many(f"{path}:{number}", len(cells), 0)
+        if len(line) > MAXIMUM_CELL:
+            _refuse_long_cells(f"{path}:{number}", line, cells)
+        if cells[0] or any(cells):
             rows.append(TableRow(number, cells))
     if not rows:
         raise HistoryError(f"{path}:{start + 1}: no cell holds anything; write a line of columns, then rows")
@@ -258,6 +262,10 @@ def grid_of_rows(path: Path, sheet: str, rows: Sequence[TableRow]) -> CellGrid:
         elif colon or beside:
             comments.append((row.line, key, SourceText(text or "".join(beside), location)))
     return CellGrid(path, sheet, Dialect("\t"), header, kept, None, comments)
+
+
+_BEFORE_COMMENT = frozenset(' \t"\ufeff#/')
+"""Characters with which a comment may begin."""
 
 
 def is_comment(line: str) -> bool:
@@ -365,6 +373,9 @@ def _cut_rows(grid: CellGrid, rows: Sequence[TableRow], width: int) -> Iterator[
     """The rows with as many cells as there are columns; empty ones behind them are none."""
     for row in rows:
         cells = row.cells
+        if len(cells) == width:
+            yield row
+            continue
         if len(cells) > width and not any(cells[width:]):
             cells = cells[:width]
         if len(cells) < width and grid.sheet:  # empty cells at the end of a sheet's row are not stored

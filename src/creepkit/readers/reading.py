@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
@@ -51,7 +52,7 @@ def read_histories(
     read: dict[tuple[str, str], tuple[Path, History]] = {}
     for path in _existing_paths(paths):
         for source in _readable_paths(path, readers):
-            for history in histories_in(_reader_of(source, readers), source):
+            for history in _histories_in(_reader_of(source, readers), source):
                 _check_printable(history, source)
                 read.setdefault((history.source or str(source), history.name), (source, history))
     return _with_unique_names(list(read.values()))
@@ -152,3 +153,14 @@ def _with_unique_names(read: Sequence[tuple[Path, History]]) -> list[History]:
 
 def _folder(path: Path) -> str:
     return (path if path.is_dir() else path.absolute().parent).name
+
+
+def _histories_in(reader: Reader, source: Path) -> list[History]:
+    """The histories of a file; its millions of cells are not looked through for cycles, half of the time it takes."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        return histories_in(reader, source)
+    finally:
+        if was_on:
+            gc.enable()

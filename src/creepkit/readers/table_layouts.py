@@ -341,8 +341,9 @@ def _rows_by_test(table: TextTable, entries: Mapping[str, SourceText], known: Kn
 def _states_condition(table: TextTable, column: int, rows: Sequence[TableRow], known: KnownNames) -> bool:
     """Whether a column holds one condition, or one text, in all rows of a test."""
     values = {row.cells[column] for row in rows}
-    is_text = not any(is_number(value, table.dialect) for value in values)
-    return len(values) == 1 and (is_text or known.is_condition(table.columns[column]))
+    if len(values) != 1:
+        return False
+    return not is_number(values.pop(), table.dialect) or known.is_condition(table.columns[column])
 
 
 def _entries_of_columns(

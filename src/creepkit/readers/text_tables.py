@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import overload
+from typing import NamedTuple, overload
 
 import numpy as np
 
@@ -54,9 +54,8 @@ def some_of(names: Sequence[str], count: int = 12) -> str:
     return shown if len(names) <= count else f"{shown} and {len(names) - count} more"
 
 
-@dataclass(frozen=True)
-class TableRow:
-    """The cells of one line of a table."""
+class TableRow(NamedTuple):
+    """The cells of one line of a table; a tuple, for a table has up to millions."""
 
     line: int
     cells: Sequence[str]

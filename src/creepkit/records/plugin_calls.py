@@ -48,11 +48,18 @@ def _unforeseen(what: str, raised: BaseException, owner: object) -> str:
 
 
 def call_of_reader(call: Callable[[], _T], reader: Reader, path: Path, method: str) -> _T:
-    """What a reader's accepts() or read() returns; HistoryError whatever it raises, also of creepkit's own readers.
+    """What a reader's accepts() or read() returns; HistoryError whatever it raises, also of creepkit's own readers."""
+    return call_on_file(call, f"{path}: {method}() of reader '{reader.name}'", reader)
+
+
+def call_on_file(call: Callable[[], _T], what: str, owner: object = None) -> _T:
+    """What a call that reads a measured file returns; HistoryError, one sentence, whatever else it raises.
 
     The content of a file may lead any reader to an error that nobody has foreseen; the user is told of which file.
+    Such an error is the cause of the HistoryError, so that a test can tell it from those that were foreseen.
+
+    what : the file and the call in words. owner : the plugin's object, whose line is named where it is known.
     """
-    what = f"{path}: {method}() of reader '{reader.name}'"
     try:
         return call()
     except CreepkitError:
@@ -64,7 +71,7 @@ def call_of_reader(call: Callable[[], _T], reader: Reader, path: Path, method: s
     except OSError as failure:
         raise HistoryError(f"{what} cannot read it ({quoted(failure.strerror or failure, 120)})") from failure
     except (Exception, SystemExit) as raised:
-        raise HistoryError(_unforeseen(what, raised, reader)) from raised
+        raise HistoryError(_unforeseen(what, raised, owner)) from raised
 
 
 def _place(raised: BaseException, owner: object) -> str:

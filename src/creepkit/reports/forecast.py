@@ -26,7 +26,9 @@ def forecast_text(forecast: Forecast) -> str:
     """What is forecast by which laws, then a paragraph for each test."""
     names = ", ".join(name if len(forecast.laws) == 1 else f"{name} ({w:.2g})" for name, w in forecast.laws.items())
     names += f" ({forecast.left_out} more of too little weight)" if forecast.left_out else ""
-    lines = [f"by {names}: {100 * forecast.level:g} % bands and intervals of single tests"]
+    lines = [f"by {names}: {100 * forecast.level:g} % bands and intervals of single tests, if the law is right"]
+    if forecast.rejected:
+        lines.append("the law does not explain the tests: this probability is not earned")
     for test in forecast.tests:
         lines += ["", *_test_lines(test)]
     return "\n".join(lines)
@@ -36,6 +38,7 @@ def _test_lines(test: TestForecast) -> list[str]:
     lines = [f"{test.name}: {test.history.condition}"]
     lines += [f"  {_end_text(one)}" for one in test.outputs.values()]
     lines += [f"  {_time_text(one, float(test.history.times[-1]))}" for one in test.times]
+    lines += [f"  {test.caution}"] if test.caution else []
     if test.score is not None:
         lines += [f"  {line}" for line in score_lines(test.score)]
     leading = next(iter(test.outputs.values()), None)
@@ -131,6 +134,7 @@ def forecast_rows(forecast: Forecast) -> list[tuple[str, ...]]:
             inside += [f"{t.event}: {_hours(t.measured)}" for t in test.times if math.isfinite(t.measured)]
             measured, explained = "\n".join(inside), f"{100 * test.score.explained:.0f} %"
         end = "" if leading is None else _end_text(leading).replace(" at ", "\nat ", 1)
+        end += f"\n{test.caution}" if test.caution else ""
         rows.append((test.name, test.history.condition, end, times, measured, explained, test.extrapolation or "no"))
     return rows
 
@@ -140,6 +144,7 @@ def forecast_to_json(forecast: Forecast) -> dict[str, Any]:
     return {
         "laws": dict(forecast.laws),
         "level": forecast.level,
+        "rejected": forecast.rejected,
         "tests": [_test_to_json(test) for test in forecast.tests],
     }
 
@@ -160,6 +165,7 @@ def _test_to_json(test: TestForecast) -> dict[str, Any]:
         "includes": dict(test.includes),
         "extrapolation": test.extrapolation,
         "notes": list(test.notes),
+        "caution": test.caution,
         "score": None if test.score is None else _score_to_json(test.score),
     }
 

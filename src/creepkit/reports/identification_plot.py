@@ -45,6 +45,10 @@ PLOTTED_STRAIN_RATIO = 0.02
 """Residuals of strains are drawn where a test's strain exceeds this share of its last one; below, noise fills them."""
 
 
+DRAWN_STRAIN_RATIO = 1.5
+"""Of the largest measured strain of a test: where its identified curve and band end."""
+
+
 DOTS_ABOVE_LINES = 100
 """Up to so many frames lie above the identified curve; more would hide it."""
 
@@ -284,8 +288,19 @@ def draw_curve(axes: Axes, curve: TestCurve, colour: Any, style: str = "-", dots
             alpha=0.55,
             zorder=3 if above else 1,
         )
-    axes.fill_between(curve.hours, *curve.band, color=colour, alpha=0.2, lw=0)
-    axes.plot(curve.hours, curve.identified, style, lw=1.2, color=colour)
+    low, high, identified = *curve.band, curve.identified
+    if curve.logarithmic:  # beyond the strains of the test a curve towards rupture says nothing of its frames
+        end = _drawn_end(curve)
+        low, high = np.minimum(low, end), np.minimum(high, end)
+        identified = np.where(identified <= end, identified, np.nan)
+    axes.fill_between(curve.hours, low, high, color=colour, alpha=0.2, lw=0)
+    axes.plot(curve.hours, identified, style, lw=1.2, color=colour)
+
+
+def _drawn_end(curve: TestCurve) -> float:
+    """The strain, %, at which the curve of a test ends; infinite where no strain above zero was measured."""
+    largest = float(np.nanmax(curve.measured, initial=0.0))
+    return DRAWN_STRAIN_RATIO * largest if largest > 0 else float("inf")
 
 
 def _draw_curves(
@@ -307,9 +322,14 @@ def _draw_curves(
         axes.set(xlabel="time, h", ylabel=axis_label(output))
 
 
+def _drawn_values(curve: TestCurve) -> Floats:
+    """(frames,) the identified values that are drawn."""
+    return curve.identified[curve.identified <= _drawn_end(curve)] if curve.logarithmic else curve.identified
+
+
 def set_curve_ranges(panels: Sequence[Axes], drawn: Sequence[TestCurve], output: str) -> None:
     """The same axes for all panels, from the measured and identified values of what is drawn of an output."""
-    values = np.concatenate([v for c in drawn for v in (c.measured, c.identified)])
+    values = np.concatenate([v for c in drawn for v in (c.measured, _drawn_values(c))])
     values = values[np.isfinite(values)]
     largest = float(values.max(initial=0.0))
     for axes in panels:
@@ -379,4 +399,6 @@ def _residual_title(fit: Identification, output: str, noise: float, first: bool)
     sd = f"{float(np.median(sizes)):.2g}{' ' + unit if unit else ''}"
     chi_square = fit.errors[output].chi_square
     lead = "measured less identified, grey: ±2 sd of frame noise\n" if first else ""
-    return f"{lead}{output.replace('_', ' ')}: noise sd {sd}, reduced chi-square {chi_square:.3g}"
+    judged = fit.adequacy is None or fit.adequacy.judges(output)
+    misfit = f", mean square misfit / noise² {chi_square:.3g}" if judged else " as the fit estimated it"
+    return f"{lead}{output.replace('_', ' ')}: noise sd {sd}{misfit}"

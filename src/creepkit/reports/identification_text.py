@@ -8,10 +8,13 @@ from dataclasses import asdict
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
+from creepkit.inverse.extrapolation import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.nuisance_plausibility import NUISANCE_UNITS
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import is_length_nuisance, is_logarithmic, kind_and_start, output_unit
+from creepkit.reports.stress_exponents import reference_sentences
+from creepkit.reports.tests_apart import apart_sentence
 
 if TYPE_CHECKING:
     from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
@@ -29,11 +32,12 @@ def identification_text(fit: Identification) -> str:
     """The law, its values with 95 % intervals, the scatter between tests, and what is not determined."""
     lines = [
         f"{fit.law.title or fit.law.name}",
+        *(["  this law does not fit the tests (see below): what follows are values of this law alone"] * rejected(fit)),
         *(f"  {label}: {expression_text(term)}" for label, term in fit.law.terms.items()),
         *(f"  {equation}" for equation in state_equations(fit.law)),
         "",
         *_values(fit),
-        *_reference(fit),
+        *([] if rejected(fit) else _reference(fit)),
         "",
         *_strains(fit),
         *_minimum_rates(fit),
@@ -47,31 +51,30 @@ def identification_text(fit: Identification) -> str:
     return "\n".join(lines)
 
 
+def rejected(fit: Identification) -> bool:
+    """Whether the tests reject the law, so that what it says of them, rates and exponents, is not theirs."""
+    return fit.adequacy is not None and fit.adequacy.rejects
+
+
 def _adequacy(fit: Identification) -> list[str]:
-    """Whether the law explains the tests, on a line of its own."""
-    return [] if fit.adequacy is None else ["", f"  the law {fit.adequacy}"]
+    """Whether the law explains the tests, and which tests lie apart from it, each on a line of its own."""
+    lines = [] if fit.adequacy is None else ["", f"  the law {fit.adequacy}"]
+    apart = apart_sentence(fit)
+    return [*lines, f"  {apart}"] if apart else lines
 
 
 def _values(fit: Identification) -> list[str]:
     width, lines = max(len(e.name) for e in fit.estimates) if fit.estimates else 4, []
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
-        note = "" if e.verdict == "determined" else f"   <- {e.verdict} by these data"
-        note = "   <- at its bound" if e.verdict == "at its bound" else note
+        note = "" if e.verdict == "determined" else f"   <- {e.verdict}"
+        note += " by these data" if e.verdict == "not determined" else ""
         lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{e.low:.4g}, {e.high:.4g}]{unit}{note}")
     return lines
 
 
 def _reference(fit: Identification) -> list[str]:
-    r = fit.reference
-    rate, low, high = (float(v) for v in fit.rate(r.stress, warn=False))
-    n, exponent_low, exponent_high = (float(v) for v in fit.local_exponent(r.stress, warn=False))
-    qualifier = " of virgin material" if fit.law.states else ""
-    return [
-        f"  rate{qualifier} at {r.stress:.4g} MPa, {r.temperature:.0f} K, strain {r.strain:.2g}, {r.time:.3g} s: "
-        f"{rate:.3g} [{low:.3g}, {high:.3g}] 1/s",
-        f"  local stress exponent there: {n:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]",
-    ]
+    return [f"  {line}" for line in reference_sentences(fit)]
 
 
 def _tests(count: int) -> str:
@@ -120,7 +123,8 @@ def _minimum_rates(fit: Identification) -> list[str]:
     within_interval = sum(r.low <= r.measured <= r.high for _, _, r in rows)
     lines = [
         f"  minimum rates of {_tests(len(rows))} without frames: predicted over measured {text}; {within_interval} "
-        f"within the 95 % interval of a single test; rates between tests scatter by {100 * fit.noise_model.rate:.0f} %"
+        f"within the 95 % interval of a single test{_if_the_law_holds(fit)}; "
+        f"rates between tests scatter by {100 * fit.noise_model.rate:.0f} %"
     ]
     if len(rows) > LISTED_TESTS:
         return lines
@@ -144,12 +148,18 @@ def _ruptures(fit: Identification) -> list[str]:
         within_interval = sum(r.low <= r.measured <= r.high for _, _, r in ruptures if not r.censored)
         line += (
             f"; time predicted over measured {min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}; "
-            f"{within_interval} within the 95 % interval of a single test"
+            f"{within_interval} within the 95 % interval of a single test{_if_the_law_holds(fit)}"
         )
     if censored:
         unexpected = sum(r.predicted < r.measured for r in censored)
         line += f"; {len(censored)} stopped before, of which {unexpected or 'none'} should have broken"
     return [line, *(_rupture_table(ruptures) if len(ruptures) <= LISTED_TESTS else [])]
+
+
+def _if_the_law_holds(fit: Identification) -> str:
+    """The condition of intervals of single tests."""
+    rejected = fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy"
+    return ", which is not earned: the law does not explain the tests" if rejected else ", if the law holds"
 
 
 def _rupture_table(ruptures: Sequence[tuple[str, str, RuptureComparison]]) -> list[str]:
@@ -240,14 +250,11 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
     """
     lines = [f"identified with creepkit {fit.provenance.get('creepkit', '')} from {_tests(len(fit.tests))}"]
     lines += [f"verdict on the law: {verdict}"] if verdict else []
+    said = "if the law held, which the tests reject" if rejected(fit) else ""
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
-        lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {e.low:.4g} to {e.high:.4g}, {e.verdict}")
-    units = {"stress": "MPa", "temperature": "K", "strain": "", "time": "s"}
-    covered = (
-        f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip() for name, (low, high) in fit.ranges.items()
-    )
-    lines.append(f"valid within the tests: {', '.join(covered)}")
+        lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {e.low:.4g} to {e.high:.4g}, {said or e.verdict}")
+    lines += _range_lines(fit)
     rate_scatter = f"rates of single tests scatter by {100 * fit.noise_model.rate:.0f} % (one sd)"
     logarithmic = logarithmic_output(fit)
     errors_text = [f"rms of ln {logarithmic} {fit.rms:.3g}"] if logarithmic in fit.errors else []
@@ -257,7 +264,34 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
         if name != logarithmic
     ]
     adequacy_text = [] if fit.adequacy is None else [f"the law {fit.adequacy}"]
+    adequacy_text += [text] if (text := apart_sentence(fit)) else []
     return [*lines, "; ".join([*errors_text, rate_scatter]), *adequacy_text, *fit.notes]
+
+
+def _range_lines(fit: Identification) -> list[str]:
+    """The range of the tests, and at which temperatures not all of its stresses were tested."""
+    units = {"stress": "MPa", "temperature": "K", "strain": "", "time": "s"}
+    covered = (
+        f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip() for name, (low, high) in fit.ranges.items()
+    )
+    lines = [f"range of the tests: {', '.join(covered)}"]
+    at_temperatures = stresses_at_temperatures(fit)
+    low, high = fit.ranges["stress"]
+    tolerance = 1.0 + SAME_STRESS
+    part = [(T, s) for T, s in at_temperatures if s[0] > low * tolerance or s[1] * tolerance < high]
+    if part:
+        named = "; ".join(
+            f"{T:.4g} K {s[0]:.4g}{f' to {s[1]:.4g}' if s[1] > s[0] * tolerance else ''} MPa"
+            for T, s in at_temperatures[:MOST_TEMPERATURES_NAMED]
+        )
+        more = len(at_temperatures) - MOST_TEMPERATURES_NAMED
+        others = f"; and {more} more temperatures" if more > 0 else ""
+        lines.append(f"not every combination of stress and temperature in this range was tested: at {named}{others}")
+    return lines
+
+
+MOST_TEMPERATURES_NAMED = 12
+"""Temperatures whose stresses an exported text states."""
 
 
 def rupture_rows(fit: Identification) -> list[tuple[str, str, RuptureComparison]]:

@@ -50,6 +50,9 @@ PANEL_WIDTH = 3.0
 """Inches of the title of one test's panel, as wide as its axes."""
 
 
+NOT_JUDGED = "this noise is not known well enough to judge the laws by it: compare them, not with 1"
+
+
 HEAT_TITLE = (
     "mean square deviation of each law in each test, over the noise of a frame\n"
     "(offsets taken out, rates of single tests not; 1: noise alone)"
@@ -124,7 +127,9 @@ def _draw_misfits(part: Any, ranking: Ranking) -> None:
     bar = part.colorbar(image, ax=heat, label="mean square deviation / noise²", pad=0.01, aspect=12, extend=extend)
     bar.set_ticks(list(labels), labels=[_number(v) for v in labels])
     bar.ax.yaxis.set_minor_locator(NullLocator())
-    heat.set_title(HEAT_TITLE, fontsize=9)
+    adequacy = ranking.best.adequacy
+    judged = adequacy is None or adequacy.outputs
+    heat.set_title(HEAT_TITLE if judged else f"{HEAT_TITLE}\n{NOT_JUDGED}", fontsize=9)
     weights = [r.weight for r in ranking.laws]
     bars.barh(range(len(weights)), weights, color=_law_colours(ranking), height=0.6)
     for row, weight in enumerate(weights):

@@ -104,4 +104,6 @@ def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> No
     axes.set(xlabel="measured time to rupture, h", ylabel="identified time to rupture, h", ylim=tuple(limits))
     axes.grid(alpha=0.25)
     place_legend_right(axes)
-    axes.set_title("time to rupture; bars: 95 % of a single test\n(law, scatter between tests)", fontsize=9)
+    axes.set_title(
+        "time to rupture; bars: 95 % of a single test\n(if the law is right; with scatter between tests)", fontsize=9
+    )

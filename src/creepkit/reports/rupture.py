@@ -12,17 +12,21 @@ from creepkit.rupture_assessment.observed_tests import celsius
 
 if TYPE_CHECKING:
     from creepkit.rupture_assessment.assessment import RuptureAssessment
+    from creepkit.rupture_assessment.checks import AssessmentCheck
     from creepkit.rupture_assessment.rupture_fit import RuptureFit
     from creepkit.rupture_assessment.strength import StrengthEstimate
 
 SHOWN_WEIGHT = 1e-3
-"""Fits of less weight are shown where they are the best of their method."""
+"""Fits of less weight do not count in what is said of the scatter."""
 
 LEAST_SCATTER_SHOWN = 1e-3
 """Standard deviation of log10 of time: a quarter of a per cent of the time."""
 
 SHOWN_EFFECTS = 6
 """Heats at each end of the list."""
+
+CRITERIA = {"bic": "BICc", "aicc": "AICc"}
+"""Both with their corrections for few tests."""
 
 PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 
@@ -45,7 +49,7 @@ def rupture_text(assessment: RuptureAssessment, *, strengths: bool = True) -> st
             (
                 "method",
                 "weight",
-                f"{assessment.settings.criterion.upper().replace('AICC', 'AICc')} - best",
+                f"{CRITERIA[assessment.settings.criterion]} - best",
                 "scatter of a test",
                 *(f"between {_plural(group)}" for group in tests.groups),
             ),
@@ -61,9 +65,15 @@ def rupture_text(assessment: RuptureAssessment, *, strengths: bool = True) -> st
         lines += _constants(assessment.relation.rates)
     lines += ["", *_strength_lines(assessment)] if strengths else []
     lines += ["", f"checks of {best.name}:"]
-    lines += [f"- {PASSED[check.passed]}: {check.name}; {check.found}" for check in assessment.checks]
+    lines += [f"- {check_text(check)}" for check in assessment.checks]
     lines += [f"note: {note}" for note in assessment.notes]
     return "\n".join(lines)
+
+
+def check_text(check: AssessmentCheck) -> str:
+    """One check as a line: of one that fails what is wrong, in the place of its name."""
+    named = check.fault if check.passed is False and check.fault else check.name
+    return f"{PASSED[check.passed]}: {named}; {check.found}"
 
 
 def _plural(group: str) -> str:
@@ -81,7 +91,6 @@ def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _method_rows(assessment: RuptureAssessment) -> list[tuple[str, ...]]:
-    best_of_method = {assessment[name].name for name in assessment.methods}
     return [
         (
             one.fit.name,
@@ -91,7 +100,6 @@ def _method_rows(assessment: RuptureAssessment) -> list[tuple[str, ...]]:
             *(f"factor {power_of_ten(scatter):.3g}" for scatter in one.fit.scatter_corrected.values()),
         )
         for one in assessment.ranked
-        if one.weight >= SHOWN_WEIGHT or one.fit.name in best_of_method
     ]
 
 
@@ -185,7 +193,7 @@ def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
         if assessment.relation is None
         else [_fit_to_json(assessment.relation.times), _fit_to_json(assessment.relation.rates)],
         "strengths": [_strength_to_json(one) for one in assessment.strengths],
-        "checks": [{"name": c.name, "passed": c.passed, "found": c.found} for c in assessment.checks],
+        "checks": [{"name": c.name, "passed": c.passed, "found": c.found, "fault": c.fault} for c in assessment.checks],
         "level": assessment.settings.level,
         "notes": list(assessment.notes),
         "provenance": dict(assessment.provenance),

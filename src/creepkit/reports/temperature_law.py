@@ -169,9 +169,13 @@ def temperature_law_text(temperature_law: TemperatureLaw) -> str:
     """The law, its numbers, the forms that remain for each parameter, and the combinations."""
     low, high = temperature_law.temperature_range
     count, data = temperature_law.isothermal_estimates.temperatures.size, temperature_law.criterion_data
+    adequacy = temperature_law.adequacy
+    verdict = [] if adequacy is None else [f"  the law {adequacy}"]
+    rejected = adequacy is not None and adequacy.rejects
     return "\n".join(
         [
             f"{temperature_law.law.title or temperature_law.law.name}",
+            *([*verdict, "  what follows are values of a law that does not fit the tests"] if rejected else []),
             *(f"  {label}: {expression_text(term)}" for label, term in temperature_law.law.terms.items()),
             "",
             *_parameter_lines(temperature_law),
@@ -183,7 +187,7 @@ def temperature_law_text(temperature_law: TemperatureLaw) -> str:
             "",
             *_combination_lines(temperature_law),
             *_prior_lines(temperature_law),
-            *([] if temperature_law.adequacy is None else [f"  the law {temperature_law.adequacy}"]),
+            *([] if rejected else verdict),
             *(f"  note: {note}" for note in temperature_law.notes),
         ]
     )

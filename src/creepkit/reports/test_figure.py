@@ -40,8 +40,10 @@ def fitted_test_figure(fit: Identification, curves: FittedCurves, test: int) -> 
         set_curve_ranges([row[0]], [curve], one.output)
         row[0].set(xlabel="time, h", ylabel=axis_label(one.output))
         draw_residuals(row[1], fit, curves, one.output, [test], colours)
+        judged = fit.adequacy is None or fit.adequacy.judges(one.output)
         chi_square = one.errors.chi_square
-        row[1].set_title(f"reduced chi-square {chi_square:.3g}" if np.isfinite(chi_square) else "", fontsize=9)
+        known = judged and np.isfinite(chi_square)
+        row[1].set_title(f"mean square misfit / noise² {chi_square:.3g}" if known else "", fontsize=9)
         for axes in row:
             axes.xaxis.label.set_fontsize(9)
             axes.yaxis.label.set_fontsize(9)

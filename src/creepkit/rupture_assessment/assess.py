@@ -13,7 +13,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import FitError, nearest
-from creepkit.inverse.information_criteria import aicc_penalty, bic_penalty, criterion_weights
+from creepkit.inverse.information_criteria import aicc_penalty, criterion_weights, small_sample_bic_penalty
 from creepkit.records import History
 from creepkit.registry.arguments import check_histories
 from creepkit.rupture_assessment.assessment import (
@@ -26,7 +26,7 @@ from creepkit.rupture_assessment.assessment import (
     interpolated,
 )
 from creepkit.rupture_assessment.checks import AssessmentCheck, effectiveness, physical_realism, repeatability, turning
-from creepkit.rupture_assessment.fitting import conditions_of, fit_method
+from creepkit.rupture_assessment.fitting import conditions_of, fit_method, too_few_tests
 from creepkit.rupture_assessment.methods import METHODS, MINIMUM_RATE, MONKMAN_GRANT
 from creepkit.rupture_assessment.monkman_grant import (
     LEAST_CURVATURE,
@@ -181,6 +181,10 @@ def _ranked(
             continue
         for degree in settings.degrees if METHODS[name].degrees else (1,):
             label = f"{name}, degree {degree}" if METHODS[name].degrees else name
+            few = too_few_tests(METHODS[name], tests, at, degree=degree, fixed=settings.fixed.get(name, {}))
+            if few:
+                rejected[label] = few
+                continue
             try:
                 fit = _fit(name, degree, tests, tensile, settings)
             except FitError as error:
@@ -193,7 +197,7 @@ def _ranked(
                 fits.append(fit)
     if not fits:
         return (), rejected
-    penalty = bic_penalty if settings.criterion == "bic" else aicc_penalty
+    penalty = small_sample_bic_penalty if settings.criterion == "bic" else aicc_penalty
     scores = [-2.0 * fit.log_likelihood + penalty(fit.parameter_count, fit.observations) for fit in fits]
     excess, by_fit = criterion_weights(scores)
     degrees = Counter(fit.method for fit in fits)

@@ -25,6 +25,7 @@ from creepkit.rupture_assessment.strength import (
     BOUND_KINDS,
     StrengthEstimate,
     WeightedModels,
+    bound_curves,
     extrapolation,
     mixed,
     strength_estimates,
@@ -151,7 +152,7 @@ class RuptureAssessment(Presentable):
     def verdict(self) -> str:
         """One sentence: which method, or which the tests cannot tell apart, and which checks it fails."""
         weights, best = self.methods, self.best.method
-        failed = [check.name for check in self.checks if check.passed is False]
+        failed = [check.fault or check.name for check in self.checks if check.passed is False]
         open_ = [check.name for check in self.checks if check.passed is None]
         if self.decisive:
             return f"decisive: {best}, of {len(weights)} methods tried; it passes all {len(self.checks)} checks"
@@ -245,9 +246,10 @@ class RuptureAssessment(Presentable):
             raise FitError(f"stress is {stress!r:.40}; give MPa above zero")
         T, s = np.array([float(temperature)]), np.array([float(stress)])
         at = Conditions(s, T, self.tensile(T), np.full(1, np.nan))
-        times = mixed(self.models(method), at, of)
-        tail = 0.5 * (1.0 - self.settings.level)
-        median, low, high = (SECONDS_PER_HOUR * power_of_ten(times.quantile(p)[0]) for p in (0.5, tail, 1.0 - tail))
+        models = self.models(method)
+        ends = [curve for (kind, _), curve in bound_curves(models, at, self.settings.level).items() if kind == of]
+        curves = [mixed(models, at, of).quantile(0.5), *ends]
+        median, low, high = (SECONDS_PER_HOUR * power_of_ten(curve[0]) for curve in curves)
         return median, low, high
 
     def plot(self, path: str | Path | None = None) -> Figure:

@@ -61,11 +61,15 @@ LEAST_ISOTHERM = 5
 
 @dataclass(frozen=True)
 class AssessmentCheck:
-    """One check: name, whether it passed (None where it cannot be made), and what was found against what is allowed."""
+    """One check: name, whether it passed (None where it cannot be made), and what was found against what is allowed.
+
+    fault : what is wrong where it does not pass, in words that stand alone; "" where the name and `found` say it.
+    """
 
     name: str
     passed: bool | None
     found: str
+    fault: str = ""
 
 
 def turning(fit: RuptureFit, tests: RuptureTests, tensile: TensileStrength) -> str:
@@ -110,12 +114,16 @@ def physical_realism(
     least, where = float(slopes[row, column]), f"{celsius(float(T[row]))}, {stress[column]:.3g} MPa"
     checks = [
         AssessmentCheck(
-            "isotherms do not turn back", bool(least > 0), f"-d log t / d log s at least {least:.2f}, at {where}"
+            "isotherms do not turn back",
+            bool(least > 0),
+            f"the least -d log t / d log s is {least:.2f}, at {where} (allowed: above 0)",
+            "isotherms turn back",
         ),
         AssessmentCheck(
             "isotherms are steep enough",
             bool(least >= LEAST_SLOPE),
-            f"-d log t / d log s at least {least:.2f}, at {where} (allowed: {LEAST_SLOPE} and more)",
+            f"the least -d log t / d log s is {least:.2f}, at {where} (allowed: {LEAST_SLOPE} and more)",
+            "isotherms are too flat",
         ),
     ]
     if T.size > 1:
@@ -128,6 +136,7 @@ def physical_realism(
                 "isotherms do not cross",
                 bool(gaps[row, column] > 0),
                 f"{text}, at {celsius(float(T[row]))}, {stress[column]:.3g} MPa",
+                "isotherms cross",
             )
         )
     return checks
@@ -162,7 +171,7 @@ def _predicted_against_measured(name: str, predicted: Floats, measured: Floats) 
         f"slope {slope:.2f} (allowed: {SLOPE_RANGE[0]} to {SLOPE_RANGE[1]}), mean line within a factor {departure:.2f} "
         f"(2), {outside} of {measured.size} beyond {OUTSIDE_DEVIATIONS} standard deviations (1.5 %, or one)"
     )
-    return AssessmentCheck(title, bool(passed), found)
+    return AssessmentCheck(title, bool(passed), found, f"predicted times depart from measured ones, {name}")
 
 
 def main_isotherms(tests: RuptureTests) -> list[tuple[float, Bools]]:
@@ -208,13 +217,15 @@ def _changed(
         return AssessmentCheck(name, None, f"the other {int(kept.sum())} tests cannot be assessed: {error}")
     if any(a is None or b is None for a, b in zip(original, repeated, strict=True)):
         lost = any(a is not None and b is None for a, b in zip(original, repeated, strict=True))
-        return AssessmentCheck(name, False if lost else None, f"there is no strength at {hours:.3g} h to compare")
+        text = f"there is no strength at {hours:.3g} h to compare"
+        return AssessmentCheck(name, False if lost else None, text, f"no strength at {hours:.3g} h is left {name}")
     if not original:
         return AssessmentCheck(name, None, "no strength can be stated at the temperatures asked for")
     changes = [b / a - 1.0 for a, b in zip(original, repeated, strict=True) if a is not None and b is not None]
     largest = max(changes, key=abs)
     text = f"the strength at {hours:.3g} h changes by up to {100 * largest:+.1f} % ({len(places)} tests less)"
-    return AssessmentCheck(name, abs(largest) <= LARGEST_CHANGE, f"{text}; allowed: 10 %")
+    fault = f"the strength changes by more than 10 % {name}"
+    return AssessmentCheck(name, abs(largest) <= LARGEST_CHANGE, f"{text}; allowed: 10 %", fault)
 
 
 def _isotherm(stress: Floats, temperature: float, tensile: TensileStrength) -> Conditions:

@@ -135,6 +135,23 @@ def fit_method(
     return _result(method, problem, point, tests, degree=degree, fixed=fixed, centre=centre, level=level)
 
 
+def too_few_tests(
+    method: RuptureMethod, tests: RuptureTests, at: Conditions, *, degree: int, fixed: Mapping[str, float]
+) -> str:
+    """Why a method is not offered for so few tests, "" where it is.
+
+    With n tests that broke and K estimates n - K - 1 must be above zero: from there on small-sample criteria exist,
+    and the scatter has three degrees of freedom or more, so that bounds say something.
+    """
+    constants = method.basis(at, degree, fixed, centre_of(tests)).linear.shape[1] + method.bilinear
+    needed = constants + len(tests.groups) + 2
+    if tests.ruptured >= needed:
+        return ""
+    broke = "1 test broke" if tests.ruptured == 1 else f"{tests.ruptured} tests broke"
+    scatters = "a scatter" if not tests.groups else f"{1 + len(tests.groups)} scatters"
+    return f"{broke}, and {constants} constants with {scatters} take {needed} or more; add tests"
+
+
 def _scaled(method: RuptureMethod, basis: Basis, times: GroupedTimes, ruptured: int) -> _Scaled:
     size = np.linalg.norm(basis.linear, axis=0)
     count = basis.linear.shape[1] + method.bilinear

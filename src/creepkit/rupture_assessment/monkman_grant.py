@@ -42,6 +42,10 @@ class MinimumRateRelation:
         spread = np.hypot(by_rate.spread, m * log_rate.spread)
         return StudentLogTime(by_rate.median, spread, np.minimum(by_rate.freedom, log_rate.freedom))
 
+    def test_scatter(self, at: Conditions) -> LogTimeDistribution:
+        """Distribution of log10 of the time of one test over the median time of its heat, by its rate."""
+        return self.times.test_scatter(at)
+
 
 def fit_relation(tests: RuptureTests, with_rate: RuptureTests, *, level: float) -> MinimumRateRelation:
     """The relation and its rate law; FitError, in one sentence, where rates are missing or too few."""

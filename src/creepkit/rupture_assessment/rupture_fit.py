@@ -123,3 +123,11 @@ class RuptureFit:
         if of == "test":
             total = total + self.scale_corrected**2
         return StudentLogTime(median, np.sqrt(total), freedom)
+
+    def test_scatter(self, at: Conditions) -> LogTimeDistribution:
+        """Distribution of log10 of the time of one test over the median time of its heat."""
+        none: Floats = np.zeros(at.stress.size)
+        spread, freedom = none + self.scale_corrected, none + self.variance_freedom.most
+        if self.distribution == "weibull":
+            return WeibullLogTime(none, none + LEAST_SCALE * self.scale_corrected, self.scale_corrected, freedom)
+        return StudentLogTime(none, spread, freedom)

@@ -41,6 +41,10 @@ class LogTimeModel(Protocol):
         """Distribution of log10 of a time in hours; of : one of BOUND_KINDS."""
         ...
 
+    def test_scatter(self, at: Conditions) -> LogTimeDistribution:
+        """Distribution of log10 of the time of one test over the median time of its heat."""
+        ...
+
 
 WeightedModels = Sequence[tuple[LogTimeModel, float]]
 
@@ -77,17 +81,22 @@ def mixed(models: WeightedModels, at: Conditions, of: str) -> MixedLogTime:
 def bound_curves(models: WeightedModels, at: Conditions, level: float) -> dict[tuple[str, float], Floats]:
     """{(of, probability): (points,)} log10 h that bound a time: lower and upper, of each of BOUND_KINDS.
 
-    A wider kind holds the narrower ones: each has degrees of freedom of its own, by which alone it might not.
+    A wider kind holds the narrower ones: each has degrees of freedom of its own, by which alone it might not. With few
+    heats, whose scatter has one or two degrees of freedom, that of a test beside it has many: so the half width of a
+    test is at least the root of the sum of squares of that of its heat and of its own scatter (the combination of
+    intervals of Zou and Donner (2008), Stat. Med. 27, 1693).
     """
     tail = 0.5 * (1.0 - level)
+    distributions = {of: mixed(models, at, of) for of in BOUND_KINDS}
+    own = MixedLogTime([model.test_scatter(at) for model, _ in models], [weight for _, weight in models])
+    median = distributions["mean"].quantile(0.5)
     curves: dict[tuple[str, float], Floats] = {}
-    for of in BOUND_KINDS:
-        distribution = mixed(models, at, of)
-        for p, wider in ((tail, np.minimum), (1.0 - tail, np.maximum)):
-            curve = distribution.quantile(p)
-            inner = curves.get((BOUND_KINDS[max(BOUND_KINDS.index(of) - 1, 0)], p), curve)
-            curves[of, p] = np.asarray(wider(curve, inner))
-    return curves
+    for p, sign in ((tail, -1.0), (1.0 - tail, 1.0)):
+        mean, heat, test = (sign * (distributions[of].quantile(p) - median) for of in BOUND_KINDS)
+        heat = np.maximum(heat, mean)
+        test = np.maximum(test, np.hypot(heat, own.quantile(p)))
+        curves |= {(of, p): median + sign * half for of, half in zip(BOUND_KINDS, (mean, heat, test), strict=True)}
+    return {(of, p): curves[of, p] for of in BOUND_KINDS for p in (tail, 1.0 - tail)}
 
 
 def strength_estimates(
@@ -166,18 +175,19 @@ class _Branch:
     def stress_at(self, hours: float) -> tuple[float | None, str]:
         """MPa at which the time is that, else None and the reason."""
         low, high, target = self.stress[0], self.stress[-1], np.log10(hours)
+        shorter, longer = (f"predicted times get {what} again" for what in ("shorter", "longer"))
         if self.stress.size < 2:
             return None, f"the time does not fall with stress about {low:.3g} MPa"
         if target > self.log_time[0]:
             if self.turns[0]:
-                return None, f"times turn back below {low:.3g} MPa, at {_hours(self.log_time[0])}"
+                return None, f"{shorter} below {low:.3g} MPa; the longest is {_hours(self.log_time[0])}"
             return (
                 None,
                 f"only {_hours(self.log_time[0])} are reached at {low:.3g} MPa, a tenth of the lowest stress tested",
             )
         if target < self.log_time[-1]:
             if self.turns[1]:
-                return None, f"times turn back above {high:.3g} MPa, at {_hours(self.log_time[-1])}"
+                return None, f"{longer} above {high:.3g} MPa; the shortest is {_hours(self.log_time[-1])}"
             return None, f"it lies above {high:.4g} MPa, up to which strengths are looked for"
         inverse = PchipInterpolator(self.log_time[::-1], np.log(self.stress[::-1]))
         return float(np.exp(inverse(target))), ""

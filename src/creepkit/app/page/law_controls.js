@@ -48,7 +48,7 @@
       list.replaceChildren(...sliders.map((slider) => slider.row));
       reset.textContent = law.parameters[0]?.interval === null ? "Back to the first values" : "Back to the optimum";
       followRow.hidden = law.covariance === null;
-      known.replaceChildren(...law.undetermined.map((sentence) => element("p", {}, sentence + ".")));
+      known.replaceChildren(...law.undetermined.map((sentence) => element("p", {}, sentence[0].toUpperCase() + sentence.slice(1) + ".")));
       law.parameters.forEach((p, k) => {
         if (p.interval === null) return;
         const [low, high] = p.interval;

@@ -6,6 +6,7 @@
   // handlers: onInput(), onRelease(), onRepeat(k)
   page.testList = function (data, state, handlers) {
     const total = element("p", { class: "total", "aria-live": "polite" });
+    const judged = element("p", { class: "help" });
     const table = element("table", {}, element("thead", {}, element("tr", {}, ...["", "test", "rms misfit", "over noise"].map((words) => element("th", { scope: "col" }, words)))));
     const body = element("tbody");
     table.append(body);
@@ -21,7 +22,7 @@
     });
     const all = element("button", { type: "button", class: "small", onclick: () => set(true) }, "show all");
     const none = element("button", { type: "button", class: "small", onclick: () => set(false) }, "show none");
-    const group = element("fieldset", {}, element("legend", {}, "Measured tests"), total, element("div", { class: "buttons" }, all, none), element("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Measured tests" }, table));
+    const group = element("fieldset", {}, element("legend", {}, "Measured tests"), total, judged, element("div", { class: "buttons" }, all, none), element("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Measured tests" }, table));
 
     function set(wanted) {
       state.tests.fill(wanted);
@@ -41,7 +42,8 @@
       const shown = [...misfits].filter(([k]) => state.tests[k]).map(([, misfit]) => misfit);
       const weighted = page.weighted(shown);
       const lost = shown.flatMap((misfit) => Object.values(misfit)).reduce((sum, one) => sum + one.lost, 0);
-      total.textContent = shown.length === 0 ? "No test is shown." : weighted === null ? "The noise of these tests is not known: state it in their files to see misfits over noise." : `Weighted rms misfit: ${page.format(weighted, 3)} times the noise, of ${shown.length} ${shown.length === 1 ? "test" : "tests"}${lost ? `; ${lost} frames lie beyond the end of a curve` : ""}.`;
+      total.textContent = shown.length === 0 ? "No test is shown." : weighted === null ? "The noise of these tests is not known well enough: state it in their files to see misfits over noise." : `These curves lie ${page.format(weighted, 3)} times the noise of a frame (rms) from ${shown.length} ${shown.length === 1 ? "test" : "tests"}, with the same rate for all tests${lost ? `; ${lost} frames lie beyond the end of a curve` : ""}.`;
+      judged.textContent = data.laws[state.law].judged;
     }
     return { group, show };
   };

@@ -30,10 +30,6 @@ STRONG_CORRELATION = 0.95
 """Correlation beyond which two parameters are determined only together."""
 
 
-UNDETERMINED_WIDTH = 1.0 / 3.0
-"""Width of a 95 % interval over that of the bounds beyond which a parameter is not determined."""
-
-
 WELL_DETERMINED_SD = 0.1
 """Standard deviation of a combination, over that which its parameters' bounds alone would leave, that is well known."""
 
@@ -76,10 +72,10 @@ def correlation(fit: Identification, coordinates: CoordinateSystem = "author") -
 def undetermined(fit: Identification) -> tuple[str, ...]:
     """What the tests do not determine, a sentence for each group of parameters, and which combination they do.
 
-    A parameter counts as such where its 95 % interval fills a third of its bounds; those tied to it by a correlation of
-    0.95 or more belong to its group. Empty where every parameter is determined.
+    A parameter counts as such where the verdict of its estimate says so; those tied to it by a correlation of 0.95 or
+    more belong to its group. Empty where every parameter is determined.
     """
-    undetermined_indices = np.flatnonzero(_relative_widths(fit) > UNDETERMINED_WIDTH)
+    undetermined_indices = np.flatnonzero([one.verdict == "not determined" for one in fit.estimates])
     groups = _groups(fit, undetermined_indices)
     sentences = [_undetermined_sentence(fit, group) for group in groups]
     return (*sentences, _determined_sentence(fit)) if sentences else ()
@@ -130,8 +126,9 @@ def _undetermined_sentence(fit: Identification, group: list[int]) -> str:
     if len(group) == 1:
         estimate, relative_width = fit.estimates[group[0]], float(_relative_widths(fit)[group[0]])
         interval = f"[{estimate.low:.3g}, {estimate.high:.3g}]"
-        return f"{names[0]} is not determined: its interval {interval} fills {relative_width:.0%} of its bounds"
-    sentence = f"{', '.join(names[:-1])} and {names[-1]} are not determined singly"
+        fills = f"its interval {interval} fills {relative_width:.0%} of its bounds"
+        return f"the parameter {names[0]} is not determined: {fills}"
+    sentence = f"the parameters {', '.join(names[:-1])} and {names[-1]} are not determined singly"
     combination = _best_determined_combination(fit, group)
     return f"{sentence}; their combination {combination} is" if combination else sentence
 

@@ -18,11 +18,12 @@ from creepkit.arrays import Floats
 from creepkit.inverse.composite_predictor import reduced_order_model_of, search_predictor_of
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.uncertainty.laplace_approximation import AT_BOUND
 from creepkit.inverse.uncertainty.posterior import Posterior
 from creepkit.records import Predictor
 
-ROUNDS = 4
-"""Of proposals."""
+ROUNDS, MOST_ROUNDS = 4, 12
+"""Of proposals: at least, and where the samples are still worth too few."""
 
 
 DRAWS = 256
@@ -41,12 +42,21 @@ LEAST_EFFECTIVE_SIZE = 40.0
 """Effective number of samples below which they say nothing."""
 
 
-UNCERTAIN_VERDICTS = ("at its bound", "not determined")
+SAMPLED_WIDTH = 0.8
+"""Width of an interval, before bounds cut it, over that of the bounds from which on it is sampled."""
 
 
 def needs_samples(fit: Identification) -> bool:
-    """Whether some value lies at its bound or is not determined."""
-    return any(estimate.verdict in UNCERTAIN_VERDICTS for estimate in fit.estimates)
+    """Whether some value lies at its bound, or its interval nearly fills the bounds."""
+    for one in fit.estimates:
+        param = fit.law.table[one.name]
+        low, high = (param.to_internal(bound) for bound in param.bounds)
+        value, start, end = (param.to_internal(v) for v in (one.value, one.low, one.high))
+        at_bound = min(value - low, high - value) <= AT_BOUND * (high - low)
+        half = max(value - start, end - value)  # of the interval as it was: a bound cuts one side at most, or both
+        if at_bound or 2.0 * half >= SAMPLED_WIDTH * (high - low):
+            return True
+    return False
 
 
 def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Identification:
@@ -71,11 +81,12 @@ def posterior_samples(fit: Identification, seed: int | None = None) -> Floats | 
     """(samples, parameters) conditioned coordinates of equal weight; None where too few of the draws count."""
     posterior, size = Posterior.from_identification(fit), fit.u.size
     seed = fit.settings.seed if seed is None else seed
-    centre, shape = np.array(fit.u), fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance))
+    centre = np.array(fit.u)
+    shape = _shortened(posterior, centre, fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance)))
     points, log_density = np.zeros((0, size)), np.zeros(0)
     proposals: list[tuple[Floats, Floats]] = []
     weights = np.zeros(0)
-    for k in range(ROUNDS):
+    for k in range(MOST_ROUNDS):
         proposals.append((centre, shape))
         drawn = _drawn(centre, shape, seed + k)
         points = np.concatenate([points, drawn])
@@ -90,11 +101,38 @@ def posterior_samples(fit: Identification, seed: int | None = None) -> Floats | 
         centre = weights @ points
         deviation = points - centre
         shape = (weights[:, None] * deviation).T @ deviation
-        shape += 1e-6 * np.diag(np.diag(fit.covariance))
+        shape += 1e-6 * np.diag(np.diag(shape))
+        if k + 1 >= ROUNDS and 1.0 / float((weights**2).sum()) >= LEAST_EFFECTIVE_SIZE:
+            break
     if 1.0 / float((weights**2).sum()) < LEAST_EFFECTIVE_SIZE:
         return None
     positions = (np.arange(SAMPLES) + 0.5) / SAMPLES
     return np.asarray(points[np.searchsorted(np.cumsum(weights), positions).clip(max=len(points) - 1)])
+
+
+def _shortened(posterior: Posterior, centre: Floats, covariance: Floats) -> Floats:
+    """The covariance with principal axes as short as the posterior falls along them.
+
+    Where tests do not tell parameters apart, as two transients that are alike, the derivatives at the optimum vanish
+    along a line that the posterior leaves soon after: Laplace's axis is then longer by orders of magnitude.
+    """
+    sd = np.sqrt(np.diag(covariance))
+    variances, axes = np.linalg.eigh(covariance / np.outer(sd, sd))
+    axes = axes * np.sqrt(np.maximum(variances, 1e-12))
+    lengths = 2.0 ** -np.arange(AXIS_HALVINGS + 1.0)
+    steps = np.concatenate([lengths, -lengths])
+    points = centre + sd * (steps[:, None, None] * axes.T).reshape(-1, centre.size)
+    fall = (posterior(centre[None])[0] - posterior(points)).reshape(2, lengths.size, centre.size)
+    freedom = posterior.degrees_of_freedom
+    allowed = 2.0 * 0.5 * (freedom + centre.size) * np.log1p(1.0 / freedom)
+    inside = (fall <= allowed).any(axis=0)
+    longest = np.where(inside.any(axis=0), lengths[inside.argmax(axis=0)], lengths[-1])
+    kept = axes * longest
+    return np.asarray(np.outer(sd, sd) * (kept @ kept.T))
+
+
+AXIS_HALVINGS = 14
+"""Of a principal axis of Laplace's approximation."""
 
 
 def _drawn(centre: Floats, shape: Floats, seed: int) -> Floats:

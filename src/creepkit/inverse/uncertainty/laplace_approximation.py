@@ -126,11 +126,23 @@ def _covariance_derivative(residuals: Residuals, noise_model: NoiseModel, output
     return np.asarray((at(LOG_COMPONENT_STEP) - at(-LOG_COMPONENT_STEP)) / (2.0 * LOG_COMPONENT_STEP))
 
 
+UNDETERMINED_WIDTH = 1.0 / 3.0
+"""Width of a 95 % interval over that of the bounds from which on a parameter is not determined."""
+
+
+AT_BOUND = 1e-4
+"""Distance from a bound over the width of the bounds within which a value lies at it."""
+
+
+ONE_SIDED = "bounded on one side only"
+"""Verdict on a parameter whose interval ends at a bound of the search."""
+
+
 @dataclass(frozen=True)
 class Estimate:
     """One parameter: value, 95 % interval in the author's unit, and a verdict.
 
-    verdict : "determined", "at its bound", or "not determined" (the interval fills four fifths of the bounds).
+    verdict : see verdict_of_interval.
     """
 
     name: str
@@ -152,8 +164,8 @@ def positive_semidefinite(covariance: Floats) -> Floats:
     Rounding makes some where the data hardly determine a combination of unknowns.
     """
     sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    scaled = covariance / np.outer(sd, sd)
-    values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    covariance = 0.5 * (covariance + covariance.T)
+    values, vectors = np.linalg.eigh(covariance / np.outer(sd, sd))
     if values[0] >= 0.0:
         return covariance
     repaired = (vectors * np.maximum(values, 0.0)) @ vectors.T
@@ -255,7 +267,7 @@ def parameter_estimates(
         value = low if value - low < 1e-9 * (high - low) else high if high - value < 1e-9 * (high - low) else value
         a, b = max(value - quantile * standard_deviation, low), min(value + quantile * standard_deviation, high)
         middle, bottom, top = (param.from_internal(float(v)) for v in (value, a, b))
-        verdict = _verdict(float(value), float(quantile * standard_deviation), low, high)
+        verdict = verdict_of_interval(float(value), (float(a), float(b)), (low, high))
         results.append(Estimate(name, middle, bottom, top, param.unit, verdict))
     return tuple(results)
 
@@ -270,21 +282,30 @@ def cut_interval_notes(law: CreepLaw, estimates: Sequence[Estimate]) -> tuple[st
 
 
 def cut_intervals(law: CreepLaw, estimates: Sequence[Estimate]) -> dict[str, float]:
-    """{parameter that the tests determine: bound at which its interval ends}."""
+    """{parameter that the tests bound on one side only: bound at which its interval ends}."""
     found = {}
     for one in estimates:
         ends = zip(law.table[one.name].bounds, (one.low, one.high), strict=True)
         cut = [b for b, end in ends if np.isclose(b, end, rtol=1e-9, atol=0.0)]  # bounds of rates are far below 1e-8
-        if one.verdict == "determined" and cut:
+        if one.verdict in ("determined", ONE_SIDED) and cut:
             found[one.name] = cut[0]
     return found
 
 
-def _verdict(value: float, half: float, low: float, high: float) -> str:
-    if 2 * half >= 0.8 * (high - low):
+def verdict_of_interval(value: float, interval: tuple[float, float], bounds: tuple[float, float]) -> str:
+    """What the tests say of a parameter, given its law: the one rule of tables, texts and exports.
+
+    "not determined" where the 95 % interval fills a third of the bounds or more; "at its bound" where the value lies
+    there; "bounded on one side only" where the interval ends at a bound of the search; else "determined". All numbers
+    are on the internal scale of the parameter, the interval cut at the bounds.
+    """
+    (low, high), width = interval, bounds[1] - bounds[0]
+    if high - low >= UNDETERMINED_WIDTH * width:
         return "not determined"
-    if min(value - low, high - value) <= 1e-4 * (high - low):
+    if min(value - bounds[0], bounds[1] - value) <= AT_BOUND * width:
         return "at its bound"
+    if min(low - bounds[0], bounds[1] - high) <= 1e-9 * width:
+        return ONE_SIDED
     return "determined"
 
 

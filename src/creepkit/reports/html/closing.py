@@ -28,8 +28,10 @@ if TYPE_CHECKING:
     from creepkit.reports.html.findings import GroupFindings
 
 
-def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -> list[PageSection]:
-    """Exports, methods, provenance, and what is missing."""
+def closing_sections(
+    contents: ReportContents, found: Sequence[GroupFindings], before_provenance: Sequence[PageSection] = ()
+) -> list[PageSection]:
+    """Exports, methods, what stands before provenance, provenance, and what is missing."""
     return [
         PageSection("exports", "Files to download", _export_blocks(contents.exports)),
         PageSection(
@@ -45,6 +47,7 @@ def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -
             if found or contents.rupture
             else [],
         ),
+        *before_provenance,
         PageSection("provenance", "Provenance, and how to repeat", _provenance_blocks(contents)),
         PageSection("missing", "What is missing", _missing_blocks(contents)),
     ]

@@ -117,9 +117,10 @@ def printable_lines(text: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """A text with a capital and a full stop, powers of ten and signs as they are printed."""
+    """A text with a capital and a full stop, powers of ten and signs as they are printed; names stay as they are."""
     text = _POWER.sub(lambda found: _with_power(found[1], found[2]), printable(text).strip()).replace(" +- ", " ± ")
-    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?', ':', '…')) else '.'}"
+    first = text[:1] if _NAME.match(text) else text[:1].upper()
+    return f"{first}{text[1:]}{'' if text.endswith(('.', '!', '?', ':', '…')) else '.'}"
 
 
 def plural(count: int, noun: str) -> str:
@@ -135,6 +136,10 @@ def number(value: float, digits: int = 4) -> str:
         return "∞" if value > 0 else "−∞"
     mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
     return _with_power(mantissa, exponent) if exponent else mantissa.replace("-", "−")
+
+
+_NAME = re.compile(r"(?![aA] )(?:[^\W\d_](?![^\W_]))|[\w-]*[_*0-9]\w*")
+"""The name of a parameter, a test or a law at the beginning of a sentence, which stays as it is written."""
 
 
 _POWER = re.compile(r"(?<![\w.+-])(-?\d+(?:\.\d+)?)e([+-]\d\d+)(?![\w.])", re.ASCII)

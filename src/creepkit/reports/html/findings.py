@@ -9,17 +9,25 @@ from markupsafe import Markup
 
 from creepkit.exporters.mathml import law_equations, symbol_element
 from creepkit.inverse.duration import STRAIN_OF_UNKNOWN_DURATION, duration_known
-from creepkit.inverse.uncertainty.laplace_approximation import cut_intervals
+from creepkit.inverse.uncertainty.laplace_approximation import cut_interval_notes
 from creepkit.inverse.unmodelled_effects import TAKEN_FOR_GRANTED
 from creepkit.reports.html.elements import Block, Formula, Items, Paragraph, Table, number, plural, sentence
-from creepkit.reports.html.law_tables import ENDS_AT_BOUND, credible_values, titled_law
-from creepkit.reports.load_programs import SECONDS_PER_HOUR
+from creepkit.reports.html.law_tables import credible_values, titled_law
+from creepkit.reports.identification_text import rejected
 from creepkit.reports.ranking import equivalents_among_remaining
+from creepkit.reports.stress_exponents import constant_load_sentence, reference_sentences
+from creepkit.reports.tests_apart import apart_sentence
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.reports.contents import ReportGroup
+
+
+REJECTED = (
+    "This law does not fit the tests. Its values only bring it as near to them as it comes: what the tests determine, "
+    "and the creep rate and the stress exponent amid them, are not derived from it."
+)
 
 
 @dataclass(frozen=True)
@@ -85,11 +93,20 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     which = "The best law" if found.ranking else "The law"
     blocks.append(Paragraph(Markup("{}: {}.").format(which, titled_law(fit.law))))
     blocks += [Formula(Markup(equation)) for equation in law_equations(fit.law)]
-    blocks += [_values(fit), _point(fit)]
-    if fit.adequacy is not None and found.ranking is not None:
+    misfit = rejected(fit)
+    if fit.adequacy is not None and (found.ranking is not None or misfit):
         blocks.append(Paragraph(sentence(f"the law {fit.adequacy}")))
-    undetermined = _undetermined(fit)
-    if undetermined:
+    apart = apart_sentence(fit)
+    if apart:
+        blocks.append(Paragraph(sentence(apart), "warning"))
+    blocks.append(_values(fit))
+    blocks += [] if misfit else [_point(fit)]
+    conditional = constant_load_sentence(fit)
+    blocks += [Paragraph(sentence(conditional))] if conditional and not misfit else []
+    undetermined = () if misfit else _undetermined(fit)
+    if misfit:
+        blocks.append(Paragraph(REJECTED))
+    elif undetermined:
         blocks += [Paragraph("What these tests do not determine, given this law:"), Items(undetermined)]
     else:
         blocks.append(Paragraph("The tests determine every parameter, given this law."))
@@ -100,6 +117,8 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     if unmodelled:
         blocks += [Paragraph("The intervals do not include:"), Items(unmodelled)]
     notes = [note for note in fit.notes if not (fit.unmodelled and note.startswith(TAKEN_FOR_GRANTED))]  # said above
+    cut = cut_interval_notes(fit.law, fit.estimates) if misfit else ()  # of values that say nothing of the tests
+    notes = [note for note in notes if note not in cut]
     remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *notes])))
     return [*blocks, Paragraph("Remarks:"), Items(remarks)] if remarks else blocks
 
@@ -109,8 +128,8 @@ def _undetermined(fit: Identification) -> list[str]:
 
 
 def _values(fit: Identification) -> Table:
+    """Values with intervals; of a law that the tests reject without what these tests would determine of it."""
     table, symbols = fit.law.table, {str(symbol): symbol for symbol in fit.law.params}
-    cut = cut_intervals(fit.law, fit.estimates)
     rows = [
         (
             Markup(symbol_element(symbols[e.name])),
@@ -118,27 +137,22 @@ def _values(fit: Identification) -> Table:
             number(e.value, 5),
             f"{number(e.low)} to {number(e.high)}",
             "" if e.unit == "1" else e.unit,
-            ENDS_AT_BOUND if e.name in cut else e.verdict,
+            *(() if rejected(fit) else (e.verdict,)),
         )
         for e in fit.estimates
     ]
-    columns = ("parameter", "meaning", "value", "95 % interval", "unit", "by these tests, given this law")
+    interval = "95 % interval, if the law held" if rejected(fit) else "95 % interval"
+    last = () if rejected(fit) else ("by these tests, given this law",)
+    columns = ("parameter", "meaning", "value", interval, "unit", *last)
     caption = "Values for stress in MPa as a ratio to 1 MPa, and time in s as a ratio to 1 s"
+    caption = f"A law that does not fit the tests: v{caption[1:]}" if rejected(fit) else caption
     return Table(caption, columns, rows, numeric=(2, 3))
 
 
 def _point(fit: Identification) -> Paragraph:
-    """Rate and local exponent at the reference point."""
-    r = fit.reference
-    rate = [number(float(v), 3) for v in fit.rate(r.stress, warn=False)]
-    exponent = [number(float(v), 3) for v in fit.local_exponent(r.stress, warn=False)]
-    virgin = " of virgin material" if fit.law.states else ""
-    return Paragraph(
-        f"Amid the tests, at {number(r.stress)} MPa, {r.temperature:.0f} K, a strain of {number(r.strain, 2)} and "
-        f"{number(r.time / SECONDS_PER_HOUR, 3)} h, the creep rate{virgin} is {rate[0]} per second (95 % interval "
-        f"{rate[1]} to {rate[2]}) and the local stress exponent is {exponent[0]} ({exponent[1]} to {exponent[2]})."
-        f"{_assumed_duration(fit)}"
-    )
+    """Rate and stress exponent at the reference point, and which derivative the exponent is."""
+    lines = [*reference_sentences(fit, lambda v, digits: number(v, digits))]
+    return Paragraph(" ".join(f"{line[:1].upper()}{line[1:]}." for line in lines) + _assumed_duration(fit))
 
 
 def _assumed_duration(fit: Identification) -> str:

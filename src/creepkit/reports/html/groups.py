@@ -36,8 +36,13 @@ from creepkit.reports.ranking_plot import misfit_of, ranking_figure
 from creepkit.reports.test_figure import fitted_test_figure, fitted_test_text
 
 if TYPE_CHECKING:
+    from creepkit.inverse.goodness_of_fit import TestFit
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
+
+
+MOST_NAMED = 12
+"""Tests that are named in a sentence."""
 
 
 # ---- curves and tests ------------------------------------------------------------------------------------------------
@@ -62,7 +67,7 @@ def curve_blocks(found: GroupFindings, figures: PageFigures) -> list[Block]:
 def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[Block]:
     """A table of all tests, and a figure for each of those whose misfit is largest, at most so many."""
     fit = found.fit
-    blocks: list[Block] = [_table_of_tests(fit)]
+    blocks: list[Block] = [_table_of_tests(fit), *[Paragraph(text, "note") for text in _without_misfit(fit)]]
     if rupture_rows(fit):
         blocks.append(_table_of_ruptures(fit))
     with_frames = [k for k, test in enumerate(fit.tests) if test.outputs]
@@ -99,7 +104,7 @@ def _table_of_tests(fit: Identification) -> Table:
                 printable(test.name, 120),
                 printable(test.condition, 200),
                 "not known" if compared is None else str(compared.by_test.get(test.name, 0)),
-                "–" if first is None else number(misfit_of(test), 3),
+                "–" if first is None or not noise_judged(fit) else number(misfit_of(test), 3),
                 "–" if first is None else number(first.errors.relative_squared_error, 2),
                 "–" if first is None else f"{number(first.offset, 2)}{unit}",
                 number(test.rate_factor, 3),
@@ -107,15 +112,45 @@ def _table_of_tests(fit: Identification) -> Table:
             )
         )
     columns = (
-        *("test", "condition", "values compared", "χ² without own rate"),
+        *("test", "condition", "values compared", "mean square misfit / noise²"),
         *("relative squared error", "offset", "rate × law", "weight"),
     )
     caption = (
-        "Tests: mean square misfit over the noise of a frame (1: noise alone) with the same rates for all tests; error "
-        "of the first output, and its offset; the test's own factor on the rate, which the misfit leaves out. Whether "
-        "the law explains the tests is judged with that factor, so that its chi-square is the smaller one"
+        "Tests: mean square misfit over the squared noise of a frame (1: noise alone), with the law's own rate for "
+        "every test; relative squared error of the first output (sum of squared differences over that about the mean "
+        "of the test), and its offset; the test's own factor on the rate, which the misfit leaves out; weight of the "
+        "test in the fit (1: as any other, less for one far from the others). Whether the law explains the tests is "
+        "judged by another number, the reduced chi-square of the findings, with the tests' own rates. A dash: the law "
+        "predicts no value at some of the frames, as after a rupture that it puts too early"
     )
     return Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6, 7))
+
+
+def noise_judged(fit: Identification) -> bool:
+    """Whether the noise of some output is known well enough for misfits over noise to mean anything."""
+    return fit.adequacy is None or bool(fit.adequacy.outputs)
+
+
+def _without_misfit(fit: Identification) -> list[str]:
+    """Why chi-square of tests is a dash in their table, a sentence for each reason."""
+    if not noise_judged(fit):
+        return ["χ² is a dash: the noise of a frame is not known well enough to judge by, as the findings say."]
+    with_frames = [test for test in fit.tests if test.outputs and np.isnan(misfit_of(test))]
+    ended = [t for t in with_frames if any(np.isnan(one.errors.mean_squared_error) for one in t.outputs)]
+    known = {id(test) for test in ended}
+    others = [test for test in with_frames if id(test) not in known]
+    sentences = []
+    if ended:
+        why = "the law predicts no value for some of its frames, as that of a test which by the law has ruptured before"
+        sentences.append(f"χ² is a dash where {why}: {_listed_tests(ended)}.")
+    if others:
+        sentences.append(f"χ² is a dash where the noise of a frame is not known: {_listed_tests(others)}.")
+    return sentences
+
+
+def _listed_tests(tests: Sequence[TestFit]) -> str:
+    named = ", ".join(printable(test.name, 120) for test in tests[:MOST_NAMED])
+    return f"{named} and {len(tests) - MOST_NAMED} more" if len(tests) > MOST_NAMED else named
 
 
 def _table_of_ruptures(fit: Identification) -> Table:
@@ -129,8 +164,19 @@ def _table_of_ruptures(fit: Identification) -> Table:
         )
         for name, condition, r in rupture_rows(fit)
     ]
-    columns = ("test", "condition", "lasted, h", "by the law, h", "95 % interval of a single test, h")
-    return Table("Rupture times; > marks tests that were stopped before", columns, rows, numeric=(2, 3, 4))
+    columns = (
+        "test",
+        "condition",
+        "lasted, h",
+        "by the law, h",
+        "95 % interval of a single test if the law is right, h",
+    )
+    rejected = fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy"
+    earned = (
+        ". The law does not explain the tests: the probability of these intervals is not earned" if rejected else ""
+    )
+    caption = f"Rupture times; > marks tests that were stopped before{earned}"
+    return Table(caption, columns, rows, numeric=(2, 3, 4))
 
 
 def _of(found: GroupFindings) -> str:
@@ -169,7 +215,7 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
             Items([sentence(str(challenge)) for challenge in ranking.challenges]),
         ]
     if ranking.failed:
-        blocks.append(Items([sentence(f"{name}: {reason}") for name, reason in ranking.failed.items()]))
+        blocks.append(Items([sentence(f"the law {name}: {reason}") for name, reason in ranking.failed.items()]))
     if drawn and ranking.best.tests:
         blocks.append(
             figures.picture(

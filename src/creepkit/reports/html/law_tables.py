@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from creepkit.reports.html.elements import Block, Paragraph, Table, number, printable
+from creepkit.reports.identification_text import rejected
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -17,8 +18,8 @@ MOST_CORRELATED = 12
 """Parameters up to which their correlations are a table."""
 
 
-ENDS_AT_BOUND = "determined; interval ends at its bound"
-"""What is said of a parameter whose interval the bound of the search cuts."""
+LAW_REJECTED = "the law does not fit"
+"""What stands for what tests say of a parameter, where they reject the law."""
 
 
 def law_title(law: CreepLaw, *, longest: int = 160) -> str:
@@ -45,7 +46,7 @@ def credible_values(ranking: Ranking | None) -> list[Block]:
             number(e.value, 5),
             f"{number(e.low)} to {number(e.high)}",
             "" if e.unit == "1" else e.unit,
-            e.verdict,
+            LAW_REJECTED if rejected(one.fit) else e.verdict,
         )
         for one in ranking.credible
         for e in one.fit.estimates

@@ -27,6 +27,8 @@ from creepkit.reports.html.findings import GroupFindings, findings_of, verdict_b
 from creepkit.reports.html.groups import group_sections
 from creepkit.reports.html.sliders import fragment_style, script_policy, slider_sections
 from creepkit.reports.html.stages import data_section, stage_sections, strength_blocks
+from creepkit.reports.identification_text import rejected
+from creepkit.reports.stress_exponents import rate_and_exponent
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -55,10 +57,9 @@ def report_html(contents: ReportContents) -> str:
     sections = [
         _findings_section(contents, found),
         *_group_sections(found, figures),
-        *slider_sections(found),
-        data_section(contents),
+        data_section(contents, found),
         *stage_sections(contents, figures),
-        *closing_sections(contents, found),
+        *closing_sections(contents, found, slider_sections(found)),
     ]
     shown = [section for section in map(_without_empty, sections) if not section.empty]
     return _template().render(
@@ -154,8 +155,7 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
     rows = []
     for one in found:
         fit, r = one.fit, one.fit.reference
-        rate = [number(float(v), 3) for v in fit.rate(r.stress, warn=False)]
-        exponent = [number(float(v), 3) for v in fit.local_exponent(r.stress, warn=False)]
+        rate, exponent = ([number(v, 3) for v in one] for one in rate_and_exponent(fit))
         weight = "–" if one.ranking is None else f"{one.ranking.laws[0].weight:.2f}"
         adequacy = "?" if fit.adequacy is None else "yes" if fit.adequacy.explains else "no"
         adequacy = "?" if fit.adequacy is not None and fit.adequacy.verdict == "cannot be judged" else adequacy
@@ -167,8 +167,8 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
                 adequacy,
                 "–" if one.decisive is None else "yes" if one.decisive else "no",
                 number(r.stress, 3),
-                f"{rate[0]} ({rate[1]} to {rate[2]})",
-                f"{exponent[0]} ({exponent[1]} to {exponent[2]})",
+                "–" if rejected(fit) else f"{rate[0]} ({rate[1]} to {rate[2]})",
+                "–" if rejected(fit) else f"{exponent[0]} ({exponent[1]} to {exponent[2]})",
             )
         )
     columns = (
@@ -179,11 +179,12 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
         "decisive",
         "at MPa",
         "creep rate there, 1/s",
-        "local exponent",
+        "stress exponent",
     )
     caption = (
-        "Materials, with 95 % intervals. Decisive: one law has more than 95 % of the weight, explains the tests, and "
-        "no other law or effect that was tried does so too; the verdict of each material says what is missing"
+        "Materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests, of laws that fit "
+        "the tests. Decisive: one law has more than 95 % of the weight, explains the tests, and no other law or effect "
+        "that was tried does so too; the verdict of each material says what is missing"
     )
     return Table(caption, columns, rows, numeric=(2, 5, 6, 7))
 

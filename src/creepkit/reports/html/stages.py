@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.duration import duration_known
-from creepkit.inverse.uncertainty.laplace_approximation import cut_intervals
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.reports.design import design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
@@ -31,21 +30,24 @@ from creepkit.reports.html.elements import (
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import findings_of
-from creepkit.reports.html.law_tables import ENDS_AT_BOUND
+from creepkit.reports.html.law_tables import LAW_REJECTED
 from creepkit.reports.html.test_details import NOT_STATED, table_of_details
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.rupture import rupture_text, strength_rows
 from creepkit.reports.rupture_plot import rupture_figure
 from creepkit.reports.temperature_law import plot_temperature_law, temperature_law_text, temperature_study_text
+from creepkit.reports.tests_apart import apart_sentence
 
 if TYPE_CHECKING:
     from creepkit.experiments.planned_design import Design
     from creepkit.extraction.extraction import Extraction
     from creepkit.forecasts.forecast import Forecast
     from creepkit.instruments.imposed import Imposed
+    from creepkit.inverse.adequacy import Adequacy
     from creepkit.quality.flags import DataQuality
     from creepkit.records import History
     from creepkit.reports.contents import ReportContents
+    from creepkit.reports.html.findings import GroupFindings
     from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 MOST_LISTED = 400
@@ -56,7 +58,7 @@ MOST_DESIGNS = 8
 """Planned tests that are listed."""
 
 
-def data_section(contents: ReportContents) -> PageSection:
+def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) -> PageSection:
     """The tests as measured, what is suspect in them, and what was left out and why."""
     histories = [h for group in contents.groups for h in group.histories]
     blocks: list[Block] = []
@@ -65,6 +67,8 @@ def data_section(contents: ReportContents) -> PageSection:
         blocks += [_table_of_histories(histories, more), table_of_details(histories[:MOST_LISTED], more)]
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)
+    apart = [f"{one.name}: {text}" if one.name else text for one in found if (text := apart_sentence(one.fit))]
+    blocks += [Paragraph(sentence(text), "warning") for text in apart]
     left_out = _exclusion_blocks(contents) if histories or contents.exclusions else []
     return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)])
 
@@ -201,7 +205,11 @@ def _imposed_blocks(name: str, under: Imposed, figures: PageFigures) -> list[Blo
 
 def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Block]:
     law = getattr(result, "temperature_law", result)
+    rejected = _rejection(law, result)
     blocks: list[Block] = []
+    if rejected is not None:
+        note = "what follows are values and trends of that law alone, and no properties of the material"
+        blocks.append(Paragraph(sentence(f"the law of this section does not fit the tests: it {rejected}; {note}")))
     if law is not None:
         low, high = law.temperature_range
         forms = ", ".join(f"{parameter} {form}" for parameter, form in law.forms.items())
@@ -211,14 +219,13 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
                 f"those at {law.T_ref:.1f} K."
             )
         )
-        cut = cut_intervals(law.law, law.estimates)
         rows = [
             (
                 e.name,
                 number(e.value, 5),
                 f"{number(e.low)} to {number(e.high)}",
                 "" if e.unit == "1" else e.unit,
-                ENDS_AT_BOUND if e.name in cut else e.verdict,
+                e.verdict if rejected is None else LAW_REJECTED,
             )
             for e in law.estimates
         ]
@@ -236,6 +243,14 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
         )
     text = temperature_law_text(result) if result is law else temperature_study_text(result)
     return [*blocks, Verbatim("The temperature law in full", printable_lines(text))]
+
+
+def _rejection(law: Any, study: Any) -> Adequacy | None:
+    """What the law of a study of temperature leaves unexplained; None where it fits, or where nobody knows."""
+    own = getattr(law, "adequacy", None)
+    joint = getattr(getattr(study, "joint_fit", None), "adequacy", None)
+    adequacy = own if own is not None else joint
+    return adequacy if adequacy is not None and adequacy.rejects else None
 
 
 def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
@@ -265,8 +280,14 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> lis
     laws = ", ".join(f"{law} ({weight:.2g})" for law, weight in forecast.laws.items())
     blocks: list[Block] = [
         Paragraph(
-            f"By {laws}: bands and intervals hold a measured value of a single test with a probability of "
-            f"{100 * forecast.level:g} %."
+            f"By {laws}: if the law is right, bands and intervals hold a measured value of a single test with a "
+            f"probability of {100 * forecast.level:g} %."
+            + (
+                " The law does not explain the tests, so that this probability is not earned: treat the bands as a "
+                "lower bound of the uncertainty."
+                if forecast.rejected
+                else ""
+            )
         ),
         _forecast_table(forecast),
     ]

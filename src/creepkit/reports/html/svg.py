@@ -66,7 +66,7 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
             "role": "img",
             "aria-labelledby": f"{identifier}-t {identifier}-d",
             "font-family": _FONTS,
-            "style": f"max-width:{4 * width / 3:.0f}px",
+            "style": f"--natural-width:{4 * width / 3:.0f}px;max-width:{4 * width / 3:.0f}px",
         }
     )
     for position, (tag, text) in enumerate((("title", title), ("desc", description))):

@@ -51,7 +51,7 @@ def test_one_stress_determines_the_rate_there_alone():
     truth = {"A": 1e-16, "n": 5.2}
     tests = planted(NORTON, truth, [(50.0, 1050.0)] * 4, seed=2, rate=0.1, noise=1e-5)
     first, second = undetermined(identify(NORTON, tests, Steady(), settings=QUICK))
-    assert first.startswith("A and n are not determined singly; their combination ln A + 3.91 n = ")
+    assert first.startswith("the parameters A and n are not determined singly; their combination ln A + 3.91 n = ")
     value, sd = (float(v) for v in first.removesuffix(" is").split(" = ")[1].split(" +- "))
     assert abs(value - np.log(1e-16 * 50**5.2)) < 3 * sd + 0.01
     assert "what the tests see at 50 MPa" in second

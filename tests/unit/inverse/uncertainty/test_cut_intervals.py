@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.uncertainty.laplace_approximation import Estimate, cut_interval_notes, cut_intervals
+from creepkit.inverse.uncertainty.laplace_approximation import (
+    Estimate,
+    cut_interval_notes,
+    cut_intervals,
+    verdict_of_interval,
+)
 
 NORTON = ck.law("norton")
 
@@ -39,3 +45,26 @@ def test_a_rate_far_below_1e_8_is_not_taken_for_its_bound() -> None:
     assert ends[name][0] < 1e-8
     assert cut_intervals(NORTON, estimates(ends)) == {}
     assert cut_interval_notes(NORTON, estimates(ends)) == ()
+
+
+@pytest.mark.parametrize(
+    ("value", "interval", "verdict"),
+    [
+        (0.50, (0.40, 0.60), "determined"),
+        (0.50, (0.33, 0.67), "not determined"),  # 34 % of the bounds
+        (0.50, (0.00, 1.00), "not determined"),
+        (0.90, (0.60, 1.00), "not determined"),
+        (0.90, (0.80, 1.00), "bounded on one side only"),
+        (0.10, (0.00, 0.20), "bounded on one side only"),
+        (1.00, (0.80, 1.00), "at its bound"),
+    ],
+)
+def test_one_rule_says_what_is_determined(value: float, interval: tuple[float, float], verdict: str) -> None:
+    assert verdict_of_interval(value, interval, (0.0, 1.0)) == verdict
+
+
+def test_nearly_equal_intervals_from_near_zero_to_a_bound_have_one_verdict() -> None:
+    """Two transients that the tests cannot tell apart: of each the interval goes over ten decades up to its bound."""
+    bounds = (np.log(1e-14), np.log(0.01))
+    for low in (5.132e-13, 5.195e-13):
+        assert verdict_of_interval(np.log(8.2e-6), (np.log(low), bounds[1]), bounds) == "not determined"

@@ -1,0 +1,109 @@
+"""The creep rate and the stress exponent amid the tests in sentences that say of which state and at what held they are.
+
+A law whose rate depends on time, strain or internal variables has several stress exponents: the derivative of its
+formula, and that of bars which are compared at one strain, as measured rates are in the literature.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from creepkit.inverse.uncertainty.state_at_strain import StateAtStrain, depends_on_history, state_at_strain
+from creepkit.language import strain, time
+from creepkit.records import ZERO_CELSIUS
+from creepkit.reports.load_programs import SECONDS_PER_HOUR
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+
+
+NumberText = Callable[[float, int], str]
+"""A number with so many digits, as the place where it stands writes it."""
+
+
+def plain_number(value: float, digits: int) -> str:
+    """A number as terminals and comments show it."""
+    return f"{value:.{digits}g}"
+
+
+def rate_and_exponent(fit: Identification) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Creep rate, 1/s, and stress exponent amid the tests, (value, low, high) each: of bars at the reference strain.
+
+    Where the law's rate depends on stress and temperature alone, or no bar can be followed, those of the formula.
+    """
+    state = _state(fit)
+    if state is not None:
+        return state.rate, state.exponent
+    stress = fit.reference.stress
+    return tuple(map(float, fit.rate(stress, warn=False))), tuple(map(float, fit.local_exponent(stress, warn=False)))
+
+
+def _state(fit: Identification) -> StateAtStrain | None:
+    return state_at_strain(fit) if depends_on_history(fit.law) else None
+
+
+def held_quantities(fit: Identification) -> str:
+    """What the derivative of the law's formula to stress holds, in words."""
+    law = fit.law
+    held = [word for word, symbol in (("time", time), ("strain", strain)) if law.uses(symbol)]
+    held += ["initial internal variables"] if law.states else []
+    return f"{', '.join(held[:-1])} and {held[-1]}" if len(held) > 1 else "".join(held)
+
+
+def reference_sentences(fit: Identification, text: NumberText = plain_number) -> list[str]:
+    """Rate and exponent amid the tests, one sentence each, without full stops."""
+    r, state = fit.reference, _state(fit)
+    at = f"{text(r.stress, 4)} MPa and {r.temperature - ZERO_CELSIUS:.0f} °C"
+    formula = _interval(tuple(map(float, fit.local_exponent(r.stress, warn=False))), text)
+    held = held_quantities(fit)
+    if state is not None:
+        hours = tuple(v / SECONDS_PER_HOUR for v in state.time)
+        lines = [
+            f"amid the tests, under a constant true stress of {at}, a bar reaches a logarithmic creep strain of "
+            f"{text(r.strain, 2)} after {_interval(hours, text)} h, and creeps there at a rate of "
+            f"{_interval(state.rate, text)} 1/s (95 % intervals in brackets)",
+            "the stress exponent at constant strain, d ln rate / d ln stress of bars compared when each has this "
+            f"strain, is {_interval(state.exponent, text)}: the one to compare with exponents of measured creep rates",
+        ]
+        if held != "strain":
+            lines.append(
+                f"the derivative of the law's formula at constant {held} is {formula}, which no test at one strain "
+                "shows"
+            )
+        return lines
+    rate = _interval(tuple(map(float, fit.rate(r.stress, warn=False))), text)
+    if not held:
+        return [
+            f"amid the tests, at {at}, the creep rate is {rate} 1/s and the stress exponent, d ln rate / d ln stress, "
+            f"is {formula} (95 % intervals in brackets)"
+        ]
+    state_text = f"a strain of {text(r.strain, 2)} and {text(r.time / SECONDS_PER_HOUR, 3)} h"
+    initial = " with internal variables as at the beginning" if fit.law.states else ""
+    return [
+        f"at {at}, {state_text}{initial}, the law's formula has a creep rate of {rate} 1/s and, at constant {held}, "
+        f"the stress exponent d ln rate / d ln stress of {formula} (95 % intervals in brackets); bars compared at one "
+        "strain may show another exponent"
+    ]
+
+
+def _interval(values: tuple[float, ...], text: NumberText) -> str:
+    value, low, high = values
+    return f"{text(value, 3)} [{text(low, 3)}, {text(high, 3)}]"
+
+
+def constant_load_sentence(fit: Identification) -> str:
+    """Where the exponent comes from in tests whose true stress rises with strain; "" where none has a constant load."""
+    loads = [h for h in fit.histories if "strain" in h.outputs and getattr(h.loading, "control", "") == "load"]
+    if not loads:
+        return ""
+    growth = fit.ranges["strain"][1]
+    scatter = fit.noise_model.rate
+    beside = f"rates of single tests scatter by {100 * scatter:.2g} % (one standard deviation) beside it"
+    if not scatter > 0:
+        beside = "the scatter of rates between tests is not known beside it"
+    return (
+        f"under a constant load the true stress rises with strain, here by up to {100 * growth:.2g} %, so that the "
+        "stress exponent comes from the curvature of single curves as well as from the comparison of tests: its "
+        f"interval holds only if the form of the law is right, and {beside}"
+    )

@@ -1,0 +1,22 @@
+"""Samples of results that creepkit keeps: an identification and a ranking, as the version before wrote them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from creepkit.inverse.identification_document import read_identification
+from creepkit.inverse.ranking_document import read_ranking
+from helpers.paths import ROOT
+from helpers.reader_samples import ReaderSample
+from helpers.samples_documents import document
+
+FORMATS = ROOT / "tests" / "data" / "formats" / "0.1.0"
+
+
+def samples() -> Iterator[ReaderSample]:
+    """The samples of results."""
+    fit, ranking = ((FORMATS / name).read_bytes() for name in ("identification.json", "ranking.json"))
+    keys = '"format" "version"'
+    yield document("identification", "identification.json", fit, read_identification, keys)
+    others = {"identification.json": fit}
+    yield document("ranking", "ranking.json", ranking, read_ranking, '"format" "weight"', others)
