@@ -18,6 +18,8 @@ from creepkit.files.reading import FileKind, open_binary
 from creepkit.inverse.history_checks import SUSPECT_LABEL, truncated_at_strain
 from creepkit.records import ZERO_CELSIUS, History
 from creepkit.records.history_selection import select_tests
+from creepkit.records.plugin_calls import accepts_path
+from creepkit.registry import default_registry
 from creepkit.reports.contents import Exclusion
 from creepkit.studies.arguments import HOUR, carried_name, plain_path
 from creepkit.studies.study_file import StudyFile
@@ -141,7 +143,13 @@ def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_
 
 
 def _files_below(file: StudyFile, folder: Path) -> Iterator[Path]:
-    """All visible files of a folder; StudyError where a folder in it cannot be read, for its files would be missing."""
+    """The visible files of a folder that tests are read from; StudyError where a folder in it cannot be read.
+
+    Of a folder that a reader takes as a whole all files below are, of another those that a reader accepts; what else
+    lies there is nobody's business.
+    """
+    readers = [found.value for found in default_registry().readers().values()]
+    is_whole = any(accepts_path(reader, folder) for reader in readers)
 
     def refuse(error: OSError) -> None:
         raise file.error(
@@ -150,8 +158,10 @@ def _files_below(file: StudyFile, folder: Path) -> Iterator[Path]:
         )
 
     for parent, folders, names in os.walk(folder, onerror=refuse):
-        folders[:] = [name for name in folders if name[0] != "."]
-        yield from (Path(parent, name) for name in names if name[0] != ".")
+        folders[:] = [name for name in folders if name[0] != "."] if is_whole else []
+        for one in (Path(parent, name) for name in names if name[0] != "."):
+            if is_whole or (one.is_file() and any(accepts_path(reader, one) for reader in readers)):
+                yield one
 
 
 def _relative(path: Path, base: Path) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.errors import StudyError, nearest
-from creepkit.files.writing import check_target
+from creepkit.files.writing import check_target, is_foreign
 from creepkit.reports.attachments import problem_of_name, same_name
 from creepkit.studies import arguments
 from creepkit.studies.camera_stages import CameraStages
@@ -230,6 +230,11 @@ class Study:
         report = self.file.model.report
         names = [] if report is None else [same_name(report.file)]
         read = {one.path.resolve() for one in files}
+        if report is not None and (folder / report.file).resolve() in read:
+            raise StudyError(
+                f"{self.path}: the report would be written to '{folder / report.file}', which is a data file; "
+                "give [report] file = another name, or another folder"
+            )
         for stage in stages:
             if not stage.file:
                 continue
@@ -248,9 +253,10 @@ class Study:
         """All data files, those of forecasts included, without what the study itself writes."""
         model = self.file.model
         own = [self.path, kept.folder, lock_path]
-        own += [folder / one.file for one in model.export if one.file is not None]
-        own += [] if model.report is None else [folder / model.report.file]
-        own += [folder / name for name in kept.outputs]
+        outputs = [folder / one.file for one in model.export if one.file is not None]
+        outputs += [] if model.report is None else [folder / model.report.file]
+        outputs += [folder / name for name in kept.outputs]
+        own += [path for path in outputs if not is_foreign(path)]  # what somebody else wrote there may be data
         paths = [*self.paths, *(path for camera in self.camera_files for path in camera.all)]
         for k, part in enumerate(model.forecast):
             paths += resolve_paths(self.file, ("forecast", k, "tests"), part.tests, self.root) if part.tests else []
