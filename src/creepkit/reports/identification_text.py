@@ -114,7 +114,8 @@ def _minimum_rates(fit: Identification) -> list[str]:
     within_interval = sum(r.low <= r.measured <= r.high for _, _, r in rows)
     lines = [
         f"  minimum rates of {_tests(len(rows))} without frames: predicted over measured {text}; {within_interval} "
-        f"within the 95 % interval of a single test{_if_the_law_holds(fit)}; rates between tests scatter by {100 * fit.noise_model.rate:.0f} %"
+        f"within the 95 % interval of a single test{_if_the_law_holds(fit)}; "
+        f"rates between tests scatter by {100 * fit.noise_model.rate:.0f} %"
     ]
     if len(rows) > LISTED_TESTS:
         return lines

@@ -181,7 +181,8 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
         "stress exponent",
     )
     caption = (
-        "Materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests. Decisive: one law has more than 95 % of the weight, explains the tests, and "
+        "Materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests. "
+        "Decisive: one law has more than 95 % of the weight, explains the tests, and "
         "no other law or effect that was tried does so too; the verdict of each material says what is missing"
     )
     return Table(caption, columns, rows, numeric=(2, 5, 6, 7))
