@@ -78,10 +78,8 @@ def test_what_is_written_beside_the_rules_is_named_here() -> None:
     assert internal == {
         "creepkit.cli.new_package",  # new files in a place where none was
         "creepkit.dataset.shards",  # FILE.parts
-        "creepkit.inverse.kept_fits",  # study.results
         "creepkit.screening.files",  # one result an alloy, below the folder of the plate
         "creepkit.specimens.reduced_order_training",  # the cache
-        "creepkit.studies.documents",  # study.results
         "creepkit.studies.lock",  # study.lock, which is refused where it is another file
         "creepkit.surrogates.weight_files",  # the checkpoint of a training
     }
