@@ -24,14 +24,6 @@ def bic_penalty(parameters: int, observations: float) -> float:
     return parameters * float(np.log(observations))
 
 
-def small_sample_bic_penalty(parameters: int, observations: float) -> float:
-    """K ln n * n/(n-K-1), which BIC is for many observations (A. McQuarrie (1999), Stat. Probab. Lett. 44, 79).
-
-    K counts the standard deviation of the scatter: without the factor a curve through almost all of a few points wins.
-    """
-    return bic_penalty(parameters, observations) * observations / max(observations - parameters - 1.0, 1.0)
-
-
 def aicc_penalty(parameters: int, observations: float) -> float:
     """2K + 2K(K+1)/(n-K-1)."""
     return 2.0 * parameters + 2.0 * parameters * (parameters + 1) / max(observations - parameters - 1.0, 1.0)

@@ -25,8 +25,8 @@ LEAST_SCATTER_SHOWN = 1e-3
 SHOWN_EFFECTS = 6
 """Heats at each end of the list."""
 
-CRITERIA = {"bic": "BICc", "aicc": "AICc"}
-"""Both with their corrections for few tests."""
+CRITERIA = {"bic": "BIC", "aicc": "AICc"}
+"""As they are written."""
 
 PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 

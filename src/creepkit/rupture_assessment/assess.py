@@ -13,7 +13,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import FitError, nearest
-from creepkit.inverse.information_criteria import aicc_penalty, criterion_weights, small_sample_bic_penalty
+from creepkit.inverse.information_criteria import aicc_penalty, bic_penalty, criterion_weights
 from creepkit.records import History
 from creepkit.registry.arguments import check_histories
 from creepkit.rupture_assessment.assessment import (
@@ -197,7 +197,7 @@ def _ranked(
                 fits.append(fit)
     if not fits:
         return (), rejected
-    penalty = small_sample_bic_penalty if settings.criterion == "bic" else aicc_penalty
+    penalty = bic_penalty if settings.criterion == "bic" else aicc_penalty
     scores = [-2.0 * fit.log_likelihood + penalty(fit.parameter_count, fit.observations) for fit in fits]
     excess, by_fit = criterion_weights(scores)
     degrees = Counter(fit.method for fit in fits)

@@ -140,8 +140,10 @@ def too_few_tests(
 ) -> str:
     """Why a method is not offered for so few tests, "" where it is.
 
-    With n tests that broke and K estimates n - K - 1 must be above zero: from there on small-sample criteria exist,
-    and the scatter has three degrees of freedom or more, so that bounds say something.
+    With n tests that broke, k constants and g scatters between groups n - k - g - 1 must be above zero, so that the
+    scatter of a test has two degrees of freedom or more: a curve with one passes through nearly all tests by chance;
+    and a criterion takes that for a good fit. Two are enough for bounds of Student's distribution to hold, and asking for
+    more would leave out curvature that few tests have (measured: rupture_strength_coverage).
     """
     constants = method.basis(at, degree, fixed, centre_of(tests)).linear.shape[1] + method.bilinear
     needed = constants + len(tests.groups) + 2

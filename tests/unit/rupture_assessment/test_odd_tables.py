@@ -46,7 +46,7 @@ def test_constants_that_are_given_have_a_size() -> None:
 
 def test_few_tests_are_refused_in_a_short_sentence() -> None:
     for tests in (TESTS[:1], TESTS[:2], [rupture_test(f"t{k}", 100.0, 873.15, 90.0 + k) for k in range(9)]):
-        with pytest.raises(FitError, match="do not determine the .* constants|take 5 or more") as caught:
+        with pytest.raises(FitError, match="do not determine the .* constants|take . or more") as caught:
             ck.rupture(tests)
         assert len(str(caught.value)) < 500
 

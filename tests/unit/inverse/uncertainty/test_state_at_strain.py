@@ -30,7 +30,7 @@ def curves() -> list[ck.History]:
 
 
 def test_time_hardening_has_n_over_one_plus_m_at_constant_strain() -> None:
-    fit = ck.identify(curves(), "time-hardening", starts=1)
+    fit = ck.identify("time-hardening", curves(), starts=1)
     state = state_at_strain(fit)
     assert state is not None
     n, m = fit.values["n"], fit.values["m"]
@@ -46,7 +46,7 @@ def test_time_hardening_has_n_over_one_plus_m_at_constant_strain() -> None:
 
 
 def test_a_combination_outside_the_hull_of_the_tests() -> None:
-    fit = ck.identify(curves(), "time-hardening", starts=1)
+    fit = ck.identify("time-hardening", curves(), starts=1)
     at = np.array([1000.0])
     assert not outside_combinations(fit, np.array([70.0]), at)
     assert "120 MPa at 727 °C" in outside_combinations(fit, np.array([120.0]), at)
