@@ -142,8 +142,8 @@ def too_few_tests(
 
     With n tests that broke, k constants and g scatters between groups n - k - g - 1 must be above zero, so that the
     scatter of a test has two degrees of freedom or more: a curve with one passes through nearly all tests by chance;
-    and a criterion takes that for a good fit. Two are enough for bounds of Student's distribution to hold, and asking for
-    more would leave out curvature that few tests have (measured: rupture_strength_coverage).
+    and a criterion takes that for a good fit. Two are enough for bounds of Student's distribution to hold, and asking
+    for more would leave out curvature that few tests have (measured: rupture_strength_coverage).
     """
     constants = method.basis(at, degree, fixed, centre_of(tests)).linear.shape[1] + method.bilinear
     needed = constants + len(tests.groups) + 2
