@@ -1,6 +1,7 @@
 """Forecasts of Norton bars, whose curves, times and their distributions are closed forms; and what is refused."""
 
 import json
+import re
 import warnings
 from dataclasses import replace
 
