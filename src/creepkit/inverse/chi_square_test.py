@@ -42,6 +42,9 @@ SIGNIFICANCE = 0.003
 FEWEST_TREND_TESTS = 5
 """Tests from which on rates are tested for a bend over the stress."""
 
+JUDGED_SCATTER = 1e-4
+"""Of ln rate between tests: less is what a simulation rounds, not what a test shows."""
+
 
 def adequacy_of(
     problem: LeastSquaresProblem,
@@ -146,7 +149,7 @@ def _scatter_of_rates(
     stresses = np.log([float(np.median(reference_stresses(h, problem.predictor))) for h in problem.histories])
     if not noise_model.rate > 0:
         return 0.0, 1.0
-    if len(rates) < FEWEST_TREND_TESTS or np.unique(stresses.round(3)).size < 3:
+    if np.std(rates) < JUDGED_SCATTER or len(rates) < FEWEST_TREND_TESTS or np.unique(stresses.round(3)).size < 3:
         return noise_model.rate, 1.0
     x = stresses - stresses.mean()
     squares = [
