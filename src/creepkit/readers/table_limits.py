@@ -33,7 +33,7 @@ def refuse_many(location: str, columns: int, keys: int) -> None:
     """Refuse more columns or keys than a table has."""
     for noun, found, usual, advice in (
         ("columns", columns, MAXIMUM_COLUMNS, "write the tests to several files"),
-        ("keys", keys, MAXIMUM_KEYS, "write only those that count"),
+        ("keys above the table", keys, MAXIMUM_KEYS, "write only those that count"),
     ):
         if found > usual and found > (most := raised(usual)):
             raise HistoryError(
