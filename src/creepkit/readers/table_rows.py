@@ -217,7 +217,7 @@ def without_empty(rows: Sequence[TableRow]) -> Sequence[TableRow]:
 
 
 def cells_by_part(rows: Sequence[TableRow], column: int) -> Iterator[tuple[Ints, list[str]]]:
-    """Lines and cells of one column, some rows at a time."""
+    """(rows,) lines and cells of one column, some rows at a time."""
     if isinstance(rows, TextRows):
         yield from ((part.lines, part.cells(column)) for part in rows.parts)
     elif rows:
