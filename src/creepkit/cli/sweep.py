@@ -77,7 +77,7 @@ def command(
 
 def parse_whole_numbers(text: str, option: str) -> tuple[int, ...]:
     """Whole numbers above zero, from text such as 1,2,3."""
-    from creepkit.errors import SurrogateError
+    from creepkit.errors import SurrogateError, quoted
 
     try:
         numbers = tuple(parsed_integer(part) for part in text.split(","))
@@ -85,6 +85,7 @@ def parse_whole_numbers(text: str, option: str) -> tuple[int, ...]:
         numbers = ()
     if not numbers or any(number not in limits.SAMPLES for number in numbers):
         raise SurrogateError(
-            f"{option} {text:.40} is not understood; write {limits.SAMPLES}, with commas between them, such as 1,2,3"
+            f"{option} {quoted(text)} is not understood; write {limits.SAMPLES}, with commas between them, such as "
+            "1,2,3"
         )
     return numbers
