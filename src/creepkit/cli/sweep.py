@@ -9,10 +9,12 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.interrupts import kept_when_interrupted
 from creepkit.cli.options import parsed_integer
 from creepkit.reports.terminal import ProgressBar, print_json, print_table
 
 
+@kept_when_interrupted("what is trained and the last checkpoint are kept, and the same command goes on from there")
 def command(
     data: Annotated[Path, typer.Argument(metavar="DATA", help="Data set that creepkit generate wrote.")],
     to: Annotated[
