@@ -93,7 +93,7 @@ def predictor_of(file: StudyFile, root: Path | None) -> Predictor | None:
         if (
             beside is None and str(named) not in reduced_order_models()
         ):  # never a file of the folder one happens to be in
-            what = f"no file {quoted(str(named))} lies beside the study, and no surrogate is called that"
+            what = f"no file '{quoted(str(named))}' lies beside the study, and no surrogate is called that"
             raise SurrogateError(f"{what}; {nearest(str(named), reduced_order_models())}")
         return ck.surrogate(beside if beside is not None else str(named))
 
