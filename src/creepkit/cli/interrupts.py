@@ -75,7 +75,7 @@ def _send_lost_interrupt_again(lost: sys.UnraisableHookArgs) -> None:
 
 
 def _send_again() -> None:
-    number = _received or signal.SIGINT
+    number = signal.Signals(_received or signal.SIGINT)
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, number)  # ends a call of the system that waits, too
     else:
