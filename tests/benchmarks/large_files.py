@@ -4,7 +4,7 @@
 
 Files of the size asked for are written to a temporary folder, and each is read in a process of its own, whose CPU time
 and largest memory are stated, imports included. "frames" are what was read, to show that it was all. A table that holds
-texts beside its numbers is read up to 6,000,000 cells, and beyond in one sentence refused, before its rows are taken
+texts beside its numbers is read up to 40,000,000 cells, and beyond refused in one sentence, before its rows are taken
 apart: the environment variable CREEPKIT_LIMITS allows more.
 """
 

@@ -87,11 +87,13 @@ def unforeseen(error: BaseException) -> tuple[str, str] | None:
     from creepkit.errors import CreepkitError
 
     below: BaseException | None = error
+    foreseen = False  # an error that a reader replaces on purpose, `from None`, is foreseen with all that caused it
     while below is not None:
         if isinstance(below, MemoryError):
             return "memory", str(error)[-200:]
         cause = below.__cause__
-        if cause is not None and not isinstance(cause, (CreepkitError, OSError, UnicodeError)):
+        foreseen = foreseen or (cause is None and below.__suppress_context__)
+        if not foreseen and cause is not None and not isinstance(cause, (CreepkitError, OSError, UnicodeError)):
             return "traceback", f"{type(cause).__name__}: {error}"[:400]
         below = cause or below.__context__
     return None

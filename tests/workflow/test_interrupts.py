@@ -1,4 +1,4 @@
-"""Ctrl-C ends a command with one line and exit code 130, and leaves no file half written."""
+"""A signal ends a command with one line, which says what is kept, and 128 + its number; no file is half written."""
 
 import os
 import signal
@@ -53,24 +53,80 @@ def started(process, folder):
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processor time is read from /proc")
-@pytest.mark.parametrize("command", ["identify", "screen", "train"])
-def test_an_interrupt_is_one_line_and_leaves_nothing_half_written(command, tmp_path):
+@pytest.mark.parametrize(
+    ("command", "sent", "said"),
+    [
+        ("identify", signal.SIGINT, "interrupted; files that were there are whole, and the same command starts"),
+        ("screen", signal.SIGTERM, "interrupted by SIGTERM; alloys that are finished are kept, and the same command"),
+        ("train", signal.SIGHUP, "interrupted by SIGHUP; the last checkpoint is kept, and the same command goes on"),
+    ],
+)
+def test_an_interrupt_is_one_line_and_leaves_nothing_half_written(command, sent, said, tmp_path):
     (tmp_path / "out").mkdir()
     words = [sys.executable, "-c", PROGRAM, *map(str, words_of(command, tmp_path))]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
         started(process, tmp_path)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(sent)
         _, stderr = process.communicate(timeout=DEADLINE)
-    assert process.returncode == 130, stderr
+    assert process.returncode == 128 + sent, stderr
     lines = [
         line for line in stderr.splitlines() if line.startswith(("creepkit:", "Traceback", "Exception", "Aborted"))
     ]
-    assert lines == [f"creepkit: {command} interrupted"]
+    assert len(lines) == 1
+    assert lines[0].startswith(f"creepkit: {command} {said} ")
     assert [path for path in tmp_path.rglob("*") if path.name.endswith((".part", ".lock"))] == []
 
 
-def test_to_be_ended_by_the_system_is_an_interrupt():
+def ended(program):
+    """Exit code and stderr of a Python program that runs the command line."""
+    words = [sys.executable, "-c", f"import os, signal\nimport creepkit.cli.app as app\n{program}"]
+    run = subprocess.run(words, timeout=DEADLINE, capture_output=True, text=True, check=False)
+    return run.returncode, run.stderr
+
+
+CALLED = "from creepkit.cli import main; main()"
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="signals are those of POSIX")
+def test_a_signal_before_the_command_began():
     """As a queue of jobs or a container ends a process."""
-    end = "import os, signal; import creepkit.cli.app as app; app.app = lambda: os.kill(os.getpid(), signal.SIGTERM); "
-    process = subprocess.run([sys.executable, "-c", f"{end}from creepkit.cli import main; main()"], timeout=DEADLINE)
-    assert process.returncode == 130
+    for name, code in (("SIGTERM", 143), ("SIGHUP", 129)):
+        killed = ended(f"app.app = lambda: os.kill(os.getpid(), signal.{name}); {CALLED}")
+        assert killed == (
+            code,
+            f"creepkit: interrupted by {name} before it began; the same command starts from the beginning\n",
+        )
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="signals are those of POSIX")
+def test_what_a_signal_turns_into_another_error_is_an_interrupt_all_the_same():
+    """Imports that are cut off raise errors of their own."""
+    program = (
+        "def cut_off():\n    try: os.kill(os.getpid(), signal.SIGTERM)\n"
+        "    except BaseException: raise ImportError('of half a library')\n"
+        f"app.app = cut_off\n{CALLED}"
+    )
+    code, stderr = ended(program)
+    assert code == 143
+    assert stderr.startswith("creepkit: interrupted by SIGTERM")
+    assert stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="signals are those of POSIX")
+def test_a_signal_while_an_object_is_tidied_away_is_not_lost():
+    """As ZipFile.__del__ of a spreadsheet that is read: Python drops what is raised there."""
+    program = (
+        "import time\nclass Tidied:\n    def __del__(self): os.kill(os.getpid(), signal.SIGTERM); time.sleep(0.1)\n"
+        f"def work(): Tidied(); time.sleep({DEADLINE})\napp.app = work\n{CALLED}"
+    )
+    code, stderr = ended(program)
+    assert code == 143
+    assert "Exception ignored" not in stderr
+    assert stderr.count("\n") == 1
+
+
+def test_nohup_is_heeded():
+    program = (
+        f"signal.signal(signal.SIGINT, signal.SIG_IGN)\napp.app = lambda: os.kill(os.getpid(), signal.SIGINT)\n{CALLED}"
+    )
+    assert ended(program) == (0, "")

@@ -16,7 +16,7 @@ from creepkit.app.documents import compared_frames, finite, numbers, rate_point
 from creepkit.app.requests import PredictRequest, ProgramRequest, RequestError
 from creepkit.app.sections import section_document
 from creepkit.arrays import Floats
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, quoted
 from creepkit.inverse.composite_predictor import predict
 from creepkit.language import Elastic
 from creepkit.records import (
@@ -198,13 +198,13 @@ def _check_lengths(program: ProgramRequest, specimen: Any) -> None:
     for name in program.lengths:
         if name not in known:
             has = ", ".join(known) or "none"
-            raise RequestError(f"specimen '{specimen.name}' has no length '{name:.60}'; it has {has}")
+            raise RequestError(f"specimen '{specimen.name}' has no length '{quoted(name, 60)}'; it has {has}")
 
 
 def _loading(program: ProgramRequest, specimen: Any) -> Loading:
     if program.load not in (load.name for load in loads_of(specimen)):
         names = ", ".join(load.name for load in loads_of(specimen))
-        raise RequestError(f"specimen '{specimen.name}' has no load '{program.load:.60}'; it has {names}")
+        raise RequestError(f"specimen '{specimen.name}' has no load '{quoted(program.load, 60)}'; it has {names}")
     if program.load == "stress":
         return StressSteps(tuple(program.steps), program.control)
     if program.load == "strain":

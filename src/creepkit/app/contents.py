@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 
-from creepkit.errors import CreepkitError, FitError
+from creepkit.errors import CreepkitError, FitError, quoted
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.language import temperature
@@ -84,7 +84,9 @@ class PageContents:
         for one in self.specimens:
             if one.name == name:
                 return one
-        raise FitError(f"this page has no specimen '{name:.60}'; it has {', '.join(s.name for s in self.specimens)}")
+        raise FitError(
+            f"this page has no specimen '{quoted(name, 60)}'; it has {', '.join(s.name for s in self.specimens)}"
+        )
 
 
 def page_contents(

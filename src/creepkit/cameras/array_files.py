@@ -21,7 +21,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.cameras.text_files import FRAME_FILE
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import read_bytes
 
@@ -104,7 +104,7 @@ def matlab_table(path: Path) -> ArrayTable:
     with _damage_reported(path):
         for array in _stored_arrays(content):
             if array.name in stored:
-                raise HistoryError(f"{path}: two of its arrays are called '{array.name:.40}'; keep one of them")
+                raise HistoryError(f"{path}: two of its arrays are called '{quoted(array.name)}'; keep one of them")
             stored[array.name] = array
 
     def load(names: Sequence[str]) -> dict[str, Floats]:
@@ -167,7 +167,7 @@ class _Stored(NamedTuple):
             raise ValueError("an array has no numbers")
         numbers = np.frombuffer(values.data, dtype=np.dtype(self.order + _TYPES[values.kind]))
         if numbers.size != count:
-            raise ValueError(f"the array {self.name:.40} has {numbers.size} numbers in the place of {count}")
+            raise ValueError(f"the array {quoted(self.name)} has {numbers.size} numbers in the place of {count}")
         return numbers.astype(float).reshape(self.shape, order="F").ravel()
 
 

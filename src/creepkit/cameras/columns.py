@@ -222,7 +222,7 @@ def _missing(format: CameraFormat, names: Sequence[str], quantity: str, spelling
             "name x, y, u and v alone with format=ck.CameraFormat(...)"
         )
     listed = ", ".join(quoted(name) for name in names[:20])
-    return f"missing column '{spellings[0]}' ({quantity} of {format}); found: {listed:.400}"
+    return f"missing column '{spellings[0]}' ({quantity} of {format}); found: {quoted(listed, 400)}"
 
 
 def _factor(format: CameraFormat, quantity: str, unit: str, name: str, location: str) -> float:

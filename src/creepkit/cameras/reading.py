@@ -101,7 +101,9 @@ def _candidates(format: FormatLike, formats: Sequence[CameraFormat]) -> tuple[Ca
         return (CameraFormat("columns", "columns named by the user", format),)
     known = {one.name: one for one in formats}
     if not isinstance(format, str):
-        raise HistoryError(f"format is {format!r:.60}; give a name, {{quantity: column}} or ck.CameraFormat(...)")
+        raise HistoryError(
+            f"format is {quoted(repr(format), 60)}; give a name, {{quantity: column}} or ck.CameraFormat(...)"
+        )
     if format not in known:
         raise HistoryError(f"no camera format is called '{format}'; {nearest(str(format), known)}")
     return (known[format],)
@@ -129,7 +131,9 @@ def _listed_files(paths: object) -> list[Path]:
     """The files of a list, in its order; HistoryError for what is none, and for a file that stands in it twice."""
     given = list(paths) if isinstance(paths, Iterable) else None
     if given is None or not all(isinstance(one, (str, Path)) for one in given):
-        raise HistoryError(f"read_frames() takes a folder, a file, a pattern or a list of files, found {paths!r:.60}")
+        raise HistoryError(
+            f"read_frames() takes a folder, a file, a pattern or a list of files, found {quoted(repr(paths), 60)}"
+        )
     if not given:
         raise HistoryError("no files are given to read frames from; name a folder, a file or a list of files")
     listed = [Path(one).expanduser() for one in given]
@@ -283,7 +287,7 @@ def _checked_times(name: str, count: int, times: ArrayLike | None) -> Floats | N
     try:
         moments = np.asarray(times, dtype=float)
     except (TypeError, ValueError):
-        raise HistoryError(f"{name}: times are {times!r:.40}; give an array of s, one for each frame") from None
+        raise HistoryError(f"{name}: times are {quoted(repr(times))}; give an array of s, one for each frame") from None
     if moments.shape != (count,):
         raise HistoryError(f"{name}: {moments.size} times for {count} frames; give one for each")
     _check_increasing(name, moments)

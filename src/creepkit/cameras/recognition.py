@@ -129,7 +129,7 @@ def _explain_near_misses(path: Path, heads: Sequence[TextHead], formats: Sequenc
 
 def _unknown(names: Sequence[str], formats: Sequence[CameraFormat], what: str) -> str:
     listed = ", ".join(quoted(name) for name in names[:12])
-    found = f"(found: {listed:.300})" if listed else "(it has none)"
+    found = f"(found: {quoted(listed, 300)})" if listed else "(it has none)"
     known = ", ".join(one.name for one in formats)
     return (
         f"no camera format has its {what} {found}; known are {known or 'none'}, or name the columns with "

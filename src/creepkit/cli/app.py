@@ -1,7 +1,7 @@
 """The command `creepkit`: its global options, its commands, and how errors end it.
 
 Exit 0 fine, 1 an error that we can explain in one line, 2 wrong usage, 70 a fault of creepkit, 130 interrupted by
-Ctrl-C or a signal to end, 141 nobody reads the output any more.
+Ctrl-C, 143 by SIGTERM, 129 by SIGHUP, 141 nobody reads the output any more.
 """
 
 from __future__ import annotations
@@ -47,9 +47,11 @@ from creepkit.cli import (
 )
 from creepkit.cli.declared_options import checked
 from creepkit.cli.described_test import TestCommand
-from creepkit.cli.failures import NO_READER, failure_sentence
+from creepkit.cli.failures import NO_READER, failure_sentence, output_sentence
 from creepkit.cli.identification_options import CommandWithDefaults
+from creepkit.cli.interrupts import exit_code, interrupted_sentence, was_interrupted
 from creepkit.errors import CreepkitError, PluginError
+from creepkit.files.writing import FULL
 
 
 class CommandGroup(TyperGroup):
@@ -66,19 +68,22 @@ class CommandGroup(TyperGroup):
             _check_files_in_environment()
             _load_plugin_files(ctx.params["plugin"])
             return super().invoke(ctx)
-        except BrokenPipeError:
-            raise typer.Exit(NO_READER) from None
-        except (CreepkitError, OSError) as error:
-            if ctx.params["debug"]:
-                raise
-            raise _ended(_sentence(error), 1) from None
         except KeyboardInterrupt:
-            typer.echo(f"creepkit: {ctx.invoked_subcommand or ''} interrupted", err=True)
-            raise typer.Exit(130) from None
+            raise self._interrupted(ctx) from None
         except Exception as error:
             if ctx.params["debug"] or _is_of_the_command_line(error):
                 raise
+            if was_interrupted():
+                raise self._interrupted(ctx) from None
+            if isinstance(error, BrokenPipeError):
+                raise typer.Exit(NO_READER) from None
+            if isinstance(error, CreepkitError | OSError):
+                raise _ended(_sentence(error), 1) from None
             raise _ended(*failure_sentence(error)) from None
+
+    def _interrupted(self, ctx: Any) -> typer.Exit:
+        name = ctx.invoked_subcommand or ""
+        return _ended(interrupted_sentence(name, self.commands.get(name)), exit_code())
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of this name, creepkit's own or a plugin's; say which plugins failed where none has it."""
@@ -241,5 +246,7 @@ def _sentence(error: Exception) -> str:
     """What an error says; with advice where it is the system's."""
     if not isinstance(error, OSError) or isinstance(error, CreepkitError) or not error.strerror:
         return str(error)
+    if error.filename is None and error.errno in FULL:  # errors of files that we write have their names
+        return output_sentence(error)
     place = f"{error.filename}: " if error.filename is not None else ""
     return f"{place}{error.strerror}; check the name, who may read and write there, and the space of the disk"

@@ -1,10 +1,11 @@
-"""What ends the command line beside errors of ours: a fault of creepkit, no memory, no reader of the output.
+"""What ends the command line beside errors of ours: a fault of creepkit, no memory, no reader of the output, a signal.
 
 A fault of creepkit is one line, exit code 70, and a file with all that a report needs; nothing is sent anywhere.
 """
 
 from __future__ import annotations
 
+import io
 import os
 import platform
 import sys
@@ -14,6 +15,8 @@ import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+
+from creepkit.cli.interrupts import exit_code, ignore_signals, interrupted_sentence, was_interrupted
 
 FAULT, NO_READER = 70, 141
 """Exit codes: EX_SOFTWARE of sysexits.h; and 128 + SIGPIPE, with which the shell reports programs of a closed pipe."""
@@ -69,10 +72,11 @@ def _address() -> str:
 
 
 def prepare_streams() -> None:
-    """Have all three standard streams open, and write what their encoding lacks as its code instead of failing.
+    """Have all three standard streams open, write all of a text or fail, and write what an encoding lacks as its code.
 
     A stream that the shell closed is /dev/null: else the next file that is opened would take its number, and what C
-    libraries print would go into that file.
+    libraries print would go into that file. A stream without buffer (PYTHONUNBUFFERED) drops without a word what the
+    system did not take at once, as on a disk that gets full: it gets a buffer that is emptied at every line end.
     """
     try:
         while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
@@ -86,6 +90,9 @@ def prepare_streams() -> None:
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
         stream = getattr(sys, name)
+        if isinstance(stream, io.TextIOWrapper) and isinstance(stream.buffer, io.RawIOBase):
+            whole = io.BufferedWriter(stream.buffer)
+            setattr(sys, name, stream := io.TextIOWrapper(whole, stream.encoding, line_buffering=True))
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
 
@@ -110,28 +117,45 @@ def run_to_the_end(run: Callable[[], None]) -> None:
     try:
         run()
     except SystemExit as end:
-        code = end.code
+        code = exit_code() if was_interrupted() and end.code == 1 else end.code
     except KeyboardInterrupt:  # before the command began, which says so itself
-        code = 130
+        code = _said_interrupted()
     except BrokenPipeError:
         code = NO_READER
     except Exception as error:
         if "--debug" in sys.argv:
             raise
-        sentence, code = failure_sentence(error)
-        _say(sentence)
+        if was_interrupted():  # as an import that was cut off, which raises something else
+            code = _said_interrupted()
+        else:
+            sentence, code = failure_sentence(error)
+            _say(sentence)
     try:
         sys.stdout.flush()
+    except KeyboardInterrupt:  # while nobody reads
+        code = exit_code()
     except BrokenPipeError:
         code = NO_READER
     except OSError as error:
-        _say(f"standard output: {error.strerror}; free some space and start again")
+        if not code:
+            _say(output_sentence(error))
         code = code or 1
     else:
+        ignore_signals()  # all is done; Python would print a traceback while it tidies up
         sys.exit(code)  # type: ignore[arg-type]
     with suppress(OSError, ValueError):  # Python flushes once more at its end, and would print a traceback
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(code)  # type: ignore[arg-type]
+
+
+def output_sentence(error: OSError) -> str:
+    """What is said of standard output that cannot be written."""
+    return f"standard output: {error.strerror}; free some space and start again"
+
+
+def _said_interrupted() -> int:
+    _say(interrupted_sentence(None))
+    return exit_code()
 
 
 def _say(sentence: str) -> None:

@@ -9,6 +9,7 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.interrupts import kept_when_interrupted
 from creepkit.cli.options import PAPER_SPECIMEN, parsed_number
 from creepkit.reports.terminal import ProgressBar
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from creepkit.sampling.domains import SamplingDesign
 
 
+@kept_when_interrupted("shards that are finished are kept, and the same command goes on with the others")
 def command(
     law: Annotated[str, typer.Argument(metavar="LAW", help="Name of a law.")],
     to: Annotated[

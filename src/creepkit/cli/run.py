@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.interrupts import kept_when_interrupted
 from creepkit.reports.terminal import ProgressBar, print_json, print_table, printable
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 REPORT_SUFFIXES = (".html", ".htm")
 
 
+@kept_when_interrupted("stages that are finished are kept, and the same command goes on with the others")
 def command(
     study: Annotated[Path, typer.Argument(metavar="STUDY.toml|REPORT.html", help="A study file, or a study's report.")],
     only: Annotated[

@@ -23,6 +23,7 @@ from creepkit.cli.identification_options import (
     setting_changes,
     surrogate_named,
 )
+from creepkit.cli.interrupts import kept_when_interrupted
 from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, penalty_named
 from creepkit.reports.terminal import ProgressBar
 
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 CONFIRMATION_CHOICES = {"when-in-doubt": "when in doubt", "always": True, "never": False}
 
 
+@kept_when_interrupted("alloys that are finished are kept, and the same command goes on with the others")
 def command(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of history files, their alloys in them.")],
     law: Annotated[

@@ -9,10 +9,12 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.interrupts import kept_when_interrupted
 from creepkit.cli.options import parsed_integer
 from creepkit.reports.terminal import ProgressBar, print_json, print_table
 
 
+@kept_when_interrupted("what is trained and the last checkpoint are kept, and the same command goes on from there")
 def command(
     data: Annotated[Path, typer.Argument(metavar="DATA", help="Data set that creepkit generate wrote.")],
     to: Annotated[
@@ -77,7 +79,7 @@ def command(
 
 def parse_whole_numbers(text: str, option: str) -> tuple[int, ...]:
     """Whole numbers above zero, from text such as 1,2,3."""
-    from creepkit.errors import SurrogateError
+    from creepkit.errors import SurrogateError, quoted
 
     try:
         numbers = tuple(parsed_integer(part) for part in text.split(","))
@@ -85,6 +87,7 @@ def parse_whole_numbers(text: str, option: str) -> tuple[int, ...]:
         numbers = ()
     if not numbers or any(number not in limits.SAMPLES for number in numbers):
         raise SurrogateError(
-            f"{option} {text:.40} is not understood; write {limits.SAMPLES}, with commas between them, such as 1,2,3"
+            f"{option} {quoted(text)} is not understood; write {limits.SAMPLES}, with commas between them, such as "
+            "1,2,3"
         )
     return numbers

@@ -9,12 +9,14 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.interrupts import kept_when_interrupted
 from creepkit.reports.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from creepkit.surrogates.parameter_gru import ParameterGru
 
 
+@kept_when_interrupted("the last checkpoint is kept, and the same command goes on from there")
 def command(
     data: Annotated[Path, typer.Argument(metavar="DATA", help="Data set that creepkit generate wrote.")],
     to: Annotated[

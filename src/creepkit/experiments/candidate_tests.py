@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import FitError
+from creepkit.errors import FitError, quoted
 from creepkit.experiments.rig import HIGHER_LEVEL, LOWER_LEVEL, Rig
 from creepkit.records import (
     History,
@@ -286,7 +286,7 @@ def candidates_given(histories: Sequence[History | CandidateTest], rigs: Sequenc
     candidates = []
     for given in histories:
         if not isinstance(given, CandidateTest | History):
-            raise FitError(f"a planned test is a history without outputs, found {given!r:.60}")
+            raise FitError(f"a planned test is a history without outputs, found {quoted(repr(given), 60)}")
         if isinstance(given, CandidateTest) and not (given.histories and 0 < given.hours < np.inf):
             raise FitError(f"the planned test '{given.description}' needs a history and a machine time above zero")
         if isinstance(given, CandidateTest):

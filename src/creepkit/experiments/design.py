@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from creepkit.arrays import single_threaded_blas
-from creepkit.errors import FitError
+from creepkit.errors import FitError, quoted
 from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig, variations_of_tests
 from creepkit.experiments.design_checks import check_arguments, edges_of, notes_of, rigs_for
 from creepkit.experiments.design_task import DesignTask, Goal, task_of
@@ -84,7 +84,7 @@ def design(
     remaining = RemainingLaws.of(source)
     rigs = rigs_for(remaining.fits[0], rig)
     if candidates is not None and not (isinstance(candidates, Sequence) and len(candidates) > 0):
-        raise FitError(f"candidates= takes a list of planned histories, found {candidates!r:.60}")
+        raise FitError(f"candidates= takes a list of planned histories, found {quoted(repr(candidates), 60)}")
     search = _Search(task_of(remaining, goal, budget), rigs, seed, progress)
     if search.nothing_to_do is not None:
         return search.nothing_to_do

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import FitError
+from creepkit.errors import FitError, quoted
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.challenges import NOT_EXCLUDED, AlteredLaw, altered_laws
 from creepkit.inverse.selection.ranking import Ranking, rank, ranking_from_scores
@@ -40,7 +40,7 @@ class RemainingLaws:
             isinstance(source, Sequence) and all(isinstance(fit, Identification) for fit in source) and len(source) > 0
         )
         if not (isinstance(source, Identification | Ranking | ModelAverage) or is_list):
-            raise FitError(f"a design is made from identifications or a ranking, found {source!r:.60}")
+            raise FitError(f"a design is made from identifications or a ranking, found {quoted(repr(source), 60)}")
         if isinstance(source, Identification):
             return cls((_usable(source),), np.ones(1), None)
         if isinstance(source, Ranking):

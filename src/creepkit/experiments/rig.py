@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from creepkit.errors import FitError
+from creepkit.errors import FitError, quoted
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.records import History, Predictor, dimension_named, dimensions_of, load_unit, outputs_of_test
 
@@ -79,7 +79,7 @@ class Rig:
         if any(not 0 < T < 1e4 for T in temperatures):
             raise FitError(f"a rig's temperatures are numbers in K, above 0; found {self.temperatures!r}")
         if not isinstance(self.dimensions, Mapping):
-            raise FitError(f"a rig's dimensions are lengths in mm by name, found {self.dimensions!r:.60}")
+            raise FitError(f"a rig's dimensions are lengths in mm by name, found {quoted(repr(self.dimensions), 60)}")
         dimensions = {
             str(name): tuple(numbers(np.atleast_1d(values), f"a rig's {name}", "lengths in mm above zero"))
             for name, values in self.dimensions.items()
@@ -196,5 +196,5 @@ def numbers(values: Iterable[float] | object, what: str, allowed: str, count: in
     except (TypeError, ValueError):
         result = []
     if not result or (count is not None and len(result) != count):
-        raise FitError(f"{what} are {allowed}; found {values!r:.60}")
+        raise FitError(f"{what} are {allowed}; found {quoted(repr(values), 60)}")
     return result

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from creepkit.errors import ExportError
+from creepkit.errors import ExportError, LawError, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, json_text, parse_json, read_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
@@ -85,8 +85,11 @@ def _valued_law(data: Any, source: str) -> LawWithValues:
         raise ExportError(f"{source}: {error}; {VALUED_LAW.kind.advice}") from None
     for name, (low, high) in values.ranges.items():
         if low > high:
-            raise ExportError(f"{source}: ranges.{name[:40]} is {low:g} to {high:g}; the lower number comes first")
-    return LawWithValues(law, values.values, values.notes, ranges=values.ranges)
+            raise ExportError(f"{source}: ranges.{quoted(name)} is {low:g} to {high:g}; the lower number comes first")
+    try:
+        return LawWithValues(law, values.values, values.notes, ranges=values.ranges)
+    except LawError as error:
+        raise ExportError(f"{source}: {error}") from error
 
 
 def read_law_file(path: str | Path) -> Identification | LawWithValues:

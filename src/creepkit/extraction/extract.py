@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.errors import FitError, HistoryError
+from creepkit.errors import FitError, HistoryError, quoted
 from creepkit.extraction.domes import Centers, find_domes, place_centers
 from creepkit.extraction.extraction import Extraction, FieldMap, PlateMotion
 from creepkit.extraction.frame_checks import fit_flags, frames_at_rest, motion_flags, read_flags, residual_flags
@@ -114,7 +114,7 @@ class _Piece(NamedTuple):
 
 def _check(frames: Frames, subset: float) -> None:
     if not isinstance(frames, Frames):
-        raise HistoryError(f"extract() takes frames, found {frames!r:.40}; read them with ck.read_frames(path)")
+        raise HistoryError(f"extract() takes frames, found {quoted(repr(frames))}; read them with ck.read_frames(path)")
     if len(frames) < 2:
         raise HistoryError(f"frames '{frames.name}': one frame is no test; extraction needs the reference and others")
     if not np.isfinite(frames.times).all() or (np.diff(frames.times) <= 0.0).any():

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -152,9 +153,11 @@ def detect_dialect(lines: Iterable[str], location: str = "", decimal: str | None
     decimal : the decimal sign, where it is known. HistoryError, beginning with `location`, where
     `1,234` may be 1234 as well as 1.234, and no other number tells.
     """
-    numbered = [line for line in lines if line.strip()]
-    delimiter = _delimiter([line[:_SAMPLE_CHARACTERS] for line in numbered[:_SAMPLE_LINES]])
-    return Dialect(delimiter, decimal or _decimal(numbered, delimiter, f"{location}: " if location else ""))
+    filled = (line for line in lines if line and not line.isspace())
+    sample = list(islice(filled, _SAMPLE_LINES))
+    delimiter = _delimiter([line[:_SAMPLE_CHARACTERS] for line in sample])
+    place = f"{location}: " if location else ""
+    return Dialect(delimiter, decimal or _decimal(chain(sample, filled), delimiter, place))
 
 
 def split_line(line: str, dialect: Dialect, location: str = "") -> list[str]:
@@ -231,7 +234,7 @@ def table_of_numbers(text: str, dialect: Dialect) -> Floats | None:
     allowed = f"0123456789+-eE\n{dialect.delimiter}{dialect.decimal}".encode()
     parts = list[Floats]()
     try:
-        for lines in _parts_of(text):
+        for lines in parts_of_lines(text):
             if not lines.isascii() or lines.encode().translate(None, allowed):
                 return None
             if re.search(rf"(?:^|[{separators}+-])0[0-9]+(?:[{separators}]|$)", lines):
@@ -243,9 +246,8 @@ def table_of_numbers(text: str, dialect: Dialect) -> Floats | None:
         return None
 
 
-def _parts_of(text: str) -> Iterator[str]:
-    """The lines of a text by some megabytes, for what is made of them takes several times their size."""
-    start = 0
+def parts_of_lines(text: str, start: int = 0) -> Iterator[str]:
+    """The lines of a text from character `start` on, some megabytes at a time, for what is made of them takes more."""
     while start < len(text):
         end = text.find("\n", start + _PART_CHARACTERS)
         end = len(text) if end < 0 else end
@@ -308,7 +310,7 @@ def _unquoted_cells(line: str, delimiter: str) -> list[str]:
     return text.split() if delimiter == " " else [cell.strip() for cell in text.split(delimiter)]
 
 
-def _decimal(lines: Sequence[str], delimiter: str, place: str) -> str:
+def _decimal(lines: Iterable[str], delimiter: str, place: str) -> str:
     """The decimal sign of most numbers in the lines; '.' where none has a fraction.
 
     Numbers with the other sign are refused where they are read, so that a text such as '617.2' does no harm here.

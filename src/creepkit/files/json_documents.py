@@ -99,7 +99,8 @@ def check_heading(data: Any, source: str, document: DocumentFormat) -> dict[str,
         newer = type(version) is int and version > document.version
         advice = f"written by a newer creepkit: update creepkit, or {document.remedy}" if newer else document.remedy
         raise kind.error(
-            f"{source}: in version {version!r:.40} of the format; this one reads version {document.version}: {advice}"
+            f"{source}: in version {quoted(repr(version))} of the format; this one reads version {document.version}: "
+            f"{advice}"
         )
     return {key: value for key, value in data.items() if key not in ("format", "version")}
 

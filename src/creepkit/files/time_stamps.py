@@ -10,7 +10,7 @@ from datetime import UTC, date, datetime, timedelta, timezone, tzinfo
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 
 DAY = 86400.0
 EPOCH = date(1970, 1, 1).toordinal()
@@ -53,7 +53,7 @@ class ClockColumn:
             parsed = _parsed(match) if match else None
             if match is None or parsed is None:
                 raise HistoryError(
-                    f"{locations[k]}: time is '{text:.40}'; write a time such as 18:51:22.9, 2025-08-18T18:51:22Z, "
+                    f"{locations[k]}: time is '{quoted(text)}'; write a time such as 18:51:22.9, 2025-08-18T18:51:22Z, "
                     "8/18/2025 18:51:22, or a number of seconds"
                 )
             day = match["date"]
@@ -175,9 +175,8 @@ def _days(
         ordinals = [_ordinal(text, order) for text in column.dates]
         if None in ordinals:
             k = ordinals.index(None)
-            problem = (
-                f"{places[k]}: '{list(column.dates)[k]:.30}' is no date{f' with the {order}' if date_order else ''}"
-            )
+            found = quoted(list(column.dates)[k], 30)
+            problem = f"{places[k]}: '{found}' is no date{f' with the {order}' if date_order else ''}"
         else:
             possible[order] = np.array([day for day in ordinals if day is not None], dtype=np.int64) - EPOCH
     if not possible:
@@ -240,7 +239,7 @@ def _zone(name: str) -> tzinfo:
         return ZoneInfo(name)
     except (KeyError, ValueError, OSError):  # ZoneInfoNotFoundError is a KeyError
         raise HistoryError(
-            f"time_zone is '{name:.40}'; write the name of a zone such as 'Europe/Berlin', or '+01:00'"
+            f"time_zone is '{quoted(name)}'; write the name of a zone such as 'Europe/Berlin', or '+01:00'"
         ) from None
 
 

@@ -39,6 +39,10 @@ ForeignRule = Literal["refuse", "beside", "replace"]
 _foreign_rule: ContextVar[ForeignRule] = ContextVar("foreign_rule", default="refuse")
 
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Numbers of errors of a disk, or of a user's share of it, that takes no more."""
+
+
 ADVICE = "choose a file in a folder that exists and has space"
 
 
@@ -311,5 +315,4 @@ def _keep_beside(path: Path, temporary: Path) -> str:
 
 def _cause(failure: OSError, advice: str) -> str:
     message = os.strerror(failure.errno) if failure.errno else " ".join(str(failure).split())
-    full = failure.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-    return f"{message}; {'free some space and start again' if full else advice}"
+    return f"{message}; {'free some space and start again' if failure.errno in FULL else advice}"

@@ -12,7 +12,7 @@ import numpy as np
 
 from creepkit import limits
 from creepkit.arrays import single_threaded_blas
-from creepkit.errors import FitError, nearest
+from creepkit.errors import FitError, nearest, quoted
 from creepkit.forecasts.draws import check_tolerances, law_draws
 from creepkit.forecasts.forecast_of_test import forecast_test
 from creepkit.forecasts.results import TestForecast
@@ -98,7 +98,7 @@ def forecast(
     if draws is not None:
         limits.check_number("draws", draws, limits.BAND_DRAWS, FitError)
     if not isinstance(tests, History) and not hasattr(tests, "__iter__"):
-        raise FitError(f"tests are histories, found {tests!r:.60}; read_histories(path) returns them")
+        raise FitError(f"tests are histories, found {quoted(repr(tests), 60)}; read_histories(path) returns them")
     histories = check_histories([tests] if isinstance(tests, History) else tests)
     if not histories:
         raise FitError("there is no test to forecast; give histories, measured or planned")
@@ -157,7 +157,7 @@ def _predictor(
 def _weighted_laws(source: Identification | WeightedLaws | ModelAverage) -> list[tuple[Identification, float]]:
     """The laws that count, with weights that add up to one: those of least weight are left out."""
     if not isinstance(source, Identification | ModelAverage) and not hasattr(source, "laws"):
-        raise FitError(f"a forecast is made by an identification or a ranking, found {source!r:.60}")
+        raise FitError(f"a forecast is made by an identification or a ranking, found {quoted(repr(source), 60)}")
     average = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
     ordered = sorted(zip(average.fits, average.weights, strict=True), key=lambda pair: -pair[1])
     kept, total = [], 0.0
@@ -182,7 +182,9 @@ def _numbers(values: Mapping[str, float] | None, what: str) -> dict[str, float]:
     try:
         return {str(name): float(value) for name, value in (values or {}).items()}
     except (AttributeError, TypeError, ValueError):
-        raise FitError(f"{what} must be numbers by name, such as {{'thickness': 0.01}}; found {values!r:.60}") from None
+        raise FitError(
+            f"{what} must be numbers by name, such as {{'thickness': 0.01}}; found {quoted(repr(values), 60)}"
+        ) from None
 
 
 def _checked_targets(targets: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
@@ -191,7 +193,7 @@ def _checked_targets(targets: Mapping[str, Sequence[float]]) -> dict[str, list[f
         return {str(name): [float(v) for v in np.atleast_1d(values)] for name, values in targets.items()}
     except (AttributeError, TypeError, ValueError):
         raise FitError(
-            f"targets must be numbers by output, such as {{'strain': [0.01]}}; found {targets!r:.60}"
+            f"targets must be numbers by output, such as {{'strain': [0.01]}}; found {quoted(repr(targets), 60)}"
         ) from None
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, Ints
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.instruments.response_likelihood import (
     DrivingRecord,
     Response,
@@ -163,19 +163,19 @@ def _checked_arguments(
 ) -> tuple[float, float] | None:
     """The range of the search; HistoryError where an argument is of another type."""
     if not isinstance(record, InstrumentRecord) or not isinstance(channel, str):
-        found = f"{type(record).__name__} and {channel!r:.40}"
+        found = f"{type(record).__name__} and {quoted(repr(channel))}"
         raise HistoryError(
             f"align_clocks() takes a record and the name of a channel, found {found}; see ck.read_record(path)"
         )
     drift, start = numbers
     for name, value in (("drift", drift), ("camera_start", 0.0 if start is None else start)):
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
-            raise HistoryError(f"{name} is {value!r:.40}; give a number")
+            raise HistoryError(f"{name} is {quoted(repr(value))}; give a number")
     if search is None:
         return None
     given = tuple(search) if isinstance(search, (tuple, list, np.ndarray)) else ()
     if len(given) != 2 or not all(isinstance(one, (int, float, np.number)) for one in given):
-        raise HistoryError(f"search is {search!r:.40}; give the least and the largest lag, s")
+        raise HistoryError(f"search is {quoted(repr(search))}; give the least and the largest lag, s")
     return float(given[0]), float(given[1])
 
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.records.units import UNITS, spelled_factors, spellings
 
 
@@ -130,7 +130,9 @@ def stated_unit(place: str, head: str, in_name: str, in_row: str) -> str:
         and replace(first, reference="") == replace(second, reference="")
     ):
         return in_row if first.reference else in_name
-    raise HistoryError(f"{place}: '{head:.60}' has the unit {in_name}, the row of units says {in_row}; correct one")
+    raise HistoryError(
+        f"{place}: '{quoted(head, 60)}' has the unit {in_name}, the row of units says {in_row}; correct one"
+    )
 
 
 def split_head(head: str) -> tuple[str, str]:

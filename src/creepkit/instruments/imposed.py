@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.presentation import Presentable
 from creepkit.records import Channel, ClockAlignment, InstrumentRecord, Program
 from creepkit.records.recorded_programs import (
@@ -117,7 +117,7 @@ def _channel_names(record: InstrumentRecord, specimen: str | tuple[str, str]) ->
     if not {"pressure", "temperature"} <= {*patterns}:
         raise HistoryError(
             f"{record.origin}: its format does not say which channels belong to '{specimen}'; name both: "
-            f"(load, temperature), out of {', '.join(record.channels):.300}"
+            f"(load, temperature), out of {quoted(', '.join(record.channels), 300)}"
         )
     wanted = (patterns["pressure"].replace("{}", specimen), patterns["temperature"].replace("{}", specimen))
     for name, pattern in zip(wanted, (patterns["pressure"], patterns["temperature"]), strict=True):

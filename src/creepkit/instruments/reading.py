@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.files.time_stamps import DAY, ResolvedTimes, resolve
 from creepkit.instruments.column_heads import (
     KNOWN_UNITS,
@@ -61,9 +61,9 @@ def read_record(
     """The record in a file, read part by part; the public function with this name says what the options are."""
     given = ReadingOptions.of(options)
     if not isinstance(path, (str, Path)):
-        raise HistoryError(f"read_record() takes the path of a file, found {path!r:.40}")
+        raise HistoryError(f"read_record() takes the path of a file, found {quoted(repr(path))}")
     if format is not None and not isinstance(format, str):
-        raise HistoryError(f"format is {format!r:.40}; give the name of an instrument format")
+        raise HistoryError(f"format is {quoted(repr(format))}; give the name of an instrument format")
     file = Path(path).expanduser()
     return call_on_file(lambda: _record(file, formats, format, given), f"{file}: read_record()")
 
@@ -250,7 +250,8 @@ class _Layout:
         stated += MINUTES_AND_SECONDS.findall(f"{head[:200]} {self.head.units[column][:40]}")
         if stated:
             raise HistoryError(
-                f"{self.path}:{self.head.names_line}: '{head:.60}' is in {stated[0]}, and its first cell is a time of "
+                f"{self.path}:{self.head.names_line}: '{quoted(head, 60)}' is in {stated[0]}, and its first cell is "
+                "a time of "
                 "a clock, hours:minutes; write numbers, or all times as h:mm:ss and the name without a unit"
             )
 
@@ -266,7 +267,7 @@ class _Layout:
             if named and (reference or stated or named) != named:
                 other = f"its unit {written}" if reference else "pressure_reference"
                 raise HistoryError(
-                    f"{self.path}:{self.head.names_line}: '{name:.60}' is called {named}, while {other} says "
+                    f"{self.path}:{self.head.names_line}: '{quoted(name, 60)}' is called {named}, while {other} says "
                     f"{reference or stated}; keep one"
                 )
             reference = reference or named or stated or self.format.pressure_reference
@@ -292,9 +293,10 @@ class _Layout:
         """What is to be said of a channel without a known unit; HistoryError where capitals decide, as in mPa."""
         found, meant = (written, near_unit(written)) if written else near_unit_of_name(name)
         if found.lower() == meant.lower() and len(meant) > 1:
-            advice = "" if written else f", or state units={{'{name:.60}': '{meant}'}}"
+            advice = "" if written else f", or state units={{'{quoted(name, 60)}': '{meant}'}}"
             raise HistoryError(
-                f"{self.path}:{self.head.names_line}: '{found}' in the head of '{name:.60}' is no unit; write {meant} "
+                f"{self.path}:{self.head.names_line}: '{found}' in the head of '{quoted(name, 60)}' is no unit; "
+                f"write {meant} "
                 f"into the head if that is meant{advice}"
             )
         if meant:
@@ -329,11 +331,11 @@ def _time_columns(
     found = tuple(dict.fromkeys(k for k in (day, clock) if k is not None))
     if not found:
         raise HistoryError(
-            f"{place}: no column of time among {', '.join(heads):.200}; name one time, or state time='its name'"
+            f"{place}: no column of time among {quoted(', '.join(heads), 200)}; name one time, or state time='its name'"
         )
     for k in found:
         if list(heads).count(heads[k]) > 1:
-            raise HistoryError(f"{place}: the column '{heads[k]:.60}' stands there twice; rename one of them")
+            raise HistoryError(f"{place}: the column '{quoted(heads[k], 60)}' stands there twice; rename one of them")
     return found
 
 
@@ -349,7 +351,7 @@ def _check_names(place: str, names: Sequence[str]) -> None:
     seen: set[str] = set()
     for name in names:
         if name in seen:
-            raise HistoryError(f"{place}: the channel '{name:.60}' stands there twice; rename one of them")
+            raise HistoryError(f"{place}: the channel '{quoted(name, 60)}' stands there twice; rename one of them")
         seen.add(name)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, TypedDict
 
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.files.time_stamps import DATE_ORDERS
 from creepkit.instruments.column_heads import TIME_UNITS
 
@@ -54,7 +54,7 @@ class ReadingOptions:
     def __post_init__(self) -> None:
         self._check_types()
         if isinstance(self.every, bool) or not isinstance(self.every, int) or not 1 <= self.every <= 100_000:
-            raise HistoryError(f"every={self.every!r:.40}; give a number of rows from 1 to 100000")
+            raise HistoryError(f"every={quoted(repr(self.every))}; give a number of rows from 1 to 100000")
         if self.pressure_reference not in ("", "gauge", "absolute"):
             raise HistoryError(f"pressure_reference is '{self.pressure_reference}'; write 'gauge' or 'absolute'")
         if self.ambient_pressure is not None and not 0.0 <= self.ambient_pressure <= 10.0:
@@ -63,26 +63,28 @@ class ReadingOptions:
             raise HistoryError(f"time_unit is '{self.time_unit}'; {nearest(self.time_unit, TIME_UNITS)}")
         if isinstance(self.channels, str):
             raise HistoryError(
-                f"channels is '{self.channels:.40}'; give a list of names: channels=['{self.channels:.40}']"
+                f"channels is '{quoted(self.channels)}'; give a list of names: channels=['{quoted(self.channels)}']"
             )
 
     def _check_types(self) -> None:
         for name in ("time", "date", "time_unit", "date_order", "time_zone", "pressure_reference"):
             if not isinstance(getattr(self, name), str):
-                raise HistoryError(f"{name} is {getattr(self, name)!r:.40}; give a text")
+                raise HistoryError(f"{name} is {quoted(repr(getattr(self, name)))}; give a text")
         if not isinstance(self.units, Mapping) or not all(isinstance(unit, str) for unit in self.units.values()):
-            raise HistoryError(f"units is {self.units!r:.40}; give {{channel: unit}}, such as {{'P1': 'bar'}}")
+            raise HistoryError(f"units is {quoted(repr(self.units))}; give {{channel: unit}}, such as {{'P1': 'bar'}}")
         if isinstance(self.missing, str) or not isinstance(self.missing, Sequence):
-            raise HistoryError(f"missing is {self.missing!r:.40}; give a list of texts, such as ['n.a.']")
+            raise HistoryError(f"missing is {quoted(repr(self.missing))}; give a list of texts, such as ['n.a.']")
         if not all(isinstance(text, str) for text in self.missing):
-            raise HistoryError(f"missing is {self.missing!r:.40}; give a list of texts, such as ['n.a.']")
+            raise HistoryError(f"missing is {quoted(repr(self.missing))}; give a list of texts, such as ['n.a.']")
         if self.channels is not None and not isinstance(self.channels, Sequence):
-            raise HistoryError(f"channels is {self.channels!r:.40}; give a list of names")
+            raise HistoryError(f"channels is {quoted(repr(self.channels))}; give a list of names")
         ambient = self.ambient_pressure
         if ambient is not None and (isinstance(ambient, bool) or not isinstance(ambient, (int, float))):
-            raise HistoryError(f"ambient_pressure is {ambient!r:.40}; give a number of MPa, such as 0.1013")
+            raise HistoryError(f"ambient_pressure is {quoted(repr(ambient))}; give a number of MPa, such as 0.1013")
         if self.date_order and self.date_order not in DATE_ORDERS:
-            raise HistoryError(f"date_order is '{self.date_order:.40}'; write {' or '.join(map(repr, DATE_ORDERS))}")
+            raise HistoryError(
+                f"date_order is '{quoted(self.date_order)}'; write {' or '.join(map(repr, DATE_ORDERS))}"
+            )
 
     @classmethod
     def of(cls, options: Mapping[str, Any]) -> ReadingOptions:

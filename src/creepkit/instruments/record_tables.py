@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import (
     ERROR_VALUES,
     Dialect,
@@ -203,7 +203,7 @@ def _check_decimal_signs(cells: Sequence[str], dialect: Dialect, location: str) 
     if len(cells) > 1 and odd and numbers + len(odd) >= 0.8 * len(cells):
         words = "points" if dialect.decimal == "." else "commas"
         raise HistoryError(
-            f"{location}: '{odd[0]:.40}', where the other numbers have decimal {words}; write all numbers alike, "
+            f"{location}: '{quoted(odd[0])}', where the other numbers have decimal {words}; write all numbers alike, "
             "without separators between thousands"
         )
 

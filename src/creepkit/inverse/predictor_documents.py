@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from creepkit.errors import DatasetError, FitError
+from creepkit.errors import DatasetError, FitError, quoted
 from creepkit.files.json_documents import as_read_back, canonical_json
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.records import Predictor, SupportsReducedOrderModel
@@ -64,17 +64,19 @@ def missing_predictor(documents: Mapping[str, PredictorDocument]) -> str:
     for document in documents.values():
         if document.kind in OF_SPECIMENS and document.name not in default_registry().specimens():
             return (
-                f"this identification was made with specimen '{document.name:.40}', which is not known here: install "
+                f"this identification was made with specimen '{quoted(document.name)}', which is not known here: "
+                "install "
                 "the plugin that has it, or give using="
             )
         if document.kind == "surrogate":
             return (
-                f"this identification was made with the surrogate '{document.name:.80}' of a file: give "
+                f"this identification was made with the surrogate '{quoted(document.name, 80)}' of a file: give "
                 "using=ck.surrogate(that file)"
             )
         if document.kind == "other":
             return (
-                f"this identification was made with '{document.name:.40}', which a file cannot hold: give using=, the "
+                f"this identification was made with '{quoted(document.name)}', which a file cannot hold: give "
+                "using=, the "
                 "predictor itself or a specimen"
             )
     return "this identification was loaded from a file: give using=, the specimen it was made with"

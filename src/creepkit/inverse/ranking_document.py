@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from creepkit.errors import FitError
+from creepkit.errors import FitError, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.inverse.identification import Identification
@@ -61,12 +61,12 @@ def _ranking_from_json(data: Any, path: str | Path) -> ModelAverage:
     weights: list[float] = []
     for entry in laws:
         if not isinstance(entry, dict) or check_keys(entry, ("file", "weight"), "laws"):
-            raise FitError(f"{path}: each of its laws is a file and a weight, found {entry!r:.60}")
+            raise FitError(f"{path}: each of its laws is a file and a weight, found {quoted(repr(entry), 60)}")
         name, weight = entry["file"], entry["weight"]
         if not isinstance(name, str) or Path(name).name != name or name in ("", ".", "..", Path(path).name):
-            raise FitError(f"{path}: a law's file is {name!r:.60}; it is a name in the same folder")
+            raise FitError(f"{path}: a law's file is {quoted(repr(name), 60)}; it is a name in the same folder")
         if isinstance(weight, bool) or not isinstance(weight, int | float) or not 0 <= weight <= 1:
-            raise FitError(f"{path}: the weight of {name} is {weight!r:.20}; it is a number from 0 to 1")
+            raise FitError(f"{path}: the weight of {name} is {quoted(repr(weight), 20)}; it is a number from 0 to 1")
         if name in (known["file"] for known in laws[: len(fits)]):
             raise FitError(f"{path}: {name} is among its laws twice; keep one of them")
         try:

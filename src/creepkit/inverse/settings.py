@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from creepkit import limits
-from creepkit.errors import FitError, nearest
+from creepkit.errors import FitError, nearest, quoted
 from creepkit.records import Nuisance
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
@@ -128,7 +128,7 @@ def _check_weights(weights: OutputWeights) -> None:
 
 def _check_nuisance(nuisance: Nuisance) -> None:
     if not isinstance(nuisance, Nuisance):
-        raise FitError(f"nuisances are names or such as Nuisance('thickness', sd=0.01), found {nuisance!r:.40}")
+        raise FitError(f"nuisances are names or such as Nuisance('thickness', sd=0.01), found {quoted(repr(nuisance))}")
     n, finite = nuisance, nuisance.sd is None or np.isfinite(nuisance.sd)
     if n.output and n.kind != "offset":
         raise FitError(f"nuisance '{n.kind}' acts on a whole test: it has no output, found output='{n.output}'")

@@ -15,7 +15,7 @@ from typing import Any
 
 import sympy
 
-from creepkit.errors import LawError
+from creepkit.errors import LawError, quoted
 from creepkit.kernels.kernel_functions import (
     Coth,
     ExpDifference,
@@ -176,11 +176,12 @@ def _check_expression(expression: sympy.Expr, origin: str) -> None:
         if not (node.is_Atom or isinstance(node, (*KNOWN_FUNCTIONS, *_ALGEBRAIC_NODES, *_CONDITIONS))):
             allowed = ", ".join(sorted(f.__name__ for f in KNOWN_FUNCTIONS))
             raise LawError(
-                f"{origin}: the function {node.func.__name__} in {node!s:.200} has no kernel; allowed are {allowed}"
+                f"{origin}: the function {node.func.__name__} in {quoted(node, 200)} has no kernel; allowed are "
+                f"{allowed}"
             )
         if isinstance(node, sympy.Piecewise) and node.args[-1].cond != sympy.true:
             raise LawError(
-                f"{origin}: the last branch of {node!s:.200} must hold in all remaining cases: write (..., True)"
+                f"{origin}: the last branch of {quoted(node, 200)} must hold in all remaining cases: write (..., True)"
             )
 
 

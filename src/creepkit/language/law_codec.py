@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import sympy
 
-from creepkit.errors import LawError
+from creepkit.errors import LawError, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError
@@ -126,7 +126,7 @@ def law_from_json(data: Any, source: str = "law file") -> CreepLaw:
     if law.fingerprint != record.fingerprint:
         raise LawError(
             f"{source}: the equations of law '{law.name}' have fingerprint {law.fingerprint} but the file says "
-            f"'{record.fingerprint:.40}'; it was changed after it was written, write it again from the law"
+            f"'{quoted(record.fingerprint)}'; it was changed after it was written, write it again from the law"
         )
     return law
 

@@ -20,7 +20,7 @@ import sympy
 from sympy.logic.boolalg import Boolean, BooleanAtom
 
 from creepkit.arrays import ArrayLike, Bools, Floats
-from creepkit.errors import LawError, nearest
+from creepkit.errors import LawError, nearest, quoted
 from creepkit.language.expression_cost import check_cost
 from creepkit.language.expression_trees import evaluate_multiprecision
 from creepkit.language.symbols import POINT_VARIABLES, Param, State
@@ -50,7 +50,8 @@ def checked_examples(name: str, examples: Any) -> tuple[Mapping[str, float], ...
         numbers = isinstance(example, Mapping) and all(isinstance(v, (int, float)) for v in example.values())
         if not numbers or "rate" not in example:
             raise LawError(
-                f"law '{name}': the example {example!r:.60} is not understood; write a tuple of examples such as "
+                f"law '{name}': the example {quoted(repr(example), 60)} is not understood; write a tuple of examples "
+                "such as "
                 '{"A": 1e-16, "n": 4, "stress": 100, "rate": 1e-8}'
             )
     return tuple(MappingProxyType(dict(example)) for example in given)

@@ -20,15 +20,8 @@ from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.loading_strain import without_loading
 from creepkit.readers.noise_correlation import read_noise_correlation
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
-from creepkit.readers.text_tables import (
-    NumberRows,
-    SourceText,
-    TableFrames,
-    TextTable,
-    column_means,
-    how_to_ignore,
-    read_frames,
-)
+from creepkit.readers.table_rows import NumberRows, cells_of, kept_alike
+from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, how_to_ignore, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, outputs_of_test, specimen_of
 
@@ -223,15 +216,14 @@ def _without_readings_before_steps(
         changed = np.array([np.diff(rows.numbers[:, k]) != 0.0 for k in imposed]).any(axis=0)
         before = np.flatnonzero(same_time & changed).tolist()
     else:
-        before = [
-            k
-            for k, (one, next_) in enumerate(pairwise(rows))
-            if one.cells[clock] == next_.cells[clock] and any(one.cells[i] != next_.cells[i] for i in imposed)
-        ]
+        imposed_cells = zip(cells_of(rows, clock), *(cells_of(rows, k) for k in imposed), strict=True)
+        pairs = enumerate(pairwise(imposed_cells))
+        before = [k for k, (one, next_) in pairs if one[0] == next_[0] and one != next_]
     if not before:
         return table, set()
-    dropped = set(before)
-    return table.with_rows([row for k, row in enumerate(rows) if k not in dropped]), {rows[k + 1].line for k in before}
+    dropped, lines = set(before), table.lines
+    kept = kept_alike(rows, (row for k, row in enumerate(rows) if k not in dropped))
+    return table.with_rows(kept), {int(lines[k + 1]) for k in before}
 
 
 def _elastic_strain(loading: Loading, temperature: float | Program, elastic: Elastic | None) -> float | None:

@@ -8,16 +8,17 @@ or `Time of day`, or the values: elapsed are times that begin below one hour or 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve
 from creepkit.readers.column_names import KnownNames, words_of
-from creepkit.readers.text_tables import NumberRows, SourceText, TableRow, TextTable
+from creepkit.readers.table_rows import NumberRows, TableRow, cells_of, kept_alike
+from creepkit.readers.text_tables import SourceText, TextTable
 from creepkit.readers.vocabulary import split_unit
 
 _ELAPSED = re.compile(r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d{1,9})?)", re.ASCII)
@@ -33,7 +34,7 @@ def with_elapsed_times(stated: dict[str, SourceText], table: TextTable, known: K
     """The table with its times as numbers; takes `date_order` and `time_zone` from what is stated."""
     order, zone = stated.pop("date_order", None), stated.pop("time_zone", None)
     if order is not None and order.text not in DATE_ORDERS:
-        raise HistoryError(f"{order.location}: date_order is '{order.text:.40}'; allowed: {', '.join(DATE_ORDERS)}")
+        raise HistoryError(f"{order.location}: date_order is '{quoted(order.text)}'; allowed: {', '.join(DATE_ORDERS)}")
     times = [k for k, name in enumerate(table.columns) if known.quantity(name) == "time"]
     if len(times) != 1 or isinstance(table.rows, NumberRows) or not is_clock_time(table.rows[0].cells[times[0]]):
         if order is not None or zone is not None:
@@ -42,7 +43,7 @@ def with_elapsed_times(stated: dict[str, SourceText], table: TextTable, known: K
             raise HistoryError(f"{entry.location}: {key} says nothing here, for no times are dates; leave it out")
         return table
     clock = times[0]
-    cells = [row.cells[clock] for row in table.rows]
+    cells = list(cells_of(table.rows, clock))
     elapsed = [_ELAPSED.fullmatch(cell) for cell in cells]
     if elapsed[0]:
         hours, assumption = _times_of(elapsed, table, clock)
@@ -54,17 +55,22 @@ def with_elapsed_times(stated: dict[str, SourceText], table: TextTable, known: K
     if suffix in known.columns.kinds["time"].units and suffix:
         place = table.location(table.columns_line, clock)
         raise HistoryError(
-            f"{place}: '{written}' is in {suffix}, and its first cell is '{cells[0]:.40}', a time of a clock; leave "
+            f"{place}: '{written}' is in {suffix}, and its first cell is '{quoted(cells[0])}', a time of a clock; "
+            "leave "
             "the unit out of the name, or write numbers"
         )
     columns[clock] = "time_s"
-    rows = []
-    for row, time in zip(table.rows, hours, strict=True):
-        changed = list(row.cells)
-        changed[clock] = repr(float(time)).replace(".", table.dialect.decimal)
-        rows.append(TableRow(row.line, changed))
+    rows = kept_alike(table.rows, _with_times(table, clock, hours))
     assumptions = (*table.assumptions, *([assumption] if assumption else []))
     return replace(table, columns=columns, rows=rows, written=table.written or table.columns, assumptions=assumptions)
+
+
+def _with_times(table: TextTable, clock: int, times: Floats) -> Iterator[TableRow]:
+    """The rows with other times, s."""
+    for row, time in zip(table.rows, times, strict=True):
+        changed = list(row.cells)
+        changed[clock] = repr(float(time)).replace(".", table.dialect.decimal)
+        yield TableRow(row.line, changed)
 
 
 def _times_of(elapsed: Sequence[re.Match[str] | None], table: TextTable, clock: int) -> tuple[Floats, str]:
@@ -73,7 +79,9 @@ def _times_of(elapsed: Sequence[re.Match[str] | None], table: TextTable, clock: 
     for row, match in zip(table.rows, elapsed, strict=True):
         if match is None:
             place = table.location(row.line, clock)
-            raise HistoryError(f"{place}: '{name}' is '{row.cells[clock]:.40}'; write h:mm:ss as in the rows before")
+            raise HistoryError(
+                f"{place}: '{name}' is '{quoted(row.cells[clock])}'; write h:mm:ss as in the rows before"
+            )
         seconds.append(3600.0 * int(match[1]) + 60.0 * int(match[2]) + float(match[3].replace(",", ".")))
     times = np.array(seconds)
     if words_of(name) in _OF_DAY:
@@ -98,7 +106,7 @@ def _since_first_row(cells: Sequence[str], table: TextTable, order: str, zone: s
     if -1 in column.rows[0]:
         k = int(np.argmax(column.rows[0] == -1))
         place = table.location(table.rows[k].line)
-        raise HistoryError(f"{place}: time is '{cells[k]:.40}'; write h:mm:ss, a date with a time, or a number")
+        raise HistoryError(f"{place}: time is '{quoted(cells[k])}'; write h:mm:ss, a date with a time, or a number")
     place = f"{table.path}, sheet '{table.sheet}', row" if table.sheet else str(table.path)
     times = resolve(column, place, table.lines, order, zone)
     notes = [note.removeprefix("its ") for note in times.notes if note.startswith("its dates")]

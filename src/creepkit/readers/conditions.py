@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import TypeVar
 
-from creepkit.errors import CreepkitError, HistoryError, nearest
+from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
 from creepkit.readers.column_names import unit_suffix
 from creepkit.readers.text_tables import SourceText
 from creepkit.readers.vocabulary import (
@@ -227,7 +227,7 @@ def _unknown_key(refused: Sequence[str], unknown: Mapping[str, SourceText], sugg
     """The error about unknown keys: what the first may have meant, and which others there are."""
     key, others = unknown[refused[0]].key or refused[0], refused[1:]
     advice = f"did you mean '{suggestion}'? A label is written" if suggestion else "a label is written"
-    places = [f"'{other:.40}' in line {unknown[other].location.rpartition(':')[2]}" for other in others[:5]]
+    places = [f"'{quoted(other)}' in line {unknown[other].location.rpartition(':')[2]}" for other in others[:5]]
     also = f"; unknown too: {', '.join(places)}" if others else ""
     also += f" and {len(others) - 5} more" if len(others) > 5 else ""
     return HistoryError(f"{unknown[refused[0]].location}: unknown key '{key}'; {advice} 'label {key or 'NAME'}'{also}")

@@ -20,12 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.files.json_documents import read_json
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.assembly import assemble_history
 from creepkit.readers.column_names import unit_suffix
-from creepkit.readers.text_tables import SourceText, TableRow, TextTable
+from creepkit.readers.table_rows import TableRow
+from creepkit.readers.text_tables import SourceText, TextTable
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History, constant_stress
 from creepkit.records.quantities import STRAIN, STRESS, TEMPERATURE, TIME, QuantityKind
@@ -247,7 +248,9 @@ def _broke(entries: _Entries) -> bool | None:
     if entries.number(NUMBERS["rupture"]) is None:
         return criterion in BROKEN if criterion else None
     if criterion and criterion not in BROKEN:
-        raise HistoryError(f"{place}: it is '{criterion:.60}', and a rupture time is stated; correct one of them")
+        raise HistoryError(
+            f"{place}: it is '{quoted(criterion, 60)}', and a rupture time is stated; correct one of them"
+        )
     return True
 
 

@@ -6,11 +6,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_number
 from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import KnownNames, split_written_name, unit_suffix
-from creepkit.readers.text_tables import SourceText, TableRow
+from creepkit.readers.table_rows import TableRow
+from creepkit.readers.text_tables import SourceText
 
 
 @dataclass
@@ -61,7 +62,8 @@ def entries_of_blocks(
             values = [(k, cell) for k, cell in values if k != first or not key][:1]
             if values and not key and (first in key_columns or is_number(values[0][1], grid.dialect)):
                 raise HistoryError(
-                    f"{place}: '{values[0][1]:.40}' stands above the names of the columns, and '{filled[first]:.40}' "
+                    f"{place}: '{quoted(values[0][1])}' stands above the names of the columns, and "
+                    f"'{quoted(filled[first])}' "
                     "is no condition that is known; write one such as 'Stress (MPa)' before it"
                 )
             if values:
@@ -100,10 +102,14 @@ def entries_above(grid: CellGrid, head: Sequence[TableRow], known: KnownNames) -
         while cells:
             key, *rest = cells
             if is_number(key, grid.dialect):
-                raise HistoryError(f"{place}: the number {key:.40} stands above the names of the columns; remove it")
+                raise HistoryError(
+                    f"{place}: the number {quoted(key)} stands above the names of the columns; remove it"
+                )
             if not rest:
                 if known.is_condition(key):
-                    raise HistoryError(f"{place}: '{key:.40}' stands above the names of the columns without a value")
+                    raise HistoryError(
+                        f"{place}: '{quoted(key)}' stands above the names of the columns without a value"
+                    )
                 put_entry(entries, f"label line {row.line}", key, place, grid, known)
                 break
             value, cells = rest[0], rest[1:]
@@ -118,7 +124,8 @@ def _with_unit(key: str, unit: str, place: str) -> str:
     _, stated = split_written_name(key.rstrip(": "))
     if stated and unit_suffix(stated) != unit_suffix(unit):
         raise HistoryError(
-            f"{place}: '{key:.60}' has the unit '{unit:.20}' behind its value; keep one of the two units"
+            f"{place}: '{quoted(key, 60)}' has the unit '{quoted(unit, 20)}' behind its value; keep one of the two "
+            "units"
         )
     return key if stated else f"{key} ({unit})"
 
@@ -130,5 +137,5 @@ def put_entry(
     written = key.rstrip(": ")
     key = known.condition(written)
     if key in entries:
-        raise HistoryError(f"{place}: '{written:.60}' was already given; keep one of them")
+        raise HistoryError(f"{place}: '{quoted(written, 60)}' was already given; keep one of them")
     entries[key] = SourceText(text, place, grid.dialect.decimal, written)

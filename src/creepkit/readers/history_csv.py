@@ -31,10 +31,11 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
-from creepkit.readers.cell_grids import CellGrid, peek_columns, read_head_alone, read_text_grid
+from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import KnownNames
 from creepkit.readers.noise_correlation import noise_correlation_text
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
+from creepkit.readers.text_grids import peek_columns, read_head_alone, read_text_grid
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (
     UNKNOWN_DURATION,

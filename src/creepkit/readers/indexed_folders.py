@@ -10,11 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.readers.assembly import assemble_history
-from creepkit.readers.cell_grids import peek_columns, read_table
 from creepkit.readers.column_names import KnownNames
-from creepkit.readers.text_tables import SourceText, TableRow, TextTable, unknown_text
+from creepkit.readers.table_rows import TableRow, grouped
+from creepkit.readers.text_grids import peek_columns, read_table
+from creepkit.readers.text_tables import SourceText, TextTable, unknown_text
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 
@@ -84,14 +85,17 @@ class IndexedFolderReader:
     ) -> Iterator[tuple[str, TextTable]]:
         """Key and frames of every test, cut from one table."""
         k = table.column(self.key_column)
-        rows: dict[str, list[TableRow]] = {key: [] for key in tests}
-        for row in table.rows:
-            key = row.cells[k]
-            if key not in rows:
-                raise HistoryError(f"{table.location(row.line)}: test '{key}' is not in {index.path}; add it there")
-            rows[key].append(row)
-        for key, part in rows.items():
-            if not part:
+
+        def check(row: TableRow) -> None:
+            if row.cells[k] not in tests:
+                raise HistoryError(
+                    f"{table.location(row.line)}: test '{quoted(row.cells[k])}' is not in {index.path}; add it there"
+                )
+
+        rows = grouped(table.rows, k, check)
+        for key in tests:
+            part = rows.get(key)
+            if part is None:
                 raise HistoryError(f"{index.location(tests[key].line)}: test '{key}' has no frames in {table.path}")
             yield key, table.with_rows(part)
 

@@ -17,12 +17,14 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.readers.assembly import assemble_without_frames
-from creepkit.readers.cell_grids import CellGrid, peek_columns, read_text_grid, table_of, without_ignored
+from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
 from creepkit.readers.column_names import NameTable, split_written_name, unit_suffix, words_of
-from creepkit.readers.text_tables import SourceText, TableRow, TextTable, unknown_text
+from creepkit.readers.table_rows import TableRow
+from creepkit.readers.text_grids import peek_columns, read_text_grid
+from creepkit.readers.text_tables import SourceText, TextTable, unknown_text
 from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary, plain_name, split_unit
 from creepkit.records import History
 from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
@@ -251,12 +253,14 @@ def _keys(table: TextTable) -> list[str]:
             quantity = written if written.startswith(("label ", "geometry ")) else f"label {written}"
         first = next((k for k, key in enumerate(keys) if _quantity(key) == _quantity(quantity)), None)
         if first is not None:
-            names = f"'{table.columns[first]:.60}' and '{written:.60}'"
+            names = f"'{quoted(table.columns[first], 60)}' and '{quoted(written, 60)}'"
             raise HistoryError(f"{location}: {names} mean the same; keep one of them")
         key_in_header = next((key for key in table.header if _quantity(key) == _quantity(quantity)), None)
         if key_in_header is not None:
             place = table.header[key_in_header].location
-            raise HistoryError(f"{place}: '{key_in_header:.60}' is also a column, '{written:.60}'; keep one of them")
+            raise HistoryError(
+                f"{place}: '{quoted(key_in_header, 60)}' is also a column, '{quoted(written, 60)}'; keep one of them"
+            )
         keys.append(quantity)
     return _named_by_specimen(table, keys)
 
@@ -280,9 +284,9 @@ def _named_by_specimen(table: TextTable, keys: list[str]) -> list[str]:
 def _check_unit(quantity: str, unit: str, written: str, location: str) -> None:
     units = QUANTITIES[quantity][0].units
     if unit not in units:
-        found = f"the unit '{unit:.40}', which is not understood" if unit else "no unit"
+        found = f"the unit '{quoted(unit)}', which is not understood" if unit else "no unit"
         raise HistoryError(
-            f"{location}: column '{written.strip():.60}' has {found}; allowed: {', '.join(units)}, such as "
+            f"{location}: column '{quoted(written.strip(), 60)}' has {found}; allowed: {', '.join(units)}, such as "
             f"'{quantity} ({next(iter(units))})'"
         )
 
@@ -300,8 +304,9 @@ def _refuse_misspelt(written: str, location: str) -> None:
     near = get_close_matches(name, [one for one in known if len(one) > 3], 1, cutoff=0.8)
     if near:
         raise HistoryError(
-            f"{location}: column '{written:.60}' is not understood; did you mean '{near[0]}'? A label is written "
-            f"'label {written:.60}'"
+            f"{location}: column '{quoted(written, 60)}' is not understood; did you mean '{near[0]}'? A label is "
+            "written "
+            f"'label {quoted(written, 60)}'"
         )
 
 
@@ -381,7 +386,8 @@ def _check_duration(entries: Mapping[str, SourceText]) -> None:
     if abs(ended - broken) > _ROUNDING * broken:
         one, other = entries[rupture], entries[end]
         raise HistoryError(
-            f"{one.location}: '{one.key or rupture}' is {one.text:.40}, and '{other.key or end}' is {other.text:.40}; "
+            f"{one.location}: '{one.key or rupture}' is {quoted(one.text)}, and '{other.key or end}' is "
+            f"{quoted(other.text)}; "
             "a test that ruptured lasted until then; correct one of them"
         )
 

@@ -10,7 +10,7 @@ from glob import glob
 from pathlib import Path
 from typing import Any, cast
 
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.files.delimited_text import refuse_unprintable
 from creepkit.hookspecs import hookimpl
 from creepkit.readers.creep_schema_json import CREEP_SCHEMA
@@ -70,7 +70,9 @@ def reader_without(ignored: Collection[str], reader: Reader) -> Reader:
     ignored : names of columns as they are written, or but for capitals and unit.
     """
     if isinstance(ignored, str) or not all(str(name).strip() for name in ignored):
-        raise HistoryError(f"ignore is {ignored!r:.60}; give a list of names of columns, such as ['load_kN', 'date']")
+        raise HistoryError(
+            f"ignore is {quoted(repr(ignored), 60)}; give a list of names of columns, such as ['load_kN', 'date']"
+        )
     vocabulary = getattr(reader, "vocabulary", None)
     if not hasattr(reader, "__dataclass_fields__") or not isinstance(vocabulary, HeaderVocabulary):
         return reader

@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
 from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, check_readable, read_bytes
@@ -26,7 +26,8 @@ from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.number_formats import number_text
 from creepkit.readers.spreadsheet_parts import check_sheet, checked_parts
 from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
-from creepkit.readers.text_tables import SourceText, TableRow, unknown_text
+from creepkit.readers.table_rows import TableRow
+from creepkit.readers.text_tables import SourceText, unknown_text
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 
@@ -254,7 +255,7 @@ def _conditions_by_test(grid: CellGrid, vocabulary: HeaderVocabulary) -> dict[st
     for row in table.rows:
         test, place = row.cells[columns[0]], table.location(row.line)
         if not test or test in tests:
-            raise HistoryError(f"{place}: the test is '{test:.40}', which is empty or named before; name each once")
+            raise HistoryError(f"{place}: the test is '{quoted(test)}', which is empty or named before; name each once")
         tests[test] = {
             known.condition(name) if known.is_condition(name) else f"label {name}": replace(entry, key=name)
             for name, entry in table.entries(row).items()
@@ -274,7 +275,9 @@ def _add_conditions(
 ) -> None:
     for test, entries in conditions.items():
         if test in stated:
-            raise HistoryError(f"{grid.place}: test '{test:.40}' has conditions in another sheet too; keep one of them")
+            raise HistoryError(
+                f"{grid.place}: test '{quoted(test)}' has conditions in another sheet too; keep one of them"
+            )
         stated[test] = entries
 
 
@@ -300,7 +303,7 @@ def _with_conditions(
         entries = stated[unused[0]].values()
         where = next((entry.location for entry in entries), str(path))
         raise HistoryError(
-            f"{where}: '{unused[0]:.40}' has conditions, but no sheet or column of that name; correct the name, or "
+            f"{where}: '{quoted(unused[0])}' has conditions, but no sheet or column of that name; correct the name, or "
             "leave the sheet out by its name: --ignore, in Python ignore=[...]"
         )
     return results

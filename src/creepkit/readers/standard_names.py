@@ -9,15 +9,16 @@ resolves 0.001 %. Else it is asked for. What was decided by head or values is re
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.readers.clock_times import with_elapsed_times
 from creepkit.readers.column_names import STATED_BY_NAME, KnownNames, split_written_name, unit_suffix, words_of
-from creepkit.readers.text_tables import NumberRows, SourceText, TableRow, TextTable
+from creepkit.readers.table_rows import NumberRows, TableRow, kept_alike
+from creepkit.readers.text_tables import SourceText, TextTable
 from creepkit.readers.vocabulary import HeaderVocabulary, plain_name, split_unit
 
 SURELY_PER_CENT, SURELY_FRACTION = 1.0, 1e-3
@@ -104,16 +105,21 @@ def _without_per_cent_signs(table: TextTable, known: KnownNames) -> TextTable:
             place = table.location(table.columns_line, k)
             raise HistoryError(f"{place}: '{columns[k]}' is not in per cent, but its cells are; correct one of them")
         columns[k] = f"{name}_pct"
-    rows = []
+    rows = kept_alike(table.rows, _rows_without_signs(replace(table, columns=columns), signed))
+    return replace(table, columns=columns, rows=rows, written=table.written or table.columns)
+
+
+def _rows_without_signs(table: TextTable, signed: Collection[int]) -> Iterator[TableRow]:
     for row in table.rows:
         cells = list(row.cells)
         for k in signed:
             if not cells[k].endswith("%"):
                 place = table.location(row.line, k)
-                raise HistoryError(f"{place}: '{columns[k]}' is '{cells[k]:.40}' without the sign % of other cells")
+                raise HistoryError(
+                    f"{place}: '{table.columns[k]}' is '{quoted(cells[k])}' without the sign % of others"
+                )
             cells[k] = cells[k].removesuffix("%").rstrip()
-        rows.append(TableRow(row.line, cells))
-    return replace(table, columns=columns, rows=rows, written=table.written or table.columns)
+        yield TableRow(row.line, cells)
 
 
 def _kind(name: str, known: KnownNames) -> bool:

@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import pairwise
 
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_number
 from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.head_rows import entries_above, entries_of_blocks
-from creepkit.readers.text_tables import SourceText, TableRow, TextTable, check_columns, unknown_text
+from creepkit.readers.table_rows import NumberRows, TableRow, cells_of, grouped, kept_alike, with_columns, with_first
+from creepkit.readers.text_tables import SourceText, TextTable, check_columns, unknown_text
 from creepkit.readers.vocabulary import HeaderVocabulary
 
 
@@ -64,7 +65,7 @@ def tests_in(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TabulatedTest
         raise HistoryError(f"{grid.location(names_line)}: every column is left out by ignore; keep those of the test")
     head, names = grid.rows[:names_at], grid.rows[names_at]
     cells, tests_below, body_at = _joined_names(grid, names_at)
-    below = replace(grid, rows=[TableRow(names.line, cells), *grid.rows[body_at:]])
+    below = replace(grid, rows=with_first(TableRow(names.line, cells), grid.rows[body_at:]))
     times = [k for k, cell in enumerate(cells) if _is_time(cell, known)]
     if len(times) > 1 and not _one_time_in_two_units(cells, times):
         return _tests_of_blocks(below, head, _pairs(below, times, known), set(range(times[0])), known)
@@ -99,7 +100,7 @@ def _with_comments(grid: CellGrid, names_line: int, known: KnownNames) -> CellGr
         if line > names_line and known.is_condition(key):
             raise HistoryError(f"{entry.location}: '{key}' stands below the names of the columns; move it above them")
         if line < names_line and key in header:
-            raise HistoryError(f"{entry.location}: '{key:.60}' was already given; keep one of them")
+            raise HistoryError(f"{entry.location}: '{quoted(key, 60)}' was already given; keep one of them")
         if line < names_line:
             header[key] = entry
     return replace(grid, header=header)
@@ -199,7 +200,7 @@ def _columns_beside(
         if not known.quantity(column):
             if stated is None:
                 raise HistoryError(
-                    f"{place}: the column '{cell:.40}' does not say what it holds; write '# columns: strain_pct' "
+                    f"{place}: the column '{quoted(cell)}' does not say what it holds; write '# columns: strain_pct' "
                     "above, or names such as 'A1 strain (%)'"
                 )
             test, column = cell, stated.text
@@ -219,7 +220,8 @@ def _pairs(grid: CellGrid, times: Sequence[int], known: KnownNames) -> list[Test
     if any(names.cells[: times[0]]):
         first = next(filter(None, names.cells))
         raise HistoryError(
-            f"{place}: the column '{first:.40}' stands before the first time; begin the columns of each test with time"
+            f"{place}: the column '{quoted(first)}' stands before the first time; begin the columns of each test "
+            "with time"
         )
     blocks = []
     for start, end in zip(times, [*times[1:], len(names.cells)], strict=True):
@@ -227,7 +229,8 @@ def _pairs(grid: CellGrid, times: Sequence[int], known: KnownNames) -> list[Test
         tests = sorted({test for test, _ in named.values() if test})
         if len(tests) > 1:
             raise HistoryError(
-                f"{place}: the columns beside one time name the tests '{tests[0]:.40}' and '{tests[1]:.40}'; begin the "
+                f"{place}: the columns beside one time name the tests '{quoted(tests[0])}' and '{quoted(tests[1])}'; "
+                "begin the "
                 "columns of each test with time"
             )
         blocks.append(TestColumns("".join(tests), {k: column for k, (_, column) in named.items()}))
@@ -239,8 +242,12 @@ def _tests_of_blocks(
 ) -> list[TabulatedTest]:
     """The tests of blocks of columns, with what the rows above say of each."""
     header = {key: entry for key, entry in grid.header.items() if key != "columns"}
-    rows: Sequence[TableRow] = list(grid.numbers) if grid.numbers is not None else grid.rows[1:]
-    _check_cells(grid, rows, {k for block in blocks for k in block.columns})
+    used = {k for block in blocks for k in block.columns}
+    rows: Sequence[TableRow] = grid.rows[1:] if grid.numbers is None else grid.numbers
+    if grid.numbers is None:
+        rows = kept_alike(rows, _checked_cells(grid, rows, used))
+    else:
+        list(_checked_cells(grid, grid.numbers[:1], used))  # every row has the same columns
     place = grid.location(grid.rows[0].line)
     tests: dict[str, TabulatedTest] = {}
     above = entries_of_blocks(grid, head, [list(block.columns) for block in blocks], key_columns, known)
@@ -250,14 +257,15 @@ def _tests_of_blocks(
         written = entries.pop("name", None)
         name = block.test or (written.text if written else str(number))
         if name in tests:
-            raise HistoryError(f"{place}: two tests are called '{name:.40}'; give each its own name")
-        check_columns(f"{place}, test '{name:.40}'", list(block.columns.values()))
+            raise HistoryError(f"{place}: two tests are called '{quoted(name)}'; give each its own name")
+        check_columns(f"{place}, test '{quoted(name)}'", list(block.columns.values()))
         table = replace(_table_of_block(grid, rows, name, block.columns), assumptions=stated.assumptions)
         tests[name] = TabulatedTest(name, {**header, **entries}, table)
     return list(tests.values())
 
 
-def _check_cells(grid: CellGrid, rows: Sequence[TableRow], used: set[int]) -> None:
+def _checked_cells(grid: CellGrid, rows: Sequence[TableRow], used: set[int]) -> Iterator[TableRow]:
+    """The rows, of as many cells as there are columns in use."""
     width = max(used) + 1
     for row in rows:
         if len(row.cells) < width and not grid.sheet:  # a cell lost within a line of text moves those behind it
@@ -268,21 +276,21 @@ def _check_cells(grid: CellGrid, rows: Sequence[TableRow], used: set[int]) -> No
         foreign = next((cell for k, cell in enumerate(row.cells) if cell and k not in used), "")
         if foreign:
             raise HistoryError(
-                f"{grid.location(row.line)}: '{foreign:.40}' stands in a column without a name; name it or remove it"
+                f"{grid.location(row.line)}: '{quoted(foreign)}' stands in a column without a name; name it or "
+                "remove it"
             )
+        yield TableRow(row.line, [*row.cells[:width], *[""] * (width - len(row.cells))])
 
 
 def _table_of_block(grid: CellGrid, rows: Sequence[TableRow], name: str, columns: Mapping[int, str]) -> TextTable:
     """The frames of one test: the rows in which a column of its own holds something, its time in pairs among them."""
     positions, line = list(columns), grid.rows[0].line
-    cut = []
-    for row in rows:
-        cells = [row.cells[k] if k < len(row.cells) else "" for k in positions]
-        if any(cells[1:]):
-            cut.append(TableRow(row.line, cells))
+    own = with_columns(rows, positions)
+    cut = own if isinstance(own, NumberRows) else kept_alike(own, (row for row in own if any(row.cells[1:])))
     if not cut:
         raise HistoryError(
-            f"{grid.location(line)}: test '{name:.40}' has no rows below the names of its columns; remove it or fill it"
+            f"{grid.location(line)}: test '{quoted(name)}' has no rows below the names of its columns; remove it or "
+            "fill it"
         )
     places = [grid.positions[k] if grid.positions else k for k in positions]
     return TextTable(grid.path, {}, list(columns.values()), line, cut, grid.dialect, grid.sheet, places)
@@ -290,12 +298,12 @@ def _table_of_block(grid: CellGrid, rows: Sequence[TableRow], name: str, columns
 
 def _without_footers(grid: CellGrid) -> tuple[CellGrid, tuple[str, ...]]:
     """The grid without remarks below its frames, which hold words alone, and what says so."""
-    rows, footers = list(grid.rows), list[str]()
-    while len(rows) > 2 and _is_remark(rows[-1], grid):
-        row = rows.pop()
+    count, footers = len(grid.rows), list[str]()
+    while count > 2 and _is_remark(row := grid.rows[count - 1], grid):
+        count -= 1
         text = " ".join(filter(None, row.cells))
-        footers.append(f"line {row.line} is a remark ({text[:40]})".replace(",", ";"))
-    return (replace(grid, rows=rows), tuple(reversed(footers))) if footers else (grid, ())
+        footers.append(f"line {row.line} is a remark ({quoted(text)})".replace(",", ";"))
+    return (replace(grid, rows=grid.rows[:count]), tuple(reversed(footers))) if footers else (grid, ())
 
 
 def _is_remark(row: TableRow, grid: CellGrid) -> bool:
@@ -318,19 +326,20 @@ def _rows_by_test(table: TextTable, entries: Mapping[str, SourceText], known: Kn
     keys = [k for k in foreign if words_of(table.columns[k]) in TEST_NAME_COLUMNS]
     if not foreign:
         return [TabulatedTest("", entries, table)]
-    groups: dict[str, list[TableRow]] = {} if keys else {"": list(table.rows)}
-    for row in table.rows if keys else ():
+
+    def check(row: TableRow) -> None:
         if not row.cells[keys[0]]:
             column = table.columns[keys[0]]
             raise HistoryError(f"{table.location(row.line)}: the row names no test; fill the column '{column}'")
-        groups.setdefault(row.cells[keys[0]], []).append(row)
+
+    groups = grouped(table.rows, keys[0], check) if keys else {"": table.rows}
     tests = []
     for name, rows in groups.items():
         stated = [k for k in foreign if k not in keys[:1] and _states_condition(table, k, rows, known)]
         own = _entries_of_columns(table, stated, rows[0], known)
         _refuse_twice(own, entries, known)
         kept = [k for k in range(len(table.columns)) if k not in (*stated, *keys[:1])]
-        cut = [TableRow(row.line, [row.cells[k] for k in kept]) for row in rows]
+        cut = with_columns(rows, kept)
         empty = [table.columns[k] for k in stated if not rows[0].cells[k] and known.is_condition(table.columns[k])]
         assumptions = (*table.assumptions, *map(unknown_text, empty))
         part = replace(table, columns=[table.columns[k] for k in kept], rows=cut, assumptions=assumptions)
@@ -340,10 +349,11 @@ def _rows_by_test(table: TextTable, entries: Mapping[str, SourceText], known: Kn
 
 def _states_condition(table: TextTable, column: int, rows: Sequence[TableRow], known: KnownNames) -> bool:
     """Whether a column holds one condition, or one text, in all rows of a test."""
-    values = {row.cells[column] for row in rows}
-    if len(values) != 1:
+    cells = cells_of(rows, column)
+    first = next(cells)
+    if any(cell != first for cell in cells):
         return False
-    return not is_number(values.pop(), table.dialect) or known.is_condition(table.columns[column])
+    return not is_number(first, table.dialect) or known.is_condition(table.columns[column])
 
 
 def _entries_of_columns(

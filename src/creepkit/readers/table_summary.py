@@ -6,12 +6,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from creepkit.readers.cell_grids import CellGrid, read_text_grid
+from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import KnownNames
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.rate_and_rupture_tables import TEST_TABLE, columns_of_tests, key_of_column
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
 from creepkit.readers.table_layouts import names_time, tests_in
+from creepkit.readers.text_grids import read_text_grid
 from creepkit.readers.vocabulary import HeaderVocabulary
 
 

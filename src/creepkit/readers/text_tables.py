@@ -10,8 +10,8 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple, overload
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import Dialect, is_number, parse_number, parse_numbers
 from creepkit.readers.column_names import NameTable, split_written_name
+from creepkit.readers.table_rows import NumberRows, TableRow, TextRows, cells_by_part
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records.quantities import QuantityKind
 
@@ -52,38 +53,6 @@ def some_of(names: Sequence[str], count: int = 12) -> str:
     """Names as messages list them: the first ones, each not longer than 40, and how many there are."""
     shown = ", ".join(name if len(name) <= 40 else f"{name[:37]}..." for name in names[:count])
     return shown if len(names) <= count else f"{shown} and {len(names) - count} more"
-
-
-class TableRow(NamedTuple):
-    """The cells of one line of a table; a tuple, for a table has up to millions."""
-
-    line: int
-    cells: Sequence[str]
-
-
-@dataclass(frozen=True)
-class NumberRows(Sequence[TableRow]):
-    """The rows of a table of numbers alone, whose text is not kept.
-
-    numbers : (rows, columns). lines : (rows,) of the file. decimal : the sign of the table, in the text of its rows.
-    """
-
-    numbers: Floats
-    lines: Ints
-    decimal: str = "."
-
-    def __len__(self) -> int:
-        return len(self.numbers)
-
-    @overload
-    def __getitem__(self, index: int) -> TableRow: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[TableRow]: ...
-    def __getitem__(self, index: int | slice) -> TableRow | Sequence[TableRow]:
-        if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(len(self)))]
-        row = range(len(self))[index]
-        return TableRow(int(self.lines[row]), [repr(float(x)).replace(".", self.decimal) for x in self.numbers[row]])
 
 
 @dataclass(frozen=True)
@@ -127,13 +96,19 @@ class TextTable:
         k = self.column(name)
         if isinstance(self.rows, NumberRows):
             return self.rows.numbers[:, k]
-        cells = [row.cells[k] for row in self.rows]
-        return parse_numbers(cells, self.dialect, lambda row: self.location(self.rows[row].line, k), self.as_written(k))
+        found = list[Floats]()
+        for lines, cells in cells_by_part(self.rows, k):
+            place = partial(self._location_among, lines, k)
+            found.append(parse_numbers(cells, self.dialect, place, self.as_written(k)))
+        return np.concatenate(found) if found else np.zeros(0)
+
+    def _location_among(self, lines: Ints, column: int, row: int) -> str:
+        return self.location(int(lines[row]), column)
 
     @property
     def lines(self) -> Ints:
         """(rows,) The line of the file in which each row stands."""
-        if isinstance(self.rows, NumberRows):
+        if isinstance(self.rows, (NumberRows, TextRows)):
             return self.rows.lines
         return np.array([row.line for row in self.rows], dtype=int)
 
@@ -148,7 +123,7 @@ class TextTable:
 
     def with_rows(self, rows: Sequence[TableRow]) -> TextTable:
         """The same table with other rows."""
-        return replace(self, rows=tuple(rows))
+        return replace(self, rows=rows)
 
     def _column_label(self, column: int) -> str:
         """The letters of a spreadsheet's column, elsewhere its number from 1."""
@@ -285,14 +260,14 @@ def _converted_column(table: TextTable, name: str, kind: QuantityKind, suffix: s
     """One column in creepkit's unit."""
     k = table.column(name)
     written = table.as_written(k)
-    return kind.convert_all(table.numbers(name), suffix, lambda row: table.location(table.rows[row].line, k), written)
+    return kind.convert_all(table.numbers(name), suffix, lambda row: table.location(int(table.lines[row]), k), written)
 
 
 def _check_marks(table: TextTable, k: int, marks: Floats) -> None:
     """Refuse what neither uses a frame nor leaves it out."""
     for row in np.flatnonzero((marks != 0.0) & (marks != 1.0))[:1]:
         raise HistoryError(
-            f"{table.location(table.rows[row].line, k)}: '{table.as_written(k)}' is {marks[row]:g}; allowed: 1 for a "
+            f"{table.location(int(table.lines[row]), k)}: '{table.as_written(k)}' is {marks[row]:g}; allowed: 1 for a "
             "frame that is used, 0 for one that is not"
         )
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.records.units import spelled_factors
 
 LENGTH_UNITS = spelled_factors("mm", "m", "cm", "um", "in")
@@ -125,18 +125,20 @@ class CameraFormat:
             raise HistoryError(f"a camera format is called {self.name!r}; give it a short name in words")
         for field in ("title", "unit", "confidence_unit"):
             if not isinstance(getattr(self, field), str):
-                raise HistoryError(f"{self}: {field} is {getattr(self, field)!r:.60}; give a text")
+                raise HistoryError(f"{self}: {field} is {quoted(repr(getattr(self, field)), 60)}; give a text")
         if not isinstance(self.deformed, bool):
-            raise HistoryError(f"{self}: deformed is {self.deformed!r:.60}; write True or False")
+            raise HistoryError(f"{self}: deformed is {quoted(repr(self.deformed), 60)}; write True or False")
         given = (self.columns,) if isinstance(self.columns, Mapping) else self.columns
         if not isinstance(given, Sequence) or not given or not all(isinstance(one, Mapping) for one in given):
-            raise HistoryError(f"{self}: columns are {{quantity: column}}, or a tuple of them, found {given!r:.60}")
+            raise HistoryError(
+                f"{self}: columns are {{quantity: column}}, or a tuple of them, found {quoted(repr(given), 60)}"
+            )
         object.__setattr__(self, "columns", tuple(self._checked_columns(one) for one in given))
         if self.unit and self.unit not in LENGTH_UNITS:
             raise HistoryError(f"{self}: '{self.unit}' is no unit of length; {nearest(self.unit, LENGTH_UNITS)}")
         axes = tuple(self.axes) if isinstance(self.axes, Sequence) else ()
         if len(axes) != 3 or not all(isinstance(axis, int) and axis in (1, -1) for axis in axes):
-            raise HistoryError(f"{self}: axes are {self.axes!r:.60}; give three factors that are 1 or -1")
+            raise HistoryError(f"{self}: axes are {quoted(repr(self.axes), 60)}; give three factors that are 1 or -1")
         object.__setattr__(self, "axes", axes)
         object.__setattr__(self, "lost", self._checked_rules())
         for field in ("patterns", "planar", "time"):
@@ -171,7 +173,7 @@ class CameraFormat:
         for quantity, one in given.items():
             spellings = (one,) if isinstance(one, str) else tuple(one) if isinstance(one, Sequence) else ()
             if not spellings or not all(isinstance(word, str) and ColumnName.of(word).name for word in spellings):
-                raise HistoryError(f"{self}: the column of {quantity} is {one!r:.60}; give its name")
+                raise HistoryError(f"{self}: the column of {quantity} is {quoted(repr(one), 60)}; give its name")
             for name in map(ColumnName.of, spellings):
                 if taken.setdefault(name, quantity) != quantity:
                     raise HistoryError(
@@ -184,14 +186,16 @@ class CameraFormat:
         value = getattr(self, field)
         texts = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Sequence) else (None,)
         if not all(isinstance(text, str) for text in texts):
-            raise HistoryError(f"{self}: {field} is {value!r:.60}; give a tuple of texts")
+            raise HistoryError(f"{self}: {field} is {quoted(repr(value), 60)}; give a tuple of texts")
         return texts
 
     def _checked_rules(self) -> tuple[LostRule, ...]:
         if isinstance(self.lost, Mapping):
             return tuple(self._checked_rule(*rule) for rule in self.lost.items())
         if not (isinstance(self.lost, tuple) and all(isinstance(rule, LostRule) for rule in self.lost)):
-            raise HistoryError(f"{self}: lost is {self.lost!r:.60}; write {{column: rule}}, such as {{'sigma': '< 0'}}")
+            raise HistoryError(
+                f"{self}: lost is {quoted(repr(self.lost), 60)}; write {{column: rule}}, such as {{'sigma': '< 0'}}"
+            )
         return self.lost
 
     def _check_layout(self) -> None:
@@ -201,10 +205,11 @@ class CameraFormat:
             column, kind = pair if isinstance(pair, (tuple, list)) and len(pair) == 2 else ("", "")
             if not (isinstance(column, str) and column and isinstance(kind, str) and _PACKED.fullmatch(kind)):
                 raise HistoryError(
-                    f"{self}: layout holds {pair!r:.60}; give a column and its type, such as ('stereo_x_mm', '<f8')"
+                    f"{self}: layout holds {quoted(repr(pair), 60)}; give a column and its type, such as "
+                    "('stereo_x_mm', '<f8')"
                 )
             if column in names:
-                raise HistoryError(f"{self}: layout has the column '{column:.40}' twice; give each its own name")
+                raise HistoryError(f"{self}: layout has the column '{quoted(column)}' twice; give each its own name")
             names.append(column)
         object.__setattr__(self, "layout", tuple((column, kind) for column, kind in pairs))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, frozen
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.records.known_specimens import load_unit
 from creepkit.records.loading import Loading, Program, loading_text
 from creepkit.records.noise_correlations import can_hold_together
@@ -113,7 +113,8 @@ class History:
             freeze(self, "temperature", float(self.temperature))
         if not callable(getattr(self.loading, "program", None)):
             raise HistoryError(
-                f"{origin}: loading is {self.loading!r:.40}; give what was imposed, such as ck.constant_stress(100.0)"
+                f"{origin}: loading is {quoted(repr(self.loading))}; give what was imposed, such as "
+                "ck.constant_stress(100.0)"
             )
         self._check_end(origin)
         sd = {n: self._checked_sd(origin, n, v, times.size) for n, v in self.standard_deviation.items()}

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 
 PRESSURE_REFERENCES = ("gauge", "absolute")
 
@@ -51,47 +51,53 @@ class InstrumentFormat:
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and re.fullmatch(r"[a-z0-9][a-z0-9_-]*", self.name)):
             raise HistoryError(
-                f"instrument format {self.name!r:.40}: the name must be small letters, digits and hyphens, such as "
+                f"instrument format {quoted(repr(self.name))}: the name must be small letters, digits and hyphens, "
+                "such as "
                 "'furnace-3'"
             )
         for field_name in ("title", "time", "date", "time_unit", "date_order", "time_zone"):
             if not isinstance(getattr(self, field_name), str):
                 raise HistoryError(
-                    f"instrument format '{self.name}': {field_name} is {getattr(self, field_name)!r:.40}; give a text"
+                    f"instrument format '{self.name}': {field_name} is {quoted(repr(getattr(self, field_name)))}; "
+                    "give a text"
                 )
         for field_name in ("required", "missing"):
             texts = getattr(self, field_name)
             if not isinstance(texts, (tuple, list)) or not all(isinstance(text, str) for text in texts):
                 raise HistoryError(
-                    f"instrument format '{self.name}': {field_name} is {texts!r:.40}; give a tuple of texts"
+                    f"instrument format '{self.name}': {field_name} is {quoted(repr(texts))}; give a tuple of texts"
                 )
         for field_name in ("units", "channel_patterns"):
             texts = getattr(self, field_name)
             if not isinstance(texts, Mapping) or not all(isinstance(text, str) for text in texts.values()):
                 raise HistoryError(
-                    f"instrument format '{self.name}': {field_name} is {texts!r:.40}; give {{text: text}}"
+                    f"instrument format '{self.name}': {field_name} is {quoted(repr(texts))}; give {{text: text}}"
                 )
         for pattern in (*self.required, *self.units):
             if isinstance(pattern, str) and _REPEATED_TWICE.search(pattern):
                 raise HistoryError(
-                    f"instrument format '{self.name}': {pattern!r:.40} repeats what it repeats already, so that a "
+                    f"instrument format '{self.name}': {quoted(repr(pattern))} repeats what it repeats already, so "
+                    "that a "
                     "search may take for ever; write it with one + or *"
                 )
             try:
                 re.compile(pattern)
             except (re.error, TypeError) as error:
                 raise HistoryError(
-                    f"instrument format '{self.name}': {pattern!r:.40} is no regular expression ({error}); correct it"
+                    f"instrument format '{self.name}': {quoted(repr(pattern))} is no regular expression ({error}); "
+                    "correct it"
                 ) from None
         if self.pressure_reference not in ("", *PRESSURE_REFERENCES):
             raise HistoryError(
-                f"instrument format '{self.name}': pressure_reference is {self.pressure_reference!r:.40}; write "
+                f"instrument format '{self.name}': pressure_reference is {quoted(repr(self.pressure_reference))}; "
+                "write "
                 "'gauge' or 'absolute', or leave it out"
             )
         for pattern in self.channel_patterns.values():
             if not (isinstance(pattern, str) and pattern.count("{}") == 1):
                 raise HistoryError(
-                    f"instrument format '{self.name}': the channel pattern {pattern!r:.40} must hold {{}} once, where "
+                    f"instrument format '{self.name}': the channel pattern {quoted(repr(pattern))} must hold {{}} "
+                    "once, where "
                     "the name of the specimen stands"
                 )
 

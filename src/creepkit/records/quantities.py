@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.records.units import UnitConversion, conversions
 
 
@@ -80,7 +80,11 @@ class QuantityKind:
         return replace(self, name=f"standard deviation of a {self.name}", units=units, low=0.0, open_interval=True)
 
     def _unit_error(self, name: str, suffix: str) -> str:
-        return f"the unit '{suffix:.40}' of '{name:.60}' is not understood" if suffix else f"'{name:.60}' has no unit"
+        return (
+            f"the unit '{quoted(suffix)}' of '{quoted(name, 60)}' is not understood"
+            if suffix
+            else f"'{quoted(name, 60)}' has no unit"
+        )
 
     def _spellings(self, name: str, suffix: str) -> str:
         if not name.endswith(suffix):  # the unit stood apart from the name

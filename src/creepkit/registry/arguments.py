@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from creepkit.arrays import ArrayLike
 from creepkit.cameras import reading as camera_reading
-from creepkit.errors import FitError, LawError, SolveError
+from creepkit.errors import FitError, LawError, SolveError, quoted
 from creepkit.instruments import reading as instrument_files
 from creepkit.instruments.reading_options import RecordOptions
 from creepkit.readers import reading
@@ -67,7 +67,9 @@ def check_histories(values: Sequence[History]) -> list[History]:
     if isinstance(values, (str, Path, History)):
         raise FitError("histories must be a list of them: read_histories(path) returns one, [history] makes one")
     if not hasattr(values, "__iter__"):
-        raise FitError(f"histories must be a list of them, found {values!r:.40}; read_histories(path) returns one")
+        raise FitError(
+            f"histories must be a list of them, found {quoted(repr(values))}; read_histories(path) returns one"
+        )
     histories = list(values)
     wrong_types = [type(h).__name__ for h in histories if not isinstance(h, History)]
     if wrong_types:

@@ -23,7 +23,7 @@ from typing import Any
 import pluggy
 
 from creepkit import hookspecs
-from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, nearest
+from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, nearest, quoted
 
 ENTRY_POINT_GROUP = "creepkit"
 
@@ -337,7 +337,7 @@ def record_problem(specimen: Any) -> str:
             f"has a record that cannot be read: {error_text(error)}; outputs are names, loads ck.Load, lengths fields"
         )
     if not outputs or not all(isinstance(name, str) for name in outputs):
-        return f"has outputs {outputs!r:.60}; give at least one name, or ck.Output"
+        return f"has outputs {quoted(repr(outputs), 60)}; give at least one name, or ck.Output"
     if both := {str(o) for o in outputs} & {load.name for load in loads}:
         return f"has an output and a load called '{both.pop()}', which a file could not tell apart; rename one"
     for name in known:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
-from creepkit.errors import CreepkitError, DatasetError
+from creepkit.errors import CreepkitError, DatasetError, quoted
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError
 
 if TYPE_CHECKING:
@@ -57,4 +57,4 @@ def specimen_from_json(document: Any, source: str, registered: Callable[[str], S
         template = registered(name)
         return CODEC.updated(template, document["fields"])
     except CreepkitError as error:
-        raise DatasetError(f"{source}: its specimen '{name:.40}' cannot be rebuilt here: {error}") from None
+        raise DatasetError(f"{source}: its specimen '{quoted(name)}' cannot be rebuilt here: {error}") from None

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
-from creepkit.errors import FitError, nearest
+from creepkit.errors import FitError, nearest, quoted
 from creepkit.inverse.information_criteria import aicc_penalty, bic_penalty, criterion_weights
 from creepkit.records import History
 from creepkit.registry.arguments import check_histories
@@ -125,7 +125,7 @@ def _known_names(methods: Sequence[str] | str | None) -> list[str] | None:
     known = [name for name in METHODS if name != MINIMUM_RATE.name]
     given: Any = methods
     if not isinstance(given, str | Sequence):
-        raise FitError(f"methods is {methods!r:.40}; give a list of names, such as ['larson-miller']")
+        raise FitError(f"methods is {quoted(repr(methods))}; give a list of names, such as ['larson-miller']")
     asked = list(dict.fromkeys([methods] if isinstance(methods, str) else methods))
     for name in asked:
         if name not in known:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import FitError, nearest
+from creepkit.errors import FitError, nearest, quoted
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.presentation import Presentable, present
 from creepkit.rupture_assessment.checks import AssessmentCheck
@@ -65,13 +65,15 @@ class RuptureSettings:
 
     def __post_init__(self) -> None:
         if not self.degrees or any(type(d) is not int or not 1 <= d <= 5 for d in self.degrees):
-            raise FitError(f"degrees are {self.degrees!r:.40}; give whole numbers from 1 to 5, such as (1, 2, 3)")
+            raise FitError(
+                f"degrees are {quoted(repr(self.degrees))}; give whole numbers from 1 to 5, such as (1, 2, 3)"
+            )
         if self.distribution not in DISTRIBUTIONS:
-            raise FitError(f"distribution is {self.distribution!r:.40}; allowed are {', '.join(DISTRIBUTIONS)}")
+            raise FitError(f"distribution is {quoted(repr(self.distribution))}; allowed are {', '.join(DISTRIBUTIONS)}")
         if self.criterion not in ("bic", "aicc"):
-            raise FitError(f"criterion is {self.criterion!r:.40}; allowed are bic and aicc")
+            raise FitError(f"criterion is {quoted(repr(self.criterion))}; allowed are bic and aicc")
         if not (isinstance(self.level, float) and 0.5 <= self.level < 1.0):
-            raise FitError(f"level is {self.level!r:.40}; give a probability from 0.5 to below 1, such as 0.95")
+            raise FitError(f"level is {quoted(repr(self.level))}; give a probability from 0.5 to below 1, such as 0.95")
         for method, constants in self.fixed.items():
             if method not in METHODS:
                 raise FitError(f"fixed= names a method '{method}'; {nearest(method, METHODS)}")
@@ -80,7 +82,9 @@ class RuptureSettings:
                     allowed = ", ".join(METHODS[method].fixable) or "none"
                     raise FitError(f"fixed= gives {method} a constant '{name}'; those that may be given: {allowed}")
                 if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST_CONSTANT:
-                    raise FitError(f"fixed= gives {method} {name}={value!r:.40}; give a number, at most 1e7 in size")
+                    raise FitError(
+                        f"fixed= gives {method} {name}={quoted(repr(value))}; give a number, at most 1e7 in size"
+                    )
 
 
 @dataclass(frozen=True)
@@ -239,11 +243,11 @@ class RuptureAssessment(Presentable):
         of : "test", one test of a new heat; "heat", the median of a new heat; "mean", of the average heat.
         """
         if of not in BOUND_KINDS:
-            raise FitError(f"of is {of!r:.40}; allowed are {', '.join(BOUND_KINDS)}")
+            raise FitError(f"of is {quoted(repr(of))}; allowed are {', '.join(BOUND_KINDS)}")
         check_temperatures([temperature])
         given: Any = stress
         if isinstance(given, bool) or not isinstance(given, Real) or not 0 < float(given) < 1e9:
-            raise FitError(f"stress is {stress!r:.40}; give MPa above zero")
+            raise FitError(f"stress is {quoted(repr(stress))}; give MPa above zero")
         T, s = np.array([float(temperature)]), np.array([float(stress)])
         at = Conditions(s, T, self.tensile(T), np.full(1, np.nan))
         models = self.models(method)
@@ -286,7 +290,9 @@ def check_hours(hours: Any) -> list[float]:
     found = _numbers(hours, "hours", "a list of hours, such as [1e3, 1e5]")
     for one in found:
         if not 0 < one < 1e12:
-            raise FitError(f"a strength is asked for at {one!r:.40} h; give numbers of hours above zero, below 1e12")
+            raise FitError(
+                f"a strength is asked for at {quoted(repr(one))} h; give numbers of hours above zero, below 1e12"
+            )
     return found
 
 
@@ -295,17 +301,17 @@ def check_temperatures(temperatures: Any) -> list[float]:
     found = _numbers(temperatures, "temperatures", "a list of temperatures in K, such as [873.15]")
     for one in found:
         if not 0 < one < 1e4:
-            raise FitError(f"a temperature is {one!r:.40}; give K, above 0 and below 10000")
+            raise FitError(f"a temperature is {quoted(repr(one))}; give K, above 0 and below 10000")
     return found
 
 
 def _numbers(values: Any, name: str, example: str) -> list[float]:
     if isinstance(values, str | Mapping) or not isinstance(values, Iterable):
-        raise FitError(f"{name} is {values!r:.40}; give {example}")
+        raise FitError(f"{name} is {quoted(repr(values))}; give {example}")
     found = []
     for one in values:
         if isinstance(one, bool) or not isinstance(one, Real):
-            raise FitError(f"{name} holds {one!r:.40}; give {example}")
+            raise FitError(f"{name} holds {quoted(repr(one))}; give {example}")
         number: Any = one  # an integer may be too large for float()
         found.append(np.inf if abs(number) > 10**30 else float(number))
     if not found:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, frozen
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records import ZERO_CELSIUS, History
 
@@ -210,10 +210,13 @@ def tensile_strengths(tests: RuptureTests, stated: Mapping[float, float] | None)
             pairs = sorted((float(T), float(s)) for T, s in stated.items())
         except (AttributeError, TypeError, ValueError):
             raise HistoryError(
-                f"tensile_strength is {stated!r:.60}; give MPa by temperature in K, such as {{1123.15: 420.0}}"
+                f"tensile_strength is {quoted(repr(stated), 60)}; give MPa by temperature in K, such as "
+                f"{{1123.15: 420.0}}"
             ) from None
         if not all(0 < T < 1e4 and 0 < s < 1e5 for T, s in pairs):
-            raise HistoryError(f"tensile_strength is {stated!r:.60}; give numbers above zero: MPa by temperature in K")
+            raise HistoryError(
+                f"tensile_strength is {quoted(repr(stated), 60)}; give numbers above zero: MPa by temperature in K"
+            )
     else:
         known = np.isfinite(tests.tensile_strength)
         pairs = [

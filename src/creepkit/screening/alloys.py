@@ -23,7 +23,7 @@ from creepkit.errors import FitError, HistoryError, nearest
 from creepkit.files.delimited_text import parse_number
 from creepkit.inverse.composite_predictor import CompositePredictor, predictor_for
 from creepkit.inverse.reference_conditions import detect_creep, distinct_loads
-from creepkit.readers.cell_grids import read_table
+from creepkit.readers.text_grids import read_table
 from creepkit.readers.text_tables import TextTable
 from creepkit.records import History, Predictor, is_logarithmic, outputs_of_test
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.errors import CreepkitError, SolveError
+from creepkit.errors import CreepkitError, SolveError, quoted
 from creepkit.records import History, Load, Prediction, Status
 from creepkit.records.prediction_assembly import (
     HistoryPrediction,
@@ -120,14 +120,15 @@ class PerTest(TestPiece, ABC):
             ) from error
         if not isinstance(found, (OneTest, Mapping)):
             raise SolveError(
-                f"{self._place(values, history)}: one() gave {found!r:.40}; it must return {{output: values}}, or a "
+                f"{self._place(values, history)}: one() gave {quoted(repr(found))}; it must return "
+                f"{{output: values}}, or a "
                 "OneTest where a test ends early"
             )
         if not isinstance(found, OneTest):
             found = OneTest(found, Status.COMPLETE, end)
         if not isinstance(found.status, Status):
             raise SolveError(
-                f"{self._place(values, history)}: one() gave the status {found.status!r:.40}; use ck.Status"
+                f"{self._place(values, history)}: one() gave the status {quoted(repr(found.status))}; use ck.Status"
             )
         ended = end if np.isnan(found.end_time) else found.end_time
         return self._rows(found, values, history), found.status, ended, ""
@@ -147,7 +148,8 @@ class PerTest(TestPiece, ABC):
                 given = row = np.zeros(0)
             if np.iscomplexobj(given) or (not row.size and history.times.size):
                 raise SolveError(
-                    f"{self._place(values, history)}: one() gave '{name}' as {found.outputs[name]!r:.60}; real "
+                    f"{self._place(values, history)}: one() gave '{name}' as "
+                    f"{quoted(repr(found.outputs[name]), 60)}; real "
                     "numbers, one for each time, are needed"
                 )
             if row.shape != history.times.shape:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from creepkit.errors import nearest
+from creepkit.errors import SurrogateError, nearest, quoted
 from creepkit.readers.vocabulary import split_unit
 from creepkit.records import (
     ZERO_CELSIUS,
@@ -81,6 +81,7 @@ def predictor_of(file: StudyFile, root: Path | None) -> Predictor | None:
     root : folder of files that a report carried, in which `..` is written `up`.
     """
     import creepkit as ck
+    from creepkit.surrogates.loading import reduced_order_models
 
     model = file.model
     specimen = None if model.specimen is None else specimen_of_study(file)
@@ -89,6 +90,11 @@ def predictor_of(file: StudyFile, root: Path | None) -> Predictor | None:
         return specimen
     beside = predictor_path(file, root)
     with file.at("identification", "predictor"):
+        if (
+            beside is None and str(named) not in reduced_order_models()
+        ):  # never a file of the folder one happens to be in
+            what = f"no file '{quoted(str(named))}' lies beside the study, and no surrogate is called that"
+            raise SurrogateError(f"{what}; {nearest(str(named), reduced_order_models())}")
         return ck.surrogate(beside if beside is not None else str(named))
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from creepkit.errors import CreepkitError, ExportError
+from creepkit.errors import CreepkitError, ExportError, quoted
 from creepkit.language.elastic import Elastic
 from creepkit.language.symbols import temperature
 from creepkit.records import Exporter, LawWithValues, exported_text
@@ -111,7 +111,8 @@ def _note_problem(text: str) -> str:
     second = [line for line in lines if SECOND_LINE in line]
     for a, b in zip(first, second, strict=False):
         if a is not b and _prefix(a, FIRST_LINE) != _prefix(b, SECOND_LINE):
-            return f"the second line of a note stands alone, {b!r:.60}; put the comment sign before each line of it"
+            found = quoted(repr(b), 60)
+            return f"the second line of a note stands alone, {found}; put the comment sign before each line of it"
     if "\x00" in text:
         return "a null character of a note is in the text; creepkit.exporters.law_description leaves them out"
     return ""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError
+from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, quoted
 from creepkit.kernels.lowering import lower
 from creepkit.language import arrhenius
 from creepkit.language.law import CreepLaw
@@ -183,7 +183,7 @@ def check_camera_format(format: CameraFormat, path: str | Path | None = None) ->
     path : an example file or folder.
     """
     if not isinstance(format, CameraFormat):
-        raise HistoryError(f"check_camera_format() takes a ck.CameraFormat, found {format!r:.40}")
+        raise HistoryError(f"check_camera_format() takes a ck.CameraFormat, found {quoted(repr(format))}")
     case = CameraFormatCase(format, None if path is None else Path(path))
     checks = {
         "its own tables": camera_checks.check_own_tables,
@@ -210,7 +210,7 @@ def check_exporter(exporter: Exporter) -> ConformanceReport:
 def check_instrument_format(format: InstrumentFormat) -> ConformanceReport:
     """Run every check on an instrument format: its name, the units of its channels, the order of its dates."""
     if not isinstance(format, InstrumentFormat):
-        raise HistoryError(f"check_instrument_format() takes a ck.InstrumentFormat, found {format!r:.40}")
+        raise HistoryError(f"check_instrument_format() takes a ck.InstrumentFormat, found {quoted(repr(format))}")
     checks = {"declaration": instrument_checks.check_declaration}
     return _report(format, "instrument format", checks, format)
 

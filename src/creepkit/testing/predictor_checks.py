@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, quoted
 from creepkit.language.law import CreepLaw
 from creepkit.records import (
     History,
@@ -295,7 +295,9 @@ def must_refuse(name: str, call: Any, remedy: str) -> ConformanceCheck:
         if "raised TypeError" in text and UNKNOWN_NUISANCE not in text:
             return ConformanceCheck(name, False, f"{text}; take nuisances= and sensitivities= in predict()")
         one_line = "\n" not in text
-        return ConformanceCheck(name, one_line, text if one_line else f"in several lines, {text!r:.80}; say it in one")
+        return ConformanceCheck(
+            name, one_line, text if one_line else f"in several lines, {quoted(repr(text), 80)}; say it in one"
+        )
     return ConformanceCheck(name, False, remedy)
 
 

@@ -61,6 +61,25 @@ def test_streams_that_are_closed_full_or_without_reader():
     assert ended('"$0" "$@" laws | true', {1, 141}) == ""  # rich ends by 1
 
 
+@LINUX
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_output_that_the_disk_takes_in_part_is_an_error(unbuffered, tmp_path):
+    """A limit on the size of files stands for the disk: it takes 300 bytes, and then none."""
+    start = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (300, 300)); from creepkit.cli import main"
+    words = ("simulate", "norton", "--set", "A=1e-16", "--set", "n=4", "--stress", "60", "--end-h", "100")
+    with (tmp_path / "made.csv").open("wb") as output:
+        run = subprocess.run(
+            [sys.executable, "-c", f"{start}; main()", *words],
+            stdout=output,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+            check=False,
+        )
+    assert run.returncode == 1
+    assert run.stderr == "creepkit: standard output: File too large; free some space and start again\n"
+
+
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
 def test_a_narrow_encoding_shows_codes(encoding, tmp_path):
     environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0", "LANG": "C", "LC_ALL": "C"}

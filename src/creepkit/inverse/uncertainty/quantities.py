@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.errors import FitError
+from creepkit.errors import FitError, quoted
 from creepkit.inverse.coordinates import Coordinates
 
 EXPONENT_STRESS_RATIO = 1.0005
@@ -82,7 +82,8 @@ def _checked_point(stress: Any, temperature: Any, strain: Any, time: Any) -> dic
         lowest_excluded, largest = name in ("stress", "temperature"), LARGEST_STRESS if name == "stress" else np.inf
         if not is_number or not 0 <= value <= largest or (lowest_excluded and value == 0):
             raise FitError(
-                f"a quantity was asked for at {name} {value!r:.40}; give a number: a stress in MPa above zero, a "
+                f"a quantity was asked for at {name} {quoted(repr(value))}; give a number: a stress in MPa above "
+                "zero, a "
                 "temperature in K above zero, a strain, a time in s"
             )
     return {name: None if value is None else float(value) for name, value in given.items()}

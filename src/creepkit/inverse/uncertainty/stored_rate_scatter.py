@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from creepkit.errors import quoted
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, RateScatter
 
 LARGEST_NUMBER = 1e12
@@ -38,7 +39,7 @@ def problem_with(scatter: RateScatter, tests: Sequence[str], unknowns: int) -> s
         return "a variance is negative, or a weight not above zero"
     for level, names in scatter.members.items():
         if level not in LEVELS[:-1] or len(names) != count:
-            return f"members of '{level:.20}' are not one for each test, of a heat or laboratory"
+            return f"members of '{quoted(level, 20)}' are not one for each test, of a heat or laboratory"
     if not {*scatter.common} <= {*LEVELS[:-1]}:
         return "common names levels that are no heat or laboratory"
     if scatter.known is not None and not 0 <= scatter.known < LARGEST_NUMBER:

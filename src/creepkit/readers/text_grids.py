@@ -1,0 +1,197 @@
+"""A text file as rows of cells, with the `# key: value` lines above them.
+
+A large table of numbers alone is read as numbers at once; else the cells are kept as texts, column by column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from creepkit.arrays import Ints
+from creepkit.errors import HistoryError
+from creepkit.files.delimited_text import (
+    Dialect,
+    decode_text,
+    detect_dialect,
+    parts_of_lines,
+    split_line,
+    split_lines,
+    table_of_numbers,
+    text_lines,
+)
+from creepkit.files.reading import FileKind, read_bytes
+from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
+from creepkit.readers.comment_lines import BEFORE_COMMENT, head_entries, is_comment, late_entries, stated_decimal
+from creepkit.readers.table_limits import (
+    MAXIMUM_CELL,
+    MAXIMUM_COLUMNS,
+    refuse_long_cells,
+    refuse_long_lines,
+    refuse_many,
+    refuse_many_texts,
+)
+from creepkit.readers.table_rows import NumberRows, TableRow, packed
+from creepkit.readers.text_tables import SourceText, TextTable
+
+TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
+
+
+_LARGE_TEXT = 65_536
+"""Characters above which the rows of a text are read as numbers at once where they hold nothing else."""
+
+
+_HEAD_LINES = 1000
+"""Lines of a large text within which its names must stand for that."""
+
+
+def read_text_grid(path: Path) -> CellGrid:
+    """Read a text table of any delimiter, decimal sign and encoding; HistoryError where it holds no table."""
+    text = decode_text(read_bytes(path, TABLE_FILE), path)
+    if "\r" in text:
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    refuse_long_lines(text, path)
+    head, offset = _head_of(text)
+    if offset == len(text):
+        problem = "holds a header but no table" if any(line.strip() for line in head) else "is empty"
+        raise HistoryError(f"{path}: the file {problem}; write a line of columns such as time_s,strain_pct, then rows")
+    if len(text) > _LARGE_TEXT and len(head) < _HEAD_LINES:
+        numbers = _grid_of_numbers(path, text, head, offset)
+        if numbers is not None:
+            return numbers
+    return _grid_of_texts(path, text, head, offset)
+
+
+def _head_of(text: str) -> tuple[list[str], int]:
+    """The lines above the first row, and the character with which that begins."""
+    head, offset = list[str](), 0
+    while offset < len(text):
+        end = text.find("\n", offset)
+        line = text[offset : len(text) if end < 0 else end]
+        if line.strip() and not is_comment(line):
+            break
+        head.append(line)
+        offset += len(line) + 1
+    return head, min(offset, len(text))
+
+
+def read_head_alone(path: Path) -> dict[str, SourceText]:
+    """The entries of a file that holds `# key: value` lines and no table; {} where it holds one."""
+    start = read_bytes(path, TABLE_FILE, first=_LARGE_TEXT)
+    lines = text_lines(decode_text(start, path)) if len(start) < _LARGE_TEXT else [" a table"]
+    if any(line.strip() and not is_comment(line) for line in lines):
+        return {}
+    return head_entries(path, lines, (), Dialect(decimal=stated_decimal(path, lines) or "."))
+
+
+@dataclass
+class _TableLines:
+    """The lines of a text from its first row on, taken one by one.
+
+    offset, first : the character and the line with which that begins. comments : of the lines that were taken, those
+    that are `# key: value`.
+    """
+
+    text: str
+    offset: int
+    first: int
+    comments: list[tuple[int, str]] = field(default_factory=list)
+
+    def numbered(self) -> Iterator[tuple[int, str]]:
+        """Number and text of each line that is neither empty nor a comment."""
+        self.comments.clear()
+        number = self.first
+        for part in parts_of_lines(self.text, self.offset):
+            lines = part.split("\n")
+            for k, line in enumerate(lines, number):
+                if line and not line.isspace():
+                    if not (line[0] in BEFORE_COMMENT and is_comment(line)):
+                        yield k, line
+                    elif ":" in line:
+                        self.comments.append((k, line))
+            number += len(lines)
+
+
+def _grid_of_texts(path: Path, text: str, head: Sequence[str], offset: int) -> CellGrid:
+    """The grid of a table that holds not numbers alone, whose first row begins at character `offset`."""
+    first = len(head) + 1
+    lines = _TableLines(text, offset, first)
+    dialect = detect_dialect((line for _, line in lines.numbered()), str(path), stated_decimal(path, head))
+    width = len(split_line(next(lines.numbered())[1], dialect, f"{path}:{first}"))
+    refuse_many_texts(path, text.count("\n", offset) * max(width, 2))  # a table has two columns or more
+    rows = packed(_rows(lines.numbered(), dialect, path))
+    if not rows:
+        raise HistoryError(f"{path}:{first}: no cell holds anything; write a line of columns, then rows")
+    late = late_entries(path, lines.comments, dialect)
+    return CellGrid(path, "", dialect, head_entries(path, head, rows[0].cells, dialect), rows, None, late)
+
+
+def _rows(numbered: Iterator[tuple[int, str]], dialect: Dialect, path: Path) -> Iterator[TableRow]:
+    """The rows in which a cell holds something; HistoryError for what no table holds."""
+    for number, line, cells in split_lines(numbered, dialect, path):
+        if len(cells) > MAXIMUM_COLUMNS:
+            refuse_many(f"{path}:{number}", len(cells), 0)
+        if len(line) > MAXIMUM_CELL:
+            refuse_long_cells(f"{path}:{number}", line, cells)
+        if cells[0] or any(cells):
+            yield TableRow(number, cells)
+
+
+def _grid_of_numbers(path: Path, text: str, head: Sequence[str], offset: int) -> CellGrid | None:
+    """The grid of a table that holds numbers alone below its names; None of any other."""
+    first = len(head) + 1
+    sample = list(islice(_TableLines(text, offset, first).numbered(), _HEAD_LINES))
+    names = sample[0][1]
+    try:
+        dialect = detect_dialect((line for _, line in sample), decimal=stated_decimal(path, head))
+    except HistoryError:  # told by who reads line by line
+        return None
+    if dialect.delimiter == " " or '"' in names:
+        return None
+    body, line_numbers, comments = _without_comments(text[offset + len(names) + 1 :].rstrip("\n"), first + 1)
+    numbers = table_of_numbers(body, dialect) if body.strip() else None
+    cells = split_line(names, dialect, f"{path}:{first}")
+    if numbers is None or numbers.shape != (line_numbers.size, len(cells)) or not np.isfinite(numbers).all():
+        return None
+    refuse_many(f"{path}:{first}", len(cells), 0)
+    refuse_long_cells(f"{path}:{first}", names, cells)
+    rows, header = NumberRows(numbers, line_numbers, dialect.decimal), head_entries(path, head, cells, dialect)
+    return CellGrid(path, "", dialect, header, [TableRow(first, cells)], rows, late_entries(path, comments, dialect))
+
+
+def _without_comments(body: str, first_line: int) -> tuple[str, Ints, list[tuple[int, str]]]:
+    """A text without comments and empty lines, the number of each line that stays, and the comments by line."""
+    if "\n\n" not in body and not body.startswith("\n") and "#" not in body and "/" not in body:
+        return body, first_line + np.arange(body.count("\n") + 1), []
+    lines = body.split("\n")
+    kept = [k for k, line in enumerate(lines) if line and line[0] not in ' \t"#/']
+    others = sorted(set(range(len(lines))).difference(kept))
+    comments = [(first_line + k, lines[k]) for k in others if is_comment(lines[k])]
+    kept += [k for k in others if lines[k].strip() and not is_comment(lines[k])]
+    kept.sort()
+    return "\n".join([lines[k] for k in kept]), first_line + np.array(kept, dtype=int), comments
+
+
+def read_table(path: Path, ignored: Collection[str] = ()) -> TextTable:
+    """Read a file of one table: its first row names the columns, whatever they are, but those left out."""
+    return table_of(without_ignored(read_text_grid(path), 0, ignored))
+
+
+def peek_columns(path: Path, byte_limit: int = 65536) -> tuple[str, ...]:
+    """The columns of a file as far as its beginning shows them, () when it has none; never raises for what it holds."""
+    try:
+        content = read_bytes(path, TABLE_FILE, first=byte_limit)
+        is_cut = len(content) == byte_limit
+        if is_cut:  # not within a character: a line feed of UTF-16 has two bytes
+            end = content.rfind(b"\n") + 1
+            content = content[: end + end % 2] if content[:2] in (b"\xff\xfe", b"\xfe\xff") else content[:end]
+        lines = [line for line in text_lines(decode_text(content, path)) if line.strip() and not is_comment(line)]
+        if not lines:
+            return ()
+        return tuple(split_line(lines[0], detect_dialect(lines, decimal=".")))
+    except HistoryError:
+        return ()
