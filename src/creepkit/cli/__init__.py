@@ -6,6 +6,7 @@ import signal
 from types import FrameType
 
 from creepkit.cli.failures import prepare_streams, print_warnings_plainly, run_to_the_end
+from creepkit.import_path import leave_settings_of_working_folder_out
 
 
 def main() -> None:
@@ -20,6 +21,7 @@ def _run() -> None:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # of nohup
             signal.signal(number, _terminate)
+    leave_settings_of_working_folder_out()
     from creepkit.cli.app import app
 
     app()
