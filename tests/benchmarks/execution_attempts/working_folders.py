@@ -217,7 +217,7 @@ def _controls(clean: Path) -> Found:
         run([sys.executable, "-c", "import json"], folder)
         yield Control(MODULES, "`python -c 'import json'` in the folder", 1, int(bool(left(folder))))
         run([sys.executable, "-m", "creepkit", "laws"], folder)
-        yield Control(MODULES, "`python -m creepkit` beside a creepkit.py, which Python takes", 1, int(bool(left(folder))))
+        yield Control(MODULES, "`python -m creepkit` beside a creepkit.py", 1, int(bool(left(folder))))
         run(["gcc", "x.c"], folder, {"PATH": f".:{os.environ['PATH']}"})
         yield Control(MODULES, "gcc by a PATH that begins with the folder", 1, int(bool(left(folder))))
         (folder / "x.csv").write_text(planted(folder))
