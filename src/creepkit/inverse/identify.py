@@ -10,8 +10,8 @@ import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import FitError
-from creepkit.inverse.adequacy import adequacy_with_remedies
 from creepkit.inverse.bound_penalties import check_bounds
+from creepkit.inverse.chi_square_test import adequacy_with_remedies
 from creepkit.inverse.composite_predictor import (
     predict,
     prediction_errors_of,

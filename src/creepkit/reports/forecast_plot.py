@@ -11,8 +11,8 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import is_logarithmic
+from creepkit.reports.curve_of_test import axis_label
 from creepkit.reports.figures import empty_figure, save_figure, set_range, wrapped
-from creepkit.reports.identification_plot import axis_label
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from dataclasses import asdict
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from creepkit.inverse.extrapolation import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.nuisance_plausibility import NUISANCE_UNITS
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
+from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import is_length_nuisance, is_logarithmic, kind_and_start, output_unit
 from creepkit.reports.stress_exponents import reference_sentences

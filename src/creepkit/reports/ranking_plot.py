@@ -13,8 +13,9 @@ from creepkit.arrays import Floats
 from creepkit.inverse.goodness_of_fit import TestFit
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
+from creepkit.reports.curve_of_test import axis_label, curve_of_test
 from creepkit.reports.figures import empty_figure, logarithmic_labels, power_of_ten, save_figure, shortened, wrapped
-from creepkit.reports.identification_plot import axis_label, curve_of_test, draw_curve, set_curve_ranges
+from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
 from creepkit.reports.load_programs import program_text
 from creepkit.reports.prediction_bands import FittedCurves, fitted_curves
 

@@ -6,16 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creepkit.reports.curve_of_test import TestCurve, axis_label, curve_of_test, unit_of
 from creepkit.reports.figures import empty_figure, save_figure
-from creepkit.reports.identification_plot import (
-    TestCurve,
-    axis_label,
-    curve_of_test,
-    draw_curve,
-    draw_residuals,
-    set_curve_ranges,
-    unit_of,
-)
+from creepkit.reports.identification_plot import draw_curve, draw_residuals, set_curve_ranges
 from creepkit.reports.load_programs import program_text
 from creepkit.reports.prediction_bands import FittedCurves
 

@@ -1,6 +1,7 @@
 """Forecasts of Norton bars, whose curves, times and their distributions are closed forms; and what is refused."""
 
 import json
+import re
 import warnings
 from dataclasses import replace
 
@@ -357,7 +358,10 @@ def test_text_json_and_picture(fit, tmp_path):
     text = str(result)
     assert "strain 0.01:" in text
     assert "measured: strain 100 % of the frames in the band and the whole curve in the wider one" in text
-    assert "extrapolated" not in text.split("plan: ")[0]
+    inside, beyond = text.split("plan: ")
+    assert "stress" not in inside.partition("extrapolated: ")[2]  # 95 MPa lies between the tests, which lasted 100 h
+    assert re.search(r"strain 0.01 after [2-9][0-9]{2} h \(the longest test: 100 h\)", inside)
+    assert "extrapolated: stress 130 MPa" in beyond
     json.dumps(forecast_to_json(result), allow_nan=False)
     result.plot(tmp_path / "forecast.png")
     assert (tmp_path / "forecast.png").stat().st_size > 10_000

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, f
 
-from creepkit.inverse.adequacy import Adequacy, OutputAdequacy, adequacy_of
+from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
+from creepkit.inverse.chi_square_test import adequacy_of
 from creepkit.inverse.frame_noise import frame_noise
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised

@@ -10,8 +10,8 @@ from creepkit.inverse.identify import identify
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.reports.condition_colours import MOST_GROUPS, MOST_IN_GROUP, ColourScale, condition_groups
+from creepkit.reports.curve_of_test import curve_of_test
 from creepkit.reports.figures import LARGEST_PIXELS, RESOLUTION
-from creepkit.reports.identification_plot import curve_of_test
 from creepkit.reports.prediction_bands import fitted_curves
 from creepkit.specimens.uniaxial import Uniaxial
 from helpers.steady_rate_predictor import Steady, planted

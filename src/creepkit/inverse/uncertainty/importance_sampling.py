@@ -83,6 +83,7 @@ def posterior_samples(fit: Identification, seed: int | None = None) -> Floats | 
     seed = fit.settings.seed if seed is None else seed
     centre = np.array(fit.u)
     shape = _shortened(posterior, centre, fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance)))
+    least = 1e-6 * np.diag(np.diag(shape))
     points, log_density = np.zeros((0, size)), np.zeros(0)
     proposals: list[tuple[Floats, Floats]] = []
     weights = np.zeros(0)
@@ -100,8 +101,7 @@ def posterior_samples(fit: Identification, seed: int | None = None) -> Floats | 
         weights /= weights.sum()
         centre = weights @ points
         deviation = points - centre
-        shape = (weights[:, None] * deviation).T @ deviation
-        shape += 1e-6 * np.diag(np.diag(shape))
+        shape = (weights[:, None] * deviation).T @ deviation + least
         if k + 1 >= ROUNDS and 1.0 / float((weights**2).sum()) >= LEAST_EFFECTIVE_SIZE:
             break
     if 1.0 / float((weights**2).sum()) < LEAST_EFFECTIVE_SIZE:
@@ -122,10 +122,8 @@ def _shortened(posterior: Posterior, centre: Floats, covariance: Floats) -> Floa
     lengths = 2.0 ** -np.arange(AXIS_HALVINGS + 1.0)
     steps = np.concatenate([lengths, -lengths])
     points = centre + sd * (steps[:, None, None] * axes.T).reshape(-1, centre.size)
-    fall = (posterior(centre[None])[0] - posterior(points)).reshape(2, lengths.size, centre.size)
-    freedom = posterior.degrees_of_freedom
-    allowed = 2.0 * 0.5 * (freedom + centre.size) * np.log1p(1.0 / freedom)
-    inside = (fall <= allowed).any(axis=0)
+    log_density = posterior(np.concatenate([centre[None], points]))
+    inside = (log_density[1:] >= log_density[0] - LARGEST_FALL).reshape(2, lengths.size, centre.size).any(axis=0)
     longest = np.where(inside.any(axis=0), lengths[inside.argmax(axis=0)], lengths[-1])
     kept = axes * longest
     return np.asarray(np.outer(sd, sd) * (kept @ kept.T))
@@ -133,6 +131,10 @@ def _shortened(posterior: Posterior, centre: Floats, covariance: Floats) -> Floa
 
 AXIS_HALVINGS = 14
 """Of a principal axis of Laplace's approximation."""
+
+
+LARGEST_FALL = 2.0
+"""Of the logarithm of the posterior along a principal axis: a Gaussian falls by 0.5, Student's t by less than this."""
 
 
 def _drawn(centre: Floats, shape: Floats, seed: int) -> Floats:
