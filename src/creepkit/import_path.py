@@ -27,6 +27,22 @@ def leave_working_folder_out_of_command() -> None:
         sys.path[:] = [entry for entry in sys.path if os.path.isabs(entry) and entry not in relative]
 
 
+def leave_settings_of_working_folder_out() -> None:
+    """Import matplotlib where its file of settings lies in the working folder, so that this file is not read.
+
+    It would come before the user's own settings, may have LaTeX executed (`text.usetex`), and older versions of
+    matplotlib evaluate parts of it.
+    """
+    if not os.path.lexists("matplotlibrc"):
+        return
+    working_folder = os.getcwd()
+    os.chdir(os.path.dirname(os.path.abspath(__file__)))
+    try:
+        import matplotlib  # noqa: F401
+    finally:
+        os.chdir(working_folder)
+
+
 def environment_without_working_folder() -> dict[str, str]:
     """The environment for another interpreter: its variables name no place of Python's relative to the working folder.
 

@@ -93,7 +93,7 @@ BENCHMARKS = {
     "reader_fuzz": Benchmark(40),
     "large_files": Benchmark(3),
     "adverse_surroundings": Benchmark(25),
-    "code_execution": Benchmark(5),
+    "code_execution": Benchmark(25),
 }
 """{name of the program: what it costs and how it is run}."""
 

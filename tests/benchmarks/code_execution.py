@@ -1,22 +1,23 @@
 """Attempts to have code executed that nobody installed: planted modules, files as plugins, hostile names in exports.
 
-    python tests/benchmarks/code_execution.py [--payloads NUMBER] [--write]
+    python tests/benchmarks/code_execution.py [--short] [--payloads NUMBER] [--write]
 
-Modules that say when they are executed lie in the working folder and beside the data while commands that start workers
-run; data files are named as plugins and as laws; and texts that try to end what they stand in are put into every text
-field of a law, one at a time, and written by every exporter. What is accepted is compiled (gfortran, gcc, g++) and run
-(node, Python) where these programs are installed; JSON and XHTML are parsed. An attempt is successful when the file
-that it wants to make is there ("executed"), or when the text does not compile, parse or load ("broken"). "refused"
-counts errors of creepkit in one sentence, "harmless" what was accepted and did nothing.
+Modules of every name that Python and all installed packages have, settings of matplotlib and programs by the names of
+compilers lie in the working folder and beside the data while commands run; data files are named as plugins and as laws;
+cache folders that others can write to hold kernels that say when they are loaded, and the commands run as user nobody
+where the program is root's; and texts that try to end what they stand in are put into every text field of a law, one at
+a time, and written by every exporter. What is accepted is compiled (gfortran, gcc, g++) and run (node, Python) where
+these programs are installed; JSON and XHTML are parsed. An attempt is successful when the file that it wants to make is
+there ("executed"); "broken" counts texts that do not compile, parse or load, and commands that end with another exit
+code than they should, "refused" errors of creepkit in one sentence, "harmless" what was accepted and did nothing. The
+last table says that the same canaries are noticed on what is unsafe on purpose.
 """
 
 from __future__ import annotations
 
 import collections
 import json
-import os
 import shutil
-import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
@@ -24,7 +25,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from killed_runs import data_set, planted_tests
+from execution_attempts import caches, working_folders
+from execution_attempts.canaries import CANARY, FAULTS, OUTCOMES, Attempt, Control, run
 from measured import Page, arguments, progress
 
 import creepkit as ck
@@ -32,12 +34,9 @@ from creepkit.errors import CreepkitError
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.records import LawWithValues
 
-OUTCOMES = ("refused", "harmless", "executed", "broken", "traceback")
-FAULTS = OUTCOMES[2:]
-CANARY = "executed_canary"
-LIMIT = 120.0
-PLANTED = f"open({{folder!r}} + '/{CANARY}', 'a').write(__file__ + chr(10))\n"
-MODULES = ("json", "numpy", "sitecustomize", "usercustomize", "distutils", "pickle", "torch", "h5py", "typer", "norton")
+MOST_SHORT = 1
+"""Hostile texts of the short form."""
+
 PAYLOADS = (
     f"$(touch {CANARY})", f'"; system("touch {CANARY}"); "', f"`touch {CANARY}`",
     f"</script><script>require('fs').writeFileSync('{CANARY}','')</script>", f"\\input{{{CANARY}}}",
@@ -80,14 +79,6 @@ def _symbol(name: str):  # type: ignore[no-untyped-def]
     return sympy.Symbol(name, real=True, positive=True)
 
 
-def run(words: list[str], folder: Path, **variables: str) -> tuple[int, str]:
-    """Exit code and stderr of a program in a folder."""
-    done = subprocess.run(
-        words, cwd=folder, capture_output=True, timeout=LIMIT, env={**os.environ, **variables}, check=False
-    )
-    return done.returncode, done.stderr.decode(errors="replace")
-
-
 def judged_text(text: str, suffix: str, folder: Path) -> tuple[str, str]:
     """What comes of an exported text: compiled, run or parsed."""
     (folder / "ABA_PARAM.INC").write_text("      implicit real*8(a-h,o-z)\n      parameter (nprecd=2)\n")
@@ -98,11 +89,11 @@ def judged_text(text: str, suffix: str, folder: Path) -> tuple[str, str]:
         commands.append(("g++", "-x", "c++", "-trigraphs", "-c", "-o", "out.o"))
     for words in commands:
         if shutil.which(words[0]):
-            code, problem = run([*words, path.name], folder)
+            ended = run([*words, path.name], folder)
             if (folder / CANARY).exists():
                 return "executed", words[0]
-            if code:
-                return "broken", f"{words[0]}: {problem[-200:]}"
+            if ended.code:
+                return "broken", f"{words[0]}: {ended.problem[-200:]}"
     try:
         if suffix == ".json":
             json.loads(text)
@@ -139,66 +130,71 @@ def exports(count: int) -> Iterator[tuple[str, str, str, str]]:
                 yield name, field, outcome, f"{text!r}: {detail}" if detail else ""
 
 
-COMMANDS = {
-    "generate": ("generate", "norton", "--specimen", "uniaxial", "--samples", "8", "--to", "m.h5", "--workers", "2"),
-    "screen": ("screen", "tests", "--law", "norton", "--dense", "none", "--to", "screened"),
-    "train": ("train", "data.h5", "--to", "n.safetensors", "--hidden", "4", "--layers", "1", "--epochs", "1"),
-    "sweep": ("sweep", "data.h5", "--to", "nets", "--hidden", "4", "--layers", "1", "--epochs", "1"),
-    "check a law": ("check", "norton"),
+NAIVE = {
+    ".py": '"""A law: {text}"""\n',
+    ".mjs": "// {text}\n",
+    ".c": "/* {text} */ int law;\n",
+    ".f": "! {text}\n      end\n",
 }
-REFUSED = {
-    "--plugin x.csv": ("--plugin", "x.csv", "laws"),
-    "--plugin without suffix": ("--plugin", "plain", "laws"),
-    "check x.csv": ("check", "x.csv"),
-    "check without suffix": ("check", "plain"),
-    "simulate ./plain": ("simulate", "./plain", "--set", "A=1", "--end-h", "1"),
-}
+"""Texts of an exporter that takes what it is given as it is."""
 
 
-def commands() -> Iterator[tuple[str, str, str]]:
-    """Name, outcome and detail of each command in a folder of planted modules."""
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch).resolve()
-        planted_tests(folder)
-        data_set(folder)
-        source = PLANTED.format(folder=str(folder))
-        for name in MODULES:
-            for place in (folder, folder / "tests"):
-                (place / f"{name}.py").write_text(source)
-        for name in ("x.csv", "plain", "norton"):
-            (folder / name).write_text(source)
-        for name, words in {**COMMANDS, **REFUSED}.items():
-            start = [sys.executable, "-P", "-m", "creepkit", *words]
-            code, problem = run(start, folder)
-            if (folder / CANARY).exists():
-                yield name, "executed", (folder / CANARY).read_text()[:200]
-                (folder / CANARY).unlink()
-            elif "Traceback" in problem or code not in ((1, 2) if name in REFUSED else (0,)):
-                yield name, "traceback", f"exit {code}: {problem[-300:]}"
-            else:
-                yield name, "refused" if name in REFUSED else "harmless", ""
+def naive_exports() -> Iterator[Control]:
+    """The same hostile texts through exporters that protect nothing; in each language one at least is noticed."""
+    for suffix, text in NAIVE.items():
+        if shutil.which(COMPILED[suffix][0]):
+            noticed = 0
+            for payload in PAYLOADS:
+                with tempfile.TemporaryDirectory() as folder:
+                    outcome, _ = judged_text(text.replace("{text}", payload), suffix, Path(folder))
+                noticed += outcome in FAULTS
+            yield Control("Hostile texts through exporters", f"a naive exporter to {suffix}", len(PAYLOADS), noticed, 1)
+
+
+def folders_and_caches(page: Page, short: bool) -> Iterator[Attempt | Control]:
+    """What was found in working folders and caches; its tables are printed."""
+    counts: dict[str, dict[str, collections.Counter[str]]] = {}
+    for module in (working_folders, caches):
+        for found in module.attempts(short):
+            if isinstance(found, Attempt):
+                rows = counts.setdefault(found.section, {})
+                rows.setdefault(found.target, collections.Counter())[found.outcome] += 1
+            yield found
+    for section, rows in counts.items():
+        page.heading(section)
+        page.table("attempt", *OUTCOMES)
+        for target, outcomes in rows.items():
+            page.row(target, *(outcomes[one] for one in OUTCOMES))
 
 
 def main() -> int:
     """Try everything, and count what came of it."""
     parser = arguments(__doc__)
     parser.add_argument("--payloads", type=int, default=len(PAYLOADS), help="hostile texts, from the first on")
+    parser.add_argument("--short", action="store_true", help="a few attempts of each kind")
     options = parser.parse_args()
-    page, faults = Page("code_execution", __doc__), []
-    page.heading("Planted modules, and data named as code")
-    page.table("command", *OUTCOMES)
-    for name, outcome, detail in commands():
-        page.row(name, *(int(outcome == one) for one in OUTCOMES))
-        faults += [f"{name}: {outcome}: {detail}"] if outcome in FAULTS else []
+    page, faults, controls = Page("code_execution", __doc__), [], []
+    number = min(options.payloads, MOST_SHORT) if options.short else options.payloads
+    for found in folders_and_caches(page, options.short):
+        if isinstance(found, Control):
+            controls.append(found)
+        elif found.outcome in FAULTS:
+            faults.append(f"{found.target}: {found.outcome}: {found.detail}")
     counts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
-    for name, field, outcome, detail in exports(options.payloads):
+    for name, field, outcome, detail in exports(number):
         counts[name][outcome] += 1
         faults += [f"{name}, {field}: {outcome}: {detail}"] if outcome in FAULTS else []
     page.heading("Hostile texts through exporters")
-    page.paragraph(f"{options.payloads} texts in each of the fields {', '.join(FIELDS)}.")
+    page.paragraph(f"{number} texts in each of the fields {', '.join(FIELDS)}.")
     page.table("exporter", *OUTCOMES)
-    for name, found in counts.items():
-        page.row(name, *(found[one] for one in OUTCOMES))
+    for name, outcomes in counts.items():
+        page.row(name, *(outcomes[one] for one in OUTCOMES))
+    controls += naive_exports()
+    page.heading("What would have been noticed")
+    page.table("attempt", "on what is unsafe on purpose", "tried", "noticed")
+    for control in controls:
+        page.row(control.section, control.consumer, control.tried, control.noticed)
+        faults += [f"{control.consumer}: the canary goes unnoticed"] if control.is_fault else []
     for fault in faults[:60]:
         progress(fault)
     if options.write:

@@ -39,6 +39,21 @@ def test_the_command_as_a_module_imports_nothing_from_the_working_folder(folder:
     assert not (folder / "ran").exists()
 
 
+def test_settings_of_matplotlib_in_the_working_folder_are_left_alone(tmp_path: Path) -> None:
+    """`text.usetex` has LaTeX run, and no program of that name is on the path here."""
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nbackend: module://planted_backend\n")
+    (tmp_path / "bar.csv").write_text(
+        "# specimen: uniaxial\n# temperature: 1073 K\n# modulus: 120 GPa\n"
+        "time [s],stress [MPa],strain\n0,60,0.0005\n3600,60,0.0006\n7200,60,0.0007\n"
+    )
+    words = [sys.executable, "-P", "-m", "creepkit", "read", "bar.csv", "--plot", "bar.svg"]
+    variables = environment(PATH=str(tmp_path))
+    done = subprocess.run(words, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False)
+
+    assert done.returncode == 0, done.stderr
+    assert "<svg" in (tmp_path / "bar.svg").read_text()
+
+
 WORKER_OF_A_SCRIPT = """
 import sys
 sys.path[:] = [folder for folder in sys.path if folder]  # this process is not the one that is looked at

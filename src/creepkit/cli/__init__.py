@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from creepkit.cli.failures import prepare_streams, print_warnings_plainly, run_to_the_end
 from creepkit.cli.interrupts import interrupt_at_signals
+from creepkit.import_path import leave_settings_of_working_folder_out
 
 
 def main() -> None:
@@ -15,6 +16,7 @@ def _run() -> None:
     interrupt_at_signals()
     prepare_streams()
     print_warnings_plainly()
+    leave_settings_of_working_folder_out()
     from creepkit.cli.app import app
 
     app()
