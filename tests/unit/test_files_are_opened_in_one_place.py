@@ -35,6 +35,7 @@ ALLOWED = {
     "creepkit.inverse.kept_fits read_bytes": "sources of the package",
     "creepkit.specimens.reduced_order_training read_bytes": "sources of the package",
     "creepkit.cli.failures open": "the null device, in place of a stream that is closed",
+    "creepkit.cli.failures TextIOWrapper": "its own output without a buffer, written whole",
     "creepkit.cli.demo read_text": "example data of the package",
     "creepkit.jobs.worker_process fdopen": "the output of a worker, a pipe to its parent",
     "creepkit.jobs.shard_progress open": "a lock that creepkit makes, written and never read",
