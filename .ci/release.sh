@@ -31,7 +31,7 @@ echo "the wheels in an empty environment, with the lowest versions that are decl
 "$python" .ci/lower_bounds.py >"$folder/lowest.txt"
 "$python" -m venv "$folder/env"
 pip="$folder/env/bin/python -m pip --disable-pip-version-check --quiet"
-if ! $pip install --constraint "$folder/lowest.txt" "$folder"/first/*.whl pytest hypothesis 2>"$folder/log"; then
+if ! $pip install --constraint "$folder/lowest.txt" "$folder"/first/*.whl pytest hypothesis jsonschema 2>"$folder/log"; then
     cat "$folder/log"
     [ -z "${CI:-}" ] || exit 1
     echo "the lowest versions cannot be had here; the wheels are not tried"
