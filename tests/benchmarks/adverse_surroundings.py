@@ -47,6 +47,12 @@ LIMIT = 120.0
 
 OUTCOMES = ("same", "refused", "interrupted", "no reader")
 FAULTS = ("no end", "exit code", "traceback", "no sentence", "harmed", "left behind", "other result")
+HEEDING_SIGNALS = """
+import os, signal, sys
+for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"):
+    signal.signal(getattr(signal, name), signal.SIG_DFL)
+os.execvp(sys.argv[1], sys.argv[1:])
+"""
 UNKNOWN_USER = 54321
 VALUES = ("--set", "A=1e-16", "--set", "n=4")
 SIMULATED = ("simulate", "norton", *VALUES, "--stress", "60", "--end-h", "100")
@@ -224,7 +230,7 @@ def signals() -> dict[str, Case]:
     """Each signal early, amid the work and late."""
     sent = {"SIGINT": (0.03, 0.3, 0.6, 0.9), "SIGTERM": (0.3, 0.8), "SIGHUP": (0.5,)}
     return {
-        f"{name} after {share:.0%}": Case((0, 130), signal=signal.Signals[name], share=share)
+        f"{name} after {share:.0%}": Case((0, 128 + signal.Signals[name]), signal=signal.Signals[name], share=share)
         for name, shares in sent.items()
         for share in shares
     }
@@ -332,6 +338,8 @@ def started(words: list[str], case: Case, folder: Path, scratch: Path, number: i
     words = [*case.before, *words]
     if case.shell:
         words = ["bash", "-c", case.shell, "bash", *words]
+    # a program that nohup or a shell's & started hands on that signals are ignored
+    words = [sys.executable, "-P", "-c", HEEDING_SIGNALS, *words]
     with (scratch / f"stdout{number}").open("wb") as output, (scratch / f"stderr{number}").open("wb") as problems:
         return subprocess.Popen(
             words, cwd=folder, env=environment(case, scratch), stdout=output, stderr=problems, start_new_session=True
@@ -418,7 +426,7 @@ def one_run(name: str, label: str, reference: Reference) -> tuple[collections.Co
             found["interrupted" if made == reference.result else "other result"] += 1
             if made != reference.result:
                 detail += f" again: {code}: {messages(scratch)[-300:]}"
-        elif codes == [130]:
+        elif case.signal and codes == [128 + case.signal]:
             found["interrupted"] += 1
         elif codes == [141] or (codes == [1] and "| " in case.shell):
             found["no reader"] += 1
