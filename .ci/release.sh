@@ -40,7 +40,7 @@ fi
 $pip check
 mkdir "$folder/outside" "$folder/empty"
 cp -R tests "$folder/outside"
-cp pyproject.toml "$folder/outside"  # for the settings of pytest
+cp -R --parents pyproject.toml docs/schemas.py docs/reference/schemas "$folder/outside"  # settings of pytest; schemas
 cd "$folder/outside"
 "$folder/env/bin/python" -m pytest -q -p no:cacheprovider \
     tests/conformance/test_registered_laws.py tests/unit/core tests/unit/files tests/unit/language
