@@ -42,7 +42,8 @@ mkdir "$folder/outside" "$folder/empty"
 cp -R tests "$folder/outside"
 cp -R --parents pyproject.toml docs/schemas.py docs/reference/schemas "$folder/outside"  # settings of pytest; schemas
 cd "$folder/outside"
-"$folder/env/bin/python" -m pytest -q -p no:cacheprovider \
+# The schemas that are kept are those that today's pydantic writes, not the lowest.
+"$folder/env/bin/python" -m pytest -q -p no:cacheprovider --deselect tests/unit/files/test_formats.py::test_the_schemas_are_current \
     tests/conformance/test_registered_laws.py tests/unit/core tests/unit/files tests/unit/language
 cd "$folder/empty"
 env -i HOME="$folder/empty" PATH="$folder/env/bin" creepkit demo --uniaxial >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
