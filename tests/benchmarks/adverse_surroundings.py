@@ -364,13 +364,15 @@ def messages(scratch: Path, number: int = 0) -> str:
 def judged_end(code: int | None, text: str, case: Case, command: Command) -> list[str]:
     """Faults of an end: by exit code and stderr."""
     codes = case.codes if command.results else (*case.codes, 0)  # what is only printed needs no space
+    if case.signal and code == -case.signal and "creepkit" not in text:
+        return []  # while Python itself started
     if code is None:
         return ["no end"]
     faults = [] if code in codes else ["exit code"]
     lines = [line for line in text.replace("\r", "\n").splitlines() if line.strip()]
     if "Traceback" in text or "internal error" in text or "Exception ignored" in text:
         faults.append("traceback")
-    silent = "2>&-" in case.shell or "| " in case.shell
+    silent = "2>&-" in case.shell or "| " in case.shell or case.before == limited(0)
     if code == 1 and not silent and not (lines and "creepkit: " in lines[-1]):
         faults.append("no sentence")
     return faults
@@ -426,13 +428,14 @@ def one_run(name: str, label: str, reference: Reference) -> tuple[collections.Co
             found["interrupted" if made == reference.result else "other result"] += 1
             if made != reference.result:
                 detail += f" again: {code}: {messages(scratch)[-300:]}"
-        elif case.signal and codes == [128 + case.signal]:
+        elif case.signal and codes[0] in (128 + case.signal, -case.signal):
             found["interrupted"] += 1
         elif codes == [141] or (codes == [1] and "| " in case.shell):
             found["no reader"] += 1
         elif codes == [1] or codes == [1, 1]:
             found["refused"] += 1
-            harmed += [n for n in replaceable if n not in after or (n in results and after[n] != before[n])]
+            if result_of(command, folder, b"") != reference.result:  # refused after the whole result was written
+                harmed += [n for n in replaceable if n not in after or (n in results and after[n] != before[n])]
         found["harmed"] += bool(harmed)
         if any(found[fault] for fault in FAULTS):
             listed = ", ".join([*harmed[:3], *left[:4]])

@@ -130,3 +130,28 @@ def test_nohup_is_heeded():
         f"signal.signal(signal.SIGINT, signal.SIG_IGN)\napp.app = lambda: os.kill(os.getpid(), signal.SIGINT)\n{CALLED}"
     )
     assert ended(program) == (0, "")
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="signals are those of POSIX")
+def test_an_interrupt_while_the_command_line_is_read_or_a_text_is_executed():
+    """typer ends the first by 130 without a word; Python itself ends by SIGINT after the second."""
+    reading = "import typer.core\ntyper.core.TyperGroup.parse_args = lambda *_: os.kill(os.getpid(), signal.SIGTERM)"
+    code, stderr = ended(f"{reading}\n{CALLED}")
+    assert code == 143
+    assert stderr.startswith("creepkit: interrupted by SIGTERM before it began")
+    executed = "app.app = lambda: exec('import os, signal; os.kill(os.getpid(), signal.SIGINT)')"
+    code, stderr = ended(f"{executed}\n{CALLED}")
+    assert code == 130
+    assert stderr.startswith("creepkit: interrupted before it began")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="of Linux alone")
+def test_streams_that_cannot_be_written():
+    """A full disk is no fault of creepkit, whatever is printed; where no sentence can be written, the code says it."""
+    with open("/dev/full", "w") as full:
+        for word in ("--version", "--help", "laws"):
+            words = [sys.executable, "-m", "creepkit", word]
+            run = subprocess.run(words, timeout=DEADLINE, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+            assert run.returncode == 1
+            assert run.stderr.startswith("creepkit: standard output: No space left on device;")
+        assert subprocess.run(words, timeout=DEADLINE, stdout=full, stderr=full, check=False).returncode == 1

@@ -7,7 +7,9 @@ Ctrl-C, 143 by SIGTERM, 129 by SIGHUP, 141 nobody reads the output any more.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -47,7 +49,7 @@ from creepkit.cli import (
 )
 from creepkit.cli.declared_options import checked
 from creepkit.cli.described_test import TestCommand
-from creepkit.cli.failures import NO_READER, failure_sentence, output_sentence
+from creepkit.cli.failures import NO_READER, failure_sentence, output_sentence, say
 from creepkit.cli.identification_options import CommandWithDefaults
 from creepkit.cli.interrupts import exit_code, interrupted_sentence, was_interrupted
 from creepkit.errors import CreepkitError, PluginError
@@ -62,16 +64,26 @@ class CommandGroup(TyperGroup):
 
     _plugins_asked = False
 
+    def make_context(self, *names: Any, **options: Any) -> Any:
+        """Read the command line; `--help` and `--version` print what they are asked for already here."""
+        with self._errors_in_one_line("--debug" in sys.argv):
+            return super().make_context(*names, **options)
+
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an error of ours becomes one line on stderr and exit code 1."""
-        try:
+        with self._errors_in_one_line(ctx.params["debug"], ctx):
             _check_files_in_environment()
             _load_plugin_files(ctx.params["plugin"])
             return super().invoke(ctx)
+
+    @contextmanager
+    def _errors_in_one_line(self, debug: bool, ctx: Any = None) -> Iterator[None]:
+        try:
+            yield
         except KeyboardInterrupt:
             raise self._interrupted(ctx) from None
         except Exception as error:
-            if ctx.params["debug"] or _is_of_the_command_line(error):
+            if debug or _is_of_the_command_line(error):
                 raise
             if was_interrupted():
                 raise self._interrupted(ctx) from None
@@ -82,6 +94,8 @@ class CommandGroup(TyperGroup):
             raise _ended(*failure_sentence(error)) from None
 
     def _interrupted(self, ctx: Any) -> typer.Exit:
+        if ctx is None:
+            return _ended(interrupted_sentence(None), exit_code())
         name = ctx.invoked_subcommand or ""
         return _ended(interrupted_sentence(name, self.commands.get(name)), exit_code())
 
@@ -232,7 +246,7 @@ def _ended(sentence: str, code: int) -> typer.Exit:
     """The end of the command, after one line on stderr."""
     from creepkit.reports.terminal import printable
 
-    typer.echo(f"creepkit: {printable(' '.join(sentence.split()))}", err=True)
+    say(printable(" ".join(sentence.split())))
     return typer.Exit(code)
 
 

@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import TextIO
 
 from creepkit.cli.interrupts import exit_code, ignore_signals, interrupted_sentence, was_interrupted
 
@@ -117,7 +118,7 @@ def run_to_the_end(run: Callable[[], None]) -> None:
     try:
         run()
     except SystemExit as end:
-        code = exit_code() if was_interrupted() and end.code == 1 else end.code
+        code = exit_code() if was_interrupted() and end.code in (1, 130) else end.code
     except KeyboardInterrupt:  # before the command began, which says so itself
         code = _said_interrupted()
     except BrokenPipeError:
@@ -129,7 +130,7 @@ def run_to_the_end(run: Callable[[], None]) -> None:
             code = _said_interrupted()
         else:
             sentence, code = failure_sentence(error)
-            _say(sentence)
+            say(sentence)
     try:
         sys.stdout.flush()
     except KeyboardInterrupt:  # while nobody reads
@@ -138,14 +139,23 @@ def run_to_the_end(run: Callable[[], None]) -> None:
         code = NO_READER
     except OSError as error:
         if not code:
-            _say(output_sentence(error))
+            say(output_sentence(error))
         code = code or 1
     else:
         ignore_signals()  # all is done; Python would print a traceback while it tidies up
-        sys.exit(code)  # type: ignore[arg-type]
-    with suppress(OSError, ValueError):  # Python flushes once more at its end, and would print a traceback
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    for stream in (sys.stdout, sys.stderr):
+        _drop_what_cannot_be_written(stream)
+    exec("")  # Python ends by SIGINT where a text that exec ran was ever interrupted, unless another ran afterwards
     sys.exit(code)  # type: ignore[arg-type]
+
+
+def _drop_what_cannot_be_written(stream: TextIO) -> None:
+    """Python flushes once more at its end, and would print a traceback or end with code 120."""
+    try:
+        stream.flush()
+    except (OSError, ValueError, KeyboardInterrupt):
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def output_sentence(error: OSError) -> str:
@@ -154,11 +164,12 @@ def output_sentence(error: OSError) -> str:
 
 
 def _said_interrupted() -> int:
-    _say(interrupted_sentence(None))
+    say(interrupted_sentence(None))
     return exit_code()
 
 
-def _say(sentence: str) -> None:
+def say(sentence: str) -> None:
+    """Write a line on stderr, if it can be written."""
     try:
         sys.stderr.write(f"creepkit: {sentence}\n")
         sys.stderr.flush()
