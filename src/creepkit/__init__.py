@@ -4,11 +4,13 @@ Every public name stands once, in __init__.pyi; its module is loaded when the na
 `import creepkit` itself is quick.
 """
 
-from creepkit.import_path import leave_working_folder_out_of_command as _leave_working_folder_out
+from creepkit import import_path as _import_path
 
-_leave_working_folder_out()  # before anything is imported that could lie there
+if _import_path.is_the_command_line():
+    _import_path.leave_working_folder_out()  # before anything is imported that could lie there
+    _import_path.end_without_traceback_at_ctrl_c()
 
-import lazy_loader as _lazy  # noqa: E402
+import lazy_loader as _lazy
 
 __getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)
 

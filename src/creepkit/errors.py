@@ -97,7 +97,7 @@ class StudyError(CreepkitError):
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return `` Did you mean 'x'?`` when a known word lies near, else the list of what is known."""
     known = sorted(known)
-    close = difflib.get_close_matches(word, known, n=1, cutoff=0.55)
+    close = difflib.get_close_matches(word[:LONGEST_QUOTE], known, n=1, cutoff=0.55)
     if close:
         return f"did you mean '{close[0]}'? (known: {', '.join(known)})"
     return f"known: {', '.join(known) or 'none'}"

@@ -9,22 +9,33 @@ this module; the script `creepkit`, and `python -P -m creepkit`, look into no wo
 from __future__ import annotations
 
 import os
+import signal
 import sys
 
 _OPTIONS_WITH_VALUES = "WX"
 
 
-def leave_working_folder_out_of_command() -> None:
-    """Take the working folder out of `sys.path` if this process is the command line of creepkit, else do nothing."""
-    module = _started_module()
-    as_module = module is not None and module.split(".")[0] == "creepkit"
-    as_script = module is None and os.path.splitext(os.path.basename(sys.argv[0] if sys.argv else ""))[0] == "creepkit"
-    if as_module and not sys.flags.safe_path and sys.argv[:1] == ["-m"]:  # Python has just put it there
+def is_the_command_line() -> bool:
+    """Whether this process was started as `creepkit` or as `python -m creepkit`."""
+    return _as_module() or (
+        _started_module() is None
+        and os.path.splitext(os.path.basename(sys.argv[0] if sys.argv else ""))[0] == "creepkit"
+    )
+
+
+def leave_working_folder_out() -> None:
+    """Take the working folder out of `sys.path` of the command line."""
+    if _as_module() and not sys.flags.safe_path and sys.argv[:1] == ["-m"]:  # Python has just put it there
         del sys.path[:1]
-    if as_module or as_script:
-        named = {*_entries(os.environ.get("PYTHONPATH", ""))}
-        relative = {os.path.abspath(entry) for entry in named if not os.path.isabs(entry)} - named
-        sys.path[:] = [entry for entry in sys.path if os.path.isabs(entry) and entry not in relative]
+    named = {*_entries(os.environ.get("PYTHONPATH", ""))}
+    relative = {os.path.abspath(entry) for entry in named if not os.path.isabs(entry)} - named
+    sys.path[:] = [entry for entry in sys.path if os.path.isabs(entry) and entry not in relative]
+
+
+def end_without_traceback_at_ctrl_c() -> None:
+    """Until the command line is imported, Ctrl-C ends the process as it does programs that are not Python's."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def leave_settings_of_working_folder_out() -> None:
@@ -61,6 +72,10 @@ def environment_without_working_folder() -> dict[str, str]:
 def _entries(path: str) -> list[str]:
     """The entries of a search path; an empty one is the working folder."""
     return path.split(os.pathsep) if path else []
+
+
+def _as_module() -> bool:
+    return (_started_module() or "").split(".")[0] == "creepkit"
 
 
 def _started_module() -> str | None:

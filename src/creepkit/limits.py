@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, quoted
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def check_number(name: str, value: Any, limits: Limits, error: type[CreepkitErro
             text = repr(value)
         except ValueError:  # Python writes no integers of more than some thousand digits
             text = "an integer of thousands of digits"
-        raise error(f"{name} is {text[:40]}; allowed are {limits}")
+        raise error(f"{name} is {quoted(text, 40)}; allowed are {limits}")
 
 
 STARTS = Limits(1, 10_000)

@@ -395,7 +395,7 @@ def one_run(name: str, label: str, reference: Reference) -> tuple[collections.Co
             if case.signal:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     runs[0].wait(case.share * reference.duration)
-                os.kill(runs[0].pid, case.signal)
+                runs[0].send_signal(case.signal)
             codes = [ended(process) for process in runs]
             until = time.monotonic() + 5.0
             while workers_in(folder) and time.monotonic() < until:

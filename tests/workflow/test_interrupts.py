@@ -155,3 +155,12 @@ def test_streams_that_cannot_be_written():
             assert run.returncode == 1
             assert run.stderr.startswith("creepkit: standard output: No space left on device;")
         assert subprocess.run(words, timeout=DEADLINE, stdout=full, stderr=full, check=False).returncode == 1
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="signals are those of POSIX")
+def test_ctrl_c_while_the_package_is_imported_prints_no_traceback(tmp_path):
+    (tmp_path / "lazy_loader.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
+    words = [sys.executable, "-m", "creepkit", "laws"]
+    run = subprocess.run(words, env=environment, timeout=DEADLINE, capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stdout, run.stderr) == (-signal.SIGINT, "", "")

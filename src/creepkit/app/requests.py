@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, quoted
 
 LARGEST_NUMBER = 1e60
 """In size; coefficients of laws reach 1e-40."""
@@ -85,5 +85,5 @@ def _first_problem(error: Exception) -> str:
     if not isinstance(error, ValidationError):
         return "the request cannot be understood"
     first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-    place = ".".join(str(part) for part in first["loc"])[:80] or "the request"
-    return f"{place}: {first['msg'][:200]}"
+    place = quoted(".".join(str(part) for part in first["loc"]), 80) or "the request"
+    return f"{place}: {quoted(first['msg'], 200)}"

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.errors import DatasetError
+from creepkit.errors import DatasetError, quoted
 from creepkit.presentation import Presentable
 from creepkit.records import Status, outputs_of
 from creepkit.registry.specimen_documents import specimen_to_json
@@ -239,12 +239,7 @@ def first_difference(one: Any, other: Any, name: str) -> str:
     if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
         pairs = (first_difference(a, b, f"{name}[{k}]") for k, (a, b) in enumerate(zip(one, other, strict=True)))
         return next((found for found in pairs if found), "")
-    return "" if one == other else f"{name} is {_shortened(one)} and {_shortened(other)}"
-
-
-def _shortened(value: Any) -> str:
-    text = str(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return "" if one == other else f"{name} is {quoted(one, 60)} and {quoted(other, 60)}"
 
 
 def summary(data: Dataset) -> dict[str, Any]:

@@ -174,7 +174,7 @@ def _no_constant(word: str) -> float:
 def _finite_number(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
-        raise _JsonError(f"the number {text[:40]} is too large")
+        raise _JsonError(f"the number {quoted(text, 40)} is too large")
     return value
 
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, quoted
 from creepkit.files.json_documents import check_keys
 
 Record = TypeVar("Record")
@@ -71,14 +71,14 @@ def built_record(record: type[Record], names: tuple[str, ...], data: Any, read: 
     except CreepkitError as error:
         raise misfit(f": {error}") from None
     except (ValueError, TypeError, ArithmeticError, IndexError, KeyError) as error:
-        raise misfit(f" is no {record.__name__} ({' '.join(str(error).split())[:200]})") from None
+        raise misfit(f" is no {record.__name__} ({quoted(' '.join(str(error).split()), 200)})") from None
 
 
 def sentence(error: ValidationError, place: str) -> str:
     """The first problem, with its place."""
     first = error.errors(include_url=False)[0]
     kind, found = first["type"], shown(first["input"])
-    steps = [repr(str(step))[1:-1][:40] for step in first["loc"] if not str(step).startswith("|")]
+    steps = [quoted(step, 40) for step in first["loc"] if not str(step).startswith("|")]
     missing = steps.pop() if kind == "missing" else ""
     where = ".".join([place, *steps]).strip(".") or "the document"
     if kind == "misfit":
@@ -96,4 +96,4 @@ def shown(data: Any) -> str:
     """What was found, in a few words."""
     if isinstance(data, dict | list):
         return "is an object" if isinstance(data, dict) else "is a list"
-    return "is null" if data is None else f"is {data!r}"[:60]
+    return "is null" if data is None else f"is {quoted(repr(data), 57)}"

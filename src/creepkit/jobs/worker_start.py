@@ -22,7 +22,7 @@ from types import ModuleType
 from typing import IO, Any
 
 from creepkit.files.cache_folders import cache_environment
-from creepkit.import_path import environment_without_working_folder
+from creepkit.import_path import environment_without_working_folder, leave_settings_of_working_folder_out
 from creepkit.registry.plugin_registry import load_plugin_file, loaded_plugin_files
 
 THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMBA")
@@ -66,6 +66,7 @@ def setup_message(job: Any) -> bytes:
 
 def receive_job(stream: IO[bytes]) -> Any:
     """The job of a setup message, once the modules and plugins are known that it may have classes of."""
+    leave_settings_of_working_folder_out()
     sys.meta_path.append(_ImportedModules(_read_pickled(stream)))
     for plugin_file in _read_pickled(stream):
         load_plugin_file(plugin_file)

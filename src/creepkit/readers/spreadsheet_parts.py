@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.limits import how_to_raise, raised
 
 MAXIMUM_UNPACKED_BYTES = 100_000_000
@@ -144,7 +144,7 @@ def check_sheet(place: str, part: bytes) -> SheetRows:
         stated = _NUMBER_OF_ROW.search(row[1])
         text = stated[1] if stated else b"%d" % (number + 1)
         if not re.fullmatch(rb"[1-9]\d{0,6}", text) or not number < int(text) <= MAXIMUM_ROW:
-            shown = text[:20].decode("ascii", "backslashreplace")
+            shown = quoted(text.decode("ascii", "backslashreplace"), 20)
             raise HistoryError(
                 f"{place}: a row is numbered {shown} behind row {number}; rows must rise, up to {MAXIMUM_ROW}; open "
                 "the file in a spreadsheet program and save it anew"
@@ -167,6 +167,6 @@ def _check_values(place: str, part: bytes) -> None:
         if cells and re.search(rb"""\st\s*=\s*["']str["']""", cells[-1][1]):
             continue
         reference = _NUMBER_OF_ROW.search(cells[-1][1]) if cells else None
-        cell = f", cell {reference[1].decode('ascii', 'replace')[:20]}" if reference else ""
-        shown = ascii(match[1][:40].decode("utf-8", "replace"))
+        cell = f", cell {quoted(reference[1].decode('ascii', 'replace'), 20)}" if reference else ""
+        shown = ascii(quoted(match[1].decode("utf-8", "replace"), 40))
         raise HistoryError(f"{place}{cell}: the number {shown} is not written as one; enter it anew in plain digits")

@@ -72,7 +72,7 @@ def read_sheets(path: Path) -> list[CellGrid]:
     except HistoryError:
         raise
     except Exception as error:  # openpyxl lets all kinds of errors through where a file is damaged
-        cause = " ".join(str(error).split())[:80]
+        cause = quoted(" ".join(str(error).split()), 80)
         raise HistoryError(f"{path}: is no spreadsheet that can be read ({cause}); save it anew as .xlsx") from None
     found = [grid for grid in grids if grid is not None]
     if aside and not found:

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_number, parse_number, parse_numbers
 from creepkit.readers.column_names import NameTable, split_written_name
 from creepkit.readers.table_rows import NumberRows, TableRow, TextRows, cells_by_part
@@ -51,7 +51,7 @@ _POINT_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)
 
 def some_of(names: Sequence[str], count: int = 12) -> str:
     """Names as messages list them: the first ones, each not longer than 40, and how many there are."""
-    shown = ", ".join(name if len(name) <= 40 else f"{name[:37]}..." for name in names[:count])
+    shown = ", ".join(quoted(name, 40) for name in names[:count])
     return shown if len(names) <= count else f"{shown} and {len(names) - count} more"
 
 
@@ -199,8 +199,9 @@ def read_frames(
                 _check_marks(table, k, values[quantity])
             found[quantity] = written
     if "time" not in values:
-        place, result = table.location(table.columns_line), some_of(table.written or table.columns)
-        raise HistoryError(f"{place}: missing column: no time among {result}; name one time_s, time_min or time_h")
+        place, names = table.location(table.columns_line), table.written or table.columns
+        result = f"among {some_of(names)}" if names else "as every column is the same in all rows"
+        raise HistoryError(f"{place}: missing column: no time {result}; name one time_s, time_min or time_h")
     return _strictly_increasing(TableFrames(table, values, table.lines))
 
 

@@ -391,4 +391,4 @@ def _remedy(returned: Any) -> str:
 
 def _type_text(thing: Any) -> str:
     """Name something unexpected: a class by its own name, else by its type."""
-    return f"the class {thing.__name__}" if isinstance(thing, type) else f"{type(thing).__name__} {thing!r}"[:80]
+    return f"the class {thing.__name__}" if isinstance(thing, type) else quoted(f"{type(thing).__name__} {thing!r}", 80)

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from creepkit.errors import ReportError
+from creepkit.errors import ReportError, quoted
 from creepkit.files.reading import FileKind, read_text
 from creepkit.reports.contents import Attachment
 
@@ -118,7 +118,7 @@ def _listed_files(manifest: str, source: Path) -> list[tuple[str, int, str]]:
         raise _damaged(source, "its list of files has other keys than format, version and files")
     if document["format"] != _FORMAT or document["version"] != _VERSION or isinstance(document["version"], bool):
         raise ReportError(
-            f"{source}: its files are of version {str(document['version'])[:20]!r} of the format, and this creepkit "
+            f"{source}: its files are of version '{quoted(document['version'], 20)}' of the format, and this creepkit "
             f"reads version {_VERSION}; run the study again with this creepkit, or use the one that wrote the report"
         )
     listed = document["files"]
@@ -177,11 +177,11 @@ def problem_of_names(names: Iterable[str]) -> str:
             return problem
         path = PurePosixPath(same_name(name))
         if path in seen:
-            return f"the name '{_shown(name)}' occurs twice"
+            return f"the name '{quoted(name)}' occurs twice"
         seen.add(path)
         folders.update(path.parents)
     clash = sorted(str(path) for path in seen & folders)
-    return f"'{_shown(clash[0])}' is a file and a folder" if clash else ""
+    return f"'{quoted(clash[0])}' is a file and a folder" if clash else ""
 
 
 def same_name(name: str) -> str:
@@ -192,7 +192,7 @@ def same_name(name: str) -> str:
 def problem_of_name(name: str) -> str:
     """Why a name is not a plain relative POSIX path, as a clause; "" where it is one."""
     if len(name) > LONGEST_NAME:
-        return f"the name '{_shown(name)}' has {len(name)} characters, and at most {LONGEST_NAME} are allowed"
+        return f"the name '{quoted(name)}' has {len(name)} characters, and at most {LONGEST_NAME} are allowed"
     parts = name.split("/")
     plain = (
         name.isprintable()  # no control characters, no marks that turn the direction of writing, no lone surrogates
@@ -203,11 +203,7 @@ def problem_of_name(name: str) -> str:
         and not any(part.startswith((".", "-", "~")) or part.endswith((".", " ")) for part in parts)
         and not any(DEVICES.match(part) for part in parts)
     )
-    return "" if plain else f"the name {_shown(name)!r} is not a plain path below a folder, such as data/test_1.csv"
-
-
-def _shown(name: str) -> str:
-    return name if len(name) <= 60 else f"{name[:57]}..."
+    return "" if plain else f"the name '{quoted(name)}' is not a plain path below a folder, such as data/test_1.csv"
 
 
 def _damaged(source: Path, problem: str) -> ReportError:

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from creepkit.errors import CreepkitError, StudyError
+from creepkit.errors import CreepkitError, StudyError, quoted
 from creepkit.files.json_documents import DocumentFormat, as_read_back, check_heading, check_keys, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import record_to_json
@@ -152,8 +152,7 @@ def _changes(old: Any, new: Any, place: str) -> list[tuple[str, str, str]]:
 
 
 def _short(value: Any) -> str:
-    text = "nothing" if value is None else repr(value)
-    return text if len(text) <= 60 else f"{text[:60]}..."
+    return "nothing" if value is None else quoted(repr(value), 60)
 
 
 def lock_if_any(path: Path) -> dict[str, Any] | None:

@@ -13,7 +13,7 @@ from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from creepkit.errors import CreepkitError, StudyError, nearest
+from creepkit.errors import CreepkitError, StudyError, nearest, quoted
 from creepkit.files.reading import FileKind, read_text
 from creepkit.studies.model import StudyModel
 from creepkit.studies.toml_lines import KeyPath, key_lines, line_of
@@ -137,14 +137,9 @@ def place_text(key: KeyPath) -> str:
     for k, one in enumerate(key):
         if isinstance(one, int):
             numbers[sum(isinstance(e, str) for e in key[:k]) - 1] = one
-    shown = [f"{_short(word)}{f' {numbers[k] + 1}' if k in numbers else ''}" for k, word in enumerate(words)]
+    shown = [f"{quoted(word, SHOWN)}{f' {numbers[k] + 1}' if k in numbers else ''}" for k, word in enumerate(words)]
     table = f"[{shown[0]}]"
     return table if len(shown) == 1 else f"{table} {'.'.join(shown[1:])}"
-
-
-def _short(text: object) -> str:
-    shown = str(text).encode("ascii", "backslashreplace").decode() if not str(text).isprintable() else str(text)
-    return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}..."
 
 
 def _syntax_error(message: str, text: str) -> str:
@@ -153,12 +148,7 @@ def _syntax_error(message: str, text: str) -> str:
     line, column = (found[1], f", column {found[2]}") if found else (str(text.count("\n") + 1), "")
     reason = re.sub(r" \(at .*\)$", "", message)
     reason = reason[:1].lower() + reason[1:]
-    return f"{line}: this is not TOML: {_short_reason(reason)}{column}; texts stand in quotes, and each key on a line"
-
-
-def _short_reason(reason: str) -> str:
-    printable = "".join(character if character.isprintable() else "?" for character in reason)
-    return printable if len(printable) <= 120 else f"{printable[:120]}..."
+    return f"{line}: this is not TOML: {quoted(reason, 120)}{column}; texts stand in quotes, and each key on a line"
 
 
 # ---- what pydantic says, as a sentence -----------------------------------------------------------------------------
@@ -185,7 +175,7 @@ def _problem(error: Any, key: KeyPath) -> str:
         table = key[:-1]
         known = known_keys(table)
         where = f"in {place_text(table)}" if table else "at the top of a study"
-        what = f"[{_short(key[-1])}]" if not table else f"key '{_short(key[-1])}'"
+        what = f"[{quoted(key[-1], SHOWN)}]" if not table else f"key '{quoted(key[-1], SHOWN)}'"
         return f"unknown {'table ' if not table else ''}{what} {where}; {nearest(str(key[-1])[:SHOWN], known)}"
     if kind == "missing":
         table = key[:-1]
@@ -238,7 +228,7 @@ def _needed(kind: str, given: Any, context: Mapping[str, Any], error: Any) -> st
 
 def _shown(value: Any) -> str:
     text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
-    return _short(text.replace("\n", " "))
+    return quoted(text, SHOWN)
 
 
 def known_keys(table: Iterable[str | int]) -> list[str]:

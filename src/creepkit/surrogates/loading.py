@@ -78,7 +78,7 @@ def _current_recipe(document: Any) -> Any:
 def _recipe_class(kind: Any) -> type[Recipe]:
     """The class of the recipes of a kind."""
     if not isinstance(kind, str) or kind not in RECIPE_CLASSES:
-        raise SurrogateError(f"kind '{quoted(kind)}' is unknown here; {nearest(str(kind)[:40], RECIPE_CLASSES)}")
+        raise SurrogateError(f"kind '{quoted(kind)}' is unknown here; {nearest(str(kind), RECIPE_CLASSES)}")
     module, _, name = RECIPE_CLASSES[kind].partition(":")
     recipe_class: type[Recipe] = getattr(import_module(module), name)
     return recipe_class
