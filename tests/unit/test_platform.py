@@ -13,8 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import creepkit as ck
+from creepkit.errors import HistoryError
 from creepkit.files import locking
 from creepkit.files.file_names import DEVICE_NAMES, file_stem, hashed_stem, numbered_stems
+from creepkit.files.writing import write_text
 from creepkit.jobs.shard_progress import ShardLock
 from helpers import source_tree
 from helpers.paths import ROOT
@@ -186,6 +188,35 @@ def test_without_locks_of_any_kind_work_goes_on(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(locking, "msvcrt", None)
     with ShardLock(tmp_path / "1.lock") as lock:
         assert lock.held
+
+
+def held_by_another_program(path, refusals):
+    """os.replace as Windows has it while a program holds the file of this name; refusals : how often it is asked."""
+    replace, asked = os.replace, itertools.count()
+
+    def as_on_windows(source, target):
+        if Path(target) == path and next(asked) < refusals:
+            raise PermissionError(errno.EACCES, "Access is denied", str(target))
+        replace(source, target)
+
+    return as_on_windows
+
+
+def test_a_file_that_a_scanner_reads_is_replaced_a_moment_later(tmp_path, monkeypatch) -> None:
+    path = write_text("old", tmp_path / "a.csv", HistoryError)
+    monkeypatch.setattr(os, "replace", held_by_another_program(path, 2))
+    write_text("new", path, HistoryError)
+    assert path.read_text() == "new"
+
+
+def test_a_result_whose_file_stays_open_in_a_spreadsheet_is_kept_beside_it(tmp_path, monkeypatch) -> None:
+    path = write_text("old", tmp_path / "a.csv", HistoryError)
+    monkeypatch.setattr(os, "replace", held_by_another_program(path, 99))
+    with pytest.raises(HistoryError, match=r"another program holds it.*the result is .*a-2"):
+        write_text("new", path, HistoryError)
+    assert path.read_text() == "old"
+    assert (tmp_path / "a-2.csv").read_text() == "new"
+    assert sorted(one.name for one in tmp_path.iterdir()) == [".creepkit-written", "a-2.csv", "a.csv"]
 
 
 # ---- names of files ------------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ import hashlib
 import os
 import secrets
 import stat
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -41,6 +42,10 @@ _foreign_rule: ContextVar[ForeignRule] = ContextVar("foreign_rule", default="ref
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Numbers of errors of a disk, or of a user's share of it, that takes no more."""
+
+
+WAITS = (0.02, 0.1, 0.4)
+"""s between attempts to give a file the name of one that another program holds."""
 
 
 ADVICE = "choose a file in a folder that exists and has space"
@@ -77,14 +82,17 @@ def replace_on_success(
         if not internal:
             _flush(temporary)
         if rule == "beside" and is_foreign(path):
-            raise error(_keep_beside(path, temporary))
+            raise error(_keep_beside(path, temporary, "was made or changed by something else meanwhile"))
         if internal:
-            os.replace(temporary, path)
+            _replace(temporary, path)
         else:
             with suppress(OSError):
                 temporary.chmod(stat.S_IMODE(path.stat().st_mode) & 0o777)
             _note(path, temporary)
-            os.replace(temporary, path)
+            try:
+                _replace(temporary, path)
+            except PermissionError:  # although its folder takes files
+                raise error(_keep_beside(path, temporary, "cannot be replaced: another program holds it")) from None
     except OSError as failure:
         raise error(f"{path}: cannot be written: {_cause(failure, advice)}") from None
     finally:
@@ -261,7 +269,7 @@ def _note(path: Path, content: Path) -> None:
             last = {name: digest for digest, name in known}
             temporary = _temporary_name(record)
             temporary.write_bytes(b"".join(_line(digest, name) for name, digest in last.items()))
-            os.replace(temporary, record)
+            _replace(temporary, record)
         flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
         descriptor = os.open(record, flags, 0o666)
         try:
@@ -302,15 +310,25 @@ def _flush(temporary: Path) -> None:
         os.fsync(file.fileno())
 
 
-def _keep_beside(path: Path, temporary: Path) -> str:
+def _replace(temporary: Path, path: Path) -> None:
+    """Give a file its name; Windows refuses that as long as anybody reads the file which has it, as scanners do."""
+    for wait in WAITS:
+        try:
+            return os.replace(temporary, path)
+        except PermissionError:
+            time.sleep(wait)
+    return os.replace(temporary, path)
+
+
+def _keep_beside(path: Path, temporary: Path, reason: str) -> str:
     """Give a result the first free name beside its own, whose file is foreign; the sentence that says so."""
     for number in range(2, 1000):
         other = path.with_name(f"{path.stem}-{number}{path.suffix}")
         if not os.path.lexists(other):
             _note(other, temporary)
-            os.replace(temporary, other)
-            return f"{path}: was made or changed by something else meanwhile, and left as it is; the result is {other}"
-    return f"{path}: was made or changed by something else meanwhile, and left as it is; the result is lost"
+            _replace(temporary, other)
+            return f"{path}: {reason}, and is left as it is; the result is {other}"
+    return f"{path}: {reason}, and is left as it is; the result is lost"
 
 
 def _cause(failure: OSError, advice: str) -> str:
