@@ -13,7 +13,7 @@ from typing import Any
 import sympy
 
 from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, factor_text
-from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.exporters.law_description import comment_lines, comment_safe, heading, printable_text
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
 from creepkit.records import LawWithValues
@@ -146,11 +146,6 @@ def cpp_lambda_definition(name: str) -> str:
 def c_block_comment(lines: Iterable[str]) -> list[str]:
     """Lines, each made ` * ...`, between comment marks; whatever could end a comment is taken apart."""
     return ["/*", *(comment_safe(line) for line in lines), " */"]
-
-
-def comment_safe(text: str) -> str:
-    """Text in which no comment ends or starts, nor a trigraph."""
-    return text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
 
 
 def _called_names(texts: Iterable[str]) -> set[str]:
