@@ -13,6 +13,8 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from creepkit.errors import CreepkitError
+
 from execution_attempts.canaries import CANARY, run
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))
@@ -279,7 +281,7 @@ def judged_text(exporter: str, text: str, expected: tuple[str, ...], folder: Pat
         found = seen(exporter, text, folder)
     except BrokenTextError as error:
         found, problem = None, str(error)
-    except (ValueError, UnicodeError, AttributeError, TypeError) as error:
+    except (CreepkitError, ValueError, AttributeError, TypeError) as error:
         found, problem = None, f"{type(error).__name__}: {error}"
     if (folder / CANARY).exists():
         return "executed", ""
