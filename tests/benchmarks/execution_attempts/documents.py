@@ -94,10 +94,6 @@ def _use_result(path: Path) -> str:
     return str(found)
 
 
-def _use_ranking(path: Path) -> str:
-    return str(ck.load_ranking(path))
-
-
 def _use_network(path: Path) -> str:
     from creepkit.surrogates.loading import load_surrogate
 
@@ -109,7 +105,7 @@ def _use_samples(path: Path) -> str:
 
 
 def fitted() -> Any:
-    """A fit of two curves, with its ranking."""
+    """The ranking of a fit of two curves."""
     import numpy as np
 
     times, rng = np.linspace(0.0, 36000.0, 12), np.random.default_rng(3)
@@ -182,8 +178,6 @@ def kinds(folder: Path, short: bool) -> dict[str, Kind]:
     ranking = fitted()
     ranking.best.save(folder / "fit.json")
     made["an identification"] = Kind(".json", json.loads((folder / "fit.json").read_text()), _write_json, _use_result)
-    ranking.save(folder / "ranking.json")
-    made["a ranking"] = Kind(".json", json.loads((folder / "ranking.json").read_text()), _write_json, _use_ranking)
     from killed_runs import data_set
 
     from execution_attempts.canaries import creepkit, run
@@ -237,7 +231,7 @@ def outcome_of(kind: Kind, places: Sequence[Place], text: str, folder: Path) -> 
 def payloads(short: bool) -> dict[str, str]:
     """The texts, by what they try."""
     chosen = {name: texts.PAYLOADS[name] for name in CHOSEN}
-    return dict(list((chosen | MORE).items())[:4]) if short else chosen | MORE
+    return {name: chosen[name] for name in CHOSEN[:2]} if short else chosen | MORE
 
 
 def attempts(short: bool) -> Found:

@@ -22,7 +22,7 @@ ITSELF = "the law itself"
 PLACE = "a note"
 """The note of the plain law, in the place of which an exporter that protects nothing writes a text as it is."""
 
-AT_COST = ("title", "term", "meaning", "note")
+AT_COST = ("title", "note")
 """Fields whose texts are compiled one at a time; the others are compiled together."""
 
 PROGRAMS = ("python", "numpy", "abaqus", "calculix", "c", "javascript", "mfront")
@@ -63,9 +63,8 @@ def _judged(exporter: str, text: str, target: tuple[str, ...]) -> tuple[str, str
 def attempts(short: bool) -> Found:
     """Each text in each field, and in all of them at once, through each exporter that takes the law."""
     chosen = {name: texts.PAYLOADS[name] for name in (texts.SHORT if short else texts.PAYLOADS)}
-    kinds = texts.LAWS[1:] if short else texts.LAWS
     for name, text in chosen.items():
-        for kind in kinds:
+        for kind in texts.LAWS:
             for field in texts.FIELDS:
                 outcome = texts.takes(kind, field, text)
                 if outcome:
@@ -79,12 +78,14 @@ def attempts(short: bool) -> Found:
                 for exporter in DRIVEN:
                     if kind == texts.CURVED and expected(exporter, kind) is None:
                         continue
+                    if short and kind == texts.STRAIGHT and expected(exporter, texts.CURVED) is not None:
+                        continue
                     if field not in (*AT_COST, texts.EVERYWHERE) and exporter in PROGRAMS:
                         continue
                     outcome, detail = outcome_of(exporter, source, kind)
                     yield Attempt(SECTION, exporter, outcome, f"{field}: {name}: {detail}")
     yield from _every_exporter_is_driven()
-    yield from _controls()
+    yield from _controls(short)
 
 
 def _of_the_law(outcome: str, detail: str) -> tuple[str, str]:
@@ -107,6 +108,13 @@ LEAST = {
 RUN = ("python", "numpy", "javascript", "c", "code_aster", "abaqus", "calculix")
 """Exporters whose unprotected texts must be seen to run, not to break alone."""
 
+SHORT = {
+    "c": "end of a C comment",
+    "javascript": "line, then JavaScript",
+    "code_aster": "encoding of a Python file",
+}
+"""{exporter: a text that runs where it is written as it is}, for the short form."""
+
 _INNER = {
     "abaqus": (r"(?m)^ +decra = 0\.0d0\n", "! {}\n"),
     "calculix": (r"(?m)^ +finish = ", "! {}\n"),
@@ -128,17 +136,19 @@ def naive(exporter: str, text: str) -> str:
     return "\n".join(lines).replace(PLACE, text) + "\n"
 
 
-def _controls() -> Iterator[Control]:
-    for exporter in LEAST:
+def _controls(short: bool) -> Iterator[Control]:
+    """With all texts; in the short form with one that is known to run, in three languages."""
+    for exporter in SHORT if short else LEAST:
         if not all(shutil.which(needed) for needed, _ in DRIVEN[exporter] if needed):
             continue
         target = expected(exporter, texts.STRAIGHT)
         assert target is not None
         noticed, executed = 0, 0
-        for text in texts.PAYLOADS.values():
+        chosen = [texts.PAYLOADS[SHORT[exporter]]] if short else [*texts.PAYLOADS.values()]
+        for text in chosen:
             outcome, _ = _judged(exporter, naive(exporter, text), target)
             noticed += outcome in FAULTS
             executed += outcome == "executed"
         found = executed if exporter in RUN else noticed
         what = "executed" if exporter in RUN else "executed or broken"
-        yield Control(SECTION, f"{exporter}, texts as they are: {what}", len(texts.PAYLOADS), found, LEAST[exporter])
+        yield Control(SECTION, f"{exporter}, texts as they are: {what}", len(chosen), found, 1 if short else LEAST[exporter])

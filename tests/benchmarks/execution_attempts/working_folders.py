@@ -43,7 +43,10 @@ COMMANDS = {
     "laws": ("laws", "norton"),
     "plugins": ("plugins",),
 }
-SHORT = ("generate", "screen", "report", "check")
+SHORT = ("generate", "read")
+TOLD_APART = ("generate", "screen", "report", "predict", "export", "check", "plugins")
+"""Commands of the further ways to start: those with workers, with files of matplotlib, and with modules by name."""
+
 REFUSED = {
     "--plugin x.csv": ("--plugin", "x.csv", "laws"),
     "--plugin without suffix": ("--plugin", "plain", "laws"),
@@ -79,9 +82,12 @@ def every_module() -> list[str]:
     return sorted(name for name in names if name.isidentifier() and name not in sys.builtin_module_names)
 
 
-def prepare(folder: Path) -> None:
-    """Data of all kinds, without anything planted."""
+def prepare(folder: Path, short: bool) -> None:
+    """Data of all kinds, without anything planted; tests alone in the short form."""
     planted_tests(folder)
+    (folder / "first").mkdir()
+    if short:
+        return
     data_set(folder)
     text = '[data]\nfiles = ["tests"]\n[identification]\nlaws = ["norton"]\n[report]\nfile = "report.html"\n'
     (folder / "study.toml").write_text(text)
@@ -129,11 +135,11 @@ def forms(short: bool) -> Iterator[tuple[str, list[str], set[str], dict[str, str
 
 
 @contextmanager
-def folder_of_data() -> Iterator[Path]:
+def folder_of_data(short: bool) -> Iterator[Path]:
     """A folder with data of all kinds."""
     with tempfile.TemporaryDirectory(prefix="attempts_") as scratch:
         folder = Path(scratch).resolve()
-        prepare(folder)
+        prepare(folder, short)
         yield folder
 
 
@@ -165,19 +171,20 @@ def served(words: list[str], folder: Path, variables: dict[str, str]) -> tuple[s
 
 def attempts(short: bool) -> Found:
     """All commands in folders of planted modules, and data that are named as code."""
-    with folder_of_data() as clean:
-        for name, words, without, variables in forms(short):
-            for kind in ("module",) if short else ("module", "package"):
+    with folder_of_data(short) as clean:
+        for number, (name, words, without, variables) in enumerate(forms(short)):
+            first = number == 0
+            for kind in ("module", "package") if first and not short else ("module",):
                 with tempfile.TemporaryDirectory(prefix="attempts_") as scratch:
                     folder = Path(scratch).resolve() / "data"
                     shutil.copytree(clean, folder)
                     plant(folder, without, kind)
                     for command, arguments in COMMANDS.items():
-                        if short and command not in SHORT:
+                        if command not in (SHORT if short else COMMANDS if first else TOLD_APART):
                             continue
                         outcome, detail = judged(run([*words, *arguments], folder, variables), folder, refused=False)
                         yield Attempt(MODULES, name, outcome, f"{command}, {kind}: {detail}")
-                    if not short and kind == "module":
+                    if not short and first and kind == "module":
                         outcome, detail = served(words, folder, variables)
                         yield Attempt(MODULES, name, outcome, f"app as a server: {detail}")
         yield from _named(clean, short)
