@@ -18,7 +18,6 @@ from typing import Any
 import creepkit as ck
 from creepkit.errors import CreepkitError
 from creepkit.exporters.law_files import read_law_file
-
 from execution_attempts import texts
 from execution_attempts.canaries import Attempt, Control, Found, left, planted
 from execution_attempts.pickles import pickle_that_runs
@@ -26,7 +25,7 @@ from execution_attempts.pickles import pickle_that_runs
 SECTION = "Texts of files that are read back"
 CHOSEN = (
     "end of a long string, then Python", "formats", "templates", "YAML", "commands of a shell", "a script", "controls",
-    "directions",
+    "directions", "an escape sequence",
 )  # fmt: skip
 MORE = {
     "a name of a function": "os:system",

@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from creepkit.errors import CreepkitError
-
 from execution_attempts.canaries import CANARY, run
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))
@@ -182,9 +181,9 @@ def mfront(text: str, folder: Path) -> str:
     function = scalar_function("law", _Law(text), text)
     calls = "".join(f"one({stress}, {temperature}, {w});" for stress, temperature, w in POINTS)
     program = (
-        '#include <cmath>\n#include <cstdio>\nusing namespace std;\nusing real = double;\n'
+        "#include <cmath>\n#include <cstdio>\nusing namespace std;\nusing real = double;\n"
         f"{function}\nvoid one(double s, double T, double w) {{ double point[] = {{s, 0, 0, T, s, s / 3, w, 0}}, "
-        "out[32] = {0}; law(point, out); for (double each : out) printf(\"%.17g\\n\", each); }\n"
+        'out[32] = {0}; law(point, out); for (double each : out) printf("%.17g\\n", each); }\n'
         f"int main() {{ {calls} }}\n"
     )
     (folder / "law.cpp").write_text(program, encoding="utf-8", errors="surrogatepass")

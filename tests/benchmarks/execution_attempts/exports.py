@@ -12,7 +12,6 @@ from pathlib import Path
 import creepkit as ck
 from creepkit.errors import CreepkitError
 from creepkit.records import LawWithValues
-
 from execution_attempts import texts
 from execution_attempts.canaries import FAULTS, Attempt, Control, Found
 from execution_attempts.driven import DRIVEN, judged_text, seen
@@ -108,11 +107,7 @@ LEAST = {
 RUN = ("python", "numpy", "javascript", "c", "code_aster", "abaqus", "calculix")
 """Exporters whose unprotected texts must be seen to run, not to break alone."""
 
-SHORT = {
-    "c": "end of a C comment",
-    "javascript": "line, then JavaScript",
-    "code_aster": "encoding of a Python file",
-}
+SHORT = {"c": "end of a C comment", "javascript": "line, then JavaScript", "code_aster": "encoding of a Python file"}
 """{exporter: a text that runs where it is written as it is}, for the short form."""
 
 _INNER = {
@@ -151,4 +146,6 @@ def _controls(short: bool) -> Iterator[Control]:
             executed += outcome == "executed"
         found = executed if exporter in RUN else noticed
         what = "executed" if exporter in RUN else "executed or broken"
-        yield Control(SECTION, f"{exporter}, texts as they are: {what}", len(chosen), found, 1 if short else LEAST[exporter])
+        yield Control(
+            SECTION, f"{exporter}, texts as they are: {what}", len(chosen), found, 1 if short else LEAST[exporter]
+        )

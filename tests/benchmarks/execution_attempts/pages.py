@@ -16,7 +16,6 @@ from typing import Any
 
 import creepkit as ck
 from creepkit.errors import CreepkitError
-
 from execution_attempts import texts
 from execution_attempts.canaries import Attempt, Control, Found
 
@@ -58,7 +57,9 @@ def law_named(text: str) -> Any:
 
 def history(text: str) -> Any:
     """A measured test with a text as its name, alloy and source; without it where a history refuses it."""
-    run = ck.simulate("norton", "uniaxial", {"A": 1e-16, "n": 4.5}, loading=ck.constant_stress(90.0), times=[0.0, 1e4, 5e4])
+    run = ck.simulate(
+        "norton", "uniaxial", {"A": 1e-16, "n": 4.5}, loading=ck.constant_stress(90.0), times=[0.0, 1e4, 5e4]
+    )
     for field in ("name", "alloy", "source"):
         with suppress(CreepkitError):
             run = run.replace(**{field: text})

@@ -7,7 +7,6 @@ from dataclasses import replace
 from creepkit.errors import CreepkitError
 from creepkit.language import CreepLaw, Elastic, Param, State, parameters, states, stress, temperature
 from creepkit.records import LawWithValues
-
 from execution_attempts.canaries import CANARY
 
 SHELL = f"touch {CANARY}"
@@ -53,6 +52,7 @@ PAYLOADS = {
     "includes of HIT": f"${{raw a}} []\n!include {CANARY}\n[]",
     "directions": "a \u202e b \u2066 c \ufeff \u200f",
     "controls": "\x00\x1b[2J\x1b]0;title\x07 \x9b31m\x7f\x08\x0c\x0b",
+    "an escape sequence": "\x1b]0;title\x07\x1b[2J",
     "half of a pair": "\ud800 x",
 }  # fmt: skip
 """{what it tries: the text}."""
@@ -102,7 +102,7 @@ def law_with(kind: str, texts: dict[str, str]) -> LawWithValues:
 
 
 def takes(kind: str, field: str, text: str) -> str:
-    """"" where a law holds this text in this field, "refused" where that is one sentence, else what was raised."""
+    """Nothing where a law holds this text in this field, "refused" where that is one sentence, else what was raised."""
     try:
         law_with(kind, {field: text})
     except CreepkitError:

@@ -21,7 +21,7 @@ from execution_attempts.canaries import LIMIT, Attempt, Control, Found, creepkit
 
 MODULES, NAMED = "Modules beside the data", "Data named where code is expected"
 OWN_BEFORE_US = {"creepkit", "sitecustomize", "usercustomize"}
-"""What `python -m creepkit` without -P takes from the working folder before a line of creepkit runs, or may."""
+"""What `python -m creepkit` without -P takes from the working folder, or may, before a line of creepkit runs."""
 
 NETWORK = ("--hidden", "4", "--layers", "1", "--epochs", "1")
 COMMANDS = {
@@ -120,6 +120,14 @@ def plant(folder: Path, without: set[str], kind: str = "module") -> None:
             (folder / name).chmod(0o755)
 
 
+def taken_by_python(variables: dict[str, str]) -> set[str]:
+    """The modules that `python -m` has imported, from the working folder if they lie there, before it runs one."""
+    with tempfile.TemporaryDirectory(prefix="attempts_") as scratch:
+        folder = Path(scratch)
+        (folder / "started.py").write_text("import sys; print(*(name.partition('.')[0] for name in sys.modules))")
+        return {*run([sys.executable, "-m", "started"], folder, variables).output.split()} | OWN_BEFORE_US
+
+
 def forms(short: bool) -> Iterator[tuple[str, list[str], set[str], dict[str, str]]]:
     """How the command is started: name, words, modules that are not planted for it, variables."""
     script = Path(sysconfig.get_path("scripts")) / "creepkit"
@@ -128,10 +136,10 @@ def forms(short: bool) -> Iterator[tuple[str, list[str], set[str], dict[str, str
     if short and script.exists():
         return
     yield "python -P -m creepkit", [sys.executable, "-P", "-m", "creepkit"], set(), {}
-    yield "python -m creepkit", [sys.executable, "-m", "creepkit"], OWN_BEFORE_US, {}
+    yield "python -m creepkit", [sys.executable, "-m", "creepkit"], taken_by_python({}), {}
     path = os.environ.get("PYTHONPATH", "")
     relative = {"PYTHONPATH": os.pathsep.join([*([path] if path else []), "", "."])}
-    yield "python -m, '.' in PYTHONPATH", [sys.executable, "-m", "creepkit"], {*OWN_BEFORE_US}, relative
+    yield "python -m, '.' in PYTHONPATH", [sys.executable, "-m", "creepkit"], taken_by_python(relative), relative
 
 
 @contextmanager

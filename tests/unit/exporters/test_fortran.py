@@ -177,7 +177,12 @@ def test_a_name_is_made_an_identifier_and_short_enough():
 @pytest.mark.parametrize("exporter", [AbaqusCreepSubroutine(), CalculixCreepSubroutine()])
 def test_nothing_in_a_note_or_a_title_becomes_code(exporter, tmp_path, gfortran):
     """Abaqus has files preprocessed, and to a preprocessor C comments are comments."""
-    notes = ("x\n      call abort()", "x & \n     & call abort()", "x\r      call abort()", "#include 'x'\n#include 'x'")
+    notes = (
+        "x\n      call abort()",
+        "x & \n     & call abort()",
+        "x\r      call abort()",
+        "#include 'x'\n#include 'x'",
+    )
     source = LawWithValues(NORTON.rename("norton", "open /* for ever"), {"A": 1e-16, "n": 5}, notes)
     (tmp_path / "ABA_PARAM.INC").write_text(PARAMETERS)
     (tmp_path / "law.f").write_text(exporter.text(source))
