@@ -139,7 +139,8 @@ import law
 for stress, temperature, w in {POINTS!r}:
     for function in (law.rate, getattr(law, "state_rates", law.rate)):
         needed = [n for n, p in inspect.signature(function).parameters.items() if p.default is p.empty]
-        print(repr(function(**{{n: v for n, v in dict(stress=stress, temperature=temperature, w=w).items() if n in needed}})))
+        given = dict(stress=stress, temperature=temperature, w=w)
+        print(repr(function(**{{name: given[name] for name in needed}})))
 """
 
 

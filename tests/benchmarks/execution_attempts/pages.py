@@ -85,7 +85,7 @@ def report(text: str) -> str:
         title=text, groups=(ReportGroup(text, ranking),), quality=ck.check_data_quality(tests),
         exclusions=(Exclusion(text, (1, 2), text),), exports=(ExportedFile(f"{text}.py", text, f"# {text}\n"),),
         failures=(StageFailure(text, text),),
-        provenance=ReportProvenance({text: text}, 7, {text: {text: [text, 1]}}, {text: text}, (f"creepkit run {text}",)),
+        provenance=ReportProvenance({text: text}, 7, {text: {text: [text, 1]}}, {text: text}, (f"run {text}",)),
         attachments=(Attachment("study.toml", text.encode(errors="replace")),), notes=(text,),
     )  # fmt: skip
     return report_html(contents)
@@ -195,7 +195,8 @@ def _controls(browser: Any, folder: Path, short: bool) -> Iterator[Control]:
     for number, text in enumerate(chosen):
         path = folder / f"naive{number}.html"
         path.write_text(
-            f"<!doctype html><meta charset=utf-8><meta http-equiv=Content-Security-Policy content=\"default-src 'none'\">"
+            "<!doctype html><meta charset=utf-8>"
+            "<meta http-equiv=Content-Security-Policy content=\"default-src 'none'\">"
             f"<title>{text}</title><style>p {{ background: {text} }}</style>"
             f"<p title='{text}'>{text}</p><p title=\"{text}\">x</p><a href=\"{html.escape(text)}\">x</a>",
             encoding="utf-8", errors="replace",
