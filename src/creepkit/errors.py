@@ -19,6 +19,11 @@ def printable(text: str) -> str:
     return _UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
+def steering(text: str) -> str:
+    """The first character of a text, line breaks and tabs aside, that must not reach a terminal; "" where all may."""
+    return next((one[0] for one in _UNPRINTABLE.finditer(text) if one[0] not in "\n\r\t"), "")
+
+
 def quoted(text: object, longest: int = LONGEST_QUOTE) -> str:
     """A text of a file as messages quote it: printable, without blanks around it, and shortened."""
     whole = str(text).strip()

@@ -6,8 +6,7 @@ before a line of creepkit runs (`sitecustomize` of such an entry, `creepkit.py` 
 this module; the script `creepkit`, and `python -P -m creepkit`, look into no working folder at all.
 """
 
-from __future__ import annotations
-
+# no `from __future__ import`: that imports a module too, before the working folder is left out
 import os
 import signal
 import sys

@@ -93,7 +93,9 @@ BENCHMARKS = {
     "reader_fuzz": Benchmark(40),
     "large_files": Benchmark(3),
     "adverse_surroundings": Benchmark(25),
-    "code_execution": Benchmark(25),
+    "code_execution": Benchmark(
+        15, (("--jobs", "2"),), "gfortran, gcc, g++, node, Chromium and playwright; root, for all caches"
+    ),
 }
 """{name of the program: what it costs and how it is run}."""
 

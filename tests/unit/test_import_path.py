@@ -196,3 +196,13 @@ def test_processes_are_started_in_one_place() -> None:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
     }
     assert called & {"Popen", "run", "call", "check_call", "check_output"} == set()
+
+
+def test_nothing_of_the_working_folder_is_imported_before_it_is_left_out(tmp_path):
+    """`from __future__ import` is an import as well."""
+    for name in ("__future__", "lazy_loader", "json"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'w')")
+    command = [sys.executable, "-m", "creepkit", "--version"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "executed").exists()

@@ -28,6 +28,7 @@ The group `failures` has `rows` (k,) int64 and `texts` (k,): which samples faile
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -38,7 +39,7 @@ from numpy.typing import NDArray
 
 from creepkit.arrays import Bools
 from creepkit.dataset.dataset import COLUMNS, HOLD_TIMES, Dataset, empty_columns
-from creepkit.errors import DatasetError, LawError
+from creepkit.errors import DatasetError, LawError, steering
 from creepkit.files.hdf5_files import open_hdf5, write_hdf5, write_names
 from creepkit.files.json_documents import compact_json, parse_json
 from creepkit.files.reading import FileKind
@@ -102,6 +103,22 @@ def check_attributes(attributes: dict[str, Any], source: str) -> None:
             raise DatasetError(f"{source}: the attribute '{name}' is no record; the file is damaged")
     if not attributes["outputs"] or len(attributes["reason_names"]) != len(attributes["reason_texts"]):
         raise DatasetError(f"{source}: names no output, or not a text for each reason; the file is damaged")
+    for name in (*NAME_LISTS, "design", "provenance"):
+        if found := steering("".join(_texts(attributes[name]))):
+            raise DatasetError(
+                f"{source}: the attribute '{name}' holds the character U+{ord(found):04X}; the file is damaged"
+            )
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """All texts of a document, its keys among them."""
+    if isinstance(value, dict):
+        value = (*value, *value.values())
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, tuple | list):
+        for item in value:
+            yield from _texts(item)
 
 
 def check_values(columns: dict[str, Any], header: Dataset, source: str) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import sympy
 
 from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, factor_text
-from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.exporters.law_description import comment_lines, comment_safe, heading, printable_text
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
 from creepkit.records import LawWithValues
@@ -60,9 +60,28 @@ towupper
 """Macros and types of math.h, and functions of other headers that compilers know without them."""
 
 
-C_RESERVED = frozenset(f"{_KEYWORDS} {_CPP_KEYWORDS} {_LIBRARY_NAMES}".split()) | {
-    name + suffix for name in _MATH_FUNCTIONS.split() for suffix in ("", "f", "l")
-}
+_MACROS = """
+linux unix i386 NULL EOF BUFSIZ RAND_MAX EXIT_FAILURE EXIT_SUCCESS MB_CUR_MAX NFDBITS FD_CLR FD_ISSET FD_SET FD_SETSIZE
+FD_ZERO BIG_ENDIAN LITTLE_ENDIAN PDP_ENDIAN BYTE_ORDER WCONTINUED WEXITED WEXITSTATUS WIFCONTINUED WIFEXITED WIFSIGNALED
+WIFSTOPPED WNOHANG WNOWAIT WSTOPPED WSTOPSIG WTERMSIG WUNTRACED be16toh be32toh be64toh htobe16 htobe32 htobe64 htole16
+htole32 htole64 le16toh le32toh le64toh errno stdin stdout stderr assert offsetof FP_ILOGB0 FP_ILOGBNAN FP_INFINITE
+FP_INT_DOWNWARD FP_INT_TONEAREST FP_INT_TONEARESTFROMZERO FP_INT_TOWARDZERO FP_INT_UPWARD FP_LLOGB0 FP_LLOGBNAN FP_NAN
+FP_NORMAL FP_SUBNORMAL FP_ZERO FP_FAST_FMA FP_FAST_FMAF FP_FAST_FMAL HUGE MAXFLOAT MATH_ERREXCEPT MATH_ERRNO DOMAIN SING
+OVERFLOW UNDERFLOW PLOSS TLOSS X_TLOSS iscanonical iseqsig issignaling issubnormal iszero near far small interface
+"""
+"""What compilers and the headers that math.h brings along replace before they look at names, without underscores."""
+
+
+_MATH_CONSTANTS = "E LOG2E LOG10E LN2 LN10 PI PI_2 PI_4 1_PI 2_PI 2_SQRTPI SQRT2 SQRT1_2"
+_WIDTHS = ("", "f", "l", "f16", "f32", "f64", "f128", "f32x", "f64x")
+"""Endings of what math.h has for each type of number; in capitals for some of its macros."""
+
+
+C_RESERVED = frozenset(f"{_KEYWORDS} {_CPP_KEYWORDS} {_LIBRARY_NAMES} {_MACROS}".split()).union(
+    (name + width for name in _MATH_FUNCTIONS.split() for width in ("", "f", "l")),
+    (f"M_{name}{width}" for name in _MATH_CONSTANTS.split() for width in _WIDTHS),
+    (name + width.upper() for name in ("HUGE_VAL", "HUGE_VAL_", "SNAN") for width in _WIDTHS),
+)
 
 
 STABLE_FUNCTIONS: dict[str, tuple[tuple[str, ...], str]] = {
@@ -146,11 +165,6 @@ def cpp_lambda_definition(name: str) -> str:
 def c_block_comment(lines: Iterable[str]) -> list[str]:
     """Lines, each made ` * ...`, between comment marks; whatever could end a comment is taken apart."""
     return ["/*", *(comment_safe(line) for line in lines), " */"]
-
-
-def comment_safe(text: str) -> str:
-    """Text in which no comment ends or starts, nor a trigraph."""
-    return text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
 
 
 def _called_names(texts: Iterable[str]) -> set[str]:

@@ -31,6 +31,10 @@ _ALTERNATIVE = "export it as 'mfront', which code_aster reads with RELATION='MFR
 _FORMULA = "LEMAITRE: rate = (UN_SUR_K s / e^UN_SUR_M)^N, of equivalent stress s and creep strain e."
 
 
+_ENCODING = "# -*- coding: utf-8 -*-"
+"""The first line: the file is Python, which else takes the encoding from what a title or note says (PEP 263)."""
+
+
 _RESERVED = (*keyword.kwlist, "_F", "DEFI_CONSTANTE", "DEFI_MATERIAU", "FORMULE")
 
 
@@ -57,7 +61,7 @@ class CodeAsterMaterial:
             else []
         )
         call = [f"{label} = DEFI_MATERIAU(", *(f"    {line}," for line in (*elastic_keywords, creep_keyword)), ")"]
-        lines = card_heading(source, "#", [*comments, *names.renaming_notes([requested])])
+        lines = [_ENCODING, *card_heading(source, "#", [*comments, *names.renaming_notes([requested])])]
         return "\n".join([*lines, *elastic_formulas, *creep_formulas, *call]) + "\n"
 
 

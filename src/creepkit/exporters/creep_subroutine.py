@@ -15,7 +15,7 @@ from typing import ClassVar
 from creepkit.errors import ExportError
 from creepkit.exporters.fortran_code import FORTRAN_RESERVED, fortran_number, law_subroutine, wrapped_lines
 from creepkit.exporters.law_code import Identifiers, LawCode
-from creepkit.exporters.law_description import comment_lines, heading
+from creepkit.exporters.law_description import comment_lines, comment_safe, heading
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, temperature, time
 from creepkit.records import LawWithValues
@@ -58,7 +58,7 @@ class CreepSubroutine:
         if code.states and self.state_template:
             templates.append(self.state_template)
         parts = [
-            "\n".join(comment_lines(header_lines, "!", 71)),
+            "\n".join(comment_lines(map(comment_safe, header_lines), "!", 71)),
             "!",
             *(
                 line

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -80,6 +81,11 @@ def comment_lines(lines: Iterable[str], marker: str, width: int = 0) -> list[str
 def printable_text(text: str) -> str:
     """Text with every character that is no letter, digit, sign or blank made a blank."""
     return "".join(c if c.isprintable() else " " for c in text)
+
+
+def comment_safe(text: str) -> str:
+    """Text in which no comment of C ends or starts, nor a trigraph."""
+    return re.sub(r"\?(?=\?)", "? ", text.replace("*/", "* /").replace("/*", "/ *"))
 
 
 def _wrapped(text: str, width: int) -> list[str]:

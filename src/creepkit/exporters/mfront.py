@@ -24,13 +24,12 @@ from creepkit.exporters.c import (
     STABLE_FUNCTION_NAMES,
     c_assignments,
     c_expression,
-    comment_safe,
     cpp_lambda_definition,
     stable_functions_in,
 )
 from creepkit.exporters.creep_forms import elastic_expressions
 from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, factor_text
-from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.exporters.law_description import comment_lines, comment_safe, heading, printable_text
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, strain, stress, temperature, time
 from creepkit.records import LawWithValues
 

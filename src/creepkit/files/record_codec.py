@@ -101,7 +101,9 @@ class RecordCodec:
                 return codec.to_json(value)
         if isinstance(value, enum.Enum):
             return value.name
-        if value is None or isinstance(value, bool | int | str):
+        if isinstance(value, str):
+            return validators.kept_text(value)
+        if value is None or isinstance(value, bool | int):
             return value
         if isinstance(value, float | np.floating):
             return float(value) if math.isfinite(value) else None if math.isnan(value) else str(float(value))
@@ -187,7 +189,7 @@ class RecordCodec:
         if _is_a(origin, np.ndarray):
             return plain(partial(self._array, np.dtype(get_args(arguments[1])[0]), allowed))
         if _is_a(origin, Mapping):
-            return schemas.dict_schema(schemas.str_schema(), self._schema(arguments[1], allowed))
+            return schemas.dict_schema(_TEXT, self._schema(arguments[1], allowed))
         if _is_a(origin, Sequence):
             items = [self._schema(part, allowed) for part in arguments if part is not ...]
             if origin is list:
@@ -234,7 +236,8 @@ class RecordCodec:
 
 _MAX_DIMENSIONS = 8
 _SCHEMAS: dict[Any, CoreSchema] = dict.fromkeys((Any, object), schemas.any_schema())
-_SCHEMAS |= {bool: schemas.bool_schema(), str: schemas.str_schema()}
+_TEXT = schemas.no_info_after_validator_function(validators.shown_text, schemas.str_schema())
+_SCHEMAS |= {bool: schemas.bool_schema(), str: _TEXT}
 
 
 def _without_alias(hint: Any) -> Any:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
-from creepkit.errors import CreepkitError, quoted
+from creepkit.errors import CreepkitError, printable, quoted, steering
 from creepkit.files.json_documents import check_keys
 
 Record = TypeVar("Record")
@@ -48,6 +48,18 @@ def number(kind: type[float], problem_of: Callable[[float], str], data: Any) -> 
     if problem:
         raise misfit(f" {problem}")
     return kind(value)
+
+
+def kept_text(text: str) -> str:
+    """A text as files hold it: what must not reach a terminal as its code, so that the file can be read again."""
+    return "".join(one if one in "\n\r\t" else printable(one) for one in text) if steering(text) else text
+
+
+def shown_text(text: str) -> str:
+    """A text that may be shown on a terminal."""
+    if found := steering(text):
+        raise misfit(f" holds the character U+{ord(found):04X}, which cannot be printed; remove it from the text")
+    return text
 
 
 def as_tuple(length: int | None, data: Any) -> tuple[Any, ...]:

@@ -90,20 +90,20 @@ class ArrayKernel:
         exec(compile(self.source, name, "exec"), namespace)
         return {entry: namespace[entry] for entry in ("rate", "log_rate", "sensitivity", "log_sensitivity")}
 
-    def rate(self, values: Mapping[str, Any], **point: Any) -> Any:
+    def rate(self, values: Mapping[str, Any], /, **point: Any) -> Any:
         """Rate of equivalent creep strain, 1/s; inf or 0 where it is beyond float64 (log_rate is finite there)."""
         return self._entries["rate"](*self._arguments(values, point))[0]
 
-    def log_rate(self, values: Mapping[str, Any], **point: Any) -> Any:
+    def log_rate(self, values: Mapping[str, Any], /, **point: Any) -> Any:
         """Natural logarithm of the rate; finite where the rate itself over- or underflows, -1e30 where it is off."""
         return self._entries["log_rate"](*self._arguments(values, point))[0]
 
-    def state_rates(self, values: Mapping[str, Any], **point: Any) -> dict[str, Any]:
+    def state_rates(self, values: Mapping[str, Any], /, **point: Any) -> dict[str, Any]:
         """Rates of the internal variables, 1/s."""
         out = self._entries["rate"](*self._arguments(values, point))
         return dict(zip(self._states, out[1:], strict=True))
 
-    def derivatives(self, values: Mapping[str, Any], **point: Any) -> RateDerivatives:
+    def derivatives(self, values: Mapping[str, Any], /, **point: Any) -> RateDerivatives:
         """The rate and its derivatives with respect to the point, the states and every internal parameter."""
         return self.internal_derivatives(*self._arguments(values, point))
 

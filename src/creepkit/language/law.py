@@ -31,11 +31,11 @@ class CreepLaw(LawRecord):
         """The law with the named terms alone."""
         return algebra.only(self, terms)
 
-    def fix(self, **values: float) -> CreepLaw:
+    def fix(self, /, **values: float) -> CreepLaw:
         """The law with parameters at fixed numbers; m=0 makes strain hardening a power law."""
         return algebra.fix(self, values)
 
-    def with_bounds(self, **bounds: tuple[float, float]) -> CreepLaw:
+    def with_bounds(self, /, **bounds: tuple[float, float]) -> CreepLaw:
         """The law with other bounds of parameters, (low, high) each in the parameter's unit; n=(3, 8)."""
         return algebra.with_bounds(self, bounds)
 
@@ -57,7 +57,7 @@ class CreepLaw(LawRecord):
         """
         return times(self, factor, terms, states, shared=shared)
 
-    def with_temperature(self, **forms: Any) -> CreepLaw:
+    def with_temperature(self, /, **forms: Any) -> CreepLaw:
         """The law with parameters made functions of temperature, such as n=linear(T_ref=1073)."""
         return algebra.with_temperature(self, forms)
 

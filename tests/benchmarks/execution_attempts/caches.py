@@ -186,6 +186,8 @@ def attempts(short: bool) -> Found:
         for kind in kinds:
             for name, (_, change) in cases.items():
                 for command, words in commands.items():
+                    if command == "generate" and kind != kinds[0]:
+                        continue
                     with forged(genuine, kind) as places:
                         change(places)
                         ended = run(as_user(creepkit(*words)), places.working, {**places.variables, **user})

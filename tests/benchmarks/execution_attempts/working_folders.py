@@ -21,7 +21,7 @@ from execution_attempts.canaries import LIMIT, Attempt, Control, Found, creepkit
 
 MODULES, NAMED = "Modules beside the data", "Data named where code is expected"
 OWN_BEFORE_US = {"creepkit", "sitecustomize", "usercustomize"}
-"""What `python -m creepkit` without -P takes from the working folder before a line of creepkit runs, or may."""
+"""What `python -m creepkit` without -P takes from the working folder, or may, before a line of creepkit runs."""
 
 NETWORK = ("--hidden", "4", "--layers", "1", "--epochs", "1")
 COMMANDS = {
@@ -43,7 +43,10 @@ COMMANDS = {
     "laws": ("laws", "norton"),
     "plugins": ("plugins",),
 }
-SHORT = ("generate", "screen", "report", "check")
+SHORT = ("generate", "read")
+TOLD_APART = ("generate", "screen", "report", "predict", "export", "check", "plugins")
+"""Commands of the further ways to start: those with workers, with files of matplotlib, and with modules by name."""
+
 REFUSED = {
     "--plugin x.csv": ("--plugin", "x.csv", "laws"),
     "--plugin without suffix": ("--plugin", "plain", "laws"),
@@ -79,9 +82,12 @@ def every_module() -> list[str]:
     return sorted(name for name in names if name.isidentifier() and name not in sys.builtin_module_names)
 
 
-def prepare(folder: Path) -> None:
-    """Data of all kinds, without anything planted."""
+def prepare(folder: Path, short: bool) -> None:
+    """Data of all kinds, without anything planted; tests alone in the short form."""
     planted_tests(folder)
+    (folder / "first").mkdir()
+    if short:
+        return
     data_set(folder)
     text = '[data]\nfiles = ["tests"]\n[identification]\nlaws = ["norton"]\n[report]\nfile = "report.html"\n'
     (folder / "study.toml").write_text(text)
@@ -114,6 +120,14 @@ def plant(folder: Path, without: set[str], kind: str = "module") -> None:
             (folder / name).chmod(0o755)
 
 
+def taken_by_python(variables: dict[str, str]) -> set[str]:
+    """The modules that `python -m` has imported, from the working folder if they lie there, before it runs one."""
+    with tempfile.TemporaryDirectory(prefix="attempts_") as scratch:
+        folder = Path(scratch)
+        (folder / "started.py").write_text("import sys; print(*(name.partition('.')[0] for name in sys.modules))")
+        return {*run([sys.executable, "-m", "started"], folder, variables).output.split()} | OWN_BEFORE_US
+
+
 def forms(short: bool) -> Iterator[tuple[str, list[str], set[str], dict[str, str]]]:
     """How the command is started: name, words, modules that are not planted for it, variables."""
     script = Path(sysconfig.get_path("scripts")) / "creepkit"
@@ -122,18 +136,18 @@ def forms(short: bool) -> Iterator[tuple[str, list[str], set[str], dict[str, str
     if short and script.exists():
         return
     yield "python -P -m creepkit", [sys.executable, "-P", "-m", "creepkit"], set(), {}
-    yield "python -m creepkit", [sys.executable, "-m", "creepkit"], OWN_BEFORE_US, {}
+    yield "python -m creepkit", [sys.executable, "-m", "creepkit"], taken_by_python({}), {}
     path = os.environ.get("PYTHONPATH", "")
     relative = {"PYTHONPATH": os.pathsep.join([*([path] if path else []), "", "."])}
-    yield "python -m, '.' in PYTHONPATH", [sys.executable, "-m", "creepkit"], {*OWN_BEFORE_US}, relative
+    yield "python -m, '.' in PYTHONPATH", [sys.executable, "-m", "creepkit"], taken_by_python(relative), relative
 
 
 @contextmanager
-def folder_of_data() -> Iterator[Path]:
+def folder_of_data(short: bool) -> Iterator[Path]:
     """A folder with data of all kinds."""
     with tempfile.TemporaryDirectory(prefix="attempts_") as scratch:
         folder = Path(scratch).resolve()
-        prepare(folder)
+        prepare(folder, short)
         yield folder
 
 
@@ -165,19 +179,20 @@ def served(words: list[str], folder: Path, variables: dict[str, str]) -> tuple[s
 
 def attempts(short: bool) -> Found:
     """All commands in folders of planted modules, and data that are named as code."""
-    with folder_of_data() as clean:
-        for name, words, without, variables in forms(short):
-            for kind in ("module",) if short else ("module", "package"):
+    with folder_of_data(short) as clean:
+        for number, (name, words, without, variables) in enumerate(forms(short)):
+            first = number == 0
+            for kind in ("module", "package") if first and not short else ("module",):
                 with tempfile.TemporaryDirectory(prefix="attempts_") as scratch:
                     folder = Path(scratch).resolve() / "data"
                     shutil.copytree(clean, folder)
                     plant(folder, without, kind)
                     for command, arguments in COMMANDS.items():
-                        if short and command not in SHORT:
+                        if command not in (SHORT if short else COMMANDS if first else TOLD_APART):
                             continue
                         outcome, detail = judged(run([*words, *arguments], folder, variables), folder, refused=False)
                         yield Attempt(MODULES, name, outcome, f"{command}, {kind}: {detail}")
-                    if not short and kind == "module":
+                    if not short and first and kind == "module":
                         outcome, detail = served(words, folder, variables)
                         yield Attempt(MODULES, name, outcome, f"app as a server: {detail}")
         yield from _named(clean, short)

@@ -346,6 +346,7 @@ def enormous(file):
         (lambda file: file.attrs.__setitem__("outputs", 3.0), "cannot be read, it seems damaged"),
         (lambda file: file.attrs.__setitem__("parameter_names", ["n", "A"]), "its parameters are n, A, those of its"),
         (lambda file: file.attrs.__setitem__("reason_texts", ["met"]), "not a text for each reason"),
+        (lambda file: file.attrs.__setitem__("condition_names", ["\x1b[2J"]), r"'condition_names' .* U\+001B"),
     ],
 )
 def test_what_a_file_promises_is_checked(data, tmp_path, change, message):

@@ -181,8 +181,19 @@ def test_names_that_c_keeps_for_itself_are_renamed_openly(tmp_path, gcc):
 
 
 def test_nothing_in_a_note_becomes_code(tmp_path, gcc):
-    notes = ["*/ broken", "/* nested", "*/*/ twice", "trigraph ??/", "back\\", "line\n*/ two", "\x00\u2028*/"]
-    library = compile_c(gcc, tmp_path, [LawWithValues(NORTON, {"A": 1e-16, "n": 5.0}, notes)])
+    notes = [
+        "*/ broken",
+        "/* nested",
+        "*/*/ twice",
+        "trigraph ??/",
+        "trigraph ???/",
+        "back\\",
+        "line\n*/ two",
+        "\x00\u2028*/",
+    ]
+    source = LawWithValues(NORTON, {"A": 1e-16, "n": 5.0}, notes)
+    assert "??" not in CExporter().text(source)
+    library = compile_c(gcc, tmp_path, [source])
     assert Compiled(library, "norton", NORTON).rate([100.0]) == pytest.approx(1e-6, rel=1e-12)
 
 

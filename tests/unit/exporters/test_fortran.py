@@ -175,6 +175,27 @@ def test_a_name_is_made_an_identifier_and_short_enough():
 
 
 @pytest.mark.parametrize("exporter", [AbaqusCreepSubroutine(), CalculixCreepSubroutine()])
+def test_nothing_in_a_note_or_a_title_becomes_code(exporter, tmp_path, gfortran):
+    """Abaqus has files preprocessed, and to a preprocessor C comments are comments."""
+    notes = (
+        "x\n      call abort()",
+        "x & \n     & call abort()",
+        "x\r      call abort()",
+        "#include 'x'\n#include 'x'",
+    )
+    source = LawWithValues(NORTON.rename("norton", "open /* for ever"), {"A": 1e-16, "n": 5}, notes)
+    (tmp_path / "ABA_PARAM.INC").write_text(PARAMETERS)
+    (tmp_path / "law.f").write_text(exporter.text(source))
+    plain = exporter.text(LawWithValues(NORTON, {"A": 1e-16, "n": 5}))
+    kept = [[line for line in text.splitlines() if line[:1] != "!"] for text in (exporter.text(source), plain)]
+    assert kept[0] == kept[1]
+    command = [gfortran, "-c", "-cpp", "law.f", "-o", "law.o"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert b"creep_" in (tmp_path / "law.o").read_bytes()
+
+
+@pytest.mark.parametrize("exporter", [AbaqusCreepSubroutine(), CalculixCreepSubroutine()])
 def test_names_that_are_long_or_those_of_routines_compile(exporter, tmp_path, gfortran):
     clash, long, longer = parameters(f"foreign_law a_{80 * 'y'} a_{80 * 'y'}z")
     source = law(clash * stress**long * longer, {clash: RATE, long: POWER, longer: POWER})

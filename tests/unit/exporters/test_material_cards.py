@@ -282,6 +282,19 @@ def test_a_temperature_makes_a_card_possible():
     assert rate(50.0, 0.0, 0.0, 1.0) == pytest.approx(float(true_rate(source, 50.0, 0.0, 0.0, 310.0)), rel=1e-10)
 
 
+@pytest.mark.parametrize(
+    "title", ["-*- coding: unicode_escape -*- \\x0aharmed = 1 #", "coding: utf-7 +AAo-harmed = 1+AAo-#"]
+)
+def test_no_title_sets_the_encoding_of_a_file_for_code_aster(title):
+    """Such a file is Python, whose first two lines may name an encoding (PEP 263) in which a comment has more lines."""
+    law = NORTON.rename("norton", title)
+    text = CodeAsterMaterial().text(LawWithValues(law, {"A": 1e-16, "n": 4.0}))
+    commands = dict.fromkeys(("DEFI_MATERIAU", "_F"), lambda **given: given)
+    names = {**commands}
+    exec(compile(text.encode(), "law.comm", "exec"), names)
+    assert {*names} - {*commands} == {"norton", "__builtins__"}
+
+
 @pytest.mark.parametrize("law", sorted(default_registry().laws()))
 @pytest.mark.parametrize("name", sorted(default_registry().exporters()))
 def test_every_registered_law_is_exported_or_refused_with_a_reason(name, law):

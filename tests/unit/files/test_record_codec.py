@@ -128,6 +128,8 @@ def test_what_is_written_is_read():
         ({"strength": 0.0}, "strength is 0, which must be above 0"),
         ({"pair": [1.0, 2.0]}, "pair.1 is 2.0, where a whole number is needed"),
         ({"count": 3.0}, "count is 3.0, where a whole number is needed"),
+        ({"inner": {"name": "\x1b[2J"}}, "inner.name holds the character U+001B, which cannot be printed"),
+        ({"inner": {"name": "a\u202eb"}}, "inner.name holds the character U+202E, which cannot be printed"),
     ],
 )
 def test_what_does_not_fit_is_one_sentence_with_its_place(changes, message):
