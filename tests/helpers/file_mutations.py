@@ -38,6 +38,10 @@ PIECES = [
 ]
 
 
+UNITS = (("_MPa", "_kPa"), ("_h", "_s"), ("_K", "_C"), ("_mm", "_um"), ("kN", "N"), ("_GPa", "_MPa"))
+"""Pairs of units of one quantity."""
+
+
 ENCODINGS = ("utf-16", "utf-16-be", "utf-32", "latin-1", "utf-8-sig")
 
 
@@ -181,6 +185,52 @@ def _time_not_increasing(sample: ReaderSample, draw: random.Random) -> Mutation 
     return Mutation("rows in another order", _joined(sample, head, rows), changed=True)
 
 
+def _time_changed(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """A time that stands in two rows, with other values in the second; or one below zero."""
+    if not sample.delimiter:
+        return None
+    head, _, rows = _rows(sample)
+    times = [k for k, name in enumerate(rows[0]) if name.startswith("time")]
+    if not times or len(rows) < 4:
+        return None
+    n = draw.randrange(2, len(rows))
+    if draw.random() < 0.5:
+        rows[n][times[0]] = rows[n - 1][times[0]]
+        return Mutation("time twice", _joined(sample, head, rows), changed=True)
+    rows[n][times[0]] = "-" + rows[n][times[0]].lstrip("-")
+    return Mutation("time below zero", _joined(sample, head, rows), changed=True)
+
+
+def _names_missing(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """The line of names left out."""
+    if not sample.delimiter:
+        return None
+    head, _, rows = _rows(sample)
+    return Mutation("names missing", _joined(sample, head, rows[1:]), changed=True)
+
+
+def _cut_in_last_row(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """A file that ends amid its last row; amid its last number, nothing but the missing line end says so."""
+    if not sample.delimiter:
+        return None
+    head, _, rows = _rows(sample)
+    last = sample.delimiter.join(rows[-1])
+    start = draw.randrange(1, len(last))
+    amid = sample.delimiter in last[start:]
+    content = _joined(sample, head, rows[:-1]) + last[:start].encode()
+    return Mutation("cut amid the last row" if amid else "cut in the last cell", content, changed=amid)
+
+
+def _other_unit(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+    """Another unit of the same quantity, with the numbers of the former: no reader can tell."""
+    text = sample.files[sample.mutated].decode("utf-8", "replace") if sample.delimiter else ""
+    choices = [(a, b) for pair in UNITS for a, b in (pair, pair[::-1]) if a in text]
+    if not choices:
+        return None
+    before, after = draw.choice(choices)
+    return Mutation("other unit", text.replace(before, after, 1).encode())
+
+
 def _line_cut(sample: ReaderSample, draw: random.Random) -> Mutation | None:
     """A row that ends amid its columns, or has one more."""
     if not sample.delimiter:
@@ -199,5 +249,9 @@ MEANINGFUL: tuple[Callable[[ReaderSample, random.Random], Mutation | None], ...]
     _no_number,
     _time_not_increasing,
     _line_cut,
+    _time_changed,
+    _names_missing,
+    _cut_in_last_row,
+    _other_unit,
     _key_repeated,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -63,7 +64,7 @@ def document(
 ) -> ReaderSample:
     """A sample of keys in quotes; keys : those that are written with a letter missing, and twice."""
     text = content.decode("utf-8", "replace")
-    lines = [line + "\n" for line in text.split("\n") if line.strip().endswith(",") and line.strip().startswith('"')]
+    lines = [line + "\n" for line in text.split("\n") if re.match(r'\s*"[^"]*": .*,\s*$', line)]
     misspelt = tuple((key, key[:2] + key[3:]) for key in keys.split())
     return ReaderSample(name, {**files, file: content}, file, read, accepted, misspelt=misspelt, repeated=tuple(lines))
 

@@ -111,8 +111,9 @@ def difference(first: Sequence[History], second: Sequence[History]) -> str:
 
 
 def decided(histories: Sequence[History]) -> str:
-    """What was assumed of the tests."""
-    return "; ".join(history.labels.get("assumed", "") for history in histories)
+    """What was assumed of the tests, and how many frames of one time were made one."""
+    said = ("assumed", "merged_frames")
+    return "; ".join(history.labels.get(label, "") for history in histories for label in said)
 
 
 def table(name: str, files: dict[str, str], mutated: str, misspelt: str, without_unit: str) -> ReaderSample:

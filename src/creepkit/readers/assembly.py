@@ -51,6 +51,11 @@ def assemble_history(
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
     table, marked = _without_readings_before_steps(table, vocabulary, conditions.terms)
+    if marked:
+        count = f"{len(marked)} reading{'s' * (len(marked) > 1)}"
+        conditions.record_assumption(
+            f"{count} left out that another one at the same time follows with other conditions"
+        )
     frames = read_frames(table, vocabulary, conditions.terms, skipped_columns)
     columns = table.location(table.columns_line)
     loading = read_loading(conditions, frames, marked)

@@ -71,9 +71,12 @@ def read_sheets(path: Path) -> list[CellGrid]:
             aside = [f"hidden sheet '{sheet.title}' not read" for sheet in book.worksheets if sheet not in shown]
     except HistoryError:
         raise
-    except Exception as error:  # openpyxl lets all kinds of errors through where a file is damaged
-        cause = quoted(" ".join(str(error).split()), 80)
-        raise HistoryError(f"{path}: is no spreadsheet that can be read ({cause}); save it anew as .xlsx") from None
+    except Exception as error:
+        if _is_own(error):
+            raise
+        raise HistoryError(
+            f"{path}: is no spreadsheet that can be read, or it is damaged; save it anew as .xlsx"
+        ) from None
     found = [grid for grid in grids if grid is not None]
     if aside and not found:
         raise HistoryError(f"{path}: {aside[0]}, and no other holds anything; unhide the sheets that count")
@@ -310,3 +313,12 @@ def _with_conditions(
 
 
 SPREADSHEET = SpreadsheetReader("xlsx", "a spreadsheet .xlsx: a test a sheet, or several side by side")
+
+
+def _is_own(error: BaseException) -> bool:
+    """Whether creepkit's code raised it; openpyxl lets all kinds of errors through where a file is damaged."""
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    module = "" if place is None else str(place.tb_frame.f_globals.get("__name__", ""))
+    return module.partition(".")[0] == "creepkit"

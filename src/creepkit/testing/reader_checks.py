@@ -156,6 +156,8 @@ def history_difference(first: History, second: History) -> str:
         a, b = dict(getattr(first, field)), dict(getattr(second, field))
         if a != b:
             return f"{field} is {a} and {b}"
+    if first.times.shape != second.times.shape:
+        return f"there are {first.times.size} and {second.times.size} frames"
     for field in ("outputs", "standard_deviation"):
         one, other = getattr(first, field), getattr(second, field)
         if list(one) != list(other):

@@ -1,0 +1,155 @@
+"""Samples of what creepkit keeps to go on later: surrogates, rupture assessments, results of stages, locks, reports."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import creepkit as ck
+from creepkit.errors import StudyError
+from creepkit.files.json_documents import json_text
+from creepkit.files.safetensors_files import HEADER_KEY
+from creepkit.files.writing import write_bytes
+from creepkit.inverse.identification_document import read_identification
+from creepkit.inverse.kept_fits import KEPT_FIT, FitFolder, kept_to_json
+from creepkit.inverse.selection.ranking import Ranking
+from creepkit.reports.attachments import embed
+from creepkit.reports.contents import Attachment
+from creepkit.rupture_assessment.assessment_document import read_assessment
+from creepkit.screening.files import read_result, write_result
+from creepkit.screening.results import AlloyResult, WeightedLaw
+from creepkit.studies.carried_study import study_of_report
+from creepkit.studies.documents import ResultFolder
+from creepkit.studies.execution import Execution
+from creepkit.studies.lock import STUDY_LOCK, read_lock
+from creepkit.studies.stages import Stage
+from creepkit.surrogates.loading import load_surrogate
+from helpers.paths import ROOT
+from helpers.reader_samples import ReaderSample
+from helpers.samples_documents import STUDY, document, written
+from helpers.samples_histories import CREEP
+from helpers.samples_results import FORMATS
+
+MADE = ROOT / "tests" / "data" / "mutated"
+HASH = "0123456789abcdef" * 4
+
+
+def lock() -> dict[str, Any]:
+    """A study.lock of one stage, the parts as a run writes them."""
+    stage = {"key": HASH[:16], "state": "done", "numbers": {"weights": {"norton": 1.0}}, "sha256": HASH[:16]}
+    return {
+        **STUDY_LOCK.heading,
+        "study": HASH,
+        "seed": 0,
+        "versions": {"python": "3.11.7", "creepkit": "0.1.0", "numpy": "2.4.6"},
+        "inputs": {"data/a.csv": HASH, "data/b.csv": HASH},
+        "declared": {"study": {"title": "planted", "seed": 0}, "forecast": []},
+        "settings": {"starts": 4, "frames": 12, "loss": "linear"},
+        "laws": {"norton": HASH[:16]},
+        "stages": {"identification": stage},
+    }
+
+
+def read_kept_fit(path: Path) -> Any:
+    """The identification of a file that a study keeps; StudyError where it would be made again."""
+    folder = FitFolder(path.parent / "fits")
+    folder.folder.mkdir(exist_ok=True)
+    write_bytes(path.read_bytes(), folder.path("key"), StudyError, force=True)
+    fit = folder.load("key", (), ck.specimen("uniaxial"))
+    if fit is None:
+        raise StudyError(f"{path}: would be made again")
+    return fit
+
+
+class StageResult:
+    """Reads a kept result of a stage as a run of its study does: StudyError where it would be made again."""
+
+    def __init__(self) -> None:
+        self.tests = ck.read_histories([FORMATS / "1073K_60MPa.csv", FORMATS / "1073K_90MPa.csv"])
+
+    def content(self) -> bytes:
+        """A file of such a result."""
+        ranking = ck.rank([read_identification(FORMATS / "identification.json").with_histories(self.tests)])
+        with tempfile.TemporaryDirectory() as name:
+            folder = ResultFolder(Path(name))
+            Execution(folder, self.tests).run([self._making(ranking)], ["identification"])
+            return folder.path("identification").read_bytes()
+
+    def __call__(self, path: Path) -> Ranking:
+        """The ranking, of a file that is as it was written for all that the list of files says."""
+
+        def made_again(results: Any, tick: Any) -> Ranking:
+            raise StudyError(f"{path}: would be made again")
+
+        folder = ResultFolder(path.parent)
+        write_bytes(path.read_bytes(), folder.path("identification"), StudyError, force=True)
+        run = Execution(folder, self.tests)
+        run.run([self._making(made_again)], ["identification"])
+        if run.failures:
+            raise StudyError(run.failures[0].sentence)
+        found: Ranking = run.results["identification"]
+        return found
+
+    def _making(self, made: Any) -> Stage:
+        make = made if callable(made) else lambda results, tick: made
+        settings = {"laws": ["norton"]}
+        return Stage("identification", "identification", "", settings, make, record=Ranking)
+
+
+def read_header(path: Path) -> Any:
+    """The surrogate whose header is a file of text, over sound weights."""
+    from safetensors import safe_open
+    from safetensors.numpy import save
+
+    with safe_open(MADE / "surrogate.safetensors", framework="numpy") as file:
+        arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (a handle, not a mapping)
+    target = path.with_suffix(".safetensors")
+    text = path.read_bytes().decode("utf-8", "replace")
+    target.write_bytes(save(arrays, metadata={HEADER_KEY: text}))
+    return load_surrogate(target)
+
+
+def header() -> bytes:
+    """The header of a surrogate, indented so that its keys stand on lines."""
+    from safetensors import safe_open
+
+    with safe_open(MADE / "surrogate.safetensors", framework="numpy") as file:
+        return json.dumps(json.loads(file.metadata()[HEADER_KEY]), indent=1).encode()
+
+
+def run_report(path: Path) -> Any:
+    """The study and its lock, written to a new folder as `creepkit run report.html` does."""
+    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        study = study_of_report(path, Path(folder) / "study")
+        lock_path = Path(folder) / "study" / "study.lock"
+        return study.file.model, read_lock(lock_path) if lock_path.exists() else None
+
+
+def samples() -> Iterator[ReaderSample]:
+    """The samples of kept files."""
+    yield document(
+        "rupture assessment", "x.json", (MADE / "rupture.json").read_bytes(), read_assessment, '"ranked" "tests"'
+    )
+    surrogate = document("surrogate", "x.safetensors", (MADE / "surrogate.safetensors").read_bytes(), load_surrogate)
+    yield ReaderSample(**{**surrogate.__dict__, "repeated": ()})
+    yield document("surrogate header", "x.json", header(), read_header, '"recipe" "metadata" "kind" "format"')
+    fit = read_identification(FORMATS / "identification.json")
+    kept = json_text({**KEPT_FIT.heading, **kept_to_json(fit)}).encode()
+    yield document("kept fit", "x.json", kept, read_kept_fit, '"linearised" "identification"')
+    result = AlloyResult("A", laws=(WeightedLaw(fit, 0.0, 1.0),))
+    alloy = written(lambda path: write_result(result, path), "x.json")
+    yield document("alloy result", "x.json", alloy, read_result, '"laws" "verdict" "weight"')
+    stage = StageResult()
+    yield document("stage result", "x.json", stage.content(), stage, '"weight" "stage"')
+    yield document("study lock", "study.lock", json_text(lock()).encode(), read_lock, '"versions" "stages" "seed"')
+    files = {"study.toml": STUDY.encode(), "study.lock": json_text(lock()).encode(), "inputs/a.csv": CREEP.encode()}
+    yield document("report of a run", "x.html", report(files), run_report, '"files" "sha256" data-number')
+
+
+def report(files: Mapping[str, bytes]) -> bytes:
+    """A page that carries files."""
+    attached = [Attachment(name, content) for name, content in files.items()]
+    return f"<!doctype html><html><body>{embed(attached)}</body></html>".encode()
