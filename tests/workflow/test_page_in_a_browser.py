@@ -299,6 +299,59 @@ def test_it_fits_the_screen(chromium, fit, histories, tmp_path, scheme, width):
         assert unnamed == 0
 
 
+CUT_OFF = """() => {
+    const wrong = [], wide = document.documentElement.clientWidth;
+    for (const panel of document.querySelectorAll('.panel')) {
+        if (!panel.offsetWidth) continue;
+        const frame = panel.getBoundingClientRect();
+        for (const part of panel.querySelectorAll('svg text, h3, button, input, .legend')) {
+            if (!part.getClientRects().length) continue;
+            const place = part.getBoundingClientRect();
+            const inside = place.left >= frame.left - 1 && place.right <= frame.right + 1
+                && place.top >= frame.top - 1 && place.bottom <= frame.bottom + 1;
+            if (!inside) wrong.push(part.textContent || part.outerHTML);
+            if (part.matches('svg text') && parseFloat(getComputedStyle(part).fontSize) < 9) wrong.push('small');
+        }
+    }
+    for (const part of document.querySelectorAll('.controls *, .panels')) {
+        const style = getComputedStyle(part);
+        const scrolls = part.scrollWidth > part.clientWidth + 1 && /auto|scroll/.test(style.overflowX);
+        if (scrolls || part.getBoundingClientRect().right > wide + 1) wrong.push(part.outerHTML.slice(0, 80));
+    }
+    return wrong;
+}"""
+"""What of the page is cut off, beyond the screen, or has to be scrolled sideways."""
+
+
+def in_sight(page):
+    """Titles of the panels that are wholly in the window."""
+    return page.evaluate(
+        "[...document.querySelectorAll('.panel')].filter((p) => { const r = p.getBoundingClientRect(); return r.height "
+        "&& r.top >= 0 && r.bottom <= innerHeight + 1; }).map((p) => p.querySelector('.name').textContent)"
+    )
+
+
+PANELS = ["Amplitude", "Width", "Shape", "Deformed section", "Creep rate against stress"]
+
+
+def test_panels_stay_in_sight_and_whole_while_sliders_move(chromium, tmp_path):
+    path = ck.interactive_page("norton", tmp_path / "page.html", specimen="bulge")
+    for width, panels in ((1250, PANELS), (800, PANELS), (400, PANELS[:1])):
+        with tab(chromium, viewport={"width": width, "height": 800}) as one:
+            one.open(path.as_uri())
+            for name in ("A", "Young's modulus"):
+                one.page.get_by_role("slider", name=name).first.scroll_into_view_if_needed()
+                assert in_sight(one.page) == panels
+                assert one.page.evaluate(CUT_OFF) == []
+            if width == 400:
+                for title in PANELS:
+                    one.page.get_by_label("plot that is shown").select_option(label=title)
+                    one.page.wait_for_timeout(50)
+                    assert in_sight(one.page) == [title]
+                    assert one.page.evaluate(CUT_OFF) == []
+            assert one.problems == []
+
+
 def contrast(first, second):
     """Of two colours, as in WCAG 2.2, section 1.4.3."""
 

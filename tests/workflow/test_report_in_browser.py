@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from creepkit.reports.html import report_html
@@ -43,7 +45,7 @@ def test_it_opens_from_a_file_and_is_whole(browser, address, scripts) -> None:
     assert [url for url in asked if not url.startswith("data:")] == [address]
     assert said == []
     assert page.get_by_role("heading", level=1).inner_text().startswith("Creep of")
-    assert page.locator("figure.drawing svg").count() == 5
+    assert page.locator("figure.drawing svg:not(.part)").count() == 5
     for figure in page.locator("figure.drawing").get_by_role("img").all():
         box = figure.bounding_box()
         assert box is not None
@@ -107,6 +109,31 @@ def test_it_fits_its_window_and_is_drawn(browser, address, width, scheme, tmp_pa
     mean = sum(level * count for level, count in enumerate(levels)) / sum(levels)
     assert mean > 220 if scheme == "light" else mean < 60
     assert sum(count > 0 for count in levels) > 50  # letters, not a blank page
+    page.context.close()
+
+
+def test_panels_of_a_figure_are_stacked_where_the_window_is_narrow(browser, address) -> None:
+    """Each panel below the one before, with text of 9 pixels and more; a wide window shows the whole figure."""
+    page, _, _ = opened(browser, address, viewport={"width": 400, "height": 900})
+    found = page.evaluate(
+        """() => [...document.querySelectorAll('.drawing')].map((figure) => {
+            const place = (svg) => { const r = svg.getBoundingClientRect(); return [r.top, r.bottom, r.width]; };
+            const parts = [...figure.querySelectorAll('svg.part')];
+            const smallest = (whole, drawn) => Math.min(...[...whole.querySelectorAll('text')]
+                .map((text) => parseFloat(getComputedStyle(text).fontSize))) * drawn;
+            const whole = figure.querySelector('svg:not(.part)'), first = parts[0] ?? whole;
+            const drawn = first.getBoundingClientRect().width / first.viewBox.baseVal.width;
+            return { parts: parts.map(place), letters: smallest(whole, drawn), whole: place(whole)[2] };
+        })"""
+    )
+    divided = [one["parts"] for one in found if one["parts"]]
+    assert divided
+    for parts in divided:
+        assert all(after[0] >= before[1] - 0.5 for before, after in pairwise(parts))
+    assert all(one["letters"] > 8.9 for one in found)
+    assert all(one["whole"] <= 1.0 for one in found if one["parts"])
+    page.set_viewport_size({"width": 1280, "height": 900})
+    assert page.locator("svg.part:visible").count() == 0
     page.context.close()
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-from collections import OrderedDict
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +12,7 @@ from creepkit.app.contents import PageContents, PageLaw, specimen_name, temperat
 from creepkit.app.documents import compared_frames, finite, numbers, rate_point
 from creepkit.app.requests import PredictRequest, ProgramRequest, RequestError
 from creepkit.app.sections import section_document
+from creepkit.app.turns import Turns
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError, quoted
 from creepkit.inverse.composite_predictor import predict
@@ -43,14 +41,6 @@ RATE_STRESSES = 60
 """At which the creep rate is drawn."""
 
 
-MOST_CLIENTS = 64
-"""Pages whose latest request is remembered."""
-
-
-class Superseded(Exception):
-    """A newer request of the same page has come."""
-
-
 @dataclass
 class PageAnswers:
     """Answers requests of pages on the same contents; one quick and one exact answer are worked out at a time.
@@ -59,10 +49,7 @@ class PageAnswers:
     """
 
     contents: PageContents
-    _quick: threading.Lock = field(default_factory=threading.Lock, repr=False)
-    _exact: threading.Lock = field(default_factory=threading.Lock, repr=False)
-    _latest: OrderedDict[str, int] = field(default_factory=OrderedDict, repr=False)
-    _latest_lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+    turns: Turns = field(default_factory=Turns, repr=False)
     _reduced: dict[str, Predictor] = field(default_factory=dict, repr=False)
 
     def prepare(self) -> None:
@@ -96,10 +83,8 @@ class PageAnswers:
         for k in request.tests:
             if not k < len(self.contents.histories):
                 raise RequestError(f"test {k} is none of the page's {len(self.contents.histories)} tests")
-        self._note(request)
-        check = self._check_of(request)
-        with self._exact if request.exact else self._quick:
-            check()
+        turn = self.turns.announce(request.client, request.number)
+        with self.turns.taken(turn, request.exact):
             page_law = self.contents.laws[request.law]
             values = page_law.law.values(request.values)
             theta = page_law.law.to_internal(values)
@@ -113,26 +98,10 @@ class PageAnswers:
                 answer["warning"] = warning
             answer["tests"] = []
             for k in request.tests:
-                check()
+                self.turns.check(turn)
                 answer["tests"].append({"test": k, **self._test_or_problem(page_law, theta, k, request.exact)})
-            check()
+            self.turns.check(turn)
             return answer
-
-    # ---- the latest request wins -----------------------------------------------------------------------------------
-
-    def _note(self, request: PredictRequest) -> None:
-        with self._latest_lock:
-            self._latest[request.client] = max(request.number, self._latest.get(request.client, 0))
-            self._latest.move_to_end(request.client)
-            while len(self._latest) > MOST_CLIENTS:
-                self._latest.popitem(last=False)
-
-    def _check_of(self, request: PredictRequest) -> Callable[[], None]:
-        def check() -> None:
-            if self._latest.get(request.client, 0) > request.number:
-                raise Superseded
-
-        return check
 
     # ---- tests -----------------------------------------------------------------------------------------------------
 

@@ -17,10 +17,12 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from creepkit.app.answers import PageAnswers, Superseded
+from creepkit.app.answers import PageAnswers
+from creepkit.app.connections import BoundedReader, Connections
 from creepkit.app.contents import PageContents
 from creepkit.app.page import page_html
 from creepkit.app.requests import RequestError, read_request
+from creepkit.app.turns import Superseded
 from creepkit.errors import CreepkitError
 
 ADDRESS = "127.0.0.1"
@@ -36,20 +38,17 @@ DEADLINE = 20.0
 """s in which a whole request must arrive, however slowly its bytes drip."""
 
 
-MOST_CONNECTIONS = 32
-"""At one time; a page holds about six."""
-
-
 class PageServer(ThreadingHTTPServer):
     """Serves one page; `url` is where. port : 0 for any that is free."""
 
     daemon_threads = True
     allow_reuse_address = True
+    request_queue_size = 128
 
     def __init__(self, contents: PageContents, port: int = 0) -> None:
         self.token = secrets.token_urlsafe(24)
         self.answers = PageAnswers(contents)
-        self._connections = threading.BoundedSemaphore(MOST_CONNECTIONS)
+        self.connections = Connections()
         super().__init__((ADDRESS, port), PageHandler)
         self.nonce = secrets.token_urlsafe(16)
         self.page = page_html(contents, nonce=self.nonce, endpoint=f"/{self.token}/predict").encode("utf-8")
@@ -60,18 +59,22 @@ class PageServer(ThreadingHTTPServer):
         return f"http://{ADDRESS}:{self.server_address[1]}/{self.token}/"
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Answer in a thread, unless too many connections are open."""
-        if not self._connections.acquire(blocking=False):
+        """Answer in a thread, unless too many connections are busy."""
+        if not self.connections.enter():
             self.shutdown_request(request)
             return
-        super().process_request(request, client_address)
+        try:
+            super().process_request(request, client_address)
+        except BaseException:  # no further thread, say
+            self.connections.leave()
+            raise
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         """Answer one connection."""
         try:
             super().process_request_thread(request, client_address)
         finally:
-            self._connections.release()
+            self.connections.leave()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing: a browser may close a connection when it likes."""
@@ -86,15 +89,30 @@ class PageHandler(BaseHTTPRequestHandler):
     timeout = PATIENCE
     wbufsize = -1  # head and body leave together
     disable_nagle_algorithm = True
-    _late = False
+    _late = _trusted = False
     _deadline: threading.Timer
+
+    def setup(self) -> None:
+        """What is read is bounded."""
+        super().setup()
+        self._reader = BoundedReader(self.rfile)
+        self.rfile: Any = self._reader
+
+    def finish(self) -> None:
+        """Close both ways, also where nobody listens any more."""
+        try:
+            with suppress(OSError):
+                super().finish()
+        finally:
+            self._reader.close()
 
     def handle_one_request(self) -> None:
         """One request: its first byte within the patience for a silent connection, all of it before a deadline."""
-        reading: Any = self.rfile
+        self.server.connections.waits(self.connection, self._trusted)
         try:
-            reading.peek(1)
+            self._reader.begin()
         except OSError:
+            self._end_waiting()
             self.close_connection = True
             return
         self._deadline = threading.Timer(DEADLINE, self._end_reading)
@@ -103,8 +121,14 @@ class PageHandler(BaseHTTPRequestHandler):
         try:
             super().handle_one_request()
         finally:
-            self._deadline.cancel()
+            self._end_waiting()
             self.close_connection |= self._late
+
+    def _end_waiting(self) -> None:
+        """The request has arrived, or will not."""
+        self.server.connections.is_busy(self.connection)
+        if deadline := self.__dict__.get("_deadline"):
+            deadline.cancel()
 
     def _end_reading(self) -> None:
         """What waits for further bytes of a late request finds its end."""
@@ -116,6 +140,7 @@ class PageHandler(BaseHTTPRequestHandler):
         """The page."""
         if not self._allowed():
             return
+        self._end_waiting()
         if self.path == f"/{self.server.token}/":
             self._send(HTTPStatus.OK, self.server.page, "text/html; charset=utf-8")
         else:
@@ -171,6 +196,7 @@ class PageHandler(BaseHTTPRequestHandler):
         elif not self._token_is_right():
             self._refuse(HTTPStatus.FORBIDDEN, "the token of this address is wrong; use the one that was printed")
         else:
+            self._trusted = True
             return True
         return False
 
@@ -193,8 +219,8 @@ class PageHandler(BaseHTTPRequestHandler):
         elif len(length) > 9 or int(length) > LARGEST_BODY:
             self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"a request has at most {LARGEST_BODY} bytes")
         else:
-            body = self.rfile.read(int(length))
-            self._deadline.cancel()  # the answer may take longer
+            body = self._reader.read(int(length))
+            self._end_waiting()  # the answer may take longer
             return body
         return None
 

@@ -4,15 +4,19 @@ import json
 import math
 import socket
 import threading
+import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.app.answers import PageAnswers, Superseded
+from creepkit.app.answers import PageAnswers
+from creepkit.app.connections import LARGEST_HEAD, MOST_CONNECTIONS
 from creepkit.app.contents import page_contents
 from creepkit.app.requests import read_request
 from creepkit.app.server import LARGEST_BODY
+from creepkit.app.turns import Superseded
 from helpers.http_requests import ask, question, request, send, serving
 from helpers.planted_bars import bars
 
@@ -245,14 +249,62 @@ def test_a_question_that_waits_is_dropped_when_a_newer_one_comes():
         except Superseded:
             given["old"] = "superseded"
 
-    with answers._exact:  # as while an exact answer is worked out
+    other = answers.turns.announce("fedcba98", 1)
+    with answers.turns.taken(other, True):  # as while an exact answer of another page is worked out
         thread = threading.Thread(target=waiting)
         thread.start()
-        while "0123456789abcdef" not in answers._latest:
-            pass
+        while "0123456789abcdef" not in answers.turns._latest:
+            time.sleep(0.001)
         answers.answer(read_request(json.dumps(question(number=2)).encode()))
     thread.join()
     assert given == {"old": "superseded"}
+
+
+def test_a_newer_exact_answer_does_not_wait_for_one_that_runs(monkeypatch):
+    """A simulation of a slider's last place is under way when it is let go at a new one."""
+    answers, given = PageAnswers(page_contents("norton")), {}
+    begun, go_on, work = threading.Event(), threading.Event(), PageAnswers._program_document
+
+    def slow(self, page_law, values, theta, request):
+        if request.number == 1:
+            begun.set()
+            assert go_on.wait(60)
+        return work(self, page_law, values, theta, request)
+
+    def asked(number):
+        try:
+            request = read_request(json.dumps(question(number=number, exact=True)).encode())
+            given[number] = answers.answer(request)["number"]
+        except Superseded:
+            given[number] = "superseded"
+
+    monkeypatch.setattr(PageAnswers, "_program_document", slow)
+    first = threading.Thread(target=asked, args=(1,))
+    first.start()
+    assert begun.wait(60)
+    asked(2)
+    assert given == {2: 2}  # while the first still runs
+    go_on.set()
+    first.join()
+    assert given == {2: 2, 1: "superseded"}
+
+
+def test_answers_that_are_wanted_are_worked_out_one_at_a_time():
+    turns, order = PageAnswers(page_contents("norton")).turns, []
+
+    def second():
+        with turns.taken(turns.announce("b", 1), True):
+            order.append("second")
+
+    with turns.taken(turns.announce("a", 1), True):
+        thread = threading.Thread(target=second)
+        thread.start()
+        with turns.taken(turns.announce("c", 1), False):  # a quick one does not wait
+            order.append("quick")
+        time.sleep(0.02)
+        order.append("first")
+    thread.join()
+    assert order == ["quick", "first", "second"]
 
 
 def test_a_bulge_test_by_the_reduced_order_model_and_by_finite_elements():
@@ -323,3 +375,58 @@ def test_an_answer_warns_of_a_law_without_temperature_over_several_temperatures(
     with serving(page_contents("norton", tests)) as one:
         assert "does not depend on temperature" in ask(one, tests=[0, 1]).data["warning"]
         assert "warning" not in ask(one, tests=[0]).data
+
+
+def test_connections_that_ask_for_nothing_give_their_places(capfd):
+    """200 of them, silent or begun, neither keep the page from anybody nor make a thread each."""
+    with serving(page_contents("norton")) as one:
+        before, idle = threading.active_count(), []
+        try:
+            for k in range(200):
+                connection = socket.create_connection(one.server_address[:2], timeout=30)
+                idle.append(connection)
+                if k % 3:
+                    connection.sendall(b"GET / HTTP/1.1\r\nX: " if k % 3 == 1 else b"P")
+                if k % 50 == 49:
+                    assert ask(one, number=k).status == 200
+            assert request(one, "GET", f"/{one.token}/").status == 200
+            assert threading.active_count() - before <= 2 * MOST_CONNECTIONS + 2
+        finally:
+            for connection in idle:
+                connection.close()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_page_that_waits_keeps_its_connection_before_strangers():
+    with serving(page_contents("norton")) as one, socket.create_connection(one.server_address[:2], timeout=30) as page:
+        head = f"GET /{one.token}/ HTTP/1.1\r\nHost: 127.0.0.1:{one.server_address[1]}\r\n\r\n".encode()
+
+        def asked():
+            page.sendall(head)
+            received = b""
+            while len(received) < len(one.page):
+                received += page.recv(1 << 16)
+            return received.startswith(b"HTTP/1.1 200")
+
+        assert asked()
+        strangers = [socket.create_connection(one.server_address[:2], timeout=30) for _ in range(2 * MOST_CONNECTIONS)]
+        assert asked()
+        for stranger in strangers:
+            stranger.close()
+
+
+def test_what_no_browser_sends_is_ended_without_a_word_to_the_terminal(server, capfd):
+    """HTTP/0.9, garbage after a request, heads without end."""
+    host = f"Host: 127.0.0.1:{server.server_address[1]}\r\n".encode()
+    page = f"GET /{server.token}/".encode()
+    assert send(server, page + b"\r\n" + host + b"\r\n").status in (0, 400, 403)
+    both = send(server, page + b" HTTP/1.1\r\n" + host + b"\r\n" + b"\x00\xff garbage \r\n\r\n" * 50)
+    assert both.status == 200
+    assert both.body.count(b"HTTP/1.1 400") <= 1
+    for header in (b"X-%d: " + b"x" * 5000 + b"\r\n", b"X-%d: " + b"x" * 70000 + b"\r\n"):
+        head = b"".join(header % k for k in range(80))
+        assert len(head) > LARGEST_HEAD
+        with suppress(ConnectionError):  # it may be ended while it still sends
+            assert send(server, page + b" HTTP/1.1\r\n" + host + head + b"\r\n").status in (0, 431)
+    assert ask(server, number=6).status == 200
+    assert capfd.readouterr() == ("", "")

@@ -3,13 +3,15 @@
 (function (page) {
   const { element, svg } = page;
   const MARGIN = { left: 66, right: 14, top: 10, bottom: 44 };
-  const HEIGHT = globalThis.innerWidth < 900 ? 220 : 270;
+  const SMALLEST = { width: 200, height: 110 }, USUAL = { width: 520, height: 220 }; // of a drawing
+  const LETTER = 7; // pixels of one in a label
 
-  // options: title, x and y {label, logarithmic, choice}, whole: whether all of a logarithmic axis is shown
+  // options: title, x and y {label, short, logarithmic, choice}, whole: whether all of a logarithmic axis is shown;
+  // short : the label of an axis that has no place for more
   page.chart = function (options) {
-    const drawing = svg("svg", { role: "img", height: HEIGHT, class: "chart" });
+    const drawing = svg("svg", { role: "img", class: "chart" });
     const readout = element("output", { class: "readout" });
-    const heading = element("h3", {}, options.title);
+    const heading = element("h3", {}, element("span", { class: "name" }, options.title));
     const switches = element("span", { class: "switches" });
     const panel = element("figure", { class: "panel" }, element("figcaption", {}, heading, switches), drawing, readout);
     const axes = { x: { ...options.x }, y: { ...options.y } };
@@ -68,13 +70,15 @@
     const still = svg("g"), inside = svg("svg", { overflow: "hidden" }), fixed = svg("g"), moving = svg("g");
     inside.append(fixed, moving);
     drawing.append(still, inside);
-    let stillKey = "", width = 0;
+    let stillKey = "", width = 0, height = 0;
 
     // Asked for when the panel changes, not for each curve: every question makes the browser lay out the page anew.
     function measure() {
-      const before = width;
-      width = Math.max(260, panel.clientWidth - 20 || 520);
-      return width !== before;
+      const before = [width, height], frame = drawing.getBoundingClientRect();
+      // one that is not shown keeps its size
+      width = Math.max(SMALLEST.width, Math.round(frame.width) || width || USUAL.width);
+      height = Math.max(SMALLEST.height, Math.round(frame.height) || height || USUAL.height);
+      return width !== before[0] || height !== before[1];
     }
 
     function draw(content) {
@@ -83,7 +87,7 @@
       const { series } = content;
       const x = page.scale(...rangeOf("x", series), axes.x.logarithmic);
       const y = page.scale(...rangeOf("y", series), axes.y.logarithmic);
-      const inner = { width: width - MARGIN.left - MARGIN.right, height: HEIGHT - MARGIN.top - MARGIN.bottom };
+      const inner = { width: width - MARGIN.left - MARGIN.right, height: height - MARGIN.top - MARGIN.bottom };
       scales = { x, y, inner };
       const places = (one) => {
         const found = [];
@@ -96,7 +100,7 @@
         return found;
       };
       const points = series.filter((one) => one.kind === "points");
-      const key = [width, x.low, x.high, x.logarithmic, y.low, y.high, y.logarithmic, content.xLabel, ...points.map((one) => one.name)].join(" ");
+      const key = [width, height, x.low, x.high, x.logarithmic, y.low, y.high, y.logarithmic, content.xLabel, ...points.map((one) => one.name)].join(" ");
       if (key !== stillKey) {
         stillKey = key;
         drawAxes(x, y, inner, width, content.xLabel ?? axes.x.label);
@@ -111,19 +115,18 @@
       for (const value of page.ticks(x.low, x.high, x.logarithmic, inner.width / 85)) {
         const at = (MARGIN.left + inner.width * x.share(value)).toFixed(1);
         parts.push(svg("line", { class: "grid", x1: at, x2: at, y1: MARGIN.top, y2: MARGIN.top + inner.height }));
-        parts.push(svg("text", { class: "tick", x: at, y: HEIGHT - MARGIN.bottom + 17, "text-anchor": "middle" }, page.format(value, 3)));
+        parts.push(svg("text", { class: "tick", x: at, y: height - MARGIN.bottom + 17, "text-anchor": "middle" }, page.format(value, 3)));
       }
-      for (const value of page.ticks(y.low, y.high, y.logarithmic, 5)) {
+      for (const value of page.ticks(y.low, y.high, y.logarithmic, Math.min(5, inner.height / 30))) {
         const at = (MARGIN.top + inner.height * (1 - y.share(value))).toFixed(1);
         parts.push(svg("line", { class: "grid", x1: MARGIN.left, x2: width - MARGIN.right, y1: at, y2: at }));
         parts.push(svg("text", { class: "tick", x: MARGIN.left - 7, y: Number(at) + 4, "text-anchor": "end" }, page.format(value, 3)));
       }
-      parts.push(svg("text", { class: "axis", x: MARGIN.left + inner.width / 2, y: HEIGHT - 8, "text-anchor": "middle" }, label));
-      parts.push(svg("text", { class: "axis", transform: `translate(14 ${MARGIN.top + inner.height / 2}) rotate(-90)`, "text-anchor": "middle" }, axes.y.label));
+      parts.push(svg("text", { class: "axis", x: MARGIN.left + inner.width / 2, y: height - 8, "text-anchor": "middle" }, label));
+      parts.push(svg("text", { class: "axis", transform: `translate(14 ${MARGIN.top + inner.height / 2}) rotate(-90)`, "text-anchor": "middle" }, axes.y.label.length * LETTER > inner.height + MARGIN.top ? axes.y.short ?? axes.y.label : axes.y.label));
       still.replaceChildren(...parts);
       for (const [name, value] of Object.entries({ x: MARGIN.left, y: MARGIN.top, ...inner })) inside.setAttribute(name, value);
-      drawing.setAttribute("width", width);
-      drawing.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
+      drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
     }
 
     function line(one, places) {

@@ -27,8 +27,9 @@
 
     function window_(from, to) {
       scale = page.scale(from, to, options.log);
-      low.textContent = page.format(from / factor, 3);
-      high.textContent = page.format(to / factor, 3);
+      const digits = page.digitsBetween(from, to);
+      low.textContent = page.format(from / factor, digits);
+      high.textContent = page.format(to / factor, digits);
       show();
     }
 

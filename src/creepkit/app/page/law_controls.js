@@ -51,9 +51,9 @@
       known.replaceChildren(...law.undetermined.map((sentence) => element("p", {}, sentence[0].toUpperCase() + sentence.slice(1) + ".")));
       law.parameters.forEach((p, k) => {
         if (p.interval === null) return;
-        const [low, high] = p.interval;
+        const [low, high] = p.interval, digits = low === null || high === null ? 3 : page.digitsBetween(low, high);
         sliders[k].mark({ optimum: p.value, interval: low === null || high === null ? undefined : p.interval });
-        sliders[k].row.append(element("div", { class: "estimate" }, `${page.format(p.value)}, 95 % from ${page.format(low, 3)} to ${page.format(high, 3)}` + (p.verdict === "determined" ? "" : `: ${p.verdict}`)));
+        sliders[k].row.append(element("div", { class: "estimate" }, `${page.format(p.value, digits + 1)}, 95 % from ${page.format(low, digits)} to ${page.format(high, digits)}` + (p.verdict === "determined" ? "" : `: ${p.verdict}`)));
       });
       const shown = law.parameters.length > 1 ? law.directions.slice(0, MOST_DIRECTIONS) : [];
       shifts = shown.map(() => 0);

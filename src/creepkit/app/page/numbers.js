@@ -18,6 +18,12 @@
     return head === "1" ? power : `${head}\u00b7${power}`;
   };
 
+  // Digits by which two numbers and those between them are told apart, at least three.
+  page.digitsBetween = function (low, high) {
+    const size = Math.max(Math.abs(low), Math.abs(high)), apart = Math.abs(high - low);
+    return apart > 0 && Number.isFinite(size / apart) ? Math.min(Math.max(3, Math.ceil(Math.log10(size / apart)) + 2), 12) : 3;
+  };
+
   // A number to be typed and copied: 1.23e-16.
   page.plain = function (value, digits = 6) {
     if (value === 0) return "0";

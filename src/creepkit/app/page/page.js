@@ -21,6 +21,7 @@
     const problem = element("p", { class: "problem", role: "alert", hidden: true });
     const warning = element("p", { class: "warning", role: "note", hidden: true });
     const panels = element("div", { class: "panels" });
+    const chosen = element("select", { "aria-label": "plot that is shown", onchange: offerPanels });
     let inputAt = null, charts = new Map(), rates = null, section = null, last = null, timer = null, before = null, settled = true;
 
     const engine = data.endpoint ? page.serverEngine(data, draw, complain) : page.ownEngine(data, draw, complain);
@@ -104,13 +105,23 @@
       const outputs = new Map(data.specimens.filter((one) => names.has(one.name)).flatMap((one) => one.outputs.map((output) => [output.name, output])));
       // the title names it in full
       const label = (output) => (output.title.length > LONGEST_LABEL ? output.unit : output.unit ? `${output.title}, ${output.unit}` : output.title);
-      charts = new Map([...outputs].map(([name, output]) => [name, page.chart({ title: capital(output.title), x: { label: "time", logarithmic: false, choice: true }, y: { label: label(output), logarithmic: false, choice: true } })]));
+      charts = new Map([...outputs].map(([name, output]) => [name, page.chart({ title: capital(output.title), x: { label: "time", logarithmic: false, choice: true }, y: { label: label(output), short: output.unit || output.title, logarithmic: false, choice: true } })]));
       const point = data.laws[state.law].rate_point;
-      rates = page.chart({ title: "Creep rate against stress", whole: true, x: { label: "stress, MPa", logarithmic: true }, y: { label: "creep rate, 1/s", logarithmic: true } });
-      rates.heading.append(element("span", { class: "help" }, ` at a strain of ${page.format(point.strain, 2)} and ${page.duration(point.time)}`));
+      rates = page.chart({ title: "Creep rate against stress", whole: true, x: { label: "stress, MPa", logarithmic: true }, y: { label: "creep rate, 1/s", short: "1/s", logarithmic: true } });
+      rates.heading.append(element("span", { class: "help" }, ` at strain ${page.format(point.strain, 2)}, ${page.duration(point.time)}`));
       section = page.section();
       section.panel.hidden = true;
-      panels.replaceChildren(...[...charts.values()].map((chart) => chart.panel), section.panel, rates.panel);
+      panels.replaceChildren(element("span", { class: "chooser" }, chosen), ...[...charts.values()].map((chart) => chart.panel), section.panel, rates.panel);
+      offerPanels();
+    }
+
+    // A narrow screen has room for one panel beside the controls: which, is chosen.
+    function offerPanels() {
+      const all = [...panels.querySelectorAll(".panel:not([hidden])")], titles = all.map((panel) => panel.querySelector(".name").textContent);
+      const kept = Math.max(0, titles.indexOf(chosen.options[chosen.selectedIndex]?.textContent));
+      chosen.replaceChildren(...titles.map((title, k) => element("option", { value: k }, title)));
+      chosen.selectedIndex = kept;
+      all.forEach((panel, k) => panel.classList.toggle("chosen", k === kept));
     }
 
     function draw(answer) {
@@ -138,7 +149,10 @@
       warning.hidden = warning.textContent === "";
       drawRates(answer.rate);
       if (answer.program?.section) {
-        section.panel.hidden = false;
+        if (section.panel.hidden) {
+          section.panel.hidden = false;
+          offerPanels();
+        }
         const drawn = answer.program.section;
         section.draw({ at: (k) => drawn.displacements[k], ...drawn });
       }

@@ -17,7 +17,7 @@
     const moment = element("input", { type: "range", min: 0, max: 7, step: 1, value: 7, "aria-label": "time of the section" });
     const words = element("output", { class: "readout" });
     const legend = element("div", { class: "legend" });
-    const panel = element("figure", { class: "panel" }, element("figcaption", {}, element("h3", {}, "Deformed section")), drawing, legend, element("label", { class: "row" }, "time ", moment, words));
+    const panel = element("figure", { class: "panel" }, element("figcaption", {}, element("h3", {}, element("span", { class: "name" }, "Deformed section"))), drawing, legend, element("label", { class: "row" }, "time ", moment, words));
     let shown = null, colours = null, width = 0;
 
     // Sides that belong to one element alone, but for the axis; those of one mesh are found once.
@@ -45,7 +45,7 @@
       // a reduced-order model says nothing of stresses: the colours stay as they were
       if (data.stress !== null) colours = data.stress;
       const moves = data.at(k), stress = colours?.[k]?.length === data.elements.length ? colours[k] : data.elements.map(() => 0);
-      if (width === 0) width = Math.max(260, panel.clientWidth - 20 || 520);
+      if (width === 0) width = Math.max(200, panel.clientWidth - 20);
       let reach = 0, top = -Infinity, bottom = Infinity;
       for (let n = 0; n < data.nodes.length / 2; n++) {
         reach = Math.max(reach, data.nodes[2 * n] + Math.max(0, moves[2 * n]));
@@ -72,8 +72,6 @@
         return piece;
       });
       drawing.replaceChildren(...filled, ...lines);
-      drawing.setAttribute("width", width);
-      drawing.setAttribute("height", height.toFixed(0));
       drawing.setAttribute("viewBox", `0 0 ${width} ${height.toFixed(0)}`);
       drawing.setAttribute("aria-label", `Deformed section at ${page.duration(data.times[k])}` + (data.stress === null ? "" : `, von Mises stress ${page.format(low, 3)} to ${page.format(high, 3)} MPa`));
       legend.classList.toggle("waiting", data.stress === null && colours !== null);

@@ -1,6 +1,7 @@
 """Figures as SVG within a page: thinned, with text as text, with identifiers of their own, always the same bytes.
 
-The ground of a figure is transparent; its colours are those of a figure on white.
+A figure of several panels is followed by one picture of each, cut out of the whole, for narrow screens. The ground of a
+figure is transparent; its colours are those of a figure on white.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from xml.etree import ElementTree
 from creepkit.reports.figures import POWER_OF_TEN, save_figure
 from creepkit.reports.html.compact_svg import compact
 from creepkit.reports.html.elements import printable
+from creepkit.reports.html.panels import Place, stacked_panels
 from creepkit.reports.html.thinning import thin_figure
 
 if TYPE_CHECKING:
@@ -21,6 +23,10 @@ if TYPE_CHECKING:
 
 LONGEST_LABEL = 160
 """Characters of one line of text in a figure."""
+
+
+LEGIBLE = 9.0
+"""Pixels of 1/96 inch: the smallest text to which a narrow screen shrinks a figure."""
 
 
 _SETTINGS: dict[Any, Any] = {
@@ -33,7 +39,7 @@ _FONTS = "system-ui, 'DejaVu Sans', Verdana, sans-serif"
 
 
 def svg_text(figure: Figure, identifier: str, title: str, description: str) -> str:
-    """A figure as an <svg> element, with its title and description for those who do not see it.
+    """A figure as an <svg> element, with its title and description for those who do not see it, and its panels.
 
     identifier : letters and digits, of its own in the page: all identifiers of the figure begin with it.
     """
@@ -52,6 +58,8 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
         if engine is not None:
             engine.execute(figure)  # axes have their places and ranges from here on
             figure.set_layout_engine("none")
+        letters = _smallest_text(figure)
+        panels = stacked_panels(figure)
         thin_figure(figure)
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(buffer, metadata={"Date": None})
@@ -59,6 +67,10 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
     width = float(str(root.get("viewBox")).split()[2])
     compact(root, identifier)
     view_box = str(root.get("viewBox"))
+    if len(panels) > 1:
+        whole = ElementTree.Element("g", {"id": f"{identifier}-w"})
+        whole.extend(list(root))
+        root[:] = [whole]
     root.attrib.clear()
     root.attrib.update(
         {
@@ -66,14 +78,52 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
             "role": "img",
             "aria-labelledby": f"{identifier}-t {identifier}-d",
             "font-family": _FONTS,
-            "style": f"--natural-width:{4 * width / 3:.0f}px;max-width:{4 * width / 3:.0f}px",
+            "style": _widths(width, letters),
         }
     )
+    if len(panels) > 1:
+        root.set("class", "whole")
     for position, (tag, text) in enumerate((("title", title), ("desc", description))):
         element = ElementTree.Element(tag, {"id": f"{identifier}-{tag[0]}"})
         element.text = printable(text)
         root.insert(position, element)
-    return ElementTree.tostring(root, encoding="unicode")
+    parts = [_part(place, identifier, letters) for place in panels] if len(panels) > 1 else []
+    return "".join(ElementTree.tostring(one, encoding="unicode") for one in (root, *parts))
+
+
+def _widths(points: float, letters: float) -> str:
+    """The width that a part of a figure was drawn for, and the least at which it can be read, pixels of 1/96 inch.
+
+    points : its width, letters : its smallest text, both in points of 1/72 inch.
+    """
+    natural = 4.0 * points / 3.0
+    legible = natural * min(1.0, LEGIBLE / (4.0 * letters / 3.0))
+    return f"--legible-width:{legible:.0f}px;max-width:{natural:.0f}px"
+
+
+def _smallest_text(figure: Figure) -> float:
+    """Points of 1/72 inch."""
+    from matplotlib.text import Text
+
+    sizes = [float(text.get_fontsize()) for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
+    return min(sizes, default=10.0)
+
+
+def _part(place: Place, identifier: str, letters: float) -> ElementTree.Element:
+    """A panel cut out of the whole figure, which has the words for those who do not see it."""
+    width, height = place.right - place.left, place.bottom - place.top
+    part = ElementTree.Element(
+        "svg",
+        {
+            "viewBox": f"{place.left:.1f} {place.top:.1f} {width:.1f} {height:.1f}",
+            "class": "part",
+            "aria-hidden": "true",
+            "font-family": _FONTS,
+            "style": _widths(width, letters),
+        },
+    )
+    ElementTree.SubElement(part, "use", {"href": f"#{identifier}-w"})
+    return part
 
 
 def _shorten_texts(figure: Figure) -> None:
