@@ -17,7 +17,7 @@ from creepkit.studies.camera_proposal import CameraProposal, proposed_cameras, t
 from creepkit.studies.folders import folders_with_tests
 from creepkit.studies.study_file import parse_study
 from creepkit.studies.tertiary_creep import shows_tertiary_creep
-from creepkit.studies.toml_text import comment, one_line, quoted, quoted_list, study_part
+from creepkit.studies.toml_text import CITATION_LINE, comment, one_line, quoted, quoted_list, study_part
 
 SECONDARY_LAWS = ("norton", "strain-hardening", "time-hardening")
 SEVERAL_STRESSES_LAW = "hyperbolic-sine"
@@ -253,6 +253,7 @@ def _data_part(files: Sequence[str], reader: str | None, summary: DataSummary, p
             f"# only = {{ temperature_C = [{summary.temperatures[0] - ZERO_CELSIUS:.0f}] }}  # these tests alone"
         )
     lines.append('suspect_frames = "exclude"  # frames that unload, fall or lie apart; or "keep"')
+    lines.append(CITATION_LINE)
     return [*lines, *(comment(f"not read: {line}") for line in problems[:MOST_REMARKS])]
 
 

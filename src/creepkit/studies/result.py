@@ -183,6 +183,7 @@ def contents_of(result: StudyResult) -> ReportContents:
         ),
         attachments=attached,
         notes=notes,
+        data_citations=tuple(file.model.data.citation),
     )
 
 

@@ -7,6 +7,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 
+CITATION_LINE = '# citation = "authors (year), title, doi"  # of published data: the methods text cites it'
+"""In the table [data]."""
+
+
 def quoted(text: str) -> str:
     """A text as TOML holds it."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -19,12 +19,20 @@ def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> st
     """Paragraphs on identification, ranking and the other stages, then the references."""
     references = References()
     paragraphs = [
+        _source_of_data(contents, references),
         *identification_methods(contents, found, references),
         *_stages(contents, references),
         _software(contents, found),
     ]
     numbered = [f"[{k}] {citation}" for k, citation in enumerate(references.listed, start=1)]
     return "\n\n".join([*(" ".join(p) for p in paragraphs if p), "\n".join(numbered)]).strip() + "\n"
+
+
+def _source_of_data(contents: ReportContents, references: References) -> list[str]:
+    """Where the data were published, if the study says so."""
+    if not contents.data_citations:
+        return []
+    return [f"The measured data are those of{references.cite(*contents.data_citations)}."]
 
 
 def _stages(contents: ReportContents, references: References) -> list[list[str]]:
