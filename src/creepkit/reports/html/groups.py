@@ -25,6 +25,7 @@ from creepkit.reports.html.elements import (
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings
+from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import correlation_table, titled_law
 from creepkit.reports.html.methods_identification import rate_scatter_sentence
 from creepkit.reports.identification_plot import identification_figure
@@ -191,6 +192,7 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
     ranking = found.ranking
     if ranking is None:
         return []
+    names = LawNames.of([found])
     rows = [
         (
             titled_law(one.fit.law),
@@ -207,12 +209,12 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
         *("law", "parameters", *misfit_columns(ranking.best), f"{criterion} − best", "weight", "explains the tests"),
     )
     blocks: list[Block] = [Table("Laws tried, the best first", columns, rows, numeric=(1, 2, 3, 4, 5))]
-    separation = _separation(ranking)
+    separation = [names.in_text(text) for text in _separation(ranking)]
     blocks += [Paragraph(text) for text in separation]
     if ranking.challenges:
         blocks += [
             Paragraph("What the tests allow beside the best law:"),
-            Items([sentence(str(challenge)) for challenge in ranking.challenges]),
+            Items([sentence(names.in_text(str(challenge))) for challenge in ranking.challenges]),
         ]
     if ranking.failed:
         blocks.append(Items([sentence(f"the law {name}: {reason}") for name, reason in ranking.failed.items()]))
@@ -224,7 +226,7 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
                 f"Mean square deviation over noise of {plural(len(ranking.laws), 'law')} in "
                 f"{plural(len(ranking.best.tests), 'test')}, the weights of the laws, and the curves of the credible "
                 f"ones. {' '.join(separation)} Weights: "
-                + ", ".join(f"{printable(r.fit.law.name, 60)} {r.weight:.3f}" for r in ranking.laws)
+                + ", ".join(f"{title_in_sentence(r.fit.law)} {r.weight:.3f}" for r in ranking.laws)
                 + ".",
                 "Where the laws differ: mean square misfit of each law in each test over the noise of a frame, without "
                 "the tests' own factors on the rate, and weights.",

@@ -13,6 +13,7 @@ from creepkit.records import output_unit
 from creepkit.reports.html.citations import References, listed
 from creepkit.reports.html.compared_values import compared_values, frame_counts
 from creepkit.reports.html.elements import number, plural, printable
+from creepkit.reports.html.law_names import title_in_sentence
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -104,13 +105,9 @@ def _loading(found: GroupFindings) -> list[str]:
     return sentences
 
 
-def _fits(found: GroupFindings) -> list[Identification]:
-    return [found.fit] if found.ranking is None else [one.fit for one in found.ranking.laws]
-
-
 def _laws(found: Sequence[GroupFindings], references: References) -> list[str]:
     """The laws by their titles and formulas, with what they cite."""
-    laws = {one.law.name: one.law for group in found for one in _fits(group)}
+    laws = {one.law.name: one.law for group in found for one in group.fits}
     named = [f"{_formula(law)}{references.cite(*law.references)}" for law in laws.values()]
     if len(named) == 1:
         return [f"The law was the {named[0]}."]
@@ -125,7 +122,7 @@ def _formula(law: CreepLaw) -> str:
     equation = f"ε̇ = {rate}{states}".replace("**", "^")
     for word, letter in (("stress", "σ"), ("strain", "ε"), ("time", "t"), ("temperature", "T")):
         equation = equation.replace(word, letter)
-    return f"{printable(law.title or law.name, 160)}, {printable(equation, 400)}"
+    return f"{title_in_sentence(law)}, {printable(equation, 400)}"
 
 
 # ---- estimation ------------------------------------------------------------------------------------------------------
@@ -178,15 +175,15 @@ def _search(fit: Identification, contents: ReportContents, references: Reference
 
 def _bounds(found: GroupFindings) -> str:
     """Between which values each law's parameters were sought."""
-    laws = {one.law.name: one.law for one in _fits(found)}
+    laws = {one.law.name: one.law for one in found.fits}
     parts = []
     for law in laws.values():
         ranges = [
             f"{name} {number(p.bounds[0], 3)} to {number(p.bounds[1], 3)}{'' if p.unit == '1' else f' {p.unit}'}"
             for name, p in law.table.items()
-            if name in {e.name for one in _fits(found) if one.law.name == law.name for e in one.estimates}
+            if name in {e.name for one in found.fits if one.law.name == law.name for e in one.estimates}
         ]
-        named = f"of the {printable(law.title or law.name, 160)} " if len(laws) > 1 else ""
+        named = f"of the {title_in_sentence(law)} " if len(laws) > 1 else ""
         parts.append(f"{named}{listed(ranges)}")
     return f"The bounds of the search were {'; '.join(parts)}."
 
@@ -280,7 +277,7 @@ def _explicit_nuisances(fit: Identification) -> str:
 
 def _penalty(found: GroupFindings) -> str:
     """The penalty on terms of a sum, where one was used."""
-    sparse = next((one.sparsity for one in _fits(found) if one.sparsity is not None), None)
+    sparse = next((one.sparsity for one in found.fits if one.sparsity is not None), None)
     if sparse is None:
         return ""
     strength = "" if sparse.strength is None else f" of strength {number(sparse.strength, 3)}"

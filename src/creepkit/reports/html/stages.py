@@ -30,6 +30,7 @@ from creepkit.reports.html.elements import (
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import findings_of
+from creepkit.reports.html.law_names import LawNames
 from creepkit.reports.html.law_tables import LAW_REJECTED
 from creepkit.reports.html.test_details import NOT_STATED, table_of_details
 from creepkit.reports.instrument_records import alignment_text, imposed_text
@@ -144,7 +145,7 @@ def _selections(contents: ReportContents) -> Iterator[str]:
         yield f"{printable(group.name, 80)}: {text}" if len(contents.groups) > 1 else text
 
 
-def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[PageSection]:
+def stage_sections(contents: ReportContents, figures: PageFigures, names: LawNames) -> Iterator[PageSection]:
     """Extraction, records, temperature, rupture, forecasts and further tests, where there are such results.
 
     Strengths stand among the findings where no law was identified, and are not repeated.
@@ -155,8 +156,8 @@ def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[P
         ("imposed", "Loads and temperatures from instrument records", contents.imposed, _imposed_blocks),
         ("temperature", "Trends with temperature", contents.temperature, _temperature_blocks),
         ("rupture", "Rupture", contents.rupture, partial(_rupture_blocks, strengths=identified)),
-        ("forecasts", "Forecasts", contents.forecasts, _forecast_blocks),
-        ("design", "Further tests proposed", contents.design, _design_blocks),
+        ("forecasts", "Forecasts", contents.forecasts, partial(_forecast_blocks, names=names)),
+        ("design", "Further tests proposed", contents.design, partial(_design_blocks, names=names)),
     )
     for identifier, title, results, blocks_of in stages:
         if len(results) == 1:
@@ -277,8 +278,8 @@ def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigur
     return [*(strength_blocks(assessment) if strengths else []), picture, text]
 
 
-def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> list[Block]:
-    laws = ", ".join(f"{law} ({weight:.2g})" for law, weight in forecast.laws.items())
+def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures, *, names: LawNames) -> list[Block]:
+    laws = ", ".join(f"{names.in_text(law)} ({weight:.2g})" for law, weight in forecast.laws.items())
     blocks: list[Block] = [
         Paragraph(
             f"By {laws}: if the law is right, bands and intervals hold a measured value of a single test with a "
@@ -307,7 +308,7 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> lis
     for test in forecast.tests:
         for note in test.notes:
             remarks.setdefault(note, []).append(printable(test.name, 80))
-    listed = [sentence(f"{note} ({', '.join(tests)})") for note, tests in remarks.items()]
+    listed = [sentence(f"{names.in_text(note)} ({', '.join(tests)})") for note, tests in remarks.items()]
     return [*blocks, Items(listed)] if listed else blocks
 
 
@@ -328,8 +329,9 @@ def _forecast_cells(forecast: Forecast) -> list[tuple[str, ...]]:
     return rows
 
 
-def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Block]:
-    blocks: list[Block] = [Paragraph(sentence(design.sentence), "lead")]
+def _design_blocks(name: str, design: Design, figures: PageFigures, *, names: LawNames) -> list[Block]:
+    verdict = sentence(names.in_text(design.sentence))
+    blocks: list[Block] = [Paragraph(verdict, "lead")]
     if design.tests:
         to_decide = design.goal == "law"
         rows = [
@@ -354,10 +356,10 @@ def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Bloc
                 lambda: design_figure(design),
                 f"What further tests tell{_of(name)}",
                 "Map of the expected information for an hour of machine time over first load and duration, left of "
-                f"constant loads, right of loads that change. {sentence(design.sentence)}",
+                f"constant loads, right of loads that change. {verdict}",
                 "Expected information for an hour of machine time over first load and duration; the plan is marked.",
             )
         )
     lines = [line.strip() for line in direction_lines(design) if line.strip()]
     remarks = [*lines[1:], *(design.notes if design.tests else ())]
-    return [*blocks, Items([sentence(text) for text in remarks])] if remarks else blocks
+    return [*blocks, Items([sentence(names.in_text(text)) for text in remarks])] if remarks else blocks
