@@ -19,7 +19,7 @@ from creepkit.errors import ReportError
 from creepkit.reports.attachments import read_attachments
 from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
 from creepkit.reports.html import report_html
-from creepkit.reports.html.elements import sentence
+from creepkit.reports.html.elements import sentence, with_interval
 from helpers.planted_rupture import larson_miller, planted
 from helpers.report_pages import HOSTILE, contents, ranking
 
@@ -82,6 +82,22 @@ def test_sentences_have_powers_of_ten_and_signs_as_they_are_printed() -> None:
     assert sentence("p < 1e-12, 4.2e-05 +- 3e-07 of test-1e-05.csv") == (
         "p < 10⁻¹², 4.2 × 10⁻⁵ ± 3 × 10⁻⁷ of test-1e-05.csv."
     )
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "shown"),
+    [
+        (4.43412, 4.30126, 4.56, ("4.43", "4.30 to 4.56")),
+        (422572.0, 410100.0, 435000.0, ("4.23 × 10⁵", "4.10 × 10⁵ to 4.35 × 10⁵")),
+        (1.2345e-12, 0.8e-12, 1.9e-12, ("1.23 × 10⁻¹²", "8.0 × 10⁻¹³ to 1.90 × 10⁻¹²")),
+        (1e-20, 1e-24, 1e-15, ("1.0 × 10⁻²⁰", "1.0 × 10⁻²⁴ to 1.00 × 10⁻¹⁵")),
+        (-0.31, -0.405, -0.215, ("−0.310", "−0.405 to −0.215")),
+        (5.0, 5.0, 5.0, ("5", "5 to 5")),
+        (2.0, 1.0, float("inf"), ("2.00", "1.00 to ∞")),
+    ],
+)
+def test_values_have_the_digits_that_their_intervals_allow(value, low, high, shown):
+    assert with_interval(value, low, high) == shown
 
 
 def test_it_loads_nothing(page: str) -> None:

@@ -11,7 +11,17 @@ from creepkit.exporters.mathml import law_equations, symbol_element
 from creepkit.inverse.duration import STRAIN_OF_UNKNOWN_DURATION, duration_known
 from creepkit.inverse.uncertainty.laplace_approximation import cut_interval_notes
 from creepkit.inverse.unmodelled_effects import TAKEN_FOR_GRANTED
-from creepkit.reports.html.elements import Block, Formula, Items, Paragraph, Table, number, plural, sentence
+from creepkit.reports.html.elements import (
+    Block,
+    Formula,
+    Items,
+    Paragraph,
+    Table,
+    number,
+    plural,
+    sentence,
+    with_interval,
+)
 from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import credible_values, titled_law
 from creepkit.reports.identification_text import rejected
@@ -151,8 +161,7 @@ def _values(fit: Identification) -> Table:
         (
             Markup(symbol_element(symbols[e.name])),
             table[e.name].meaning,
-            number(e.value, 5),
-            f"{number(e.low)} to {number(e.high)}",
+            *with_interval(e.value, e.low, e.high),
             "" if e.unit == "1" else e.unit,
             *(() if rejected(fit) else (e.verdict,)),
         )

@@ -27,6 +27,7 @@ from creepkit.reports.html.elements import (
     printable,
     printable_lines,
     sentence,
+    with_interval,
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import findings_of
@@ -224,8 +225,7 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
         rows = [
             (
                 e.name,
-                number(e.value, 5),
-                f"{number(e.low)} to {number(e.high)}",
+                *with_interval(e.value, e.low, e.high),
                 "" if e.unit == "1" else e.unit,
                 e.verdict if rejected is None else LAW_REJECTED,
             )
