@@ -159,7 +159,7 @@ def _to_place(value: float, distance: float) -> str:
     """A number with its digits down to the second one of a distance, two of its own at least, zeros among them."""
     if value == 0.0 or not math.isfinite(value):
         return number(value)
-    place = math.floor(math.log10(distance)) - 1
+    place = math.floor(math.log10(float(f"{distance:.1e}"))) - 1
     digits = min(max(math.floor(math.log10(abs(value))) - place + 1, 2), MOST_DIGITS)
     mantissa, _, exponent = f"{value:#.{digits}g}".partition("e")
     mantissa = mantissa.removesuffix(".")

@@ -41,7 +41,7 @@ def _stages(contents: ReportContents, references: References) -> list[list[str]]
         tests = {one.test for one in contents.exclusions}
         paragraphs.append(
             [
-                f"Frames of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons that the "
+                f"Readings of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons that the "
                 "report lists."
             ]
         )

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.noise_model import MINIMUM_TESTS
+from creepkit.inverse.nuisance_plausibility import nuisance_unit
 from creepkit.inverse.variance_components import NOISE_PRIOR_SD
 from creepkit.language.printing import expression_text, state_equations
-from creepkit.records import output_unit
+from creepkit.records import kind_and_start, output_unit
 from creepkit.reports.html.citations import References, listed
 from creepkit.reports.html.compared_values import compared_values, frame_counts
 from creepkit.reports.html.elements import number, plural, printable
@@ -70,7 +71,7 @@ def _tests(found: Sequence[GroupFindings]) -> list[str]:
     measured, fitted = sum(c.measured for c in counts), sum(c.fitted for c in counts)
     values = plural(sum(one.count for one in known), "value")
     if measured:
-        frames = f"{fitted} of {plural(measured, 'measured frame')} were fitted, which makes {values} compared"
+        frames = f"{fitted} of {plural(measured, 'reading')} were fitted, which makes {values} compared"
     else:
         frames = f"{values} were compared"
     transforms = {one.transforms for one in known}
@@ -79,7 +80,7 @@ def _tests(found: Sequence[GroupFindings]) -> list[str]:
     else:
         how = (
             "Strains ε were compared as arsinh(ε / 2f), which is ln(ε / f) well above the floor f, 1 % of the median "
-            "final strain of a material and at least three times the noise of a frame; lengths linearly, divided by "
+            "final strain of a material and at least three times the noise of a reading; lengths linearly, divided by "
             "their standard deviation."
         )
     return [f"Creep laws were identified from {plural(tests, 'test')}{materials}: {frames}.", how]
@@ -143,7 +144,7 @@ def _estimation(found: GroupFindings, contents: ReportContents, references: Refe
         _penalty(found),
     ]
     if settings.loss != "linear":
-        sentences.append(f"Frames far off have less weight by the loss '{settings.loss}'.")
+        sentences.append(f"Readings far off have less weight by the loss '{settings.loss}'.")
     if settings.test_loss == "student":
         sentences.append(
             f"Tests far from the others have less weight by Student's distribution{references.cite('student')}."
@@ -198,8 +199,8 @@ def _noise_priors(fit: Identification) -> str:
     if not stated:
         return ""
     return (
-        f"The noise of a frame has a log-normal prior about the noise that the tests state ({listed(stated)}), with a "
-        f"standard deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
+        f"The noise of a reading has a log-normal prior about the noise that the tests state ({listed(stated)}), with "
+        f"a standard deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
     )
 
 
@@ -230,7 +231,7 @@ def _weights(fit: Identification, references: References) -> list[str]:
     if settings.weights == "noise":
         parts = listed(["noise", *estimated, "what the law cannot follow"])
         return [
-            f"Frames have equal weights; {parts} were estimated as variance components, and 95 % intervals are those "
+            f"Readings have equal weights; {parts} were estimated as variance components, and 95 % intervals are those "
             f"of a sandwich covariance{references.cite('sandwich')} with Student's quantiles."
         ]
     if settings.weights == "equal":
@@ -269,7 +270,10 @@ def _explicit_nuisances(fit: Identification) -> str:
     if not explicit:
         return ""
     priors = {(n.key, n.prior_mean, n.prior_sd) for n in fit.nuisances}
-    named = [f"{key} {number(mean)} ± {number(sd, 2)}" for key, mean, sd in sorted(priors)]
+    named = [
+        f"{key} {number(mean)} ± {number(sd, 2)} {nuisance_unit(kind_and_start(key)[0])}".rstrip()
+        for key, mean, sd in sorted(priors)
+    ]
     if not named or len(named) > MOST_NAMED:
         named = list(dict.fromkeys(n.kind for n in explicit))
     return f"Nuisance parameters with Gaussian priors (mean ± standard deviation) were {listed(named)}."
@@ -303,10 +307,9 @@ def _ranking(ranking: Ranking, fit: Identification, references: References) -> l
 
 
 def _criterion(name: str, references: References) -> str:
-    if name == "bic":
-        return f"Bayesian information criterion{references.cite('bic')} over independent frames"
-    if name == "aicc":
-        return f"corrected information criterion of Akaike{references.cite('aicc')} over independent frames"
+    criteria = {"bic": "Bayesian information criterion", "aicc": "corrected information criterion of Akaike"}
+    if name in criteria:
+        return f"{criteria[name]}{references.cite(name)} with the number of independent readings"
     return "error of tests that were held out"
 
 
@@ -315,5 +318,5 @@ def _adequacy(found: Sequence[GroupFindings]) -> list[str]:
         return []
     return [
         "A law explains the tests where its chi-square, against noise that was stated or estimated from neighbouring "
-        "frames and not from its own misfit, has a probability of at least 0.3 %."
+        "readings and not from its own misfit, has a probability of at least 0.3 %."
     ]

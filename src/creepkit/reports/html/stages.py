@@ -89,7 +89,7 @@ def _table_of_histories(histories: Sequence[History], more: str) -> Table:
         )
         for h in histories[:MOST_LISTED]
     ]
-    columns = ("test", "alloy", "condition", "measured frames", "last frame, h", "ended", "file")
+    columns = ("test", "alloy", "condition", "readings", "last reading, h", "ended", "file")
     return Table(f"{plural(len(histories), 'test')} as measured{more}", columns, rows, numeric=(3, 4))
 
 
@@ -101,35 +101,40 @@ def _ending(history: History) -> str:
 
 def _quality_blocks(quality: DataQuality) -> list[Block]:
     if not quality.tests:
-        return [Paragraph("No test has frames, so that there was nothing for the check of data quality to look at.")]
+        return [
+            Paragraph(
+                "No test has readings over time, so that there was nothing for the check of data quality to look at."
+            )
+        ]
     if not quality.flags:
         return [Paragraph(f"The check of data quality found nothing suspect in {plural(quality.tests, 'test')}.")]
     rows = [
         (
             printable(flag.history, 160),
             flag.kind,
-            frame_ranges_text(flag.frames) if flag.frames else "–",
+            readings_text(flag.frames) if flag.frames else "–",
             "–" if flag.time is None else number(flag.time / 3600.0),
             printable(flag.reason),
             printable(flag.proposal or "–"),
         )
         for flag in quality.flags[:MOST_LISTED]
     ]
-    columns = ("test", "what", "frames", "at, h", "reason", "what may be done")
+    columns = ("test", "what", "readings", "at, h", "reason", "what may be done")
     caption = f"What the check of data quality found in {plural(quality.tests, 'test')}; it drops nothing by itself"
     return [Table(caption, columns, rows, numeric=(3,))]
+
+
+def readings_text(frames: Sequence[int]) -> str:
+    """Numbers of readings: 'readings 97-191, 193'; of a bar that has no camera as of what has one."""
+    return frame_ranges_text(frames).replace("frame", "reading", 1)
 
 
 def _exclusion_blocks(contents: ReportContents) -> list[Block]:
     selected = [Paragraph(text) for text in _selections(contents)]
     if not contents.exclusions:
-        return [Paragraph("No frame was excluded by hand or by the check of data quality."), *selected]
+        return [Paragraph("No reading was excluded by hand or by the check of data quality."), *selected]
     rows = [
-        (
-            printable(one.test, 120),
-            frame_ranges_text(one.frames) if one.frames else "the whole test",
-            printable(one.reason),
-        )
+        (printable(one.test, 120), readings_text(one.frames) if one.frames else "the whole test", printable(one.reason))
         for one in contents.exclusions[:MOST_LISTED]
     ]
     return [Table("Left out of the identification", ("test", "what", "reason"), rows), *selected]
