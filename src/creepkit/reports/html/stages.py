@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.duration import duration_known
 from creepkit.quality.flags import frame_ranges_text
-from creepkit.reports.design import design_figure, direction_lines, order_text
+from creepkit.reports.design import cheapest_text, design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
 from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows
@@ -355,6 +355,7 @@ def _design_blocks(name: str, design: Design, figures: PageFigures, *, names: La
             f"The first of {plural(len(design.tests), 'planned test')} considered, {order_text(design)}; goal: "
             f"{design.goal}. A nat of information divides the volume of what is likely by 2.7"
         )
+        blocks.append(Paragraph(sentence(names.in_text(cheapest_text(design)))))
         blocks.append(Table(caption, columns, rows, numeric=tuple(range(1, len(columns)))))
         blocks.append(
             figures.picture(
