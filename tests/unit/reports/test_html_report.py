@@ -270,6 +270,16 @@ def test_laws_have_their_titles_and_methods_say_bounds_and_priors() -> None:
     assert f"n {n[0]:g} to {n[1]:g}" in page
 
 
+def test_methods_set_each_equation_and_give_it_as_latex_and_as_text_to_copy() -> None:
+    page = page_of(False)
+    section = page[page.index('<section id="methods"') : page.index('<section id="sliders"')]
+    text, _, rest = section.partition("</pre>")
+    assert "ε̇ = A*σ^n" in text
+    assert "<math" not in text  # what is copied is text
+    assert rest.count("<math") == len(ranking().laws)
+    assert rest.count(r"\begin{align*}") == len(ranking().laws)
+
+
 def test_a_page_outside_a_study_has_its_ranking_among_the_downloads(tmp_path: Path) -> None:
     page = ck.report(ranking(), tmp_path / "report.html").read_text()
     assert {"ranking.json", "norton.json", "strain-hardening.json"} <= set(re.findall(r'download="([^"]+)"', page))
