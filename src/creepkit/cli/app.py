@@ -68,22 +68,23 @@ class CommandGroup(TyperGroup):
             _check_files_in_environment()
             _load_plugin_files(ctx.params["plugin"])
             return super().invoke(ctx)
-        except KeyboardInterrupt:
-            raise self._interrupted(ctx) from None
+        except KeyboardInterrupt as error:
+            raise self._interrupted(ctx, error) from None
         except Exception as error:
             if ctx.params["debug"] or _is_of_the_command_line(error):
                 raise
             if was_interrupted():
-                raise self._interrupted(ctx) from None
+                raise self._interrupted(ctx, error) from None
             if isinstance(error, BrokenPipeError):
                 raise typer.Exit(NO_READER) from None
             if isinstance(error, CreepkitError | OSError):
                 raise _ended(_sentence(error), 1) from None
             raise _ended(*failure_sentence(error)) from None
 
-    def _interrupted(self, ctx: Any) -> typer.Exit:
+    def _interrupted(self, ctx: Any, error: BaseException) -> typer.Exit:
         name = ctx.invoked_subcommand or ""
-        return _ended(interrupted_sentence(name, self.commands.get(name)), exit_code())
+        kept = str(error) if isinstance(error, KeyboardInterrupt) else ""
+        return _ended(interrupted_sentence(name, self.commands.get(name), kept), exit_code())
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of this name, creepkit's own or a plugin's; say which plugins failed where none has it."""
