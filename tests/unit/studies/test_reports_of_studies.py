@@ -105,3 +105,14 @@ def test_a_proposed_study_has_a_place_for_the_source_of_its_data(study: Path) ->
     text = propose_study(study.parent / "data", study).text
     assert text.count("# citation = ") == 1
     assert parse_study(study, text.replace("# citation", "citation")).model.data.citation
+
+
+def test_a_study_and_its_result_are_printed_in_few_lines(study: Path, plain_pages: None) -> None:
+    study.write_text(ONE_FIT + "[report]\n")
+    loaded = ck.Study.load(study)
+    assert repr(loaded) == f"Study 'one law' ({study}): data, identification, report"
+    result = loaded.run()
+    first, verdict, report = repr(result).splitlines()
+    assert first == "StudyResult 'one law': 2 tests; stages: 3 made"
+    assert verdict.strip().startswith("only norton was fitted; it ")
+    assert report.strip() == f"report: {result.report}"
