@@ -46,7 +46,7 @@ def load_text(history: History) -> str:
 
 
 def kind_of_test(history: History) -> str:
-    """What is prescribed in a test, in a few words: "creep under constant load", "relaxation at constant strain"."""
+    """What is prescribed in a test, in a few words: "creep under constant load", "constant strain, at which the stress relaxes"."""
     loading = history.loading
     if isinstance(loading, PointLoading):
         prescribed = [name for name, one in (("stress", loading.stress), ("strain", loading.strain)) if one]
@@ -55,7 +55,7 @@ def kind_of_test(history: History) -> str:
     pieces = holds(program, last, LOAD_TOLERANCE * float(np.abs(program.values).max()))
     levels = "constant" if len(pieces) == 1 else "stepwise" if pieces else "changing"
     if loading.quantity == "strain":
-        return f"{'relaxation' if pieces else 'response'} at {levels} strain"
+        return f"{levels} strain{', at which the stress relaxes' if pieces else ''}"
     if loading.quantity == "stress":
         held = "true stress" if getattr(loading, "control", "load") == "stress" else "load"
         return f"creep under {levels} {held}"

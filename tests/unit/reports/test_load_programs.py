@@ -63,8 +63,8 @@ def test_holds_leave_out_ramps_and_end_with_the_test():
         (StressSteps(((0.0, 50.0), (4 * HOUR, 60.0))), "creep under stepwise load"),
         (StressSteps(((0.0, 50.0), (40 * HOUR, 60.0))), "creep under constant load"),  # the step comes after the end
         (PressureJump(8.0, 8.0, 4 * HOUR), "creep under constant pressure"),
-        (StrainSteps(((0.0, 0.002),)), "relaxation at constant strain"),
-        (RecordedLoading(Program([0.0, 9 * HOUR], [0.0, 0.01]), "strain"), "response at changing strain"),
+        (StrainSteps(((0.0, 0.002),)), "constant strain, at which the stress relaxes"),
+        (RecordedLoading(Program([0.0, 9 * HOUR], [0.0, 0.01]), "strain"), "changing strain"),
         (PointLoading({"11": Program.constant(50.0)}, {"12": Program.constant(0.0)}),
          "prescribed components of stress and strain"),
     ],

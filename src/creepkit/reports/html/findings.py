@@ -70,7 +70,7 @@ def findings_of(group: ReportGroup) -> GroupFindings | None:
     found = _found(group)
     if found is None:
         return None
-    in_text = LawNames.of([found]).in_text
+    in_text = LawNames.of(found.fits).in_text
     equivalents, remarks = tuple(map(in_text, found.equivalents)), tuple(map(in_text, found.remarks))
     return replace(found, verdict=in_text(found.verdict), equivalents=equivalents, remarks=remarks)
 
@@ -146,7 +146,7 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     notes = [note for note in fit.notes if not (fit.unmodelled and note.startswith(TAKEN_FOR_GRANTED))]  # said above
     cut = cut_interval_notes(fit.law, fit.estimates) if misfit else ()  # of values that say nothing of the tests
     notes = [note for note in notes if note not in cut]
-    remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *map(LawNames.of([found]).in_text, notes)])))
+    remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *map(LawNames.of(found.fits).in_text, notes)])))
     return [*blocks, Paragraph("Remarks:"), Items(remarks)] if remarks else blocks
 
 

@@ -196,7 +196,7 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
     ranking = found.ranking
     if ranking is None:
         return []
-    names = LawNames.of([found])
+    names = LawNames.of(found.fits)
     rows = [
         (
             titled_law(one.fit.law),

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from creepkit.reports.html.elements import printable
 
 if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
     from creepkit.language import CreepLaw
-    from creepkit.reports.html.findings import GroupFindings
 
 LONGEST_TITLE = 160
 """Characters of a title within a sentence."""
@@ -58,9 +58,8 @@ class LawNames:
         self._pattern = re.compile(rf"(?<![\w*+-])(?:{'|'.join(map(re.escape, longest_first))})(?![\w*+(-])")
 
     @classmethod
-    def of(cls, found: Iterable[GroupFindings]) -> LawNames:
+    def of(cls, fits: Iterable[Identification]) -> LawNames:
         """Those of all laws that were fitted."""
-        fits = [fit for one in found for fit in one.fits]
         return cls({fit.law.name: fit.law for fit in fits}.values())
 
     def in_text(self, text: str) -> str:

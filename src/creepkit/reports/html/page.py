@@ -60,7 +60,7 @@ def report_html(contents: ReportContents) -> str:
         _findings_section(contents, found),
         *_group_sections(found, figures),
         data_section(contents, found),
-        *stage_sections(contents, figures, LawNames.of(found)),
+        *stage_sections(contents, figures, LawNames.of(fit for one in found for fit in one.fits)),
         *closing_sections(contents, found, slider_sections(found)),
     ]
     shown = [section for section in map(_without_empty, sections) if not section.empty]
