@@ -46,7 +46,7 @@ def load_text(history: History) -> str:
 
 
 def kind_of_test(history: History) -> str:
-    """What is prescribed in a test, in a few words: "creep under constant load", "constant strain, at which the stress relaxes"."""
+    """What is prescribed in a test: "creep under constant load", "constant strain, at which the stress relaxes"."""
     loading = history.loading
     if isinstance(loading, PointLoading):
         prescribed = [name for name, one in (("stress", loading.stress), ("strain", loading.strain)) if one]
