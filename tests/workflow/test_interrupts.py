@@ -1,6 +1,7 @@
 """A signal ends a command with one line, which says what is kept, and 128 + its number; no file is half written."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,6 +19,14 @@ PROGRAM = (
 )
 DEADLINE = 120.0
 """s in which a command must begin its work, and end when it is told to."""
+
+
+STUDY = """[data]
+files = ["test.csv"]
+[identification]
+laws = ["combined"]
+starts = 64
+"""
 
 
 def words_of(command, folder):
@@ -38,6 +47,10 @@ def words_of(command, folder):
             "--workers",
             "1",
         )
+    if command == "run":
+        shutil.copy(next(PLANTED_BULGE.glob("*.csv")), folder / "test.csv")
+        (folder / "study.toml").write_text(STUDY)
+        return ("run", folder / "study.toml", "--to", folder / "out")
     return ("identify", PLANTED_BULGE, "--law", "combined", "--starts", "64", "--to", folder / "out")
 
 
@@ -58,6 +71,7 @@ def started(process, folder):
     [
         ("identify", signal.SIGINT, "interrupted; files that were there are whole, and the same command starts"),
         ("screen", signal.SIGTERM, "interrupted by SIGTERM; alloys that are finished are kept, and the same command"),
+        ("run", signal.SIGINT, "interrupted; kept: quality; the same command goes on with identification"),
         ("train", signal.SIGHUP, "interrupted by SIGHUP; the last checkpoint is kept, and the same command goes on"),
     ],
 )
@@ -73,8 +87,9 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_half_written(command, sent,
         line for line in stderr.splitlines() if line.startswith(("creepkit:", "Traceback", "Exception", "Aborted"))
     ]
     assert len(lines) == 1
-    assert lines[0].startswith(f"creepkit: {command} {said} ")
-    assert [path for path in tmp_path.rglob("*") if path.name.endswith((".part", ".lock"))] == []
+    assert lines[0].startswith(f"creepkit: {command} {said}")
+    left = [path.name for path in tmp_path.rglob("*") if path.name.endswith((".part", ".lock"))]
+    assert left == (["running.lock"] if command == "run" else [])  # empty, and locked by nobody
 
 
 def ended(program):

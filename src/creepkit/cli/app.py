@@ -80,24 +80,25 @@ class CommandGroup(TyperGroup):
     def _errors_in_one_line(self, debug: bool, ctx: Any = None) -> Iterator[None]:
         try:
             yield
-        except KeyboardInterrupt:
-            raise self._interrupted(ctx) from None
+        except KeyboardInterrupt as error:
+            raise self._interrupted(ctx, error) from None
         except Exception as error:
             if debug or _is_of_the_command_line(error):
                 raise
             if was_interrupted():
-                raise self._interrupted(ctx) from None
+                raise self._interrupted(ctx, error) from None
             if isinstance(error, BrokenPipeError):
                 raise typer.Exit(NO_READER) from None
             if isinstance(error, CreepkitError | OSError):
                 raise _ended(_sentence(error), 1) from None
             raise _ended(*failure_sentence(error)) from None
 
-    def _interrupted(self, ctx: Any) -> typer.Exit:
+    def _interrupted(self, ctx: Any, error: BaseException) -> typer.Exit:
         if ctx is None:
             return _ended(interrupted_sentence(None), exit_code())
         name = ctx.invoked_subcommand or ""
-        return _ended(interrupted_sentence(name, self.commands.get(name)), exit_code())
+        kept = str(error) if isinstance(error, KeyboardInterrupt) else ""
+        return _ended(interrupted_sentence(name, self.commands.get(name), kept), exit_code())
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of this name, creepkit's own or a plugin's; say which plugins failed where none has it."""

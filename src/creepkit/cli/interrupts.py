@@ -92,11 +92,11 @@ def exit_code() -> int:
     return 128 + (_received or signal.SIGINT)
 
 
-def interrupted_sentence(name: str | None, command: Any = None) -> str:
-    """How an interrupted command ends; name : None where it did not begin."""
+def interrupted_sentence(name: str | None, command: Any = None, kept: str = "") -> str:
+    """How an interrupted command ends; name : None where it did not begin. kept : what it leaves, if it said so."""
     received = _received or signal.SIGINT
     by = "" if received == signal.SIGINT else f" by {signal.Signals(received).name}"
     if name is None:
         return f"interrupted{by} before it began; the same command starts from the beginning"
-    kept = getattr(getattr(command, "callback", None), "kept_when_interrupted", NOTHING_KEPT)
+    kept = kept or getattr(getattr(command, "callback", None), "kept_when_interrupted", NOTHING_KEPT)
     return f"{name} interrupted{by}; {kept}"

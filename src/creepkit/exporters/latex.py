@@ -46,9 +46,7 @@ class LatexExporter:
         law, converted_values, printer = source.law, convert_values(source), LatexLawPrinter(source.law)
         comments_text = (source.title, *source.notes, *(f"Source: {reference}" for reference in law.references))
         lines = comment_lines(comments_text, "%")
-        lines += _align_environment(
-            [row for left, right in latex_equations(law, printer) for row in _equation_rows(left, right)]
-        )
+        lines += equations_in_latex(law, printer)
         lines += [rf"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
         lines += _value_table(source, converted_values, printer)
         lines += (
@@ -56,6 +54,12 @@ class LatexExporter:
         )
         lines += _arrhenius_equations(law, converted_values, printer)
         return "\n".join(lines) + "\n"
+
+
+def equations_in_latex(law: CreepLaw, printer: LatexLawPrinter | None = None) -> list[str]:
+    """The lines of an align environment with the rate of strain and those of internal variables."""
+    equations = latex_equations(law, printer or LatexLawPrinter(law))
+    return _align_environment([row for left, right in equations for row in _equation_rows(left, right)])
 
 
 def _equation_rows(left: str, summands: Sequence[str]) -> list[str]:

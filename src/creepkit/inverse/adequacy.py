@@ -160,7 +160,7 @@ class Adequacy:
             if self.rate_scatter > 0:
                 scatter = f", with rates of tests that scatter by {100 * self.rate_scatter:.2g} %"
             if self.chi_square < IMPLAUSIBLE_CHI_SQUARE:
-                scatter += " (far larger than what the frames show: check its unit)"
+                scatter += " (far larger than what the readings show: check its unit)"
             found = f"{self._chi_square_text}, {self._p_value_text}{correlated}"
             return f"explains the tests to their {source} noise{self.qualification}{scatter}: {found}"
         parts = [

@@ -120,7 +120,7 @@ def identification_notes(
     with_both = [h.name for h in histories if h.minimum_rate is not None and h.outputs]
     if with_both:
         sentences.append(
-            f"the minimum rate stated of {_named(with_both)} was not used: the frames of its test hold it already"
+            f"the minimum rate stated of {_named(with_both)} was not used: the readings of its test hold it already"
         )
     sentences += nuisance_correlation_notes(problem, estimation.residuals)
     if (problem.bound_penalties.constraint_violations(estimation.minimum.x[: problem.parameter_count]) > 1e-3).any():

@@ -157,8 +157,8 @@ def how_to_state_noise(outputs: Sequence[str], few_frames: Sequence[tuple[str, i
         more = len(few_frames) - MOST_NAMED_TESTS
         tests = f" of {named}{f' and {more} more tests' if more > 0 else ''}" if few_frames else ""
         return (
-            f"no noise is stated, and too few frames{tests} show it: noise that is estimated from fewer than "
-            f"{LEAST_NOISE_FREEDOM / FREEDOM_PER_FRAME:.0f} frames of a test cannot judge whether a law explains it "
+            f"no noise is stated, and too few readings{tests} show it: noise that is estimated from fewer than "
+            f"{LEAST_NOISE_FREEDOM / FREEDOM_PER_FRAME:.0f} readings of a test cannot judge whether a law explains it "
             f"(state it in a column such as {column}, in Python as standard_deviation)"
         )
     if MINIMUM_RATE_OUTPUT in outputs:

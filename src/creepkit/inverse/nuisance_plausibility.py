@@ -34,6 +34,11 @@ NUISANCE_UNITS = {
 """Units of the kinds, but for offsets (that of the output) and lengths (mm)."""
 
 
+def nuisance_unit(kind: str) -> str:
+    """The unit of a kind; "" of an offset, whose output has one."""
+    return "mm" if is_length_nuisance(kind) else NUISANCE_UNITS.get(kind, "")
+
+
 @dataclass(frozen=True)
 class ImplausibleNuisance:
     """A nuisance whose estimate lies far from its prior.
@@ -158,7 +163,7 @@ def _explicit(problem: LeastSquaresProblem, estimates: Sequence[NuisanceEstimate
         if not size > 0 or distance <= MOST_STANDARD_DEVIATIONS * max(size, one.sd):
             continue
         is_length = is_length_nuisance(one.kind)
-        unit = "mm" if is_length else NUISANCE_UNITS[one.kind]
+        unit = nuisance_unit(one.kind)
         share = distance / abs(one.prior_mean) if is_length and one.prior_mean else float("nan")
         source = "stated" if stated else "usual"
         found.append(ImplausibleNuisance(one.key, one.owner, "", one.value, unit, distance / size, size, source, share))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import errno
 import itertools
 import os
+import re
 import stat
 import time
 from collections import Counter
@@ -225,6 +226,15 @@ class ProgressReporter:
             return accepted
         remaining = max(self._record.target - done, 0) / rate
         return f"{rate:.3g}/s, {duration_text(remaining)} left, {accepted}"
+
+
+def series_of_task(task: str) -> tuple[str, str]:
+    """Of "law 3 of 8: Garofalo" the series "law", whose members share a bar and a time left, and the rest; else "".
+
+    A task that is none of a series is its own.
+    """
+    found = re.match(r"([a-z ]+) (\d+ of \d+: .+)", task)
+    return (found[1], found[2]) if found else (task, "")
 
 
 def duration_text(seconds: float) -> str:

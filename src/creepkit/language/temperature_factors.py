@@ -68,7 +68,7 @@ def times(
     return replace(
         law,
         name=f"{law.name}*{factor.name}{description}",
-        title=f"{law.title}, {factor.name.replace('arrhenius', 'Arrhenius')} in temperature",
+        title=f"{law.title} with {factor.name.replace('arrhenius', 'Arrhenius')} temperature dependence",
         terms=new_terms,
         states=new_states,
         params={s: p for s, p in parameters.table().items() if s in used},

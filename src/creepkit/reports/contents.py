@@ -107,7 +107,8 @@ class ReportContents:
     left out. temperature, forecasts, design, rupture, extractions : results of the other stages by a title of their
     own, which is the name of their group or of their file. imposed : {test: what its
     instrument recorded}. exports : laws to download. failures : of stages.
-    attachments : study, lock and data. notes : further remarks, one sentence each.
+    attachments : study, lock and data. notes : further remarks, one sentence each. data_citations : where the data
+    were published, as a list of references has them.
     """
 
     title: str
@@ -125,6 +126,7 @@ class ReportContents:
     provenance: ReportProvenance = field(default_factory=ReportProvenance)
     attachments: tuple[Attachment, ...] = ()
     notes: tuple[str, ...] = ()
+    data_citations: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         _freeze(self, "temperature", "forecasts", "design", "rupture", "extractions", "imposed")

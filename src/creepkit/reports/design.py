@@ -52,9 +52,13 @@ def design_text(design: Design) -> str:
         rows = [_columns(design), *(_cells(design, test) for test in design.tests[:ROWS])]
         widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
         lines += ["", *("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows)]
-        lines += ["", order_text(design)]
+        lines += ["", order_text(design), cheapest_text(design)]
     lines += direction_lines(design)
     return "\n".join(lines + _ending(design))
+
+
+LARGE_SHARE = 0.5
+"""Of the highest expected information: what the cheapest test that is named gives at least."""
 
 
 def order_text(design: Design) -> str:
@@ -65,6 +69,27 @@ def order_text(design: Design) -> str:
         f"in the order: tests with a probability of {DECISIVE_WEIGHT:g} or more of a decisive and right verdict, the "
         "shortest first; then the others by that probability, and where it is alike by the expected information"
     )
+
+
+def cheapest_text(design: Design) -> str:
+    """Which planned test reaches the goal in the least machine time, as a sentence; "" where there are none."""
+    if not design.tests:
+        return ""
+    if design.goal == "law":
+        able = [test for test in design.tests if test.expectation.probability >= DECISIVE_WEIGHT]
+        does = f"separates the laws with a probability of {DECISIVE_WEIGHT:g} or more"
+        if not able:
+            best = max(design.tests, key=lambda test: test.expectation.probability)
+            return (
+                f"no test considered {does}; nearest comes {best.description} ({best.expectation.probability:.2g}, "
+                f"{best.hours:.3g} h of machine time)"
+            )
+    else:
+        most = max(test.expectation.information for test in design.tests)
+        able = [test for test in design.tests if test.expectation.information >= LARGE_SHARE * most]
+        does = f"gives at least {100 * LARGE_SHARE:.0f} % of the highest expected information of a test"
+    cheapest = min(able, key=lambda test: test.hours)
+    return f"the cheapest test that {does}: {cheapest.description} ({cheapest.hours:.3g} h of machine time)"
 
 
 def direction_lines(design: Design) -> list[str]:
@@ -103,7 +128,7 @@ def print_design(design: Design) -> None:
     if design.tests:
         rows = [_cells(design, test) for test in design.tests[:ROWS]]
         print_table(f"{len(design.tests)} planned tests, goal: {design.goal}", _columns(design), rows)
-    order = [order_text(design)] if design.tests else []
+    order = [order_text(design), cheapest_text(design)] if design.tests else []
     print("\n".join([design.sentence, *order, *direction_lines(design), *_ending(design)]))
 
 

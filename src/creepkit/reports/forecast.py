@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.records import output_unit
+from creepkit.reports.load_programs import kind_of_test
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
@@ -35,7 +36,7 @@ def forecast_text(forecast: Forecast) -> str:
 
 
 def _test_lines(test: TestForecast) -> list[str]:
-    lines = [f"{test.name}: {test.history.condition}"]
+    lines = [f"{test.name}: {kind_of_test(test.history)}, {test.history.condition}"]
     lines += [f"  {_end_text(one)}" for one in test.outputs.values()]
     lines += [f"  {_time_text(one, float(test.history.times[-1]))}" for one in test.times]
     lines += [f"  {test.caution}"] if test.caution else []
@@ -119,7 +120,10 @@ def end_shares(one: OutputForecast) -> dict[str, float]:
     return {part: share for part, share in sorted(shares.items(), key=lambda pair: -pair[1]) if share >= SHOWN_SHARE}
 
 
-FORECAST_COLUMNS = ("test", "condition", "at the end", "times, h", "measured", "own nuisances explain", "extrapolated")
+FORECAST_COLUMNS = (
+    *("test", "kind of test and condition", "at the end", "times, h", "measured", "own nuisances explain"),
+    "extrapolated",
+)
 
 
 def forecast_rows(forecast: Forecast) -> list[tuple[str, ...]]:
@@ -135,7 +139,8 @@ def forecast_rows(forecast: Forecast) -> list[tuple[str, ...]]:
             measured, explained = "\n".join(inside), f"{100 * test.score.explained:.0f} %"
         end = "" if leading is None else _end_text(leading).replace(" at ", "\nat ", 1)
         end += f"\n{test.caution}" if test.caution else ""
-        rows.append((test.name, test.history.condition, end, times, measured, explained, test.extrapolation or "no"))
+        condition = f"{kind_of_test(test.history)}, {test.history.condition}"
+        rows.append((test.name, condition, end, times, measured, explained, test.extrapolation or "no"))
     return rows
 
 

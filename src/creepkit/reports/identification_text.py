@@ -8,11 +8,11 @@ from dataclasses import asdict
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from creepkit.inverse.nuisance_plausibility import NUISANCE_UNITS
+from creepkit.inverse.nuisance_plausibility import nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
 from creepkit.language.printing import expression_text, state_equations
-from creepkit.records import is_length_nuisance, is_logarithmic, kind_and_start, output_unit
+from creepkit.records import is_logarithmic, kind_and_start, output_unit
 from creepkit.reports.stress_exponents import reference_sentences
 from creepkit.reports.tests_apart import apart_sentence
 
@@ -238,8 +238,7 @@ def _plus_minus(n: NuisanceEstimate) -> str:
 
 
 def _unit(key: str) -> str:
-    kind = kind_and_start(key)[0]
-    unit = "mm" if is_length_nuisance(kind) else NUISANCE_UNITS.get(kind, "")
+    unit = nuisance_unit(kind_and_start(key)[0])
     return f", {unit}" if unit else ""
 
 

@@ -45,6 +45,23 @@ def load_text(history: History) -> str:
     return _level_text(loading.program(), last, f" {unit}")
 
 
+def kind_of_test(history: History) -> str:
+    """What is prescribed in a test: "creep under constant load", "constant strain, at which the stress relaxes"."""
+    loading = history.loading
+    if isinstance(loading, PointLoading):
+        prescribed = [name for name, one in (("stress", loading.stress), ("strain", loading.strain)) if one]
+        return f"prescribed components of {' and '.join(prescribed)}"
+    program, last = loading.program(), _last_time(history)
+    pieces = holds(program, last, LOAD_TOLERANCE * float(np.abs(program.values).max()))
+    levels = "constant" if len(pieces) == 1 else "stepwise" if pieces else "changing"
+    if loading.quantity == "strain":
+        return f"{levels} strain{', at which the stress relaxes' if pieces else ''}"
+    if loading.quantity == "stress":
+        held = "true stress" if getattr(loading, "control", "load") == "stress" else "load"
+        return f"creep under {levels} {held}"
+    return f"creep under {levels} {loading.quantity}"
+
+
 def _level_text(program: Program, last: float, unit: str) -> str:
     tolerance = LOAD_TOLERANCE * float(np.abs(program.values).max())
     return _holds_text(holds(program, last, tolerance), unit, lambda v: f"{v:g}")

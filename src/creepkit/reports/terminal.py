@@ -11,6 +11,7 @@ from typing import Any
 import typer
 
 from creepkit import errors
+from creepkit.jobs.shard_progress import series_of_task
 
 
 def printable(text: str) -> str:
@@ -77,6 +78,8 @@ class ProgressBar:
 
     def tick(self, task: str, done: int, total: int, note: str = "") -> None:
         """Report that `done` of `total` parts of a task are finished; note : what else there is to say."""
+        task, member = series_of_task(task)
+        note = ", ".join(part for part in (member, note) if part)
         if self._bar is not None:
             if task not in self._tasks:
                 self._tasks[task] = self._bar.add_task(task, total=total, note=note)

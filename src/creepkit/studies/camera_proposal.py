@@ -13,7 +13,7 @@ import numpy as np
 from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import CreepkitError
 from creepkit.registry.arguments import frame_files, read_frames, read_record
-from creepkit.studies.toml_text import comment, quoted, quoted_list, study_part
+from creepkit.studies.toml_text import CITATION_LINE, comment, quoted, quoted_list, study_part
 
 if TYPE_CHECKING:
     from creepkit.records import Frames, InstrumentRecord
@@ -163,5 +163,6 @@ def text_of_cameras(folder: Path, cameras: CameraProposal, names: Sequence[str])
     identification = ["# The tests are not known before the frames are extracted.", "[identification]"]
     identification += [f"laws = {quoted_list(laws)}  # creepkit laws lists all", "", "[selection]", 'by = "bic"']
     report = ["[report]", 'file = "report.html"', "attach_MB = 3  # data files up to this size in all are put into it"]
-    parts = [study_part(folder), list(cameras.lines), identification, report]
+    data = ["# [data]", CITATION_LINE]
+    parts = [study_part(folder), list(cameras.lines), data, identification, report]
     return "\n\n".join("\n".join(lines) for lines in parts) + "\n"

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.files.record_codec import RecordError
 from creepkit.inverse.kept_fits import COMPUTING, keep_fits
-from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text
+from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text, series_of_task
 from creepkit.records import History
 from creepkit.reports.contents import ExportedFile, StageFailure
 from creepkit.studies.documents import (
@@ -32,6 +32,10 @@ RUNNING_LOCK = "running.lock"
 
 
 CHANGED = "was made again, for what was kept of it had been changed since it was written"
+
+
+MOST_NAMED = 6
+"""Stages that a sentence names."""
 
 
 _log = logging.getLogger("creepkit.studies")
@@ -135,7 +139,22 @@ class Execution:
         """Carry out the stages of these names, each behind those that it needs.
 
         read_others : whether results of other stages, where they are kept of the same inputs, are read for a report.
+        A KeyboardInterrupt says which stages are kept.
         """
+        try:
+            self._run(stages, wanted, read_others=read_others)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(self._kept_sentence(stages, wanted)) from None
+
+    def _kept_sentence(self, stages: Sequence[Stage], wanted: Collection[str]) -> str:
+        """Half a sentence on what an interrupted run leaves."""
+        kept = [one.name for one in self.records if one.state in ("made", "kept")]
+        ended = {one.name for one in self.records}
+        left = [stage.name for stage in stages if stage.name in wanted and stage.name not in ended]
+        named = f"kept: {_listed(kept)}" if kept else "no stage was finished, laws that are fitted are kept"
+        return f"{named}; the same command goes on with {left[0] if left else 'the report'}"
+
+    def _run(self, stages: Sequence[Stage], wanted: Collection[str], *, read_others: bool) -> None:
         for number, stage in enumerate(stages, 1):
             key = self._key(stage)
             if stage.name not in wanted:
@@ -247,7 +266,8 @@ class Execution:
         begun: dict[str, float] = {}
 
         def tick(task: str, done: int, total: int) -> None:
-            elapsed = time.monotonic() - begun.setdefault(task, start if not begun else time.monotonic())
+            series = series_of_task(task)[0]
+            elapsed = time.monotonic() - begun.setdefault(series, start if not begun else time.monotonic())
             left = (
                 f", {duration_text(elapsed / done * (total - done))} left" if elapsed > 0 and 0 < done < total else ""
             )
@@ -304,6 +324,11 @@ class Execution:
                     fits += keys
                 if altered is not None:
                     altered.append(kept.altered)
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _check_export(stage: Stage, export: ExportedFile) -> None:

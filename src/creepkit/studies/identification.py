@@ -32,10 +32,12 @@ def identified_laws(
     import creepkit as ck
 
     fits, (search, penalty) = [], how
-    for law in laws:
+    for k, law in enumerate(laws, start=1):
 
-        def of_law(task: str, done: int, total: int, name: str = law.name) -> None:
-            tick(f"{name}, {task}", done, total)
+        def of_law(
+            task: str, done: int, total: int, named: str = f"{k} of {len(laws)}: {law.title or law.name}"
+        ) -> None:
+            tick(f"law {named}, {task}", done, total)
 
         fits.append(ck.identify(law, tests, using, search=search, penalty=penalty, settings=settings, progress=of_law))
     return ck.rank(fits)

@@ -103,6 +103,7 @@ class DataPart(Part):
     """[data]: files of tests, patterns or folders, relative to the study file; none where cameras give the tests.
 
     only : values of labels that tests must have. up_to_strain : frames beyond it are left out.
+    citation : where the data were published, one text or several, as a list of references has them.
     """
 
     files: Annotated[Texts, BeforeValidator(_one_or_more)] = []
@@ -112,6 +113,7 @@ class DataPart(Part):
     up_to_strain: Positive | None = None
     suspect_frames: Literal["exclude", "keep"] = "exclude"
     check_quality: bool = True
+    citation: Annotated[Texts, BeforeValidator(_one_or_more)] = []
 
 
 class RecordPart(Part):

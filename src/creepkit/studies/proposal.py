@@ -16,8 +16,9 @@ from creepkit.records import ZERO_CELSIUS, History, dimensions_of, load_unit
 from creepkit.studies.camera_proposal import CameraProposal, proposed_cameras, text_of_cameras
 from creepkit.studies.folders import folders_with_tests
 from creepkit.studies.study_file import parse_study
+from creepkit.studies.swapped_units import swapped_units
 from creepkit.studies.tertiary_creep import shows_tertiary_creep
-from creepkit.studies.toml_text import comment, one_line, quoted, quoted_list, study_part
+from creepkit.studies.toml_text import CITATION_LINE, comment, one_line, quoted, quoted_list, study_part
 
 SECONDARY_LAWS = ("norton", "strain-hardening", "time-hardening")
 SEVERAL_STRESSES_LAW = "hyperbolic-sine"
@@ -145,8 +146,9 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
     summary = DataSummary.of(tests)
     text = _text(folder, files, reader, summary, quality, problems, cameras)
     parse_study(path, text)  # what is written must be valid
+    doubts = [f"check the units: {line}" for line in swapped_units(tests)]
     return StudyProposal(
-        text, (*summary.lines, *cameras.summary, *(f"not read: {line}" for line in problems[:MOST_REMARKS]))
+        text, (*summary.lines, *doubts, *cameras.summary, *(f"not read: {line}" for line in problems[:MOST_REMARKS]))
     )
 
 
@@ -245,7 +247,8 @@ def _text(
 
 
 def _data_part(files: Sequence[str], reader: str | None, summary: DataSummary, problems: Sequence[str]) -> list[str]:
-    lines = [*map(comment, summary.lines), "[data]", f"files = {quoted_list(files)}"]
+    doubts = [comment(f"Check the units: {line}") for line in swapped_units(summary.tests)]
+    lines = [*map(comment, summary.lines), *doubts, "[data]", f"files = {quoted_list(files)}"]
     lines += [f"reader = {quoted(reader)}"] if reader is not None else []
     lines += ['# ignore = ["load_kN", "date"]  # columns that nobody needs']
     if len(summary.temperatures) > 1:
@@ -253,6 +256,7 @@ def _data_part(files: Sequence[str], reader: str | None, summary: DataSummary, p
             f"# only = {{ temperature_C = [{summary.temperatures[0] - ZERO_CELSIUS:.0f}] }}  # these tests alone"
         )
     lines.append('suspect_frames = "exclude"  # frames that unload, fall or lie apart; or "keep"')
+    lines.append(CITATION_LINE)
     return [*lines, *(comment(f"not read: {line}") for line in problems[:MOST_REMARKS])]
 
 

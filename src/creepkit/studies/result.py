@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -30,6 +31,10 @@ CARRIED_FOLDER = "inputs"
 """Of the data files that a report carries."""
 
 
+MOST_VERDICTS, LONGEST_LINE = 5, 300
+"""Verdicts, and characters of a line, of a result that is printed."""
+
+
 MOST_IDENTIFIED = 1_000_000
 """Characters of identifications that a report carries."""
 
@@ -46,7 +51,7 @@ if TYPE_CHECKING:
     from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StudyResult:
     """What a run of a study gave: ordinary records, by group of tests or by name.
 
@@ -75,6 +80,20 @@ class StudyResult:
     extractions: Mapping[str, Extraction] = field(default_factory=dict, repr=False)
     imposed: Mapping[str, Imposed] = field(default_factory=dict, repr=False)
     documents: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        """Stages by their states, the verdict on each group, and where the report is."""
+        states = Counter(one.state for one in self.stages)
+        counted = ", ".join(f"{count} {state}" for state, count in states.items()) or "none"
+        lines = [f"StudyResult '{self.title}': {len(self.histories)} tests; stages: {counted}"]
+        verdicts = [f"{name}: {one.verdict}" if name else one.verdict for name, one in self.rankings.items()]
+        lines += [
+            *verdicts[:MOST_VERDICTS],
+            *([f"and {len(verdicts) - MOST_VERDICTS} more groups"] if len(verdicts) > MOST_VERDICTS else []),
+        ]
+        lines += [f"failed: {one.stage}: {one.sentence}" for one in self.failures]
+        lines.append(f"report: {self.report or 'none'}")
+        return "\n  ".join(line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 1]}…" for line in lines)
 
     @property
     def histories(self) -> tuple[History, ...]:
@@ -183,6 +202,7 @@ def contents_of(result: StudyResult) -> ReportContents:
         ),
         attachments=attached,
         notes=notes,
+        data_citations=tuple(file.model.data.citation),
     )
 
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from creepkit.reports.contents import ReportContents
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Study:
     """A study file that was read and checked.
 
@@ -51,6 +51,11 @@ class Study:
         study = cls(read_study_file(Path(path)), None if root is None else Path(root))
         study.check()
         return study
+
+    def __repr__(self) -> str:
+        """Title, file, and the tables that it has."""
+        tables = ", ".join(sorted(self.file.model.model_fields_set - {"study"}))
+        return f"Study '{self.file.model.study.title}' ({self.path}): {tables or 'nothing'}"
 
     @property
     def path(self) -> Path:

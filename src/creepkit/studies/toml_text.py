@@ -6,6 +6,9 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
+CITATION_LINE = '# citation = "authors (year), title, doi"  # of published data: the methods text cites it'
+"""In the table [data]."""
+
 
 def quoted(text: str) -> str:
     """A text as TOML holds it."""

@@ -124,7 +124,7 @@ def test_a_study_groups_tests_and_finds_the_same(tests, trend):
     assert len(found.isothermal_fits) == 5
     assert found.joint_fit.law.names == ("A", "n", "Q")
     assert found.temperature_law.forms == trend.forms
-    assert "Norton power law (PL), Arrhenius in temperature" in str(found)
+    assert "Norton power law (PL) with Arrhenius temperature dependence" in str(found)
 
 
 def test_a_form_is_where_it_should_be_at_its_reference_temperature():

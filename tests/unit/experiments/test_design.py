@@ -16,6 +16,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import History, StressSteps, constant_stress
+from creepkit.reports.design import cheapest_text
 from helpers.log_rate_predictor import END, known_scatter, measured
 from helpers.planted_bars import BAR, SPL, bars
 
@@ -56,6 +57,7 @@ def test_information_of_a_test_is_that_of_regression(line):
         assert test.expectation.information == pytest.approx(expected, rel=1e-3)
         assert test.expectation.parameter_sd["n"] == pytest.approx(np.sqrt(after[1, 1]), rel=5e-3)
     assert found.best.description == "80 MPa"  # the farther end: ln 80/50 > ln 50/40
+    assert f"{found.best.description} ({found.best.hours:.3g} h" in cheapest_text(found)  # all last as long
 
 
 def test_two_runs_are_made_at_both_ends_of_the_range(line):
@@ -211,6 +213,10 @@ def test_a_design_is_told_as_text_json_and_a_map(hardening, tmp_path):
     found.plot(tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 1000
     assert str(found).startswith(found.sentence)
+    able = [test.hours for test in found.tests if test.expectation.probability >= 0.95]
+    said = cheapest_text(found)
+    assert said in str(found)
+    assert (f"({min(able):.3g} h of machine time)" if able else "no test considered separates the laws") in said
 
 
 def test_work_that_is_stopped_gives_the_best_so_far(hardening):

@@ -19,7 +19,7 @@ from creepkit.errors import ReportError
 from creepkit.reports.attachments import read_attachments
 from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
 from creepkit.reports.html import report_html
-from creepkit.reports.html.elements import sentence
+from creepkit.reports.html.elements import sentence, with_interval
 from helpers.planted_rupture import larson_miller, planted
 from helpers.report_pages import HOSTILE, contents, ranking
 
@@ -84,6 +84,22 @@ def test_sentences_have_powers_of_ten_and_signs_as_they_are_printed() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("value", "low", "high", "shown"),
+    [
+        (4.43412, 4.30126, 4.56, ("4.43", "4.30 to 4.56")),
+        (422572.0, 410100.0, 435000.0, ("4.23 × 10⁵", "4.10 × 10⁵ to 4.35 × 10⁵")),
+        (1.2345e-12, 0.8e-12, 1.9e-12, ("1.23 × 10⁻¹²", "8.0 × 10⁻¹³ to 1.90 × 10⁻¹²")),
+        (1e-20, 1e-24, 1e-15, ("1.0 × 10⁻²⁰", "1.0 × 10⁻²⁴ to 1.0 × 10⁻¹⁵")),
+        (-0.31, -0.405, -0.215, ("−0.310", "−0.405 to −0.215")),
+        (5.0, 5.0, 5.0, ("5", "5 to 5")),
+        (2.0, 1.0, float("inf"), ("2.0", "1.0 to ∞")),
+    ],
+)
+def test_values_have_the_digits_that_their_intervals_allow(value, low, high, shown):
+    assert with_interval(value, low, high) == shown
+
+
 def test_it_loads_nothing(page: str) -> None:
     for element in elements(parsed(page)):
         for name, value in element.attrib.items():
@@ -144,7 +160,7 @@ def test_findings_come_first_and_say_what_was_found() -> None:
     assert "<math" in first
     assert "explains the tests" in first
     for estimate in best.estimates:
-        assert f"{estimate.value:.5g}".split("e")[0].replace("-", "−") in first
+        assert with_interval(estimate.value, estimate.low, estimate.high)[0] in first
     order = re.findall(r'<section id="([a-z]+)"', body)
     assert order == [
         *("findings", "curves", "tests", "ranking", "nuisances", "data", "exclusions", "forecasts", "exports"),
@@ -252,6 +268,16 @@ def test_laws_have_their_titles_and_methods_say_bounds_and_priors() -> None:
     assert "The bounds of the search were of the " in page
     n = ck.law("norton").table["n"].bounds
     assert f"n {n[0]:g} to {n[1]:g}" in page
+
+
+def test_methods_set_each_equation_and_give_it_as_latex_and_as_text_to_copy() -> None:
+    page = page_of(False)
+    section = page[page.index('<section id="methods"') : page.index('<section id="sliders"')]
+    text, _, rest = section.partition("</pre>")
+    assert "ε̇ = A*σ^n" in text
+    assert "<math" not in text  # what is copied is text
+    assert rest.count("<math") == len(ranking().laws)
+    assert rest.count(r"\begin{align*}") == len(ranking().laws)
 
 
 def test_a_page_outside_a_study_has_its_ranking_among_the_downloads(tmp_path: Path) -> None:

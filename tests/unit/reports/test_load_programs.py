@@ -5,7 +5,7 @@ import pytest
 
 from creepkit.records import History, PointLoading, PressureJump, Program, RecordedLoading, StrainSteps, constant_stress
 from creepkit.records.loading import StressSteps
-from creepkit.reports.load_programs import holds, label_of, program_text
+from creepkit.reports.load_programs import holds, kind_of_test, label_of, program_text
 
 HOUR = 3600.0
 
@@ -53,3 +53,21 @@ def test_holds_leave_out_ramps_and_end_with_the_test():
     program = PressureJump(8.0, 10.0, 100.0, ramp=5.0).program()
     assert holds(program, 300.0, 0.1) == [(5.0, 100.0, 8.0), (105.0, 300.0, 10.0)]
     assert holds(program, 90.0, 0.1) == [(5.0, 100.0, 8.0)]
+
+
+@pytest.mark.parametrize(
+    ("loading", "kind"),
+    [
+        (constant_stress(50.0), "creep under constant load"),
+        (constant_stress(50.0, "stress"), "creep under constant true stress"),
+        (StressSteps(((0.0, 50.0), (4 * HOUR, 60.0))), "creep under stepwise load"),
+        (StressSteps(((0.0, 50.0), (40 * HOUR, 60.0))), "creep under constant load"),  # the step comes after the end
+        (PressureJump(8.0, 8.0, 4 * HOUR), "creep under constant pressure"),
+        (StrainSteps(((0.0, 0.002),)), "constant strain, at which the stress relaxes"),
+        (RecordedLoading(Program([0.0, 9 * HOUR], [0.0, 0.01]), "strain"), "changing strain"),
+        (PointLoading({"11": Program.constant(50.0)}, {"12": Program.constant(0.0)}),
+         "prescribed components of stress and strain"),
+    ],
+)  # fmt: skip
+def test_what_is_held_is_said_in_the_words_of_the_field(loading, kind):
+    assert kind_of_test(history(loading)) == kind

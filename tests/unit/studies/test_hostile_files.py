@@ -85,6 +85,21 @@ def test_a_report_gives_back_study_lock_and_data_alone(study: Path, tmp_path: Pa
     assert not (tmp_path / "made").exists()
 
 
+@pytest.mark.parametrize(
+    "name", ["../stolen.csv", "inputs/../../stolen.csv", "/stolen.csv", "C:/stolen.csv", "..\\stolen.csv"]
+)
+def test_a_forged_report_writes_nothing_outside_its_folder_or_inside(study: Path, tmp_path: Path, name: str) -> None:
+    """Its list of files is altered in the page: no name is followed, and not even the sound files are written."""
+    page, before = tmp_path / "page.html", sorted(tmp_path.rglob("*"))
+    sound = embed([Attachment("study.toml", STUDY.encode()), Attachment("inputs/data/one.csv", b"x")])
+    page.write_text(sound.replace('"inputs/data/one.csv"', json.dumps(name)))
+    with pytest.raises(CreepkitError, match="cannot be trusted: the name .* is not a plain path") as caught:
+        study_of_report(page, tmp_path / "made")
+    assert "\n" not in str(caught.value)
+    assert sorted(tmp_path.rglob("*")) == [*before, page]
+    assert not Path("/stolen.csv").exists()
+
+
 @pytest.mark.parametrize("link", ["inputs", "inputs/data", "study.toml", "study.lock", "."])
 def test_a_report_is_not_written_through_a_link(study: Path, tmp_path: Path, link: str) -> None:
     page, made, elsewhere = tmp_path / "page.html", tmp_path / "made", tmp_path / "elsewhere"

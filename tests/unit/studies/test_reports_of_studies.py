@@ -10,7 +10,10 @@ import pytest
 import creepkit as ck
 from creepkit.errors import StudyError
 from creepkit.files.writing import RECORD
+from creepkit.reports.html.methods import methods_text
 from creepkit.studies.carried_study import study_of_report
+from creepkit.studies.proposal import propose_study
+from creepkit.studies.study_file import parse_study
 from helpers.study_runs import ONE_FIT, STUDY, numbers, states
 
 
@@ -81,3 +84,35 @@ def test_a_report_of_large_data_carries_their_hashes(study: Path, plain_pages: N
     (tmp_path / "again" / "inputs").mkdir()
     (study.parent / "data").rename(tmp_path / "again" / "inputs" / "data")
     assert numbers(study_of_report(result.report, tmp_path / "again").run()) == numbers(result)
+
+
+def test_the_source_of_the_data_is_cited_and_kept(study: Path, plain_pages: None) -> None:
+    """A published citation stands first among the references, in the settings, and in the lock."""
+    source = "A. Smith (2020), Creep of A, doi 10.1000/1"
+    study.write_text(ONE_FIT.replace("[data]\n", f'[data]\ncitation = "{source}"\n') + "[report]\n")
+    result = ck.Study.load(study).run()
+    contents = result.report_contents()
+    assert contents.data_citations == (source,)
+    text = methods_text(contents, [])
+    assert text.startswith("The measured data are those of [1].")
+    assert f"\n[1] {source}" in text
+    assert contents.provenance.settings["data"]["citation"] == [source]
+    lock = json.loads((study.parent / "study.lock").read_text())
+    assert lock["declared"]["data"]["citation"] == [source]
+
+
+def test_a_proposed_study_has_a_place_for_the_source_of_its_data(study: Path) -> None:
+    text = propose_study(study.parent / "data", study).text
+    assert text.count("# citation = ") == 1
+    assert parse_study(study, text.replace("# citation", "citation")).model.data.citation
+
+
+def test_a_study_and_its_result_are_printed_in_few_lines(study: Path, plain_pages: None) -> None:
+    study.write_text(ONE_FIT + "[report]\n")
+    loaded = ck.Study.load(study)
+    assert repr(loaded) == f"Study 'one law' ({study}): data, identification, report"
+    result = loaded.run()
+    first, verdict, report = repr(result).splitlines()
+    assert first == "StudyResult 'one law': 2 tests; stages: 3 made"
+    assert verdict.strip().startswith("only norton was fitted; it ")
+    assert report.strip() == f"report: {result.report}"

@@ -25,6 +25,7 @@ only = { temperature_C = [750, 800], alloy = "X" }
 up_to_strain = 0.1
 suspect_frames = "keep"
 check_quality = true
+citation = "A. Smith (2020), doi 10.1000/1"
 
 [[record]]
 name = "rig"

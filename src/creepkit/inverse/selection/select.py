@@ -100,10 +100,10 @@ def select(
     tried_further: tuple[str, ...] = ()
     if fits and sums:
         pairs = sums_of_two([fit.law for fit in fits])
-        fits += _identify_all(pairs, histories, using, settings, through, progress, failed)
+        fits += _identify_all(pairs, histories, using, settings, through, progress, failed, "sum")
     elif fits and sums is None:
         richer = _richer_laws(rank(fits, challenge=False), histories)[: settings.further_laws]
-        fits += _identify_all(richer, histories, using, settings, through, progress, failed)
+        fits += _identify_all(richer, histories, using, settings, through, progress, failed, "further law")
         tried_further = tuple(law.name for law in richer if law.name not in failed)
     if not fits:
         name, reason = next(iter(failed.items()))
@@ -156,18 +156,23 @@ def _identify_all(
     through: Predictor | None,
     progress: IterationCallback | None,
     failed: dict[str, str],
+    kind: str = "law",
 ) -> list[Identification]:
     """The laws that can be identified; the others go to `failed`.
 
+    kind : what they are, for the progress: "law 3 of 8: Garofalo's hyperbolic sine".
     through : all laws that it knows are identified with it first, and those far behind keep their values from it.
     """
     fits = []
     for k, law in enumerate(laws):
+        task = f"{kind} {k + 1} of {len(laws)}: {law.title or law.name}"
+        if progress is not None:
+            progress(task, k, len(laws))
         first = through_for_law(through, law)
         fit = _try_to_identify(law, histories, first or using, settings, failed, sampled=first is None)
         fits += [fit] if fit is not None else []
         if progress is not None:
-            progress("law", k + 1, len(laws))
+            progress(task, k + 1, len(laws))
     if through is None or not fits:
         return fits
     competitive = {id(r.fit) for r in rank(fits, challenge=False).laws if r.excess < RULED_OUT_EXCESS}

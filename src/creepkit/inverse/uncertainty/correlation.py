@@ -127,7 +127,7 @@ def _undetermined_sentence(fit: Identification, group: list[int]) -> str:
         estimate, relative_width = fit.estimates[group[0]], float(_relative_widths(fit)[group[0]])
         interval = f"[{estimate.low:.3g}, {estimate.high:.3g}]"
         fills = f"its interval {interval} fills {relative_width:.0%} of its bounds"
-        return f"the parameter {names[0]} is not determined: {fills}"
+        return f"the parameter {names[0]} ({fit.law.table[names[0]].meaning}) is not determined: {fills}"
     sentence = f"the parameters {', '.join(names[:-1])} and {names[-1]} are not determined singly"
     combination = _best_determined_combination(fit, group)
     return f"{sentence}; their combination {combination} is" if combination else sentence

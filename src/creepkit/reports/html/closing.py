@@ -6,11 +6,17 @@ import base64
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup
+
+from creepkit.exporters.latex import equations_in_latex
+from creepkit.exporters.law_description import comment_lines
+from creepkit.exporters.mathml import law_equations
 from creepkit.files.file_names import file_stem
 from creepkit.reports.attachments import problem_of_name
 from creepkit.reports.html.elements import (
     Block,
     Downloads,
+    Formula,
     Items,
     PageSection,
     Paragraph,
@@ -21,11 +27,16 @@ from creepkit.reports.html.elements import (
     printable_lines,
     sentence,
 )
+from creepkit.reports.html.law_names import title_in_sentence
 from creepkit.reports.html.methods import methods_text
 
 if TYPE_CHECKING:
     from creepkit.reports.contents import ExportedFile, ReportContents
     from creepkit.reports.html.findings import GroupFindings
+
+
+MOST_EQUATIONS = 20
+"""Laws whose equations are set in the methods."""
 
 
 def closing_sections(
@@ -34,23 +45,30 @@ def closing_sections(
     """Exports, methods, what stands before provenance, provenance, and what is missing."""
     return [
         PageSection("exports", "Files to download", _export_blocks(contents.exports)),
-        PageSection(
-            "methods",
-            "Methods text",
-            [
-                Verbatim(
-                    "To be copied into a paper and shortened",
-                    printable_lines(methods_text(contents, found)),
-                    prose=True,
-                )
-            ]
-            if found or contents.rupture
-            else [],
-        ),
+        PageSection("methods", "Methods text", _methods_blocks(contents, found) if found or contents.rupture else []),
         *before_provenance,
         PageSection("provenance", "Provenance, and how to repeat", _provenance_blocks(contents)),
         PageSection("missing", "What is missing", _missing_blocks(contents)),
     ]
+
+
+# ---- methods ---------------------------------------------------------------------------------------------------------
+
+
+def _methods_blocks(contents: ReportContents, found: Sequence[GroupFindings]) -> list[Block]:
+    """The text with its equations as plain text, to be copied, and the same equations set, and as LaTeX."""
+    text = Verbatim(
+        "To be copied into a paper and shortened", printable_lines(methods_text(contents, found)), prose=True
+    )
+    laws = list({fit.law.name: fit.law for one in found for fit in one.fits}.values())[:MOST_EQUATIONS]
+    if not laws:
+        return [text]
+    blocks: list[Block] = [text, Paragraph("The equations of the laws in it:")]
+    for law in laws:
+        blocks.append(Paragraph(sentence(title_in_sentence(law))))
+        blocks += [Formula(Markup(equation)) for equation in law_equations(law)]
+    latex = [line for law in laws for line in (*comment_lines([title_in_sentence(law)], "%"), *equations_in_latex(law))]
+    return [*blocks, Verbatim("The same equations in LaTeX", printable_lines("\n".join(latex)))]
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------

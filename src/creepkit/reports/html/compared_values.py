@@ -98,8 +98,8 @@ def _transforms(observations: ObservationVector) -> list[str]:
 def selection_sentence(counts: FrameCounts, most: int) -> str:
     """How many frames were selected for a fit, and how."""
     if counts.fitted == counts.usable == counts.measured:
-        return f"All {plural(counts.measured, 'measured frame')} were fitted."
-    text = f"{counts.fitted} of {plural(counts.measured, 'measured frame')} were selected for the fit"
+        return f"All {plural(counts.measured, 'reading')} were fitted."
+    text = f"{counts.fitted} of {plural(counts.measured, 'reading')} were selected for the fit"
     if counts.fitted < counts.usable:
         return f"{text}: at most {most} of a test, half of them spread evenly in time and half in its logarithm."
-    return f"{text}: frames at time zero, and those without values, are not compared."
+    return f"{text}: readings at time zero, and those without values, are not compared."

@@ -5,6 +5,7 @@ Strings are text, which the template escapes; Markup is what is HTML already.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,10 @@ from markupsafe import Markup
 
 LONGEST_TEXT = 4000
 """Characters of a cell or paragraph; an error message may hold a name of any length."""
+
+
+MOST_DIGITS = 7
+"""Of a value, however narrow its interval is."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +140,29 @@ def number(value: float, digits: int = 4) -> str:
     if value in (float("inf"), float("-inf")):
         return "∞" if value > 0 else "−∞"
     mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
+    return _with_power(mantissa, exponent) if exponent else mantissa.replace("-", "−")
+
+
+def with_interval(value: float, low: float, high: float) -> tuple[str, str]:
+    """A value, and 'low to high': two significant digits of the distance between them, and two digits at least."""
+    distances = [abs(value - end) if end != value else math.nan for end in (low, high)]
+    if not any(map(math.isfinite, distances)):
+        return number(value, 5), f"{number(low)} to {number(high)}"
+    nearest = min(one for one in distances if math.isfinite(one))
+    ends = [
+        _to_place(end, one if math.isfinite(one) else nearest) for end, one in zip((low, high), distances, strict=True)
+    ]
+    return _to_place(value, nearest), " to ".join(ends)
+
+
+def _to_place(value: float, distance: float) -> str:
+    """A number with its digits down to the second one of a distance, two of its own at least, zeros among them."""
+    if value == 0.0 or not math.isfinite(value):
+        return number(value)
+    place = math.floor(math.log10(float(f"{distance:.1e}"))) - 1
+    digits = min(max(math.floor(math.log10(abs(value))) - place + 1, 2), MOST_DIGITS)
+    mantissa, _, exponent = f"{value:#.{digits}g}".partition("e")
+    mantissa = mantissa.removesuffix(".")
     return _with_power(mantissa, exponent) if exponent else mantissa.replace("-", "−")
 
 

@@ -11,7 +11,18 @@ from creepkit.exporters.mathml import law_equations, symbol_element
 from creepkit.inverse.duration import STRAIN_OF_UNKNOWN_DURATION, duration_known
 from creepkit.inverse.uncertainty.laplace_approximation import cut_interval_notes
 from creepkit.inverse.unmodelled_effects import TAKEN_FOR_GRANTED
-from creepkit.reports.html.elements import Block, Formula, Items, Paragraph, Table, number, plural, sentence
+from creepkit.reports.html.elements import (
+    Block,
+    Formula,
+    Items,
+    Paragraph,
+    Table,
+    number,
+    plural,
+    sentence,
+    with_interval,
+)
+from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import credible_values, titled_law
 from creepkit.reports.identification_text import rejected
 from creepkit.reports.ranking import equivalents_among_remaining
@@ -48,9 +59,24 @@ class GroupFindings:
     remarks: tuple[str, ...] = ()
     decisive: bool | None = None
 
+    @property
+    def fits(self) -> list[Identification]:
+        """Of all laws, the best first."""
+        return [self.fit] if self.ranking is None else [one.fit for one in self.ranking.laws]
+
 
 def findings_of(group: ReportGroup) -> GroupFindings | None:
-    """What was found of a group; None where nothing was."""
+    """What was found of a group, laws in its sentences by their titles; None where nothing was."""
+    found = _found(group)
+    if found is None:
+        return None
+    in_text = LawNames.of(found.fits).in_text
+    equivalents, remarks = tuple(map(in_text, found.equivalents)), tuple(map(in_text, found.remarks))
+    return replace(found, verdict=in_text(found.verdict), equivalents=equivalents, remarks=remarks)
+
+
+def _found(group: ReportGroup) -> GroupFindings | None:
+    """The same with the names of laws, by which commands know them."""
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import RankedLaw, Ranking
     from creepkit.screening.results import AlloyResult
@@ -71,7 +97,8 @@ def findings_of(group: ReportGroup) -> GroupFindings | None:
     if isinstance(result, Identification):
         adequacy = "was identified; whether it explains the tests is not known"
         adequacy = adequacy if result.adequacy is None else str(result.adequacy)
-        return GroupFindings(group.name, result, None, f"the law '{result.law.name}' {adequacy}")
+        law = f"the {title_in_sentence(result.law)}" if result.law.title else f"the law '{result.law.name}'"
+        return GroupFindings(group.name, result, None, f"{law} {adequacy}")
     return None
 
 
@@ -119,7 +146,7 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     notes = [note for note in fit.notes if not (fit.unmodelled and note.startswith(TAKEN_FOR_GRANTED))]  # said above
     cut = cut_interval_notes(fit.law, fit.estimates) if misfit else ()  # of values that say nothing of the tests
     notes = [note for note in notes if note not in cut]
-    remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *notes])))
+    remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *map(LawNames.of(found.fits).in_text, notes)])))
     return [*blocks, Paragraph("Remarks:"), Items(remarks)] if remarks else blocks
 
 
@@ -134,8 +161,7 @@ def _values(fit: Identification) -> Table:
         (
             Markup(symbol_element(symbols[e.name])),
             table[e.name].meaning,
-            number(e.value, 5),
-            f"{number(e.low)} to {number(e.high)}",
+            *with_interval(e.value, e.low, e.high),
             "" if e.unit == "1" else e.unit,
             *(() if rejected(fit) else (e.verdict,)),
         )

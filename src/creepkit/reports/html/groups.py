@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.errors import CreepkitError
+from creepkit.inverse.nuisance_plausibility import nuisance_unit
 from creepkit.inverse.selection.discrimination import chi_square_by_test
 from creepkit.records import output_unit
 from creepkit.reports.html.compared_values import compared_values
@@ -25,6 +26,7 @@ from creepkit.reports.html.elements import (
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings
+from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import correlation_table, titled_law
 from creepkit.reports.html.methods_identification import rate_scatter_sentence
 from creepkit.reports.identification_plot import identification_figure
@@ -38,6 +40,7 @@ from creepkit.reports.test_figure import fitted_test_figure, fitted_test_text
 if TYPE_CHECKING:
     from creepkit.inverse.goodness_of_fit import TestFit
     from creepkit.inverse.identification import Identification
+    from creepkit.inverse.nuisance_parameters import NuisanceEstimate
     from creepkit.inverse.selection.ranking import Ranking
 
 
@@ -87,7 +90,7 @@ def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[B
                 f"Test {name}",
                 fitted_test_text(fit, curves, k),
                 f"{name}: measured (dots), identified with 95 % band of the law, and measured less identified; grey: "
-                "two standard deviations of the noise of a frame.",
+                "two standard deviations of the noise of a reading.",
             )
         )
     return blocks
@@ -116,12 +119,12 @@ def _table_of_tests(fit: Identification) -> Table:
         *("relative squared error", "offset", "rate × law", "weight"),
     )
     caption = (
-        "Tests: mean square misfit over the squared noise of a frame (1: noise alone), with the law's own rate for "
+        "Tests: mean square misfit over the squared noise of a reading (1: noise alone), with the law's own rate for "
         "every test; relative squared error of the first output (sum of squared differences over that about the mean "
         "of the test), and its offset; the test's own factor on the rate, which the misfit leaves out; weight of the "
         "test in the fit (1: as any other, less for one far from the others). Whether the law explains the tests is "
         "judged by another number, the reduced chi-square of the findings, with the tests' own rates. A dash: the law "
-        "predicts no value at some of the frames, as after a rupture that it puts too early"
+        "predicts no value at some of the readings, as after a rupture that it puts too early"
     )
     return Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6, 7))
 
@@ -134,17 +137,19 @@ def noise_judged(fit: Identification) -> bool:
 def _without_misfit(fit: Identification) -> list[str]:
     """Why chi-square of tests is a dash in their table, a sentence for each reason."""
     if not noise_judged(fit):
-        return ["χ² is a dash: the noise of a frame is not known well enough to judge by, as the findings say."]
+        return ["χ² is a dash: the noise of a reading is not known well enough to judge by, as the findings say."]
     with_frames = [test for test in fit.tests if test.outputs and np.isnan(misfit_of(test))]
     ended = [t for t in with_frames if any(np.isnan(one.errors.mean_squared_error) for one in t.outputs)]
     known = {id(test) for test in ended}
     others = [test for test in with_frames if id(test) not in known]
     sentences = []
     if ended:
-        why = "the law predicts no value for some of its frames, as that of a test which by the law has ruptured before"
+        why = (
+            "the law predicts no value for some of its readings, as that of a test which by the law has ruptured before"
+        )
         sentences.append(f"χ² is a dash where {why}: {_listed_tests(ended)}.")
     if others:
-        sentences.append(f"χ² is a dash where the noise of a frame is not known: {_listed_tests(others)}.")
+        sentences.append(f"χ² is a dash where the noise of a reading is not known: {_listed_tests(others)}.")
     return sentences
 
 
@@ -191,6 +196,7 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
     ranking = found.ranking
     if ranking is None:
         return []
+    names = LawNames.of(found.fits)
     rows = [
         (
             titled_law(one.fit.law),
@@ -207,12 +213,12 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
         *("law", "parameters", *misfit_columns(ranking.best), f"{criterion} − best", "weight", "explains the tests"),
     )
     blocks: list[Block] = [Table("Laws tried, the best first", columns, rows, numeric=(1, 2, 3, 4, 5))]
-    separation = _separation(ranking)
+    separation = [names.in_text(text) for text in _separation(ranking)]
     blocks += [Paragraph(text) for text in separation]
     if ranking.challenges:
         blocks += [
             Paragraph("What the tests allow beside the best law:"),
-            Items([sentence(str(challenge)) for challenge in ranking.challenges]),
+            Items([sentence(names.in_text(str(challenge))) for challenge in ranking.challenges]),
         ]
     if ranking.failed:
         blocks.append(Items([sentence(f"the law {name}: {reason}") for name, reason in ranking.failed.items()]))
@@ -224,10 +230,10 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
                 f"Mean square deviation over noise of {plural(len(ranking.laws), 'law')} in "
                 f"{plural(len(ranking.best.tests), 'test')}, the weights of the laws, and the curves of the credible "
                 f"ones. {' '.join(separation)} Weights: "
-                + ", ".join(f"{printable(r.fit.law.name, 60)} {r.weight:.3f}" for r in ranking.laws)
+                + ", ".join(f"{title_in_sentence(r.fit.law)} {r.weight:.3f}" for r in ranking.laws)
                 + ".",
-                "Where the laws differ: mean square misfit of each law in each test over the noise of a frame, without "
-                "the tests' own factors on the rate, and weights.",
+                "Where the laws differ: mean square misfit of each law in each test over the noise of a reading, "
+                "without the tests' own factors on the rate, and weights.",
             )
         )
     return blocks
@@ -265,13 +271,18 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
     """Noise and scatter as they were estimated, and explicit nuisance parameters."""
     fit = found.fit
     noise = [
-        (name.replace("_", " "), f"{number(one.noise, 2)}{_unit(name)}", f"{number(one.offset, 2)}{_unit(name)}")
+        (name.replace("_", " "), number(one.noise, 2), number(one.offset, 2), output_unit(name) or "1")
         for name, one in fit.noise_model.outputs.items()
     ]
     blocks: list[Block] = [Paragraph(rate_scatter_sentence(fit))]
     if noise:
         blocks.append(
-            Table("Noise as it was estimated, one standard deviation", ("output", "frame", "offset of a test"), noise)
+            Table(
+                "Noise as it was estimated, one standard deviation",
+                ("output", "of a reading", "of the offset of a test", "unit"),
+                noise,
+                numeric=(1, 2),
+            )
         )
     rows = [
         (
@@ -279,19 +290,21 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
             printable(n.owner, 120) or "all",
             f"{number(n.value)} ± {number(n.sd, 2)}",
             f"{number(n.prior_mean)} ± {number(n.prior_sd, 2)}",
+            _nuisance_unit(n, fit),
             number((n.value - n.prior_mean) / n.prior_sd, 2) if n.prior_sd > 0 else "–",
         )
         for n in fit.nuisances
     ]
     if rows:
-        columns = ("nuisance parameter", "of", "estimate", "prior", "deviation, sd")
-        blocks.append(Table("Nuisance parameters estimated beside the law", columns, rows, numeric=(2, 3, 4)))
+        columns = ("nuisance parameter", "of", "estimate", "prior", "unit", "deviation over sd of the prior")
+        blocks.append(Table("Nuisance parameters estimated beside the law", columns, rows, numeric=(2, 3, 5)))
     return [*blocks, *correlation_table(fit)]
 
 
-def _unit(output: str) -> str:
-    unit = output_unit(output)
-    return f" {unit}" if unit else ""
+def _nuisance_unit(nuisance: NuisanceEstimate, fit: Identification) -> str:
+    """In words of the table: 1 of pure numbers; of an offset that of the outputs where these have one in common."""
+    units = {output_unit(name) or "1" for name in fit.noise_model.outputs}
+    return nuisance_unit(nuisance.kind) or (units.pop() if nuisance.kind == "offset" and len(units) == 1 else "1")
 
 
 def group_sections(

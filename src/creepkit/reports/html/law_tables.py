@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from creepkit.reports.html.elements import Block, Paragraph, Table, number, printable
+from creepkit.reports.html.elements import Block, Paragraph, Table, number, printable, with_interval
 from creepkit.reports.identification_text import rejected
 
 if TYPE_CHECKING:
@@ -43,8 +43,7 @@ def credible_values(ranking: Ranking | None) -> list[Block]:
             law_title(one.fit.law),
             f"{one.weight:.3f}",
             e.name,
-            number(e.value, 5),
-            f"{number(e.low)} to {number(e.high)}",
+            *with_interval(e.value, e.low, e.high),
             "" if e.unit == "1" else e.unit,
             LAW_REJECTED if rejected(one.fit) else e.verdict,
         )

@@ -19,6 +19,7 @@ def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> st
     """Paragraphs on identification, ranking and the other stages, then the references."""
     references = References()
     paragraphs = [
+        _source_of_data(contents, references),
         *identification_methods(contents, found, references),
         *_stages(contents, references),
         _software(contents, found),
@@ -27,13 +28,20 @@ def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> st
     return "\n\n".join([*(" ".join(p) for p in paragraphs if p), "\n".join(numbered)]).strip() + "\n"
 
 
+def _source_of_data(contents: ReportContents, references: References) -> list[str]:
+    """Where the data were published, if the study says so."""
+    if not contents.data_citations:
+        return []
+    return [f"The measured data are those of{references.cite(*contents.data_citations)}."]
+
+
 def _stages(contents: ReportContents, references: References) -> list[list[str]]:
     paragraphs: list[list[str]] = []
     if contents.exclusions:
         tests = {one.test for one in contents.exclusions}
         paragraphs.append(
             [
-                f"Frames of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons that the "
+                f"Readings of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons that the "
                 "report lists."
             ]
         )

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.noise_model import MINIMUM_TESTS
+from creepkit.inverse.nuisance_plausibility import nuisance_unit
 from creepkit.inverse.variance_components import NOISE_PRIOR_SD
 from creepkit.language.printing import expression_text, state_equations
-from creepkit.records import output_unit
+from creepkit.records import kind_and_start, output_unit
 from creepkit.reports.html.citations import References, listed
 from creepkit.reports.html.compared_values import compared_values, frame_counts
 from creepkit.reports.html.elements import number, plural, printable
+from creepkit.reports.html.law_names import title_in_sentence
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -69,7 +71,7 @@ def _tests(found: Sequence[GroupFindings]) -> list[str]:
     measured, fitted = sum(c.measured for c in counts), sum(c.fitted for c in counts)
     values = plural(sum(one.count for one in known), "value")
     if measured:
-        frames = f"{fitted} of {plural(measured, 'measured frame')} were fitted, which makes {values} compared"
+        frames = f"{fitted} of {plural(measured, 'reading')} were fitted, which makes {values} compared"
     else:
         frames = f"{values} were compared"
     transforms = {one.transforms for one in known}
@@ -78,7 +80,7 @@ def _tests(found: Sequence[GroupFindings]) -> list[str]:
     else:
         how = (
             "Strains ε were compared as arsinh(ε / 2f), which is ln(ε / f) well above the floor f, 1 % of the median "
-            "final strain of a material and at least three times the noise of a frame; lengths linearly, divided by "
+            "final strain of a material and at least three times the noise of a reading; lengths linearly, divided by "
             "their standard deviation."
         )
     return [f"Creep laws were identified from {plural(tests, 'test')}{materials}: {frames}.", how]
@@ -104,13 +106,9 @@ def _loading(found: GroupFindings) -> list[str]:
     return sentences
 
 
-def _fits(found: GroupFindings) -> list[Identification]:
-    return [found.fit] if found.ranking is None else [one.fit for one in found.ranking.laws]
-
-
 def _laws(found: Sequence[GroupFindings], references: References) -> list[str]:
     """The laws by their titles and formulas, with what they cite."""
-    laws = {one.law.name: one.law for group in found for one in _fits(group)}
+    laws = {one.law.name: one.law for group in found for one in group.fits}
     named = [f"{_formula(law)}{references.cite(*law.references)}" for law in laws.values()]
     if len(named) == 1:
         return [f"The law was the {named[0]}."]
@@ -125,7 +123,7 @@ def _formula(law: CreepLaw) -> str:
     equation = f"ε̇ = {rate}{states}".replace("**", "^")
     for word, letter in (("stress", "σ"), ("strain", "ε"), ("time", "t"), ("temperature", "T")):
         equation = equation.replace(word, letter)
-    return f"{printable(law.title or law.name, 160)}, {printable(equation, 400)}"
+    return f"{title_in_sentence(law)}, {printable(equation, 400)}"
 
 
 # ---- estimation ------------------------------------------------------------------------------------------------------
@@ -146,7 +144,7 @@ def _estimation(found: GroupFindings, contents: ReportContents, references: Refe
         _penalty(found),
     ]
     if settings.loss != "linear":
-        sentences.append(f"Frames far off have less weight by the loss '{settings.loss}'.")
+        sentences.append(f"Readings far off have less weight by the loss '{settings.loss}'.")
     if settings.test_loss == "student":
         sentences.append(
             f"Tests far from the others have less weight by Student's distribution{references.cite('student')}."
@@ -178,15 +176,15 @@ def _search(fit: Identification, contents: ReportContents, references: Reference
 
 def _bounds(found: GroupFindings) -> str:
     """Between which values each law's parameters were sought."""
-    laws = {one.law.name: one.law for one in _fits(found)}
+    laws = {one.law.name: one.law for one in found.fits}
     parts = []
     for law in laws.values():
         ranges = [
             f"{name} {number(p.bounds[0], 3)} to {number(p.bounds[1], 3)}{'' if p.unit == '1' else f' {p.unit}'}"
             for name, p in law.table.items()
-            if name in {e.name for one in _fits(found) if one.law.name == law.name for e in one.estimates}
+            if name in {e.name for one in found.fits if one.law.name == law.name for e in one.estimates}
         ]
-        named = f"of the {printable(law.title or law.name, 160)} " if len(laws) > 1 else ""
+        named = f"of the {title_in_sentence(law)} " if len(laws) > 1 else ""
         parts.append(f"{named}{listed(ranges)}")
     return f"The bounds of the search were {'; '.join(parts)}."
 
@@ -201,8 +199,8 @@ def _noise_priors(fit: Identification) -> str:
     if not stated:
         return ""
     return (
-        f"The noise of a frame has a log-normal prior about the noise that the tests state ({listed(stated)}), with a "
-        f"standard deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
+        f"The noise of a reading has a log-normal prior about the noise that the tests state ({listed(stated)}), with "
+        f"a standard deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
     )
 
 
@@ -233,7 +231,7 @@ def _weights(fit: Identification, references: References) -> list[str]:
     if settings.weights == "noise":
         parts = listed(["noise", *estimated, "what the law cannot follow"])
         return [
-            f"Frames have equal weights; {parts} were estimated as variance components, and 95 % intervals are those "
+            f"Readings have equal weights; {parts} were estimated as variance components, and 95 % intervals are those "
             f"of a sandwich covariance{references.cite('sandwich')} with Student's quantiles."
         ]
     if settings.weights == "equal":
@@ -272,7 +270,10 @@ def _explicit_nuisances(fit: Identification) -> str:
     if not explicit:
         return ""
     priors = {(n.key, n.prior_mean, n.prior_sd) for n in fit.nuisances}
-    named = [f"{key} {number(mean)} ± {number(sd, 2)}" for key, mean, sd in sorted(priors)]
+    named = [
+        f"{key} {number(mean)} ± {number(sd, 2)} {nuisance_unit(kind_and_start(key)[0])}".rstrip()
+        for key, mean, sd in sorted(priors)
+    ]
     if not named or len(named) > MOST_NAMED:
         named = list(dict.fromkeys(n.kind for n in explicit))
     return f"Nuisance parameters with Gaussian priors (mean ± standard deviation) were {listed(named)}."
@@ -280,7 +281,7 @@ def _explicit_nuisances(fit: Identification) -> str:
 
 def _penalty(found: GroupFindings) -> str:
     """The penalty on terms of a sum, where one was used."""
-    sparse = next((one.sparsity for one in _fits(found) if one.sparsity is not None), None)
+    sparse = next((one.sparsity for one in found.fits if one.sparsity is not None), None)
     if sparse is None:
         return ""
     strength = "" if sparse.strength is None else f" of strength {number(sparse.strength, 3)}"
@@ -306,10 +307,9 @@ def _ranking(ranking: Ranking, fit: Identification, references: References) -> l
 
 
 def _criterion(name: str, references: References) -> str:
-    if name == "bic":
-        return f"Bayesian information criterion{references.cite('bic')} over independent frames"
-    if name == "aicc":
-        return f"corrected information criterion of Akaike{references.cite('aicc')} over independent frames"
+    criteria = {"bic": "Bayesian information criterion", "aicc": "corrected information criterion of Akaike"}
+    if name in criteria:
+        return f"{criteria[name]}{references.cite(name)} with the number of independent readings"
     return "error of tests that were held out"
 
 
@@ -318,5 +318,5 @@ def _adequacy(found: Sequence[GroupFindings]) -> list[str]:
         return []
     return [
         "A law explains the tests where its chi-square, against noise that was stated or estimated from neighbouring "
-        "frames and not from its own misfit, has a probability of at least 0.3 %."
+        "readings and not from its own misfit, has a probability of at least 0.3 %."
     ]

@@ -25,6 +25,8 @@ from creepkit.reports.html.elements import (
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings, findings_of, verdict_blocks, with_histories
 from creepkit.reports.html.groups import group_sections
+from creepkit.reports.html.law_names import LawNames, title_in_sentence
+from creepkit.reports.html.law_tables import law_title
 from creepkit.reports.html.sliders import fragment_style, script_policy, slider_sections
 from creepkit.reports.html.stages import data_section, stage_sections, strength_blocks
 from creepkit.reports.identification_text import rejected
@@ -58,7 +60,7 @@ def report_html(contents: ReportContents) -> str:
         _findings_section(contents, found),
         *_group_sections(found, figures),
         data_section(contents, found),
-        *stage_sections(contents, figures),
+        *stage_sections(contents, figures, LawNames.of(fit for one in found for fit in one.fits)),
         *closing_sections(contents, found, slider_sections(found)),
     ]
     shown = [section for section in map(_without_empty, sections) if not section.empty]
@@ -139,7 +141,7 @@ def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) 
 
 def _overview(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
     explained = sum(one.fit.adequacy is not None and one.fit.adequacy.explains for one in found)
-    laws = [one.fit.law.name for one in found]
+    laws = [title_in_sentence(one.fit.law) for one in found]
     counts = sorted({name: laws.count(name) for name in laws}.items(), key=lambda pair: (-pair[1], pair[0]))
     named = ", ".join(f"{printable(name, 60)} in {count}" for name, count in counts[:8])
     compared = [one for one in found if one.decisive is not None]
@@ -162,7 +164,7 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
         rows.append(
             (
                 printable(one.name, 120),
-                printable(fit.law.name, 120),
+                law_title(fit.law),
                 weight,
                 adequacy,
                 "–" if one.decisive is None else "yes" if one.decisive else "no",

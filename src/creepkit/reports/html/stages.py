@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.duration import duration_known
 from creepkit.quality.flags import frame_ranges_text
-from creepkit.reports.design import design_figure, direction_lines, order_text
+from creepkit.reports.design import cheapest_text, design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
 from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows
@@ -27,9 +27,11 @@ from creepkit.reports.html.elements import (
     printable,
     printable_lines,
     sentence,
+    with_interval,
 )
 from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import findings_of
+from creepkit.reports.html.law_names import LawNames
 from creepkit.reports.html.law_tables import LAW_REJECTED
 from creepkit.reports.html.test_details import NOT_STATED, table_of_details
 from creepkit.reports.instrument_records import alignment_text, imposed_text
@@ -65,6 +67,7 @@ def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) 
     if histories:
         more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
         blocks += [_table_of_histories(histories, more), table_of_details(histories[:MOST_LISTED], more)]
+    blocks += [Paragraph(sentence(f"Source of the data: {text}")) for text in contents.data_citations]
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)
     apart = [f"{one.name}: {text}" if one.name else text for one in found if (text := apart_sentence(one.fit))]
@@ -86,7 +89,7 @@ def _table_of_histories(histories: Sequence[History], more: str) -> Table:
         )
         for h in histories[:MOST_LISTED]
     ]
-    columns = ("test", "alloy", "condition", "measured frames", "last frame, h", "ended", "file")
+    columns = ("test", "alloy", "condition", "readings", "last reading, h", "ended", "file")
     return Table(f"{plural(len(histories), 'test')} as measured{more}", columns, rows, numeric=(3, 4))
 
 
@@ -98,35 +101,40 @@ def _ending(history: History) -> str:
 
 def _quality_blocks(quality: DataQuality) -> list[Block]:
     if not quality.tests:
-        return [Paragraph("No test has frames, so that there was nothing for the check of data quality to look at.")]
+        return [
+            Paragraph(
+                "No test has readings over time, so that there was nothing for the check of data quality to look at."
+            )
+        ]
     if not quality.flags:
         return [Paragraph(f"The check of data quality found nothing suspect in {plural(quality.tests, 'test')}.")]
     rows = [
         (
             printable(flag.history, 160),
             flag.kind,
-            frame_ranges_text(flag.frames) if flag.frames else "–",
+            readings_text(flag.frames) if flag.frames else "–",
             "–" if flag.time is None else number(flag.time / 3600.0),
             printable(flag.reason),
             printable(flag.proposal or "–"),
         )
         for flag in quality.flags[:MOST_LISTED]
     ]
-    columns = ("test", "what", "frames", "at, h", "reason", "what may be done")
+    columns = ("test", "what", "readings", "at, h", "reason", "what may be done")
     caption = f"What the check of data quality found in {plural(quality.tests, 'test')}; it drops nothing by itself"
     return [Table(caption, columns, rows, numeric=(3,))]
+
+
+def readings_text(frames: Sequence[int]) -> str:
+    """Numbers of readings: 'readings 97-191, 193'; of a bar that has no camera as of what has one."""
+    return frame_ranges_text(frames).replace("frame", "reading", 1)
 
 
 def _exclusion_blocks(contents: ReportContents) -> list[Block]:
     selected = [Paragraph(text) for text in _selections(contents)]
     if not contents.exclusions:
-        return [Paragraph("No frame was excluded by hand or by the check of data quality."), *selected]
+        return [Paragraph("No reading was excluded by hand or by the check of data quality."), *selected]
     rows = [
-        (
-            printable(one.test, 120),
-            frame_ranges_text(one.frames) if one.frames else "the whole test",
-            printable(one.reason),
-        )
+        (printable(one.test, 120), readings_text(one.frames) if one.frames else "the whole test", printable(one.reason))
         for one in contents.exclusions[:MOST_LISTED]
     ]
     return [Table("Left out of the identification", ("test", "what", "reason"), rows), *selected]
@@ -143,7 +151,7 @@ def _selections(contents: ReportContents) -> Iterator[str]:
         yield f"{printable(group.name, 80)}: {text}" if len(contents.groups) > 1 else text
 
 
-def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[PageSection]:
+def stage_sections(contents: ReportContents, figures: PageFigures, names: LawNames) -> Iterator[PageSection]:
     """Extraction, records, temperature, rupture, forecasts and further tests, where there are such results.
 
     Strengths stand among the findings where no law was identified, and are not repeated.
@@ -154,8 +162,8 @@ def stage_sections(contents: ReportContents, figures: PageFigures) -> Iterator[P
         ("imposed", "Loads and temperatures from instrument records", contents.imposed, _imposed_blocks),
         ("temperature", "Trends with temperature", contents.temperature, _temperature_blocks),
         ("rupture", "Rupture", contents.rupture, partial(_rupture_blocks, strengths=identified)),
-        ("forecasts", "Forecasts", contents.forecasts, _forecast_blocks),
-        ("design", "Further tests proposed", contents.design, _design_blocks),
+        ("forecasts", "Forecasts", contents.forecasts, partial(_forecast_blocks, names=names)),
+        ("design", "Further tests proposed", contents.design, partial(_design_blocks, names=names)),
     )
     for identifier, title, results, blocks_of in stages:
         if len(results) == 1:
@@ -222,8 +230,7 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
         rows = [
             (
                 e.name,
-                number(e.value, 5),
-                f"{number(e.low)} to {number(e.high)}",
+                *with_interval(e.value, e.low, e.high),
                 "" if e.unit == "1" else e.unit,
                 e.verdict if rejected is None else LAW_REJECTED,
             )
@@ -276,8 +283,8 @@ def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigur
     return [*(strength_blocks(assessment) if strengths else []), picture, text]
 
 
-def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> list[Block]:
-    laws = ", ".join(f"{law} ({weight:.2g})" for law, weight in forecast.laws.items())
+def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures, *, names: LawNames) -> list[Block]:
+    laws = ", ".join(f"{names.in_text(law)} ({weight:.2g})" for law, weight in forecast.laws.items())
     blocks: list[Block] = [
         Paragraph(
             f"By {laws}: if the law is right, bands and intervals hold a measured value of a single test with a "
@@ -306,7 +313,7 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures) -> lis
     for test in forecast.tests:
         for note in test.notes:
             remarks.setdefault(note, []).append(printable(test.name, 80))
-    listed = [sentence(f"{note} ({', '.join(tests)})") for note, tests in remarks.items()]
+    listed = [sentence(f"{names.in_text(note)} ({', '.join(tests)})") for note, tests in remarks.items()]
     return [*blocks, Items(listed)] if listed else blocks
 
 
@@ -327,8 +334,9 @@ def _forecast_cells(forecast: Forecast) -> list[tuple[str, ...]]:
     return rows
 
 
-def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Block]:
-    blocks: list[Block] = [Paragraph(sentence(design.sentence), "lead")]
+def _design_blocks(name: str, design: Design, figures: PageFigures, *, names: LawNames) -> list[Block]:
+    verdict = sentence(names.in_text(design.sentence))
+    blocks: list[Block] = [Paragraph(verdict, "lead")]
     if design.tests:
         to_decide = design.goal == "law"
         rows = [
@@ -347,16 +355,17 @@ def _design_blocks(name: str, design: Design, figures: PageFigures) -> list[Bloc
             f"The first of {plural(len(design.tests), 'planned test')} considered, {order_text(design)}; goal: "
             f"{design.goal}. A nat of information divides the volume of what is likely by 2.7"
         )
+        blocks.append(Paragraph(sentence(names.in_text(cheapest_text(design)))))
         blocks.append(Table(caption, columns, rows, numeric=tuple(range(1, len(columns)))))
         blocks.append(
             figures.picture(
                 lambda: design_figure(design),
                 f"What further tests tell{_of(name)}",
                 "Map of the expected information for an hour of machine time over first load and duration, left of "
-                f"constant loads, right of loads that change. {sentence(design.sentence)}",
+                f"constant loads, right of loads that change. {verdict}",
                 "Expected information for an hour of machine time over first load and duration; the plan is marked.",
             )
         )
     lines = [line.strip() for line in direction_lines(design) if line.strip()]
     remarks = [*lines[1:], *(design.notes if design.tests else ())]
-    return [*blocks, Items([sentence(text) for text in remarks])] if remarks else blocks
+    return [*blocks, Items([sentence(names.in_text(text)) for text in remarks])] if remarks else blocks
