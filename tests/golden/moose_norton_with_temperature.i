@@ -1,10 +1,10 @@
-# norton*arrhenius: Norton power law (PL), Arrhenius in temperature
+# norton*arrhenius: Norton power law (PL) with Arrhenius temperature dependence
 #
 # rate = A*stress**n*exp(-Q/R*(1/T - 1/1073.15))    [power law]
 #
 # Numbers below are in Pa and s, temperatures in K: stress is a ratio to 1 Pa, time to 1 s, rates are per s.
 # Parameters, for stress as a ratio to 1 MPa and time to 1 s:
-#   A = 1.2e-16 1/s, rate coefficient
+#   A = 1.2e-16 1/s, rate coefficient (MPa^-n s^-1 for stress in MPa and time in s)
 #   n = 5.2, stress exponent
 #   Q = 400000.0 J/mol, activation energy
 # Note: n = 5.2 [5.1, 5.3]

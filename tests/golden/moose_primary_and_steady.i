@@ -5,9 +5,9 @@
 #
 # Numbers below are in MPa and s, temperatures in K: stress is a ratio to 1 MPa, time to 1 s, rates are per s.
 # Parameters, for stress as a ratio to 1 MPa and time to 1 s:
-#   A_1 = 1e-16 1/s, rate coefficient
+#   A_1 = 1e-16 1/s, rate coefficient (MPa^-n_1 s^-1 for stress in MPa and time in s)
 #   n_1 = 5.0, stress exponent
-#   A_2 = 1e-12 1/s, rate coefficient
+#   A_2 = 1e-12 1/s, rate coefficient (MPa^-n_2 s^-(m + 1) for stress in MPa and time in s)
 #   n_2 = 4.0, stress exponent
 #   m = -0.7, time exponent
 # Note: n = 5.2 [5.1, 5.3]

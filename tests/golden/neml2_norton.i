@@ -4,7 +4,7 @@
 #
 # Numbers below are in MPa and s, temperatures in K: stress is a ratio to 1 MPa, time to 1 s, rates are per s.
 # Parameters, for stress as a ratio to 1 MPa and time to 1 s:
-#   A = 1.2e-16 1/s, rate coefficient
+#   A = 1.2e-16 1/s, rate coefficient (MPa^-n s^-1 for stress in MPa and time in s)
 #   n = 5.2, stress exponent
 # Note: n = 5.2 [5.1, 5.3]
 # Note: valid from 973 to 1123 K

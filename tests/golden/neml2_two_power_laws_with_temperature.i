@@ -1,13 +1,13 @@
-# norton+norton*arrhenius: Norton power law (PL) + Norton power law (PL), Arrhenius in temperature
+# norton+norton*arrhenius: Norton power law (PL) + Norton power law (PL) with Arrhenius temperature dependence
 #
 # rate = A_1*stress**n_1*exp(-Q/R*(1/T - 1/1073.15))    [power law 1]
 #      + A_2*stress**n_2*exp(-Q/R*(1/T - 1/1073.15))    [power law 2]
 #
 # Numbers below are in MPa and s, temperatures in K: stress is a ratio to 1 MPa, time to 1 s, rates are per s.
 # Parameters, for stress as a ratio to 1 MPa and time to 1 s:
-#   A_1 = 1e-12 1/s, rate coefficient
+#   A_1 = 1e-12 1/s, rate coefficient (MPa^-n_1 s^-1 for stress in MPa and time in s)
 #   n_1 = 3.0, stress exponent
-#   A_2 = 1e-18 1/s, rate coefficient
+#   A_2 = 1e-18 1/s, rate coefficient (MPa^-n_2 s^-1 for stress in MPa and time in s)
 #   n_2 = 6.0, stress exponent
 #   Q = 300000.0 J/mol, activation energy
 # Note: n = 5.2 [5.1, 5.3]

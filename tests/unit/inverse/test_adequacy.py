@@ -235,7 +235,7 @@ def test_without_any_noise_nothing_can_be_judged():
     assert np.isnan(found.discrepancy_in_noises)
     assert "in Python as standard_deviation" in str(found)
     assert f"too few readings of '{tests[0].name}' (5)" in str(found)
-    assert "fewer than 30 frames of a test cannot judge" in str(found)
+    assert "fewer than 30 readings of a test cannot judge" in str(found)
 
 
 # ---- sentences ---------------------------------------------------------------------------------------------------

@@ -193,12 +193,12 @@ def test_rates_beside_curves_narrow_the_interval():
     assert widths[1] < 0.5 * widths[0]
 
 
-def test_a_rate_beside_the_frames_of_its_test_is_not_counted_twice():
+def test_a_rate_beside_the_readings_of_its_test_is_not_counted_twice():
     tests = [curve(s) for s in (80.0, 100.0, 120.0)]
     with_rates = [h.replace(minimum_rate=3e-9) for h in tests]
     plain, both = (ck.identify(NORTON, each, starts=1) for each in (tests, with_rates))
     assert both.values == plain.values
-    assert any("minimum rate" in note and "frames" in note for note in both.notes)
+    assert any("minimum rate" in note and "readings" in note for note in both.notes)
     assert not any("minimum rate" in note for note in plain.notes)
 
 
