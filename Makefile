@@ -35,7 +35,7 @@ test: core
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
-	@for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q); done
+	@for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q -n 2); done
 	$(BIN)/pytest -q -n 2 --dist loadgroup $(PYTEST_OPTIONS)
 
 core: .venv/.ok

@@ -3,6 +3,7 @@
     python tests/benchmarks/all.py                            list the programs
     python tests/benchmarks/all.py NAME ... [--write]         run the commands of some, one after another
     python tests/benchmarks/all.py everything [--write]       run all that need no further file or program
+    python tests/benchmarks/all.py --short [NAME ...]         run the short forms, as .ci/run does, of all that have one
 
 With --write every program writes its tables to docs/measured. Commands run from the root of the project.
 """
@@ -26,12 +27,14 @@ class Benchmark:
     """A program with the options of its published tables.
 
     minutes : of CPU, expected, of all its commands on an AMD EPYC core. commands : options, a list for each run.
-    needs : files and programs that are neither in the project nor among its dependencies, or "".
+    needs : files and programs that are neither in the project nor among its dependencies, or "". short : options of a
+    form of a minute or two, whose figures are compared with none; () where there is none.
     """
 
     minutes: float
     commands: tuple[tuple[str, ...], ...] = ((),)
     needs: str = ""
+    short: tuple[str, ...] = ()
 
 
 DATA = "measured data in ../shared/data"
@@ -39,8 +42,8 @@ BENCHMARKS = {
     "import_time": Benchmark(0.1),
     "page_latency": Benchmark(1, needs="Chromium and playwright"),
     "core_speed": Benchmark(2),
-    "random_simulations": Benchmark(30),
-    "killed_runs": Benchmark(90),
+    "random_simulations": Benchmark(30, short=("--cases", "1000", "--laws", "10", "--seed", "7", "--jobs", "2")),
+    "killed_runs": Benchmark(90, short=("--kills", "5", "--seed", "7", "--jobs", "2")),
     "camera_reading": Benchmark(0.5),
     "rendered_speckle": Benchmark(1, needs="pyvale 2026.10, here or in the Python of the option --python"),
     "user_costs": Benchmark(2, needs=DATA),
@@ -90,11 +93,14 @@ BENCHMARKS = {
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "structure": Benchmark(0.1),
     "rate_tables": Benchmark(20, needs=DATA),
-    "reader_fuzz": Benchmark(40),
-    "large_files": Benchmark(3),
-    "adverse_surroundings": Benchmark(25),
+    "reader_fuzz": Benchmark(40, short=("--short", "--first", "700000", "--jobs", "2")),
+    "large_files": Benchmark(3, short=("--megabytes", "10")),
+    "adverse_surroundings": Benchmark(25, short=("--short", "--jobs", "2")),
     "code_execution": Benchmark(
-        15, (("--jobs", "2"),), "gfortran, gcc, g++, node, Chromium and playwright; root, for all caches"
+        15,
+        (("--jobs", "2"),),
+        "gfortran, gcc, g++, node, Chromium and playwright; root, for all caches",
+        short=("--short", "--jobs", "2"),
     ),
 }
 """{name of the program: what it costs and how it is run}."""
@@ -120,11 +126,11 @@ def list_programs() -> None:
             print("    python " + " ".join(command(name, options)))
 
 
-def run(names: list[str], write: bool) -> list[str]:
+def run(names: list[str], *, write: bool, short: bool) -> list[str]:
     """Run the commands of some programs in turn; those that failed."""
     failed = []
     for name in names:
-        for options in BENCHMARKS[name].commands:
+        for options in (BENCHMARKS[name].short,) if short else BENCHMARKS[name].commands:
             arguments = command(name, options) + (["--write"] if write else [])
             print(f"\n$ python {' '.join(arguments)}", flush=True)
             start = time.monotonic()
@@ -139,17 +145,23 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help="programs to run, or 'everything'; none: list them")
     parser.add_argument("--write", action="store_true", help="write the tables to docs/measured")
+    parser.add_argument("--short", action="store_true", help="the short forms, whose tables are not written")
     options = parser.parse_args()
-    if not options.names:
+    names = options.names
+    if options.short:
+        with_short = [name for name, benchmark in BENCHMARKS.items() if benchmark.short]
+        if options.write or not set(names) <= set(with_short):
+            parser.error(f"--short goes without --write, and with {', '.join(with_short)}")
+        names = names or with_short
+    elif not names:
         list_programs()
         return
-    names = options.names
     if names == ["everything"]:
         names = [name for name, benchmark in BENCHMARKS.items() if not benchmark.needs]
     unknown = [name for name in names if name not in BENCHMARKS]
     if unknown:
         parser.error(f"there is no program {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
-    failed = run(names, options.write)
+    failed = run(names, write=options.write, short=options.short)
     if failed:
         raise SystemExit("failed: " + "; ".join(failed))
 

@@ -119,7 +119,7 @@ def unforeseen(error: BaseException) -> tuple[str, str] | None:
 
 
 RAW = re.compile(r"Traceback|<class|<[\w.]+ object|\b0x[0-9a-f]{8,}|\b[A-Z]\w*(Error|Exception)\b|KeyError|\bb'\\\\x")
-"""What a message for a user does not hold, unless it stands in the file."""
+"""What a message for a user does not hold, unless in quotes: there stands what the file holds."""
 
 
 def is_unclear(error: BaseException, folder: Path) -> bool:
@@ -134,7 +134,7 @@ def is_unclear(error: BaseException, folder: Path) -> bool:
         below = below.__cause__ or below.__context__
         if below is not None and not isinstance(below, CreepkitError):
             raw |= {str(below).strip(), repr(below)}
-    return len(said) < 12 or said in raw or RAW.search(said) is not None
+    return len(said) < 12 or said in raw or RAW.search(re.sub(r"'[^']*'", "''", said)) is not None
 
 
 def work(folder: Path) -> None:
