@@ -33,6 +33,7 @@ from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import findings_of
 from creepkit.reports.html.law_names import LawNames
 from creepkit.reports.html.law_tables import LAW_REJECTED
+from creepkit.reports.html.minimum_rates import minimum_rate_table
 from creepkit.reports.html.test_details import NOT_STATED, table_of_details
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.rupture import rupture_text, strength_rows
@@ -67,6 +68,7 @@ def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) 
     if histories:
         more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
         blocks += [_table_of_histories(histories, more), table_of_details(histories[:MOST_LISTED], more)]
+        blocks += minimum_rate_table(histories[:MOST_LISTED], found)
     blocks += [Paragraph(sentence(f"Source of the data: {text}")) for text in contents.data_citations]
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)
