@@ -22,7 +22,6 @@ from creepkit import integration, kernels
 from creepkit.arrays import Floats, frozen
 from creepkit.errors import SolveError
 from creepkit.integration import FibreInput, FibreModel, FibreTest, IntegrationSettings
-from creepkit.integration.time_discretisation import SDIRK4_TEXT
 from creepkit.records import History, Load, NuisanceValues, Output, Prediction, Program, Status
 from creepkit.records.prediction_assembly import (
     HistoryPrediction,
@@ -31,6 +30,7 @@ from creepkit.records.prediction_assembly import (
     check_nuisances,
 )
 from creepkit.specimens.bar import SEARCH_TOLERANCE, STEPS_PER_BREAKPOINT
+from creepkit.specimens.fibre_beam_text import fibre_beam_text
 from creepkit.specimens.run import Run, run_from_outputs
 from creepkit.specimens.test_piece import TestPiece
 
@@ -97,16 +97,7 @@ class FibreBeam(TestPiece, ABC):
             if not least <= value <= most:
                 raise SolveError(f"specimen '{self.name}': {name} is {value!r}; allowed are {least:g} to {most:g}")
 
-    def model_text(self, histories: Sequence[History]) -> str:
-        """How the beam is simulated, in sentences for a paper."""
-        places, _ = self.section()
-        return (
-            f"The beam has {len(self.beam_stations().moments)} sections of {len(places)} fibres each, all of them "
-            "uniaxial material points; plane sections stay plane, deflections are small, shear is left out, and "
-            "deflections follow from the curvatures by virtual work. Fibres are integrated in time together by "
-            f"{SDIRK4_TEXT}, with a local error of at most {self.tolerance:g} in a step; the beam ruptures where a "
-            f"fibre reaches a creep strain of {self.strain_limit:g}."
-        )
+    model_text = fibre_beam_text
 
     # ---- of each kind of beam -------------------------------------------------------------------------------------
 

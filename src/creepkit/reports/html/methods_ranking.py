@@ -36,7 +36,7 @@ def ranking_sentences(found: GroupFindings, references: References, *, numbers: 
             "chi-square, under the covariance of the law that explains the tests best, plus the logarithm of the "
             "determinant that integrates nuisance parameters out"
             if by_likelihood
-            else "-2 ln L, multiplied by the independent over all readings"
+            else "-2 ln L, multiplied by the number of independent readings over that of all"
         )
         criterion = (
             f"{name}{references.cite(ranking.criterion)}: {deviance}, plus {penalty} for K parameters that the tests "
