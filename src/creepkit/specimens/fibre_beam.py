@@ -1,10 +1,9 @@
 """Beams of fibres: sections along a span, each of many uniaxial material points, under a force or a deflection.
 
 Plane sections stay plane (Bernoulli), deflections are small, shear and thermal expansion are left out, and supports
-give no moment. A change of temperature changes creep and the modulus alone. A
-subclass says where its sections are and which moment a unit of force gives them; by virtual work the same moments,
-integrated over the curvatures, give the deflection of the point where the force acts. The deflection includes the
-elastic one.
+give no moment. A change of temperature changes creep and the modulus alone. A subclass says where its sections are and
+which moment a unit of force gives them; by virtual work the same moments, integrated over the curvatures, give the
+deflection of the point where the force acts. The deflection includes the elastic one.
 """
 
 from __future__ import annotations
