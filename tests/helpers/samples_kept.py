@@ -24,8 +24,9 @@ from creepkit.screening.results import AlloyResult, WeightedLaw
 from creepkit.studies.carried_study import study_of_report
 from creepkit.studies.documents import ResultFolder
 from creepkit.studies.execution import Execution
+from creepkit.studies.law_stages import numbers_of_ranking
 from creepkit.studies.lock import STUDY_LOCK, read_lock
-from creepkit.studies.stages import Stage
+from creepkit.studies.stage import Stage
 from creepkit.surrogates.loading import load_surrogate
 from helpers.paths import ROOT
 from helpers.reader_samples import ReaderSample
@@ -96,7 +97,7 @@ class StageResult:
     def _making(self, made: Any) -> Stage:
         make = made if callable(made) else lambda results, tick: made
         settings = {"laws": ["norton"]}
-        return Stage("identification", "identification", "", settings, make, record=Ranking)
+        return Stage("identification", "identification", "", settings, make, numbers_of_ranking, record=Ranking)
 
 
 def read_header(path: Path) -> Any:

@@ -17,7 +17,16 @@ from creepkit.errors import CreepkitError, FitError, quoted
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.language import temperature
-from creepkit.records import ZERO_CELSIUS, History, LawWithValues, Predictor, Specimen, known_specimens, predict_with
+from creepkit.records import (
+    ZERO_CELSIUS,
+    History,
+    LawWithValues,
+    Predictor,
+    Specimen,
+    dimensions_of,
+    known_specimens,
+    predict_with,
+)
 from creepkit.registry.arguments import check_histories, resolve_law
 
 if TYPE_CHECKING:
@@ -134,17 +143,20 @@ def _checked_surrogate(surrogate: Any, law: CreepLaw) -> Predictor:
 
 def _page_laws(source: PageSource) -> tuple[PageLaw, ...]:
     """The laws of a source, those of a ranking by falling weight."""
-    given: Any = source
-    if isinstance(given, LawWithValues):
-        return (PageLaw(given.law, dict(given.values)),)
-    if hasattr(given, "fits"):  # the laws of a ranking, from its file
-        pairs = sorted(zip(given.fits, given.weights, strict=True), key=lambda pair: -pair[1])
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+
+    if isinstance(source, LawWithValues):
+        return (PageLaw(source.law, dict(source.values)),)
+    if isinstance(source, ModelAverage):  # the laws of a ranking, from its file
+        pairs = sorted(zip(source.fits, source.weights, strict=True), key=lambda pair: -pair[1])
         return tuple(PageLaw(fit.law, fit.values, fit, float(weight)) for fit, weight in pairs[:MOST_LAWS])
-    if hasattr(given, "laws"):
-        return tuple(PageLaw(one.fit.law, one.fit.values, one.fit, one.weight) for one in given.laws[:MOST_LAWS])
-    if hasattr(given, "estimates"):
-        return (PageLaw(given.law, given.values, given),)
-    law = resolve_law(given)
+    if isinstance(source, Ranking):
+        return tuple(PageLaw(one.fit.law, one.fit.values, one.fit, one.weight) for one in source.laws[:MOST_LAWS])
+    if isinstance(source, Identification):
+        return (PageLaw(source.law, source.values, source),)
+    law = resolve_law(source)
     return (PageLaw(law, _example_values(law)),)
 
 
@@ -170,15 +182,13 @@ def _specimens(histories: Sequence[History], first: str | None) -> tuple[Specime
     for name in wanted:
         if name not in known:
             raise FitError(f"specimen '{name}' cannot be shown on a page; those that can are {', '.join(known)}")
-    return tuple(known[name] for name in dict.fromkeys([*wanted, *sorted(known, key=_bar_first(known))]))
+    others = sorted(known, key=lambda name: _numbers_asked_for(known[name]))
+    return tuple(known[name] for name in dict.fromkeys([*wanted, *others]))
 
 
-def _bar_first(known: Mapping[str, Any]) -> Any:
-    """Sort specimens by how much is asked of a user before a first curve is seen: those without lengths first."""
-    return lambda name: (
-        "modulus" in getattr(known[name], "conditions", {}),
-        len(getattr(known[name], "dimensions", ())),
-    )
+def _numbers_asked_for(specimen: Specimen) -> tuple[bool, int]:
+    """How much a user has to state before a first curve of a specimen is seen: a modulus, and how many lengths."""
+    return "modulus" in getattr(specimen, "conditions", {}), len(dimensions_of(specimen))
 
 
 def _has_plain_load(specimen: Any) -> bool:

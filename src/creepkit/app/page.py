@@ -20,7 +20,7 @@ from creepkit.app.runtime_files import runtime_script
 from creepkit.exporters.javascript import law_expression
 from creepkit.records import LawWithValues
 
-FOLDER = Path(__file__).parent / "page"
+FOLDER = Path(__file__).parent / "page_parts"
 
 
 SCRIPTS = (

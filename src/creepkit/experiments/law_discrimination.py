@@ -31,8 +31,8 @@ from creepkit.experiments.expectations import Expectation, ExpectedChiSquare
 from creepkit.experiments.known_laws import Expansion, KnownLaw, nuisances_of_planned, values_of_nuisances
 from creepkit.experiments.planned_outcomes import PlannedOutcomes, test_key
 from creepkit.inverse.composite_predictor import predict, search_predictor_of
-from creepkit.inverse.identify import search_problem
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
+from creepkit.inverse.initial_search import search_problem
 from creepkit.inverse.iterative_estimation import starting_point
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel

@@ -76,6 +76,10 @@ class MathmlExporter:
         return "\n".join(lines) + "\n"
 
 
+class Exponential(sympy.Function):  # type: ignore[misc]
+    """exp, which sympy's printer takes for a denominator where its exponent is negative."""
+
+
 class MathmlPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
     """Print with numeric characters instead of names, symbols of the point as in papers, Arrhenius factors as such."""
 
@@ -87,7 +91,8 @@ class MathmlPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
 
     def doprint(self, expr: sympy.Basic) -> str:
         """The expression as MathML without a root element."""
-        return re.sub(r"&(\w+);", _character_reference, str(super().doprint(expr)))
+        kept = expr.replace(sympy.exp, Exponential)
+        return re.sub(r"&(\w+);", _character_reference, str(super().doprint(kept)))
 
     def _print_Symbol(self, sym: Any, style: str = "plain") -> Any:
         if sym in _VARIABLE_NAMES:
@@ -99,7 +104,7 @@ class MathmlPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
             return self._node("msub", stem, self._leaf("mi", "∞"))
         return super()._print_Symbol(sym, style)
 
-    def _print_exp(self, expr: Any) -> Any:
+    def _print_Exponential(self, expr: Any) -> Any:
         activations = {exponent: arrhenius_exponent(exponent) for exponent in sympy.Add.make_args(expr.args[0])}
         factors = [self._arrhenius(activation) for activation in activations.values() if activation]
         rest = sympy.Add(*(part for part, found in activations.items() if not found))

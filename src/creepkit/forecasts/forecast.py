@@ -48,6 +48,7 @@ class Forecast(Presentable):
     level : probability that a pointwise band holds a measured value, a simultaneous band a whole curve, and an interval
     a time, of a single test, if the law is right. tests : one forecast each.
     rejected : whether the law of most weight does not explain its tests, so that this probability is not earned.
+    draws : of the law, of each test's own rate and of its dimensions, in each test; the largest number.
     """
 
     laws: Mapping[str, float]
@@ -55,6 +56,7 @@ class Forecast(Presentable):
     tests: tuple[TestForecast, ...]
     left_out: int = 0
     rejected: bool = False
+    draws: int = 0
 
     def __getitem__(self, test: str) -> TestForecast:
         """The forecast of one test, by name."""
@@ -119,13 +121,14 @@ def forecast(
             CompositePredictor({h.specimen: p for h, p in zip(histories, predictors, strict=True)}),
         )
     _check_targets(asked, targets_given, predictors)
-    made = []
+    made, most_draws = [], 0
     with single_threaded_blas():
         for k, (history, predictor) in enumerate(zip(histories, predictors, strict=True)):
             if progress is not None:
                 progress("tests", k, len(histories))
             rng = np.random.default_rng([weighted[0][0].settings.seed, zlib.crc32(history.name.encode())])
             count = draws or (DRAWS if reduced_order_model_of(predictor) is None else COSTLY_DRAWS)
+            most_draws = max(most_draws, count)
             laws = [(law_draws(f, max(round(count * w), LEAST_DRAWS), rng), w) for f, w in weighted]
             made.append(
                 forecast_test(laws, history, predictor, level=level, targets=asked, tolerances=tolerances, rng=rng)
@@ -135,7 +138,7 @@ def forecast(
     given = len(source.fits) if isinstance(source, ModelAverage) else len(getattr(source, "laws", weighted))
     adequacy = weighted[0][0].adequacy
     rejected = adequacy is not None and adequacy.verdict == "leaves a discrepancy"
-    return Forecast(_named_weights(weighted), level, tuple(made), given - len(weighted), rejected)
+    return Forecast(_named_weights(weighted), level, tuple(made), given - len(weighted), rejected, most_draws)
 
 
 def _predictor(

@@ -70,6 +70,13 @@ meets the conditions of order 2 at every place.
 """
 
 
+SDIRK2_TEXT = (
+    "a singly diagonally implicit Runge-Kutta method of two stages and order 2, L-stable (R. Alexander (1977), SIAM J. "
+    "Numer. Anal. 14, 1006)"
+)
+"""SDIRK2 in words."""
+
+
 SDIRK4 = _tableau(
     rows=[
         [1 / 4],
@@ -92,6 +99,13 @@ SDIRK4 = _tableau(
 
 The dense output is the one quartic that meets the conditions of order 3, and of order 4 for quadrature, everywhere.
 """
+
+
+SDIRK4_TEXT = (
+    "a singly diagonally implicit Runge-Kutta method of five stages and order 4 with an embedded one of order 3, "
+    "L-stable (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, Section IV.6)"
+)
+"""SDIRK4 in words."""
 
 
 def merge_programs(*programs: Program, end: float) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 
@@ -126,6 +126,16 @@ def identification_notes(
     if (problem.bound_penalties.constraint_violations(estimation.minimum.x[: problem.parameter_count]) > 1e-3).any():
         sentences.append("a constraint of the law does not hold over the tests at these values")
     return (*sentences, *_test_notes(problem, tests, nuisances))
+
+
+def one_end_note(minima: Mapping[str, int], search: str) -> tuple[str, ...]:
+    """That a search had one start alone, if it had.
+
+    minima : see inverse.search.multistart.minima_counts. search : its name, "" of a multi-start without a trace.
+    """
+    if minima.get("search_ends") != 1 or search not in ("", "multi-start"):
+        return ()
+    return ("the search ended once: whether another minimum is lower was not examined (raise starts)",)
 
 
 def domain_notes(prediction: Prediction, histories: Sequence[History]) -> tuple[str, ...]:

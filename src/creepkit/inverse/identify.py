@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from creepkit.inverse.composite_predictor import (
     predictors_for_law,
     reduced_order_model_of,
     refined_of,
-    search_predictor_of,
     through_for_law,
 )
 from creepkit.inverse.defect_correction import (
@@ -30,7 +29,14 @@ from creepkit.inverse.defect_correction import (
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identification_notes import domain_notes, fitted_ranges, identification_notes, provenance_of
+from creepkit.inverse.identification_notes import (
+    domain_notes,
+    fitted_ranges,
+    identification_notes,
+    one_end_note,
+    provenance_of,
+)
+from creepkit.inverse.initial_search import SearchOutcome, initial_search
 from creepkit.inverse.iterative_estimation import (
     APPROXIMATE_LIMITS,
     SIMULATION_LIMITS,
@@ -48,9 +54,9 @@ from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rupture_prediction import compare_rupture_times
-from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
+from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.search.local_refinement import IterationCallback
-from creepkit.inverse.search.multistart import EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct
+from creepkit.inverse.search.multistart import MultiStart
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
@@ -132,7 +138,7 @@ def identify_values(
             lower, upper = (bound[: len(law.params)] for bound in (problem.bounds.lower, problem.bounds.upper))
             search_outcome = SearchOutcome([np.clip(start.u, lower, upper)], 0, None)
         else:
-            search_outcome = _global_search(problem, through, search or MultiStart(), progress)
+            search_outcome = initial_search(problem, through, search or MultiStart(), progress)
         if search_outcome.dropped_terms:
             return _without_terms(problem, histories, search_outcome, progress)
         best, numerical_error = _best_estimate(
@@ -153,18 +159,6 @@ def _gradient(best: EstimationResult) -> Floats:
     return np.asarray(np.einsum("te,tep->p", factor.inverse_times(residuals.values), residuals.jacobian))
 
 
-class SearchOutcome(NamedTuple):
-    """The end of a global search: starts of the estimation, evaluations, trace, and terms that its minimum is without.
-
-    starts : (parameters,) conditioned coordinates each.
-    """
-
-    starts: list[Floats]
-    evaluations: int
-    trace: SearchTrace | None
-    dropped_terms: tuple[str, ...] = ()
-
-
 def _without_terms(
     problem: LeastSquaresProblem,
     histories: Sequence[History],
@@ -179,32 +173,6 @@ def _without_terms(
     fit = identify(reduced_law, histories, problem.predictor, settings=problem.settings, start=start, progress=progress)
     note = f"the search left out {' and '.join(dropped_terms)} of law '{law.name}'"
     return replace(fit, search_trace=search_outcome.trace, notes=(*fit.notes, note))
-
-
-def _global_search(
-    problem: LeastSquaresProblem, through: Predictor | None, search: GlobalSearch, progress: IterationCallback | None
-) -> SearchOutcome:
-    """The best minima that differ, by the reduced-order model of the cheapest predictor."""
-    predictor = through or problem.predictor
-    reduced_order_model = reduced_order_model_of(predictor)
-    searched = search_problem(problem, search_predictor_of(reduced_order_model or predictor))
-    search_result = search.minima(searched, progress)
-    distinct_minima = distinct(
-        search_result.minima,
-        searched.bounds,
-        equal_predictions=EQUAL_PREDICTIONS if reduced_order_model is None else EQUAL_REDUCED_ORDER_PREDICTIONS,
-    )
-    starts = [minimum.x for minimum in distinct_minima]
-    return SearchOutcome(starts, searched.evaluations.count, search_result.trace, distinct_minima[0].terms_off)
-
-
-def search_problem(problem: LeastSquaresProblem, predictor: Predictor) -> LeastSquaresProblem:
-    """What a global search minimises: a broad covariance, and a loss with which no single curve dominates.
-
-    The likelihoods decide between its minima, since the covariance is not yet known. Its unknowns are u alone.
-    """
-    loss = "soft_l1" if problem.settings.loss == "linear" else problem.settings.loss
-    return replace(problem.with_predictor(predictor).with_fixed_nuisances(), loss=loss)
 
 
 def _best_estimate(
@@ -328,7 +296,10 @@ def _result(
         tests=tests,
         ranges=fitted_ranges(problem),
         settings=problem.settings,
-        provenance=provenance_of(problem, search_outcome.evaluations, getattr(search_outcome.trace, "search", "")),
+        provenance={
+            **provenance_of(problem, search_outcome.evaluations, getattr(search_outcome.trace, "search", "")),
+            **search_outcome.minima,
+        },
         errors=pooled_errors(histories, prediction, tests),
         nuisances=nuisance_estimates,
         converged=best.minimum.converged,
@@ -339,6 +310,7 @@ def _result(
         notes=(
             *suspect_frames_note(histories),
             *identification_notes(best, tests, nuisance_estimates),
+            *one_end_note(search_outcome.minima, getattr(search_outcome.trace, "search", "")),
             *(nuisance.sentence for nuisance in implausible),
             *cut_interval_notes(law, estimates),
             *domain_notes(prediction, histories),

@@ -40,6 +40,10 @@ SINGLE_VALUES = (MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT)
 """Outputs of which a test has one value: no frames, no offset, no drift, and all of its scatter in one misfit."""
 
 
+FLOOR_SHARE, FLOOR_NOISES = 0.01, 3.0
+"""Floor of a logarithmic transform: over the median end value, and at least so many times the noise of a frame."""
+
+
 def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
     """The transform of one output of these histories, all of which have it."""
     if output == RUPTURE_OUTPUT:
@@ -54,7 +58,7 @@ def log_transform_for(histories: Sequence[History], output: str) -> LogTransform
     largest_values = [float(np.max(h.outputs[output][usable_frames(h, output)], initial=0.0)) for h in histories]
     noise = np.median([frame_noise(h, output) for h in histories])
     median_largest = float(np.median(largest_values))
-    return LogTransform(max(0.01 * median_largest, 3.0 * float(noise), 1e-14))
+    return LogTransform(max(FLOOR_SHARE * median_largest, FLOOR_NOISES * float(noise), 1e-14))
 
 
 def linear_transform_for(histories: Sequence[History], output: str) -> LinearTransform:

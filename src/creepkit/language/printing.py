@@ -47,7 +47,7 @@ def _without_rounding(number: sympy.Expr) -> sympy.Expr:
 
 
 class LatexLawPrinter(LatexPrinter):  # type: ignore[misc]
-    """Print exponentials of reciprocal temperature as Arrhenius factors, everything else as sympy does."""
+    """Print exponentials as exp[...], those of reciprocal temperature as Arrhenius factors, all else as sympy does."""
 
     def __init__(self, law: LawRecord) -> None:
         names = {s: _LATEX_NAMES[s.name] for s in law.params if s.name in _LATEX_NAMES}
@@ -55,12 +55,10 @@ class LatexLawPrinter(LatexPrinter):  # type: ignore[misc]
 
     def _print_exp(self, e: Any, exp: Any = None) -> str:
         parts = {part: arrhenius_exponent(part) for part in sympy.Add.make_args(e.args[0])}
-        if not any(parts.values()):
-            return str(self._print_ExpBase(e, exp=exp))
         text = "".join(self._arrhenius_factor(result) for result in parts.values() if result)
         rest = sympy.Add(*(part for part, found in parts.items() if not found))
         if rest != 0:
-            text += rf" \exp\!\left[{self._print(rest)}\right]"
+            text += rf"{' ' if text else ''}\exp\!\left[{self._print(rest)}\right]"
         return text if exp is None else rf"\left({text}\right)^{{{exp}}}"
 
     def _print_Piecewise(self, expr: Any, exp: Any = None) -> str:

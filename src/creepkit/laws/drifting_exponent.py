@@ -7,6 +7,7 @@ paper's identifications.
 import sympy
 
 from creepkit.language import CreepLaw, Param, hookimpl, parameters, strain, stress, time
+from creepkit.laws.paper import PAPER
 
 A, n_0, n_inf, C, tau_d, tau_r, m = parameters("A n_0 n_inf C tau_d tau_r m")
 
@@ -28,7 +29,7 @@ DRIFTING_EXPONENT = CreepLaw(
         m: Param("strain exponent", bounds=(-1, 0), off=0.0),
     },
     constraints=(n >= 0,),
-    references=("Eq. (1) of Chen et al., Machine Learning-Driven Creep Law Discovery",),
+    references=(f"{PAPER}, Eq. (1)",),
 )
 
 

@@ -1,6 +1,7 @@
 """Strain-hardening power law (SPL): the rate falls with the creep strain already reached."""
 
 from creepkit.language import CreepLaw, Param, hookimpl, parameters, strain, stress
+from creepkit.laws.paper import PAPER
 
 A, n, m = parameters("A n m")
 
@@ -14,7 +15,7 @@ STRAIN_HARDENING = CreepLaw(
         n: Param("stress exponent", bounds=(1, 8), off=0.0),
         m: Param("strain exponent", bounds=(-1, 0), off=0.0),
     },
-    references=("Table 1 of Chen et al., Machine Learning-Driven Creep Law Discovery",),
+    references=(f"{PAPER}, Table 1",),
 )
 
 

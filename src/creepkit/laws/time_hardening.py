@@ -4,6 +4,7 @@ t^m cannot be integrated from zero at m = -1, so m stops at -0.95 where the pape
 """
 
 from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress, time
+from creepkit.laws.paper import PAPER
 
 A, n, m = parameters("A n m")
 
@@ -19,7 +20,7 @@ TIME_HARDENING = CreepLaw(
     },
     references=(
         "Bailey (1935), The Utilization of Creep Test Data in Engineering Design, Proc. Inst. Mech. Eng. 131, 131-349",
-        "Table 1 of Chen et al., Machine Learning-Driven Creep Law Discovery",
+        f"{PAPER}, Table 1",
     ),
 )
 

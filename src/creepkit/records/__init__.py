@@ -85,7 +85,7 @@ from creepkit.records.quantities import QUANTITIES, QuantityKind, unit_of
 from creepkit.records.specimen_record import Dimension, Load, Output
 from creepkit.records.surface_observation import SurfaceObservation, SurfacePoints, SurfaceRegion
 from creepkit.records.typical_history import typical_history
-from creepkit.records.units import ZERO_CELSIUS
+from creepkit.records.units import SECONDS_PER_HOUR, ZERO_CELSIUS
 
 __all__ = [
     "COVARIANCE_NUISANCES",
@@ -95,6 +95,7 @@ __all__ = [
     "QUANTITIES",
     "RATE_NUISANCES",
     "SCALABLE_LOADS",
+    "SECONDS_PER_HOUR",
     "STEP_DURATION",
     "STEP_NUISANCES",
     "TENSOR_COMPONENTS",

@@ -78,7 +78,8 @@ class Predictor(Protocol):
     `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
     of its loading); `reduced_order_model()`, `refined()` and `for_search()`, see SupportsReducedOrderModel,
     SupportsRefinement and SupportsSearchTolerance; `specimen`, that a surrogate stands for; `outside_class(law)`, why
-    it does not know the class of a law, in a sentence, or "" where it does.
+    it does not know the class of a law, in a sentence, or "" where it does; `model_text(histories)`, how it predicts
+    these tests, in sentences for a paper: what is solved, discretisation, integration in time, tolerances, rupture.
     """
 
     def predict(

@@ -11,6 +11,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 ZERO_CELSIUS = 273.15
+
+
+SECONDS_PER_HOUR = 3600.0
 """K."""
 
 

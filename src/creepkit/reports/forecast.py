@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.records import output_unit
-from creepkit.reports.load_programs import kind_of_test
+from creepkit.reports.load_programs import SECONDS_PER_HOUR, kind_of_test
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
     from creepkit.forecasts.measured_test import ExplainedNuisance, TestScore
     from creepkit.forecasts.results import OutputForecast, TestForecast, TimeForecast
-
-SECONDS_PER_HOUR = 3600.0
-
 
 SHOWN_SHARE = 0.02
 """Of the variance: smaller parts of a band are not named."""

@@ -9,10 +9,8 @@ import numpy as np
 
 from creepkit.inverse.observation_vector import frames_with_data
 from creepkit.inverse.reference_conditions import LOAD_TOLERANCE
+from creepkit.records import SECONDS_PER_HOUR as SECONDS_PER_HOUR
 from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program, load_unit
-
-SECONDS_PER_HOUR = 3600.0
-
 
 MOST_HOLDS = 3
 """Holds that are written one by one; of more, the first, the last and their number."""

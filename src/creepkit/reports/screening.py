@@ -11,7 +11,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.frame_noise import usable_frames
-from creepkit.records import growing_output, output_named, specimen_of
+from creepkit.records import SECONDS_PER_HOUR, growing_output, output_named, specimen_of
 from creepkit.reports.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
 from creepkit.reports.terminal import print_json, print_table
 from creepkit.screening.files import COMPARISON_STRESS, confirmation_text, result_columns
@@ -189,9 +189,6 @@ def _law_fraction(members: tuple[AlloyResult, ...], law: str, decisive: bool) ->
 
 MAX_CLASSES = 4
 """Classes that are shown."""
-
-
-SECONDS_PER_HOUR = 3600.0
 
 
 def plot_histories(plate: ScreeningResult, results: list[AlloyResult]) -> Figure:

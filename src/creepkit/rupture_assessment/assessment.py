@@ -14,12 +14,13 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError, nearest, quoted
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.presentation import Presentable, present
+from creepkit.records import SECONDS_PER_HOUR
 from creepkit.rupture_assessment.checks import AssessmentCheck
 from creepkit.rupture_assessment.likelihood import DISTRIBUTIONS, Distribution
 from creepkit.rupture_assessment.log_time_distributions import power_of_ten
 from creepkit.rupture_assessment.methods import METHODS, Conditions
 from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
-from creepkit.rupture_assessment.observed_tests import SECONDS_PER_HOUR, RuptureTests, celsius
+from creepkit.rupture_assessment.observed_tests import RuptureTests, celsius
 from creepkit.rupture_assessment.rupture_fit import RuptureFit
 from creepkit.rupture_assessment.strength import (
     BOUND_KINDS,

@@ -31,7 +31,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.language.symbols import GAS_CONSTANT
-from creepkit.rupture_assessment.observed_tests import SECONDS_PER_HOUR
+from creepkit.records import SECONDS_PER_HOUR
 
 LN10 = float(np.log(10.0))
 

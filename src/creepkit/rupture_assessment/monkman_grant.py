@@ -8,10 +8,11 @@ import numpy as np
 
 from creepkit.arrays import Floats, frozen
 from creepkit.errors import FitError
+from creepkit.records import SECONDS_PER_HOUR
 from creepkit.rupture_assessment.fitting import fit_method
 from creepkit.rupture_assessment.log_time_distributions import LogTimeDistribution, StudentLogTime
 from creepkit.rupture_assessment.methods import MINIMUM_RATE, MONKMAN_GRANT, Conditions
-from creepkit.rupture_assessment.observed_tests import SECONDS_PER_HOUR, RuptureTests
+from creepkit.rupture_assessment.observed_tests import RuptureTests
 from creepkit.rupture_assessment.rupture_fit import RuptureFit
 
 UNUSED_ENERGY = 300e3

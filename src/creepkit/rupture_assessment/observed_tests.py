@@ -12,12 +12,11 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError, quoted
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
-from creepkit.records import ZERO_CELSIUS, History
+from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History
 
 TensileStrength = Callable[[Floats], Floats]
 """MPa at temperatures in K, arrays of one shape; NaN where it is not known."""
 
-SECONDS_PER_HOUR = 3600.0
 
 TENSILE_LABEL = "tensile_strength_MPa"
 """Label of a history, or column of a table, with the tensile strength at the temperature of the test, MPa."""

@@ -12,6 +12,7 @@ import numpy as np
 from creepkit import integration, kernels
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
+from creepkit.integration.time_discretisation import SDIRK4_TEXT
 from creepkit.records import (
     History,
     HistoryPrediction,
@@ -95,6 +96,18 @@ class Bar:
     def for_search(self) -> Self:
         """The bar at the tolerance of a global search, at which strains err by some 1e-4 of themselves."""
         return self.replace(tolerance=max(self.tolerance, SEARCH_TOLERANCE))
+
+    def model_text(self, histories: Sequence[History]) -> str:
+        """How the bar is simulated, in sentences for a paper."""
+        return (
+            f"A bar is one material point, whose creep rate is integrated in time by {SDIRK4_TEXT}; the step is chosen "
+            f"so that its local error is at most {self.tolerance:g} of the strain. {self.imposed_text} A bar is taken "
+            f"to rupture at a logarithmic creep strain of {self.strain_limit:g}, or where an internal variable reaches "
+            "its limit or the creep rate diverges."
+        )
+
+    imposed_text: ClassVar[str] = ""
+    """What the point of such a bar goes through, in a sentence for a paper."""
 
     # ---- of each kind of bar --------------------------------------------------------------------------------------
 

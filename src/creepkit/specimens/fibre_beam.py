@@ -1,10 +1,9 @@
 """Beams of fibres: sections along a span, each of many uniaxial material points, under a force or a deflection.
 
 Plane sections stay plane (Bernoulli), deflections are small, shear and thermal expansion are left out, and supports
-give no moment. A change of temperature changes creep and the modulus alone. A
-subclass says where its sections are and which moment a unit of force gives them; by virtual work the same moments,
-integrated over the curvatures, give the deflection of the point where the force acts. The deflection includes the
-elastic one.
+give no moment. A change of temperature changes creep and the modulus alone. A subclass says where its sections are and
+which moment a unit of force gives them; by virtual work the same moments, integrated over the curvatures, give the
+deflection of the point where the force acts. The deflection includes the elastic one.
 """
 
 from __future__ import annotations
@@ -30,6 +29,7 @@ from creepkit.records.prediction_assembly import (
     check_nuisances,
 )
 from creepkit.specimens.bar import SEARCH_TOLERANCE, STEPS_PER_BREAKPOINT
+from creepkit.specimens.fibre_beam_text import fibre_beam_text
 from creepkit.specimens.run import Run, run_from_outputs
 from creepkit.specimens.test_piece import TestPiece
 
@@ -95,6 +95,8 @@ class FibreBeam(TestPiece, ABC):
             value = getattr(self, name)
             if not least <= value <= most:
                 raise SolveError(f"specimen '{self.name}': {name} is {value!r}; allowed are {least:g} to {most:g}")
+
+    model_text = fibre_beam_text
 
     # ---- of each kind of beam -------------------------------------------------------------------------------------
 

@@ -10,7 +10,10 @@ import numpy as np
 
 from creepkit.arrays import Floats, usable_cores
 from creepkit.errors import SolveError
+from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.simulation import Simulation, SurfaceSensitivities
+from creepkit.fem.solver import SolverSettings
+from creepkit.integration.time_discretisation import SDIRK2_TEXT
 from creepkit.records import Program
 
 if TYPE_CHECKING:
@@ -50,6 +53,18 @@ def step_time_derivative(
     )
     up, down = (line.interpolate(outputs, times) for line in ends)
     return np.asarray((up - down) / (2.0 * _TIME_SHIFT))
+
+
+def finite_element_text(model: FiniteElementModel, settings: SolverSettings) -> str:
+    """Elements, kinematics, material, integration in time and its end, in sentences for a paper."""
+    return (
+        f"Finite elements of a body of revolution: {len(model.elements)} quadrilaterals of eight nodes with 2 x 2 "
+        f"integration points, {len(model.nodes)} nodes. Strains are finite (logarithmic, Hencky elasticity), and creep "
+        "flows along the elastic deviator at the rate that the law gives for the von Mises stress. Time is integrated "
+        f"by {SDIRK2_TEXT}, in steps whose estimated error of displacements is at most {settings.tolerance:g} of their "
+        f"largest plus {settings.least:g} mm. A test ends at a creep strain of {settings.strain_limit:g} in a point or "
+        f"an observed displacement of {settings.deflection_limit:g} mm."
+    )
 
 
 Task = TypeVar("Task")

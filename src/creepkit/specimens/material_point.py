@@ -19,6 +19,7 @@ from creepkit import integration, kernels
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
+from creepkit.integration.time_discretisation import SDIRK2_TEXT
 from creepkit.records import (
     TENSOR_COMPONENTS,
     History,
@@ -87,6 +88,15 @@ class MaterialPoint:
                 f"point specimen: tolerance {self.tolerance:g}, strain_limit {self.strain_limit:g}, max_steps "
                 f"{self.max_steps}; allowed are 1e-10 to 1e-2, above 0 up to 10, and 10 to 10 000 000"
             )
+
+    def model_text(self, histories: Sequence[History]) -> str:
+        """How the point is simulated, in sentences for a paper."""
+        return (
+            "A material point under prescribed components of stress and strain has small strains, isotropic elasticity "
+            "and creep along the deviator of stress, at the rate that the law gives for the von Mises stress; it is "
+            f"integrated in time by {SDIRK2_TEXT}, with a local error of at most {self.tolerance:g} of the strain in a "
+            f"step, and ruptures at an equivalent creep strain of {self.strain_limit:g}."
+        )
 
     def replace(self, **changes: float) -> MaterialPoint:
         """The same specimen with some fields changed."""

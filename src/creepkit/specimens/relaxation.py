@@ -39,6 +39,10 @@ class Relaxation(Bar):
     title: ClassVar[str] = "Uniaxial tension under held total strain, or steps and ramps of it"
     outputs: ClassVar[tuple[Output, ...]] = (Output("stress", "stress", grows=False, visible=1.0),)
     loads: ClassVar[tuple[Load, ...]] = (Load("strain", "strain", "total strain"),)
+    imposed_text: ClassVar[str] = (
+        "Its true stress is Young's modulus times the difference of the logarithmic total strain that is imposed and "
+        "the creep strain."
+    )
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {"strain": (5e-4, 5e-3), "modulus": (50e3, 300e3)}
     )

@@ -40,6 +40,10 @@ class Uniaxial(Bar):
     """Stresses, MPa, of the paper's dimple of 0.5 mm under its pressures, about 12.5 times them."""
     dataset_names: ClassVar[Mapping[str, str]] = MappingProxyType({"jump_time": "Tj"})
     """What data sets call the conditions of its tests."""
+    imposed_text: ClassVar[str] = (
+        "Its true stress is the stress that is held, or under a held load the nominal one times the exponential of the "
+        "logarithmic creep strain."
+    )
     load_scaling: ClassVar[LoadScaling] = LoadScaling()
     """For sampling: the reference stress is the load itself."""
 

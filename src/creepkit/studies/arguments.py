@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from creepkit.errors import SurrogateError, nearest, quoted
 from creepkit.readers.vocabulary import split_unit
 from creepkit.records import (
+    SECONDS_PER_HOUR,
     ZERO_CELSIUS,
     Nuisance,
     Predictor,
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from creepkit.experiments.rig import Rig
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.language import CreepLaw
-
-HOUR = 3600.0
 
 
 def quantity(file: StudyFile, key: tuple[str | int, ...], kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:
@@ -182,7 +181,7 @@ def _nuisance(file: StudyFile, number: int, part: NuisancePart) -> Nuisance:
             part.scope,
             output=part.output or "",
             tests=tuple(part.tests),
-            start=HOUR * (part.start_h or 0.0),
+            start=SECONDS_PER_HOUR * (part.start_h or 0.0),
             **values,
         )
 
@@ -215,7 +214,7 @@ def settings_of(file: StudyFile) -> IdentificationSettings:
 
 def steps_of(steps: Sequence[Step]) -> list[tuple[float, float]]:
     """(start in s, level) of each step."""
-    return [(HOUR * one.from_h, one.level) for one in steps]
+    return [(SECONDS_PER_HOUR * one.from_h, one.level) for one in steps]
 
 
 def temperature_of(file: StudyFile, key: tuple[str | int, ...], steps: Sequence[Step]) -> float | Program:

@@ -25,7 +25,7 @@ from creepkit.studies import arguments
 from creepkit.studies.cameras import CameraFiles, StudyCameras, format_of
 from creepkit.studies.inputs import InputFile
 from creepkit.studies.model import CameraPart, RecordPart
-from creepkit.studies.stages import Results, Stage, Tick
+from creepkit.studies.stage import Results, Stage, Tick
 
 MOST_REASON = 300
 """Characters of a reason for which frames were flagged."""
@@ -95,7 +95,9 @@ class CameraStages:
             {name: getattr(part, name) for name in ("name", "format", "columns", "interval_s", "names", "subset_mm")},
             [operator, part.centers_mm, part.rest_frames, predictor_fingerprint(specimen)],
         ]
-        return Stage(_extraction_name(part), "extraction", "", settings, make, record=ExtractedTests)
+        return Stage(
+            _extraction_name(part), "extraction", "", settings, make, _numbers_of_frames, record=ExtractedTests
+        )
 
     def _imposed(self, number: int, part: CameraPart, own: CameraFiles, hashes: Mapping[Path, list[str]]) -> Stage:
         import creepkit as ck
@@ -121,7 +123,7 @@ class CameraStages:
             return ImposedOnTests(tuple(found))
 
         settings = [hashes[path], record.model_dump(), part.channels, [part.lag_s, part.search_s, part.camera_start]]
-        return Stage(_record_name(part), "record", "", settings, make, (need,), ImposedOnTests)
+        return Stage(_record_name(part), "record", "", settings, make, _numbers_of_records, (need,), ImposedOnTests)
 
     # ---- tests -------------------------------------------------------------------------------------------------------
 
@@ -179,6 +181,26 @@ class CameraStages:
             for name, one in self.extractions(results).items()
             for flag in one.flags
         ]
+
+
+def _numbers_of_frames(extracted: ExtractedTests) -> dict[str, Any]:
+    """Frames used, the centre and the last outputs of each test piece."""
+    return {
+        one.name: {
+            "frames": int(one.used.sum()),
+            "centre": one.center,
+            **{name: float(values[one.used][-1]) for name, values in one.outputs.items() if one.used.any()},
+        }
+        for one in extracted.tests
+    }
+
+
+def _numbers_of_records(imposed: ImposedOnTests) -> dict[str, Any]:
+    """The alignment of the clocks of each test piece."""
+    return {
+        f"{k + 1}": {"lag_s": one.alignment.lag, "interval_s": one.alignment.lag_interval, "zero_s": one.time_zero}
+        for k, one in enumerate(imposed.tests)
+    }
 
 
 def _extraction_name(part: CameraPart) -> str:

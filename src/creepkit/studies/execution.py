@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.files.record_codec import RecordError
+from creepkit.files.record_codec import RecordError, record_to_json
 from creepkit.inverse.kept_fits import COMPUTING, keep_fits
 from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text, series_of_task
 from creepkit.records import History
@@ -25,8 +25,7 @@ from creepkit.studies.documents import (
     digest_of_result,
     key_of,
 )
-from creepkit.studies.numbers import numbers_of
-from creepkit.studies.stages import Stage
+from creepkit.studies.stage import Stage
 
 RUNNING_LOCK = "running.lock"
 
@@ -220,7 +219,7 @@ class Execution:
             result = self._codec(stage).from_json(stage.record, data["record"])
             if isinstance(result, ExportedFile):
                 _check_export(stage, result)
-            numbers = numbers_of(stage.kind, result)  # not those of the file, which anybody may have written
+            numbers = _numbers_of(stage, result)  # not those of the file, which anybody may have written
         except (CreepkitError, KeyError, AttributeError, TypeError, ValueError, ArithmeticError, AssertionError):
             return None
         self.results.set(stage.name, result)
@@ -287,7 +286,7 @@ class Execution:
         if getattr(result, "interrupted", False):  # by Ctrl-C, with the best so far, which is not the result
             raise KeyboardInterrupt
         self.results.set(stage.name, result)
-        numbers = numbers_of(stage.kind, result)
+        numbers = _numbers_of(stage, result)
         if sum(altered):
             remark = CHANGED
         kept: dict[str, Any] = {"numbers": numbers}
@@ -324,6 +323,12 @@ class Execution:
                     fits += keys
                 if altered is not None:
                     altered.append(kept.altered)
+
+
+def _numbers_of(stage: Stage, result: Any) -> dict[str, Any]:
+    """The numbers of a result by name, as JSON holds them."""
+    numbers: dict[str, Any] = record_to_json(dict(stage.numbers(result)))
+    return numbers
 
 
 def _listed(names: Sequence[str]) -> str:

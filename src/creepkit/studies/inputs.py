@@ -16,12 +16,12 @@ import numpy as np
 from creepkit.errors import StudyError, nearest
 from creepkit.files.reading import FileKind, open_binary
 from creepkit.inverse.history_checks import SUSPECT_LABEL, truncated_at_strain
-from creepkit.records import ZERO_CELSIUS, History
+from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History
 from creepkit.records.history_selection import select_tests
 from creepkit.records.plugin_calls import accepts_path
 from creepkit.registry import default_registry
 from creepkit.reports.contents import Exclusion
-from creepkit.studies.arguments import HOUR, carried_name, plain_path
+from creepkit.studies.arguments import carried_name, plain_path
 from creepkit.studies.study_file import StudyFile
 
 DATA_FILE = FileKind("a data file", StudyError, "name files of tests", maximum_bytes=2_000_000_000)
@@ -257,7 +257,7 @@ def _excluded(file: StudyFile, histories: Sequence[History], complete: bool) -> 
             if part.frames is not None:
                 unused[_frame_numbers(file, k, part.frames, history)] = True
             if part.from_h is not None or part.to_h is not None:
-                hours = history.times / HOUR
+                hours = history.times / SECONDS_PER_HOUR
                 within = (hours >= (part.from_h or 0.0)) & (hours <= (np.inf if part.to_h is None else part.to_h))
                 unused |= within
             if not unused.any():
@@ -266,7 +266,8 @@ def _excluded(file: StudyFile, histories: Sequence[History], complete: bool) -> 
             remaining = [replace(h, used=h.used & ~unused) if h.name == history.name else h for h in remaining]
         if len(exclusions) == before:
             given = "from_h" if part.from_h is not None else "to_h"
-            first, last = min(h.times[0] for h in named) / HOUR, max(h.times[-1] for h in named) / HOUR
+            first = min(h.times[0] for h in named) / SECONDS_PER_HOUR
+            last = max(h.times[-1] for h in named) / SECONDS_PER_HOUR
             what = f"test '{part.test}' has no frame there; its frames are from {first:g} h to {last:g} h"
             raise file.error(("exclude", k, given), what)
     return remaining, exclusions

@@ -5,9 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from creepkit.readers.vocabulary import split_unit
-from creepkit.records import TENSOR_COMPONENTS, ZERO_CELSIUS, History, Loading, Program, Specimen, loads_of
+from creepkit.records import (
+    SECONDS_PER_HOUR,
+    TENSOR_COMPONENTS,
+    ZERO_CELSIUS,
+    History,
+    Loading,
+    Program,
+    Specimen,
+    loads_of,
+)
 from creepkit.records.quantities import QUANTITIES, QuantityKind
-from creepkit.studies.arguments import HOUR, lengths_of, quantity, steps_of, temperature_of
+from creepkit.studies.arguments import lengths_of, quantity, steps_of, temperature_of
 from creepkit.studies.model import ForecastPart, Step
 from creepkit.studies.study_file import StudyFile
 
@@ -33,7 +42,7 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
 
     part, place = file.model.forecast[number], ("forecast", number)
     specimen = _specimen_of(file, number, part)
-    end = HOUR * float(part.end_h or 0.0)
+    end = SECONDS_PER_HOUR * float(part.end_h or 0.0)
     taken = {load.name: load for load in loads_of(specimen)}
     if COMPONENTS in taken:
         loading = _component_loading(file, number, part)

@@ -12,7 +12,7 @@ from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.duration import duration_known, followed_duration, needs_durations
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
-from creepkit.records import ZERO_CELSIUS, History, dimensions_of, load_unit
+from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
 from creepkit.studies.camera_proposal import CameraProposal, proposed_cameras, text_of_cameras
 from creepkit.studies.folders import folders_with_tests
 from creepkit.studies.study_file import parse_study
@@ -337,7 +337,7 @@ def _forecast_part(summary: DataSummary) -> list[str]:
     history = next(h for h in summary.tests if h.outputs or h.minimum_rate is not None)
     quantity, unit = history.loading.quantity, load_unit(history)
     level = float(history.loading.program().values.max())
-    celsius, hours = history.mean_temperature - ZERO_CELSIUS, 2 * followed_duration(history) / 3600
+    celsius, hours = history.mean_temperature - ZERO_CELSIUS, 2 * followed_duration(history) / SECONDS_PER_HOUR
     lines = [
         "[[forecast]]",
         'name = "longer test"',

@@ -20,10 +20,12 @@ from creepkit.studies.documents import ResultFolder
 from creepkit.studies.execution import Execution, running_alone
 from creepkit.studies.inputs import InputFile, input_files, read_inputs, resolve_paths
 from creepkit.studies.lock import changed_results, differences, lock_if_any, lock_of, write_lock
-from creepkit.studies.page import lock_path_of, write_own, write_page
 from creepkit.studies.planned_tests import check_forecast
+from creepkit.studies.report_stage import lock_path_of, write_own, write_page
 from creepkit.studies.result import StudyResult
-from creepkit.studies.stages import STAGE_KINDS, Stage, Stages, needed_stages
+from creepkit.studies.stage import STAGE_KINDS, Stage, needed_stages
+from creepkit.studies.stage_inputs import StageInputs
+from creepkit.studies.stages import stages_of
 from creepkit.studies.study_file import StudyFile, read_study_file
 
 if TYPE_CHECKING:
@@ -193,7 +195,7 @@ class Study:
         inputs = read_inputs(self.file, self.paths, cameras.histories(execution.results), complete=complete)
         if progress is not None:
             progress("reading", 1, 1, f"{len(inputs.histories)} tests in {len(files)} files")
-        stages = Stages(self.file, inputs, self.root).all()
+        stages = stages_of(StageInputs(self.file, inputs, self.root))
         self._check_exports(stages, folder, files)
         execution.histories = inputs.histories
         wanted = needed_stages(stages, kinds)

@@ -147,6 +147,10 @@ EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS = 1e-5, 5e-3
 reduced-order model is not better than the latter, and along a valley one start is enough for its predictor."""
 
 
+SAME_COORDINATES = 0.02
+"""Distance over the width of the bounds, in every coordinate, up to which two minima are one."""
+
+
 WORKING_ERROR = 0.3
 """Misfit that is assumed in a search, over that spread (see inverse.noise_model.initial_working_noise)."""
 
@@ -157,7 +161,7 @@ def distinct(
     *,
     equal_predictions: float = EQUAL_PREDICTIONS,
     max_count: int = 2,
-    tolerance: float = 0.02,
+    tolerance: float = SAME_COORDINATES,
 ) -> list[Minimum]:
     """The best minima that differ by more than 2 % of the bounds in some coordinate, and in what they predict."""
     selected: list[Minimum] = []
@@ -165,6 +169,18 @@ def distinct(
         if not any(_same(minimum, other, bounds, equal_predictions, tolerance) for other in selected):
             selected.append(minimum)
     return selected[:max_count]
+
+
+def minima_counts(
+    minima: Sequence[Minimum], bounds: Bounds, *, equal_predictions: float = EQUAL_PREDICTIONS
+) -> dict[str, int]:
+    """How often a search ended: "search_ends", "distinct_minima" of them, and "ends_at_best" that are the best one.
+
+    minima : best first.
+    """
+    best = [minimum for minimum in minima if _same(minimum, minima[0], bounds, equal_predictions, SAME_COORDINATES)]
+    apart = distinct(minima, bounds, equal_predictions=equal_predictions, max_count=len(minima))
+    return {"search_ends": len(minima), "distinct_minima": len(apart), "ends_at_best": len(best)}
 
 
 def _same(a: Minimum, b: Minimum, bounds: Bounds, equal_predictions: float, tolerance: float) -> bool:

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from markupsafe import Markup
-
-from creepkit.exporters.latex import equations_in_latex
-from creepkit.exporters.law_description import comment_lines
-from creepkit.exporters.mathml import law_equations
 from creepkit.files.file_names import file_stem
 from creepkit.reports.attachments import problem_of_name
 from creepkit.reports.html.elements import (
     Block,
     Downloads,
-    Formula,
     Items,
     PageSection,
     Paragraph,
@@ -27,16 +22,14 @@ from creepkit.reports.html.elements import (
     printable_lines,
     sentence,
 )
-from creepkit.reports.html.law_names import title_in_sentence
+from creepkit.reports.html.law_definitions import definition_blocks
+from creepkit.reports.html.law_tables import covariance_file
 from creepkit.reports.html.methods import methods_text
+from creepkit.reports.html.methods_tests import laws_of
 
 if TYPE_CHECKING:
     from creepkit.reports.contents import ExportedFile, ReportContents
     from creepkit.reports.html.findings import GroupFindings
-
-
-MOST_EQUATIONS = 20
-"""Laws whose equations are set in the methods."""
 
 
 def closing_sections(
@@ -44,7 +37,7 @@ def closing_sections(
 ) -> list[PageSection]:
     """Exports, methods, what stands before provenance, provenance, and what is missing."""
     return [
-        PageSection("exports", "Files to download", _export_blocks(contents.exports)),
+        PageSection("exports", "Files to download", _export_blocks([*contents.exports, *_covariances(found)])),
         PageSection("methods", "Methods text", _methods_blocks(contents, found) if found or contents.rupture else []),
         *before_provenance,
         PageSection("provenance", "Provenance, and how to repeat", _provenance_blocks(contents)),
@@ -56,22 +49,25 @@ def closing_sections(
 
 
 def _methods_blocks(contents: ReportContents, found: Sequence[GroupFindings]) -> list[Block]:
-    """The text with its equations as plain text, to be copied, and the same equations set, and as LaTeX."""
+    """The text to be copied, and the equations that it numbers: set, with their symbols, and as text."""
     text = Verbatim(
         "To be copied into a paper and shortened", printable_lines(methods_text(contents, found)), prose=True
     )
-    laws = list({fit.law.name: fit.law for one in found for fit in one.fits}.values())[:MOST_EQUATIONS]
-    if not laws:
-        return [text]
-    blocks: list[Block] = [text, Paragraph("The equations of the laws in it:")]
-    for law in laws:
-        blocks.append(Paragraph(sentence(title_in_sentence(law))))
-        blocks += [Formula(Markup(equation)) for equation in law_equations(law)]
-    latex = [line for law in laws for line in (*comment_lines([title_in_sentence(law)], "%"), *equations_in_latex(law))]
-    return [*blocks, Verbatim("The same equations in LaTeX", printable_lines("\n".join(latex)))]
+    return [text, *definition_blocks(laws_of(found).values())]
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
+
+
+def _covariances(found: Sequence[GroupFindings]) -> list[ExportedFile]:
+    """The covariance of the best law of each material."""
+    files = [(one, covariance_file(one.fit)) for one in found if one.fit.estimates]
+    if len(found) == 1:
+        return [file for _, file in files]
+    return [
+        replace(file, name=f"covariance_{file_stem(one.name, str(k))}.csv", target=f"{file.target}, {one.name}")
+        for k, (one, file) in enumerate(files, start=1)
+    ]
 
 
 def _export_blocks(exports: Sequence[ExportedFile]) -> list[Block]:

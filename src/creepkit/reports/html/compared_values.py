@@ -11,6 +11,8 @@ import numpy as np
 from creepkit.errors import CreepkitError
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.observation_vector import (
+    FLOOR_NOISES,
+    FLOOR_SHARE,
     MINIMUM_RATE_OUTPUT,
     RUPTURE_OUTPUT,
     ObservationVector,
@@ -25,6 +27,13 @@ from creepkit.reports.html.elements import number, plural
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.records import History
+
+
+FLOOR = (
+    f", {100 * FLOOR_SHARE:g} % of the median end value of a material and at least {FLOOR_NOISES:g} times the noise of "
+    "a reading"
+)
+"""What the floor of a logarithmic transform is."""
 
 
 @dataclass(frozen=True)
@@ -48,12 +57,16 @@ def frame_counts(histories: Sequence[History], frames: int) -> FrameCounts:
 class ComparedValues:
     """The values that a fit compared with its law's predictions.
 
-    by_test : {test: how many}, with its rupture time or minimum rate. transforms : a sentence on each output, in what
-    quantity it is compared.
+    by_test : {test: how many}, with its rupture time or minimum rate. transforms : half a sentence on each output, in
+    what quantity it is compared, with its numbers; kinds_of_transforms : the same without them, as materials share it.
+    followed : tests that are compared up to their rupture. run_outs : those of them that were stopped before.
     """
 
     by_test: Mapping[str, int]
     transforms: tuple[str, ...]
+    kinds_of_transforms: tuple[str, ...] = ()
+    followed: int = 0
+    run_outs: int = 0
 
     @property
     def count(self) -> int:
@@ -74,11 +87,16 @@ def compared_values(fit: Identification) -> ComparedValues | None:
         return None
     counts = np.asarray(observations.present).sum(axis=1)
     return ComparedValues(
-        {h.name: int(count) for h, count in zip(tests, counts, strict=True)}, tuple(_transforms(observations))
+        {h.name: int(count) for h, count in zip(tests, counts, strict=True)},
+        tuple(_transforms(observations, numbers=True)),
+        tuple(_transforms(observations, numbers=False)),
+        int(observations.followed_to_rupture.sum()),
+        int(observations.censored.sum()),
     )
 
 
-def _transforms(observations: ObservationVector) -> list[str]:
+def _transforms(observations: ObservationVector, *, numbers: bool) -> list[str]:
+    """In what quantity each output is compared; numbers : those of the material, or what they are in general."""
     sentences = []
     for output, transform in zip(observations.outputs, observations.transforms, strict=True):
         name, unit = output.replace("_", " "), output_unit(output)
@@ -88,10 +106,11 @@ def _transforms(observations: ObservationVector) -> list[str]:
         elif output == MINIMUM_RATE_OUTPUT:
             sentences.append("minimum creep rates by their logarithms")
         elif isinstance(transform, LogTransform):
-            floor = f"{number(transform.floor, 3)}{unit}"
-            sentences.append(f"{name} ε as arsinh(ε / 2f), which is ln(ε / f) well above the floor f = {floor}")
+            floor = f" = {number(transform.floor, 3)}{unit}" if numbers else FLOOR
+            sentences.append(f"{name} ε as arsinh(ε / 2f), which is ln(ε / f) well above the floor f{floor}")
         elif isinstance(transform, LinearTransform):
-            sentences.append(f"{name} linearly, divided by the standard deviation {number(transform.scale, 3)}{unit}")
+            scale = f" {number(transform.scale, 3)}{unit}" if numbers else " of its readings"
+            sentences.append(f"{name} linearly, divided by the standard deviation{scale}")
     return sentences
 
 

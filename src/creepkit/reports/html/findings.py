@@ -121,7 +121,7 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     blocks.append(Paragraph(Markup("{}: {}.").format(which, titled_law(fit.law))))
     blocks += [Formula(Markup(equation)) for equation in law_equations(fit.law)]
     misfit = rejected(fit)
-    if fit.adequacy is not None and (found.ranking is not None or misfit):
+    if fit.adequacy is not None and (found.ranking is not None or misfit) and str(fit.adequacy) not in found.verdict:
         blocks.append(Paragraph(sentence(f"the law {fit.adequacy}")))
     apart = apart_sentence(fit)
     if apart:

@@ -24,11 +24,11 @@ from creepkit.reports.html.elements import (
     printable,
     sentence,
 )
-from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings
 from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import correlation_table, titled_law
 from creepkit.reports.html.methods_identification import rate_scatter_sentence
+from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.identification_plot import identification_figure
 from creepkit.reports.identification_text import rupture_rows
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
@@ -61,7 +61,7 @@ def curve_blocks(found: GroupFindings, figures: PageFigures) -> list[Block]:
             lambda: identification_figure(fit),
             f"Identified law and tests{_of(found)}",
             f"Curves of {plural(len(fit.histories), 'test')} over time with the law's 95 % bands, residuals, and creep "
-            f"rates over stress. {sentence(found.verdict)} The table of tests holds the numbers.",
+            "rates over stress. The table of tests holds the numbers.",
             "Measured (dots) and identified (lines with 95 % band); residuals; creep rate over stress.",
         )
     ]

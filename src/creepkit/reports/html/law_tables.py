@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 from markupsafe import Markup
 
+from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION
+from creepkit.reports.contents import ExportedFile
 from creepkit.reports.html.elements import Block, Paragraph, Table, number, printable, with_interval
 from creepkit.reports.identification_text import rejected
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.uncertainty.correlation import Correlation
     from creepkit.language import CreepLaw
 
 MOST_CORRELATED = 12
@@ -65,4 +69,39 @@ def correlation_table(fit: Identification) -> list[Block]:
         return [Paragraph(f"The correlations of {len(names)} parameters are in the file of the identification.")]
     rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, correlation.matrix, strict=True)]
     caption = f"Correlations of the estimates of the {law_title(fit.law)}; ln where the logarithm is estimated"
-    return [Table(caption, ("parameter", *names), rows, numeric=tuple(range(1, len(names) + 1)))]
+    table = Table(caption, ("parameter", *names), rows, numeric=tuple(range(1, len(names) + 1)))
+    return [table, *_rounding_warning(correlation)]
+
+
+def _rounding_warning(correlation: Correlation) -> list[Block]:
+    """That the values of strongly correlated parameters belong together, with the strongest correlation."""
+    size = np.abs(np.triu(correlation.matrix, 1))
+    if not size.max() > STRONG_CORRELATION:
+        return []
+    k, j = np.unravel_index(int(size.argmax()), size.shape)
+    first, second = (printable(correlation.names[i], 80) for i in (k, j))
+    return [
+        Paragraph(
+            f"{first} and {second} have a correlation of {number(float(correlation.matrix[k, j]), 4)}: their values "
+            "hold together only. Rounding one of them, or taking it from elsewhere, changes the creep rate by far more "
+            "than its interval; carry all digits, and take uncertainties of rates from the covariance, which is among "
+            "the files to download.",
+            "warning",
+        )
+    ]
+
+
+def covariance_file(fit: Identification) -> ExportedFile:
+    """The covariance of the estimates as a table: in ln of parameters of logarithmic scale, else in their units."""
+    correlation = fit.correlation()
+    covariance = correlation.matrix * np.outer(correlation.sd, correlation.sd)
+    units = ["1" if p.scale == "log" else p.unit for p in fit.law.table.values()]
+    values = [p.to_internal(fit.values[name]) for name, p in fit.law.table.items()]
+    lines = [
+        f"# covariance of the estimates of law {printable(fit.law.name, 160)}; ln A: of the natural logarithm of A, in",
+        "# its unit; given the law, in the Gaussian approximation at the optimum",
+        ",".join(["parameter", "unit", "estimate", *correlation.names]),
+    ]
+    for name, unit, value, row in zip(correlation.names, units, values, covariance, strict=True):
+        lines.append(",".join([name, unit, f"{value:.12g}", *(f"{v:.12g}" for v in row)]))
+    return ExportedFile("covariance.csv", f"covariance of the estimates, {law_title(fit.law)}", "\n".join(lines) + "\n")

@@ -22,10 +22,11 @@ def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> st
         _source_of_data(contents, references),
         *identification_methods(contents, found, references),
         *_stages(contents, references),
-        _software(contents, found),
+        _software(contents, found, references),
     ]
-    numbered = [f"[{k}] {citation}" for k, citation in enumerate(references.listed, start=1)]
-    return "\n\n".join([*(" ".join(p) for p in paragraphs if p), "\n".join(numbered)]).strip() + "\n"
+    text, cited = references.numbered("\n\n".join(" ".join(p) for p in paragraphs if p))
+    numbered = "\n".join(f"[{k}] {citation}" for k, citation in enumerate(cited, start=1))
+    return f"{text}\n\n{numbered}".strip() + "\n"
 
 
 def _source_of_data(contents: ReportContents, references: References) -> list[str]:
@@ -64,11 +65,13 @@ def _stages(contents: ReportContents, references: References) -> list[list[str]]
         were = "was" if len(ruptures) == 1 else "were"
         paragraphs.append([f"{plural(len(ruptures), 'rupture test')}{with_them} {were} assessed by {listed(cited)}."])
     if contents.forecasts:
-        level = next(iter(contents.forecasts.values())).level
+        forecasts = contents.forecasts.values()
+        level, draws = next(iter(forecasts)).level, max(one.draws for one in forecasts)
+        drawn = f"; they come from {draws} draws in each test" if draws else ""
         paragraphs.append(
             [
                 f"Forecasts have bands of {100 * level:g} % that contain the uncertainty of the parameters and of the "
-                "choice of the law, the scatter between tests, dimensions, noise and numerical error."
+                f"choice of the law, the scatter between tests, dimensions, noise and numerical error{drawn}."
             ]
         )
     if contents.design:
@@ -84,10 +87,16 @@ def _plural_of(label: str) -> str:
     return f"{label[:-1]}ies" if label.endswith("y") else f"{label}s"
 
 
-def _software(contents: ReportContents, found: Sequence[GroupFindings]) -> list[str]:
+def _software(contents: ReportContents, found: Sequence[GroupFindings], references: References) -> list[str]:
     versions = dict(contents.provenance.versions)
     if not versions and found:
         versions = {"creepkit": str(found[0].fit.provenance.get("creepkit", ""))}
-    named = listed([f"{printable(name, 60)} {printable(version, 60)}" for name, version in versions.items() if version])
+    named = listed(
+        [
+            f"{printable(name, 60)} {printable(version, 60)}{references.cite(name) if name == 'creepkit' else ''}"
+            for name, version in versions.items()
+            if version
+        ]
+    )
     seed = "" if contents.provenance.seed is None else f", seed {contents.provenance.seed}"
     return [sentence(f"The work was done with {named}{seed}")] if named else []

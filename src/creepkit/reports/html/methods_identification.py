@@ -5,142 +5,62 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.nuisance_plausibility import nuisance_unit
+from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
 from creepkit.inverse.variance_components import NOISE_PRIOR_SD
-from creepkit.language.printing import expression_text, state_equations
-from creepkit.records import kind_and_start, output_unit
+from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
+from creepkit.records import is_logarithmic, kind_and_start, output_unit
 from creepkit.reports.html.citations import References, listed
-from creepkit.reports.html.compared_values import compared_values, frame_counts
 from creepkit.reports.html.elements import number, plural, printable
-from creepkit.reports.html.law_names import title_in_sentence
+from creepkit.reports.html.methods_ranking import adequacy_sentences, ranking_sentences
+from creepkit.reports.html.methods_tests import MOST_NAMED, by_material, compared_tests, laws, loading, models
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection.ranking import Ranking
-    from creepkit.language import CreepLaw
     from creepkit.reports.contents import ReportContents
     from creepkit.reports.html.findings import GroupFindings
-
-MOST_NAMED = 6
-"""Materials that a sentence names; of more it says how many."""
 
 
 def identification_methods(
     contents: ReportContents, found: Sequence[GroupFindings], references: References
 ) -> list[list[str]]:
-    """Paragraphs on tests and laws, on estimation, and on ranking and adequacy; none where nothing was identified."""
+    """Paragraphs on tests and laws, models, estimation, and ranking and adequacy; none where nothing was identified."""
     if not found:
         return []
-    tests = [*_tests(found), *_by_material(found, _loading), *_laws(found, references)]
-    estimation = _by_material(found, lambda one: _estimation(one, contents, references))
-    ranking = _by_material(
-        [one for one in found if one.ranking is not None],
-        lambda one: [] if one.ranking is None else _ranking(one.ranking, one.fit, references),
-    )
-    return [tests, estimation, [*ranking, *_adequacy(found)]]
-
-
-def _by_material(found: Sequence[GroupFindings], sentences_of: Any) -> list[str]:
-    """The sentences on each material: once where all have the same, else after the names of their materials."""
-    names: dict[tuple[str, ...], list[str]] = {}
-    for one in found:
-        names.setdefault(tuple(text for text in sentences_of(one) if text), []).append(printable(one.name, 80))
-    if len(names) == 1:
-        return [*next(iter(names))]
+    alone = len(found) == 1
+    ranked = [one for one in found if one.ranking is not None]
     return [
-        " ".join([f"Of {listed(who) if len(who) <= MOST_NAMED else plural(len(who), 'material')}:", *sentences])
-        for sentences, who in names.items()
-        if sentences
+        [*compared_tests(found), *by_material(found, loading), *laws(found, references)],
+        by_material(found, lambda one: models(one.fit)),
+        [
+            *by_material(found, lambda one: _estimation(one, contents, references, numbers=alone)),
+            *([] if alone else _scatter_over_materials([one.fit for one in found])),
+        ],
+        [
+            *by_material(ranked, lambda one: ranking_sentences(one, references, numbers=alone)),
+            *adequacy_sentences(found, references),
+        ],
     ]
 
 
-# ---- tests and laws --------------------------------------------------------------------------------------------------
+# ---- search ----------------------------------------------------------------------------------------------------------
 
 
-def _tests(found: Sequence[GroupFindings]) -> list[str]:
-    """How many tests, frames and values, and in what quantity values are compared."""
-    tests = sum(len(one.fit.tests) for one in found)
-    materials = f" of {plural(len(found), 'material')}" if len(found) > 1 else ""
-    compared = [compared_values(one.fit) for one in found]
-    known = [one for one in compared if one is not None]
-    if len(known) < len(found):
-        return [f"Creep laws were identified from {plural(tests, 'test')}{materials}."]
-    counts = [frame_counts(one.fit.histories, one.fit.settings.frames) for one in found]
-    measured, fitted = sum(c.measured for c in counts), sum(c.fitted for c in counts)
-    values = plural(sum(one.count for one in known), "value")
-    if measured:
-        frames = f"{fitted} of {plural(measured, 'reading')} were fitted, which makes {values} compared"
-    else:
-        frames = f"{values} were compared"
-    transforms = {one.transforms for one in known}
-    if len(transforms) == 1:
-        how = f"Compared were {listed([*transforms.pop()])}."
-    else:
-        how = (
-            "Strains ε were compared as arsinh(ε / 2f), which is ln(ε / f) well above the floor f, 1 % of the median "
-            "final strain of a material and at least three times the noise of a reading; lengths linearly, divided by "
-            "their standard deviation."
-        )
-    return [f"Creep laws were identified from {plural(tests, 'test')}{materials}: {frames}.", how]
-
-
-def _loading(found: GroupFindings) -> list[str]:
-    """What was held in uniaxial tests, and what their strains are."""
-    uniaxial = [h for h in found.fit.histories if "strain" in h.outputs]
-    sentences = []
-    controls = {str(getattr(h.loading, "control", "")) for h in found.fit.histories} - {""}
-    if len(controls) == 1:
-        sentences.append(
-            "Loads were held, so that the true stress grows with strain."
-            if controls == {"load"}
-            else "The true stress was held."
-        )
-    elif controls:
-        sentences.append("In some tests loads were held, in others the true stress.")
-    measures, elastic = {h.strain_measure for h in uniaxial}, {h.includes_elastic for h in uniaxial}
-    if len(measures) == 1 and len(elastic) == 1:
-        contains = "contain" if elastic == {True} else "do not contain"
-        sentences.append(f"Strains are {measures.pop()} and {contains} the elastic strain on loading.")
-    return sentences
-
-
-def _laws(found: Sequence[GroupFindings], references: References) -> list[str]:
-    """The laws by their titles and formulas, with what they cite."""
-    laws = {one.law.name: one.law for group in found for one in group.fits}
-    named = [f"{_formula(law)}{references.cite(*law.references)}" for law in laws.values()]
-    if len(named) == 1:
-        return [f"The law was the {named[0]}."]
-    tried = "; ".join(named)
-    letters = "ε̇ is the creep rate in 1/s, σ the stress in MPa, ε the strain, t the time in s, T the temperature in K"
-    return [f"The laws tried were: {tried}. In them {letters}."]
-
-
-def _formula(law: CreepLaw) -> str:
-    rate = " + ".join(expression_text(term) for term in law.terms.values())
-    states = "".join(f", {equation}" for equation in state_equations(law))
-    equation = f"ε̇ = {rate}{states}".replace("**", "^")
-    for word, letter in (("stress", "σ"), ("strain", "ε"), ("time", "t"), ("temperature", "T")):
-        equation = equation.replace(word, letter)
-    return f"{title_in_sentence(law)}, {printable(equation, 400)}"
-
-
-# ---- estimation ------------------------------------------------------------------------------------------------------
-
-
-def _estimation(found: GroupFindings, contents: ReportContents, references: References) -> list[str]:
+def _estimation(found: GroupFindings, contents: ReportContents, references: References, *, numbers: bool) -> list[str]:
+    """How values and intervals were found; numbers : whether sizes of noise stand in it, as of one material alone."""
     fit = found.fit
     settings = fit.settings
-    specimen = str(fit.provenance.get("specimen", "")).strip()
     sentences = [
-        f"The tests were predicted by the model of the specimen '{printable(specimen, 80)}'." if specimen else "",
         _search(fit, contents, references),
-        _bounds(found),
+        _agreement(fit) if numbers else "",
+        "The bounds of the search are those of the table of symbols.",
         *_weights(fit, references),
-        rate_scatter_sentence(fit),
+        *_offsets(fit, numbers=numbers),
+        rate_scatter_sentence(fit) if numbers else "",
+        *_autocorrelation(fit, numbers=numbers),
         _explicit_nuisances(fit),
-        _noise_priors(fit),
+        _noise_priors(fit, numbers=numbers),
         _penalty(found),
     ]
     if settings.loss != "linear":
@@ -174,33 +94,17 @@ def _search(fit: Identification, contents: ReportContents, references: Reference
     return f"Parameters were sought within their bounds{end}"
 
 
-def _bounds(found: GroupFindings) -> str:
-    """Between which values each law's parameters were sought."""
-    laws = {one.law.name: one.law for one in found.fits}
-    parts = []
-    for law in laws.values():
-        ranges = [
-            f"{name} {number(p.bounds[0], 3)} to {number(p.bounds[1], 3)}{'' if p.unit == '1' else f' {p.unit}'}"
-            for name, p in law.table.items()
-            if name in {e.name for one in found.fits if one.law.name == law.name for e in one.estimates}
-        ]
-        named = f"of the {title_in_sentence(law)} " if len(laws) > 1 else ""
-        parts.append(f"{named}{listed(ranges)}")
-    return f"The bounds of the search were {'; '.join(parts)}."
-
-
-def _noise_priors(fit: Identification) -> str:
-    """The prior about noise that the tests state, where there is some."""
-    stated = [
-        f"{name.replace('_', ' ')} {number(one.stated, 3)}{f' {unit}' if (unit := output_unit(name)) else ''}"
-        for name, one in fit.noise_model.outputs.items()
-        if one.stated > 0
-    ]
-    if not stated:
+def _agreement(fit: Identification) -> str:
+    """How many ends of the search agree, where the identification says so."""
+    counts = [fit.provenance.get(name) for name in ("search_ends", "ends_at_best", "distinct_minima")]
+    if not all(isinstance(one, int) for one in counts):
         return ""
+    ends, best, distinct = counts
+    if ends == 1:
+        return "The search ended once, so that it does not show whether another minimum is lower."
     return (
-        f"The noise of a reading has a log-normal prior about the noise that the tests state ({listed(stated)}), with "
-        f"a standard deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
+        f"For the best law {best} of {ends} ends of the search are the best minimum, and {distinct} of them are "
+        f"{'distinct local minima' if distinct != 1 else 'distinct'}."
     )
 
 
@@ -211,6 +115,9 @@ def _search_name(fit: Identification, contents: ReportContents) -> str:
     if not stated and isinstance(part, Mapping):
         stated = part.get("search", "")
     return str(stated).lower()
+
+
+# ---- weights and noise -----------------------------------------------------------------------------------------------
 
 
 def _weights(fit: Identification, references: References) -> list[str]:
@@ -231,8 +138,11 @@ def _weights(fit: Identification, references: References) -> list[str]:
     if settings.weights == "noise":
         parts = listed(["noise", *estimated, "what the law cannot follow"])
         return [
-            f"Readings have equal weights; {parts} were estimated as variance components, and 95 % intervals are those "
-            f"of a sandwich covariance{references.cite('sandwich')} with Student's quantiles."
+            f"Readings have equal weights; {parts} were estimated as variance components. 95 % intervals are those of "
+            "the covariance of this weighted least-squares estimate under the estimated noise model"
+            f"{references.cite('weighted least squares')}, H⁻¹ (Jᵀ W C W J + P) H⁻¹ with H = Jᵀ W J + P, where J are "
+            "the derivatives of the residuals, W the weights, C the covariance of the noise and P the precision of the "
+            "priors, with Student's quantiles."
         ]
     if settings.weights == "equal":
         return ["The sum of the relative squared errors of the outputs was minimised, each output with equal weight."]
@@ -241,6 +151,60 @@ def _weights(fit: Identification, references: References) -> list[str]:
         return [f"The sum of the relative squared errors was minimised with 0.99 of the weight on the amplitude{chen}."]
     weights = ", ".join(f"{name.replace('_', ' ')} {number(value, 3)}" for name, value in settings.weights.items())
     return [f"The sum of the relative squared errors of the outputs was minimised, with the weights {weights}."]
+
+
+def _offsets(fit: Identification, *, numbers: bool) -> list[str]:
+    """The prior of offsets of tests; numbers : whether an estimated standard deviation is stated."""
+    offsets = [n for n in fit.settings.nuisances if n.kind == "offset"]
+    if not offsets:
+        return ["No offsets of tests were allowed."]
+    given = [n for n in offsets if n.sd is not None]
+    sizes = [
+        f"{name.replace('_', ' ')} {number(one.offset, 2)} {output_unit(name)}".rstrip()
+        for name, one in fit.noise_model.outputs.items()
+        if one.offset > 0
+    ]
+    was = "as was given" if len(given) == len(offsets) else "estimated from the tests"
+    stated = f" ({listed(sizes)})" if sizes and (numbers or given) else ""
+    return [
+        f"The offset of each output of a test has a Gaussian prior about zero, its standard deviation {was}{stated}."
+    ]
+
+
+def _autocorrelation(fit: Identification, *, numbers: bool) -> list[str]:
+    """What is autocorrelated, and how; numbers : whether sizes and lengths are stated."""
+    noise = fit.noise_model
+    if fit.settings.weights != "likelihood":
+        return []
+    sentences = [
+        "Autocorrelated parts have the covariance s² exp(-d / l) at a distance d, in ln t of outputs that are compared "
+        f"by their logarithm and else in time over the duration of a test; those were kept by which the likelihood "
+        f"gains more than by chance in {100 * AUTOCORRELATION_CONFIDENCE:g} % of cases."
+    ]
+    if numbers and noise.discrepancy > 0:
+        logarithmic = any(is_logarithmic(name) for name in noise.outputs)
+        length = noise.discrepancy_length / (1.0 if logarithmic else LINEAR_COORDINATE_LENGTH)
+        sentences.append(
+            f"What the law cannot follow has s = {number(noise.discrepancy, 3)} times the noise of a reading and l = "
+            f"{number(length, 3)}."
+        )
+    return sentences
+
+
+def _noise_priors(fit: Identification, *, numbers: bool) -> str:
+    """The prior about noise that the tests state, where there is some."""
+    stated = [
+        f"{name.replace('_', ' ')} {number(one.stated, 3)}{f' {unit}' if (unit := output_unit(name)) else ''}"
+        for name, one in fit.noise_model.outputs.items()
+        if one.stated > 0
+    ]
+    if not stated:
+        return ""
+    return (
+        f"The noise of a reading has a log-normal prior about the noise that the tests state"
+        f"{f' ({listed(stated)})' if numbers else ''}, with a standard deviation of {number(NOISE_PRIOR_SD, 2)} of its "
+        "logarithm."
+    )
 
 
 def _rate_estimated(fit: Identification) -> bool:
@@ -254,15 +218,42 @@ def rate_scatter_sentence(fit: Identification) -> str:
     rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
     if not rates:
         return "No scatter of creep rates between tests was allowed: every test follows the law's own rate."
-    size = f"{number(100 * fit.noise_model.rate, 3)} % about the law (one standard deviation of their logarithm)"
+    return _scatter_text(fit, f"{number(100 * fit.noise_model.rate, 3)} %", plural(len(fit.tests), "test"))
+
+
+def _scatter_text(fit: Identification, percent: str, tests: str) -> str:
+    """The sentence where scatter was allowed; percent : how much. tests : how many there are, where they show none."""
+    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
+    size = f"{percent} about the law (one standard deviation of their logarithm)"
     if rates[0].sd is not None:
         return f"The creep rates of single tests have a Gaussian prior: they scatter by {size}, as was given."
     if _rate_estimated(fit):
         return f"The creep rates of single tests scatter by {size}, as was estimated."
-    cannot = f"{plural(len(fit.tests), 'test')} cannot show it"
+    cannot = f"{tests} cannot show it"
     if fit.noise_model.rate == 0.0 or fit.settings.weights == "likelihood":
         return f"How the creep rates of single tests scatter is not known, for {cannot}: the intervals hold for these."
     return f"The creep rates of single tests were assumed to scatter by {size}, for {cannot}."
+
+
+def _scatter_over_materials(fits: Sequence[Identification]) -> list[str]:
+    """The same of several materials, one sentence with the range for all of whom it is alike."""
+    groups: dict[str, list[Identification]] = {}
+    for fit in fits:
+        if any(n.kind == "rate" and not n.is_simulated for n in fit.settings.nuisances):
+            groups.setdefault(_scatter_text(fit, "", ""), []).append(fit)
+        else:
+            groups.setdefault(rate_scatter_sentence(fit), [])
+    sentences = []
+    for text, alike in groups.items():
+        if not alike:
+            sentences.append(text)
+            continue
+        low, high = (number(100 * f(fit.noise_model.rate for fit in alike), 3) for f in (min, max))
+        counts = sorted({len(fit.tests) for fit in alike})
+        tests = plural(counts[0], "test") if len(counts) == 1 else f"{counts[0]} to {counts[-1]} tests"
+        of = "" if len(groups) == 1 else f"Of {plural(len(alike), 'material')}: "
+        sentences.append(of + _scatter_text(alike[0], f"{low} %" if low == high else f"{low} to {high} %", tests))
+    return sentences
 
 
 def _explicit_nuisances(fit: Identification) -> str:
@@ -290,33 +281,3 @@ def _penalty(found: GroupFindings) -> str:
         f"The terms of the sum {printable(sparse.law, 120)} were selected by the penalty {sparse.penalty}{strength} "
         f"and confirmed by BIC{dropped}."
     )
-
-
-# ---- ranking ---------------------------------------------------------------------------------------------------------
-
-
-def _ranking(ranking: Ranking, fit: Identification, references: References) -> list[str]:
-    under = " under a common covariance" if fit.settings.weights == "likelihood" else ""
-    return [
-        f"The laws were compared{under} by the {_criterion(ranking.criterion, references)}; the weight of a law is "
-        "exp(-difference / 2) over the sum of all laws tried, and a law is credible with a weight above "
-        f"{CREDIBLE_WEIGHT:g}. A law is called decisive where its weight is above {DECISIVE_WEIGHT:g}, it was among "
-        "the laws asked for, it explains the tests, and neither a share of another law nor an effect that was not "
-        "modelled changes that."
-    ]
-
-
-def _criterion(name: str, references: References) -> str:
-    criteria = {"bic": "Bayesian information criterion", "aicc": "corrected information criterion of Akaike"}
-    if name in criteria:
-        return f"{criteria[name]}{references.cite(name)} with the number of independent readings"
-    return "error of tests that were held out"
-
-
-def _adequacy(found: Sequence[GroupFindings]) -> list[str]:
-    if all(one.fit.adequacy is None for one in found):
-        return []
-    return [
-        "A law explains the tests where its chi-square, against noise that was stated or estimated from neighbouring "
-        "readings and not from its own misfit, has a probability of at least 0.3 %."
-    ]

@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from creepkit.reports.attachments import embed
 from creepkit.reports.html.closing import closing_sections
+from creepkit.reports.html.data_section import data_section
 from creepkit.reports.html.elements import (
     Block,
     PageSection,
@@ -22,13 +23,13 @@ from creepkit.reports.html.elements import (
     printable,
     printable_lines,
 )
-from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import GroupFindings, findings_of, verdict_blocks, with_histories
 from creepkit.reports.html.groups import group_sections
 from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import law_title
+from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.html.sliders import fragment_style, script_policy, slider_sections
-from creepkit.reports.html.stages import data_section, stage_sections, strength_blocks
+from creepkit.reports.html.stage_sections import stage_sections, strength_blocks
 from creepkit.reports.identification_text import rejected
 from creepkit.reports.stress_exponents import rate_and_exponent
 
@@ -157,7 +158,7 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
     rows = []
     for one in found:
         fit, r = one.fit, one.fit.reference
-        rate, exponent = ([number(v, 3) for v in one] for one in rate_and_exponent(fit))
+        rate, exponent = ([number(v, 3) for v in interval] for interval in rate_and_exponent(fit))
         weight = "–" if one.ranking is None else f"{one.ranking.laws[0].weight:.2f}"
         adequacy = "?" if fit.adequacy is None else "yes" if fit.adequacy.explains else "no"
         adequacy = "?" if fit.adequacy is not None and fit.adequacy.verdict == "cannot be judged" else adequacy

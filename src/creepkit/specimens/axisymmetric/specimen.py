@@ -50,6 +50,14 @@ class Axisymmetric(AxisymmetricSettings):
 
         return predict_axisymmetric(self, law, theta, histories, nuisances or {}, sensitivities)
 
+    def model_text(self, histories: Sequence[History]) -> str:
+        """How the body is simulated, in sentences for a paper."""
+        from creepkit.specimens.axisymmetric.finite_elements import prepared_section, solver_settings
+        from creepkit.specimens.finite_element_tests import finite_element_text
+
+        load = histories[0].loading.quantity if histories else self.loads[0].name
+        return finite_element_text(prepared_section(self, load).model, solver_settings(self))
+
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> AxisymmetricRun:
         """Run one test, keeping displacements, stresses and strains of the whole body; see AxisymmetricRun."""
         from creepkit.specimens.axisymmetric.run import run_axisymmetric

@@ -37,6 +37,10 @@ _LENGTHS: dict[str, dict[str, Any]] = {"apex_thickness": {"tolerance": 0.02, "al
 """What is known of a length beside its value: a thickness is measured to some 0.01 mm."""
 
 
+_CLAMPED = {"bottom": "at the underside of the plate outside the cavity", "rim": "at the outer rim"}
+"""Where a clamped edge is."""
+
+
 _RANGES = {
     "tolerance": (1e-6, 0.1),
     "deflection_limit": (1e-3, 1e3),
@@ -115,6 +119,22 @@ class BulgeSettings:
         if geometry_changes:
             changes["geometry"] = changes.get("geometry", self.geometry).replace(**geometry_changes)
         return replace(self, **changes)
+
+    @property
+    def boundary_text(self) -> str:
+        """Lengths, boundary conditions and load of the dimple, in sentences for a paper."""
+        held = "held nodes are those of the mesh that was given"
+        lengths = ""
+        if self.mesh is None:
+            held = " and ".join(_CLAMPED[edge] for edge in self.geometry.clamped)
+            held = f"all displacements are zero {held}"
+            named = (f"{n.replace('_', ' ')} {getattr(self.geometry, n):g} mm" for n in DimpleGeometry.lengths)
+            lengths = f"The dimple has, unless a test states a length of its own, {', '.join(named)}. "
+        return (
+            f"{lengths}Boundary conditions: {held}; radial displacements are zero on the axis; the gas presses on the "
+            "underside, normal to its deformed surface. Compared is what the operator of a test, by default "
+            f"'{self.observation}', observes of the displacement of the top."
+        )
 
     @property
     def surface_region(self) -> SurfaceRegion:

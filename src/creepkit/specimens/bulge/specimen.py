@@ -60,6 +60,15 @@ class Bulge(BulgeSettings):
 
         return predict_bulge(self, law, theta, histories, nuisances or {}, sensitivities)
 
+    def model_text(self, histories: Sequence[History]) -> str:
+        """How the dimple is simulated, in sentences for a paper."""
+        from creepkit.specimens.bulge.finite_elements import solver_settings
+        from creepkit.specimens.bulge.setup import model_of_specimen
+        from creepkit.specimens.finite_element_tests import finite_element_text
+
+        text = finite_element_text(model_of_specimen(self), solver_settings(self))
+        return f"{text} {self.boundary_text}"
+
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
         """Run one test, keeping displacements, stresses and strains of the whole dimple; see BulgeRun."""
         from creepkit.specimens.bulge.run import run_bulge

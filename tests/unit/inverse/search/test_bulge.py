@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.identify import identify, search_problem
+from creepkit.inverse.identify import identify
+from creepkit.inverse.initial_search import search_problem
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings

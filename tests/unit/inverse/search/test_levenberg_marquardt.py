@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.identify import search_problem
+from creepkit.inverse.initial_search import search_problem
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
 from creepkit.inverse.search.local_refinement import robust_loss, robust_weight

@@ -1,20 +1,15 @@
-"""The sections on the other stages of a study: data, extraction, temperature, rupture, forecasts, further tests."""
+"""The sections on the other stages of a study: extraction, records, temperature, rupture, forecasts, further tests."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, TypeVar
 
-from creepkit.inverse.duration import duration_known
-from creepkit.quality.flags import frame_ranges_text
 from creepkit.reports.design import cheapest_text, design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
 from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows
 from creepkit.reports.forecast_plot import forecast_figure
-from creepkit.reports.html.compared_values import frame_counts, selection_sentence
 from creepkit.reports.html.elements import (
     Block,
     Items,
@@ -29,126 +24,28 @@ from creepkit.reports.html.elements import (
     sentence,
     with_interval,
 )
-from creepkit.reports.html.figures import PageFigures
 from creepkit.reports.html.findings import findings_of
 from creepkit.reports.html.law_names import LawNames
 from creepkit.reports.html.law_tables import LAW_REJECTED
-from creepkit.reports.html.test_details import NOT_STATED, table_of_details
+from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.rupture import rupture_text, strength_rows
 from creepkit.reports.rupture_plot import rupture_figure
 from creepkit.reports.temperature_law import plot_temperature_law, temperature_law_text, temperature_study_text
-from creepkit.reports.tests_apart import apart_sentence
 
 if TYPE_CHECKING:
+    from creepkit.discovery.discover import TemperatureStudy
+    from creepkit.discovery.temperature_law import TemperatureLaw
     from creepkit.experiments.planned_design import Design
     from creepkit.extraction.extraction import Extraction
     from creepkit.forecasts.forecast import Forecast
     from creepkit.instruments.imposed import Imposed
     from creepkit.inverse.adequacy import Adequacy
-    from creepkit.quality.flags import DataQuality
-    from creepkit.records import History
     from creepkit.reports.contents import ReportContents
-    from creepkit.reports.html.findings import GroupFindings
     from creepkit.rupture_assessment.assessment import RuptureAssessment
-
-MOST_LISTED = 400
-"""Rows of a table of tests."""
-
 
 MOST_DESIGNS = 8
 """Planned tests that are listed."""
-
-
-def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) -> PageSection:
-    """The tests as measured, what is suspect in them, and what was left out and why."""
-    histories = [h for group in contents.groups for h in group.histories]
-    blocks: list[Block] = []
-    if histories:
-        more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
-        blocks += [_table_of_histories(histories, more), table_of_details(histories[:MOST_LISTED], more)]
-    blocks += [Paragraph(sentence(f"Source of the data: {text}")) for text in contents.data_citations]
-    if contents.quality is not None:
-        blocks += _quality_blocks(contents.quality)
-    apart = [f"{one.name}: {text}" if one.name else text for one in found if (text := apart_sentence(one.fit))]
-    blocks += [Paragraph(sentence(text), "warning") for text in apart]
-    left_out = _exclusion_blocks(contents) if histories or contents.exclusions else []
-    return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)])
-
-
-def _table_of_histories(histories: Sequence[History], more: str) -> Table:
-    rows = [
-        (
-            printable(h.name, 120),
-            printable(h.alloy or NOT_STATED, 80),
-            printable(h.condition, 200),
-            str(h.times.size) if h.outputs else "–",
-            number(float(h.times[-1]) / 3600.0) if duration_known(h) else "–",
-            _ending(h),
-            printable(re.split(r"[/\\]", h.source)[-1] or NOT_STATED, 160),
-        )
-        for h in histories[:MOST_LISTED]
-    ]
-    columns = ("test", "alloy", "condition", "readings", "last reading, h", "ended", "file")
-    return Table(f"{plural(len(histories), 'test')} as measured{more}", columns, rows, numeric=(3, 4))
-
-
-def _ending(history: History) -> str:
-    if history.rupture_time is not None:
-        return f"ruptured at {number(history.rupture_time / 3600.0)} h"
-    return "stopped unruptured" if history.unruptured else NOT_STATED
-
-
-def _quality_blocks(quality: DataQuality) -> list[Block]:
-    if not quality.tests:
-        return [
-            Paragraph(
-                "No test has readings over time, so that there was nothing for the check of data quality to look at."
-            )
-        ]
-    if not quality.flags:
-        return [Paragraph(f"The check of data quality found nothing suspect in {plural(quality.tests, 'test')}.")]
-    rows = [
-        (
-            printable(flag.history, 160),
-            flag.kind,
-            readings_text(flag.frames) if flag.frames else "–",
-            "–" if flag.time is None else number(flag.time / 3600.0),
-            printable(flag.reason),
-            printable(flag.proposal or "–"),
-        )
-        for flag in quality.flags[:MOST_LISTED]
-    ]
-    columns = ("test", "what", "readings", "at, h", "reason", "what may be done")
-    caption = f"What the check of data quality found in {plural(quality.tests, 'test')}; it drops nothing by itself"
-    return [Table(caption, columns, rows, numeric=(3,))]
-
-
-def readings_text(frames: Sequence[int]) -> str:
-    """Numbers of readings: 'readings 97-191, 193'; of a bar that has no camera as of what has one."""
-    return frame_ranges_text(frames).replace("frame", "reading", 1)
-
-
-def _exclusion_blocks(contents: ReportContents) -> list[Block]:
-    selected = [Paragraph(text) for text in _selections(contents)]
-    if not contents.exclusions:
-        return [Paragraph("No reading was excluded by hand or by the check of data quality."), *selected]
-    rows = [
-        (printable(one.test, 120), readings_text(one.frames) if one.frames else "the whole test", printable(one.reason))
-        for one in contents.exclusions[:MOST_LISTED]
-    ]
-    return [Table("Left out of the identification", ("test", "what", "reason"), rows), *selected]
-
-
-def _selections(contents: ReportContents) -> Iterator[str]:
-    """How many frames of the tests of each group were selected for the fit."""
-    for group in contents.groups:
-        found = findings_of(group)
-        if found is None or not any(h.outputs for h in found.fit.histories):
-            continue
-        most = found.fit.settings.frames
-        text = selection_sentence(frame_counts(found.fit.histories, most), most)
-        yield f"{printable(group.name, 80)}: {text}" if len(contents.groups) > 1 else text
 
 
 def stage_sections(contents: ReportContents, figures: PageFigures, names: LawNames) -> Iterator[PageSection]:
@@ -157,24 +54,55 @@ def stage_sections(contents: ReportContents, figures: PageFigures, names: LawNam
     Strengths stand among the findings where no law was identified, and are not repeated.
     """
     identified = any(findings_of(group) is not None for group in contents.groups)
-    stages: tuple[tuple[str, str, Mapping[str, Any], Callable[[str, Any, PageFigures], list[Block]]], ...] = (
-        ("extraction", "Extraction from camera frames", contents.extractions, _extraction_blocks),
-        ("imposed", "Loads and temperatures from instrument records", contents.imposed, _imposed_blocks),
-        ("temperature", "Trends with temperature", contents.temperature, _temperature_blocks),
-        ("rupture", "Rupture", contents.rupture, partial(_rupture_blocks, strengths=identified)),
-        ("forecasts", "Forecasts", contents.forecasts, partial(_forecast_blocks, names=names)),
-        ("design", "Further tests proposed", contents.design, partial(_design_blocks, names=names)),
+    yield from _sections(
+        ("extraction", "Extraction from camera frames"),
+        contents.extractions,
+        lambda name, one: _extraction_blocks(name, one, figures),
     )
-    for identifier, title, results, blocks_of in stages:
-        if len(results) == 1:
-            (name, result), *_ = results.items()
-            yield PageSection(identifier, title, blocks_of(name, result, figures))
-        elif results:
-            inner = [
-                PageSection(f"{identifier}-{k}", printable(name, 120) or "All tests", blocks_of(name, result, figures))
-                for k, (name, result) in enumerate(results.items(), start=1)
-            ]
-            yield PageSection(identifier, title, (), inner)
+    yield from _sections(
+        ("imposed", "Loads and temperatures from instrument records"),
+        contents.imposed,
+        lambda name, one: _imposed_blocks(one),
+    )
+    yield from _sections(
+        ("temperature", "Trends with temperature"),
+        contents.temperature,
+        lambda name, one: _temperature_blocks(name, one, figures),
+    )
+    yield from _sections(
+        ("rupture", "Rupture"),
+        contents.rupture,
+        lambda name, one: _rupture_blocks(name, one, figures, strengths=identified),
+    )
+    yield from _sections(
+        ("forecasts", "Forecasts"),
+        contents.forecasts,
+        lambda name, one: _forecast_blocks(name, one, figures, names=names),
+    )
+    yield from _sections(
+        ("design", "Further tests proposed"),
+        contents.design,
+        lambda name, one: _design_blocks(name, one, figures, names=names),
+    )
+
+
+Result = TypeVar("Result")
+
+
+def _sections(
+    head: tuple[str, str], results: Mapping[str, Result], blocks_of: Callable[[str, Result], list[Block]]
+) -> Iterator[PageSection]:
+    """The section of a stage: of several results each has a section of its own. head : identifier and title."""
+    identifier, title = head
+    if len(results) == 1:
+        (name, result), *_ = results.items()
+        yield PageSection(identifier, title, blocks_of(name, result))
+    elif results:
+        inner = [
+            PageSection(f"{identifier}-{k}", printable(name, 120) or "All tests", blocks_of(name, result))
+            for k, (name, result) in enumerate(results.items(), start=1)
+        ]
+        yield PageSection(identifier, title, (), inner)
 
 
 def _of(name: str) -> str:
@@ -195,7 +123,7 @@ def _extraction_blocks(name: str, extraction: Extraction, figures: PageFigures) 
     return [picture, Verbatim("What was extracted, and how well", printable_lines(extraction_text(extraction)))]
 
 
-def _imposed_blocks(name: str, under: Imposed, figures: PageFigures) -> list[Block]:
+def _imposed_blocks(under: Imposed) -> list[Block]:
     """The alignment of the clocks with its interval, and how well programs follow the record."""
     alignment = under.alignment
     low, high = alignment.lag_interval
@@ -211,9 +139,11 @@ def _imposed_blocks(name: str, under: Imposed, figures: PageFigures) -> list[Blo
     ]
 
 
-def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Block]:
-    law = getattr(result, "temperature_law", result)
-    rejected = _rejection(law, result)
+def _temperature_blocks(name: str, result: TemperatureStudy | TemperatureLaw, figures: PageFigures) -> list[Block]:
+    from creepkit.discovery.discover import TemperatureStudy
+
+    law = result.temperature_law if isinstance(result, TemperatureStudy) else result
+    rejected = _rejection(result)
     blocks: list[Block] = []
     if rejected is not None:
         note = "what follows are values and trends of that law alone, and no properties of the material"
@@ -248,15 +178,18 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
                 "Parameters at each temperature with 95 % intervals, and the forms that remain with their weights.",
             )
         )
-    text = temperature_law_text(result) if result is law else temperature_study_text(result)
+    text = temperature_study_text(result) if isinstance(result, TemperatureStudy) else temperature_law_text(result)
     return [*blocks, Verbatim("The temperature law in full", printable_lines(text))]
 
 
-def _rejection(law: Any, study: Any) -> Adequacy | None:
+def _rejection(result: TemperatureStudy | TemperatureLaw) -> Adequacy | None:
     """What the law of a study of temperature leaves unexplained; None where it fits, or where nobody knows."""
-    own = getattr(law, "adequacy", None)
-    joint = getattr(getattr(study, "joint_fit", None), "adequacy", None)
-    adequacy = own if own is not None else joint
+    from creepkit.discovery.discover import TemperatureStudy
+
+    law = result.temperature_law if isinstance(result, TemperatureStudy) else result
+    adequacy = None if law is None else law.adequacy
+    if adequacy is None and isinstance(result, TemperatureStudy) and result.joint_fit is not None:
+        adequacy = result.joint_fit.adequacy
     return adequacy if adequacy is not None and adequacy.rejects else None
 
 
@@ -275,7 +208,7 @@ def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigur
         lambda: rupture_figure(assessment),
         f"Rupture assessment{_of(name)}",
         f"Isotherms of stress over rupture time with tests and bounds, the master curve, and predicted over measured "
-        f"times of {plural(len(assessment.tests), 'test')}. {sentence(assessment.verdict)}",
+        f"times of {plural(len(assessment.tests), 'test')}.",
         "Isotherms with tests and bounds; master curve; predicted against measured times. Broken lines lie beyond the "
         "stresses tested.",
     )
@@ -362,7 +295,7 @@ def _design_blocks(name: str, design: Design, figures: PageFigures, *, names: La
                 lambda: design_figure(design),
                 f"What further tests tell{_of(name)}",
                 "Map of the expected information for an hour of machine time over first load and duration, left of "
-                f"constant loads, right of loads that change. {verdict}",
+                "constant loads, right of loads that change.",
                 "Expected information for an hour of machine time over first load and duration; the plan is marked.",
             )
         )

@@ -1,0 +1,58 @@
+"""The global search that an identification begins with: its starts, and how often its ends agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import NamedTuple
+
+from creepkit.arrays import Floats
+from creepkit.inverse.composite_predictor import reduced_order_model_of, search_predictor_of
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
+from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.inverse.search.multistart import (
+    EQUAL_PREDICTIONS,
+    EQUAL_REDUCED_ORDER_PREDICTIONS,
+    distinct,
+    minima_counts,
+)
+from creepkit.records import Predictor
+
+
+class SearchOutcome(NamedTuple):
+    """The end of a global search: starts of the estimation, evaluations, trace, and terms that its minimum is without.
+
+    starts : (parameters,) conditioned coordinates each. minima : how many ends it had, and how many of them differ.
+    """
+
+    starts: list[Floats]
+    evaluations: int
+    trace: SearchTrace | None
+    dropped_terms: tuple[str, ...] = ()
+    minima: Mapping[str, int] = MappingProxyType({})
+
+
+def initial_search(
+    problem: LeastSquaresProblem, through: Predictor | None, search: GlobalSearch, progress: IterationCallback | None
+) -> SearchOutcome:
+    """The best minima that differ, by the reduced-order model of the cheapest predictor."""
+    predictor = through or problem.predictor
+    reduced_order_model = reduced_order_model_of(predictor)
+    searched = search_problem(problem, search_predictor_of(reduced_order_model or predictor))
+    search_result = search.minima(searched, progress)
+    equal = EQUAL_PREDICTIONS if reduced_order_model is None else EQUAL_REDUCED_ORDER_PREDICTIONS
+    distinct_minima = distinct(search_result.minima, searched.bounds, equal_predictions=equal)
+    counts = minima_counts(search_result.minima, searched.bounds, equal_predictions=equal)
+    starts = [minimum.x for minimum in distinct_minima]
+    return SearchOutcome(starts, searched.evaluations.count, search_result.trace, distinct_minima[0].terms_off, counts)
+
+
+def search_problem(problem: LeastSquaresProblem, predictor: Predictor) -> LeastSquaresProblem:
+    """What a global search minimises: a broad covariance, and a loss with which no single curve dominates.
+
+    The likelihoods decide between its minima, since the covariance is not yet known. Its unknowns are u alone.
+    """
+    loss = "soft_l1" if problem.settings.loss == "linear" else problem.settings.loss
+    return replace(problem.with_predictor(predictor).with_fixed_nuisances(), loss=loss)

@@ -1,0 +1,118 @@
+"""The section on the data: the tests as measured, what is suspect in them, and what was left out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from creepkit.inverse.duration import duration_known
+from creepkit.quality.flags import frame_ranges_text
+from creepkit.records import SECONDS_PER_HOUR
+from creepkit.reports.html.compared_values import frame_counts, selection_sentence
+from creepkit.reports.html.elements import Block, PageSection, Paragraph, Table, number, plural, printable, sentence
+from creepkit.reports.html.findings import findings_of
+from creepkit.reports.html.minimum_rates import minimum_rate_table
+from creepkit.reports.html.test_details import NOT_STATED, table_of_details
+from creepkit.reports.tests_apart import apart_sentence
+
+if TYPE_CHECKING:
+    from creepkit.quality.flags import DataQuality
+    from creepkit.records import History
+    from creepkit.reports.contents import ReportContents
+    from creepkit.reports.html.findings import GroupFindings
+
+MOST_LISTED = 400
+"""Rows of a table of tests."""
+
+
+def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) -> PageSection:
+    """The tests as measured, what is suspect in them, and what was left out and why."""
+    histories = [h for group in contents.groups for h in group.histories]
+    blocks: list[Block] = []
+    if histories:
+        more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
+        blocks += [_table_of_histories(histories, more), table_of_details(histories[:MOST_LISTED], more)]
+        blocks += minimum_rate_table(histories[:MOST_LISTED], found)
+    blocks += [Paragraph(sentence(f"Source of the data: {text}")) for text in contents.data_citations]
+    if contents.quality is not None:
+        blocks += _quality_blocks(contents.quality)
+    apart = [f"{one.name}: {text}" if one.name else text for one in found if (text := apart_sentence(one.fit))]
+    blocks += [Paragraph(sentence(text), "warning") for text in apart]
+    left_out = _exclusion_blocks(contents) if histories or contents.exclusions else []
+    return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)])
+
+
+def _table_of_histories(histories: Sequence[History], more: str) -> Table:
+    rows = [
+        (
+            printable(h.name, 120),
+            printable(h.alloy or NOT_STATED, 80),
+            printable(h.condition, 200),
+            str(h.times.size) if h.outputs else "–",
+            number(float(h.times[-1]) / SECONDS_PER_HOUR) if duration_known(h) else "–",
+            _ending(h),
+            printable(re.split(r"[/\\]", h.source)[-1] or NOT_STATED, 160),
+        )
+        for h in histories[:MOST_LISTED]
+    ]
+    columns = ("test", "alloy", "condition", "readings", "last reading, h", "ended", "file")
+    return Table(f"{plural(len(histories), 'test')} as measured{more}", columns, rows, numeric=(3, 4))
+
+
+def _ending(history: History) -> str:
+    if history.rupture_time is not None:
+        return f"ruptured at {number(history.rupture_time / SECONDS_PER_HOUR)} h"
+    return "stopped unruptured" if history.unruptured else NOT_STATED
+
+
+def _quality_blocks(quality: DataQuality) -> list[Block]:
+    if not quality.tests:
+        return [
+            Paragraph(
+                "No test has readings over time, so that there was nothing for the check of data quality to look at."
+            )
+        ]
+    if not quality.flags:
+        return [Paragraph(f"The check of data quality found nothing suspect in {plural(quality.tests, 'test')}.")]
+    rows = [
+        (
+            printable(flag.history, 160),
+            flag.kind,
+            readings_text(flag.frames) if flag.frames else "–",
+            "–" if flag.time is None else number(flag.time / SECONDS_PER_HOUR),
+            printable(flag.reason),
+            printable(flag.proposal or "–"),
+        )
+        for flag in quality.flags[:MOST_LISTED]
+    ]
+    columns = ("test", "what", "readings", "at, h", "reason", "what may be done")
+    caption = f"What the check of data quality found in {plural(quality.tests, 'test')}; it drops nothing by itself"
+    return [Table(caption, columns, rows, numeric=(3,))]
+
+
+def readings_text(frames: Sequence[int]) -> str:
+    """Numbers of readings: 'readings 97-191, 193'; of a bar that has no camera as of what has one."""
+    return frame_ranges_text(frames).replace("frame", "reading", 1)
+
+
+def _exclusion_blocks(contents: ReportContents) -> list[Block]:
+    selected = [Paragraph(text) for text in _selections(contents)]
+    if not contents.exclusions:
+        return [Paragraph("No reading was excluded by hand or by the check of data quality."), *selected]
+    rows = [
+        (printable(one.test, 120), readings_text(one.frames) if one.frames else "the whole test", printable(one.reason))
+        for one in contents.exclusions[:MOST_LISTED]
+    ]
+    return [Table("Left out of the identification", ("test", "what", "reason"), rows), *selected]
+
+
+def _selections(contents: ReportContents) -> Iterator[str]:
+    """How many frames of the tests of each group were selected for the fit."""
+    for group in contents.groups:
+        found = findings_of(group)
+        if found is None or not any(h.outputs for h in found.fit.histories):
+            continue
+        most = found.fit.settings.frames
+        text = selection_sentence(frame_counts(found.fit.histories, most), most)
+        yield f"{printable(group.name, 80)}: {text}" if len(contents.groups) > 1 else text

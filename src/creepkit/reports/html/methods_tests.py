@@ -1,0 +1,190 @@
+"""Which tests were compared with which laws, and by which models, in sentences for a paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import sympy
+
+from creepkit.inverse.composite_predictor import predictor_for, reduced_order_model_of, underlying_specimen
+from creepkit.inverse.reference_conditions import reference_temperature
+from creepkit.language.printing import arrhenius_exponent
+from creepkit.reports.html.citations import References, listed
+from creepkit.reports.html.compared_values import compared_values, frame_counts
+from creepkit.reports.html.elements import number, plural, printable, sentence
+from creepkit.reports.html.law_names import title_in_sentence
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+    from creepkit.language import CreepLaw
+    from creepkit.records import History
+    from creepkit.reports.html.findings import GroupFindings
+
+MOST_NAMED = 6
+"""Materials that a sentence names; of more it says how many."""
+
+
+def by_material(found: Sequence[GroupFindings], sentences_of: Callable[[GroupFindings], Sequence[str]]) -> list[str]:
+    """The sentences on each material: each once where it is that of all, else after the names of its materials."""
+    names: dict[str, list[str]] = {}
+    for one in found:
+        for text in filter(None, sentences_of(one)):
+            names.setdefault(text, []).append(printable(one.name, 80))
+    shared = [text for text, who in names.items() if len(who) == len(found)]
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for text, who in names.items():
+        if len(who) < len(found):
+            groups.setdefault(tuple(who), []).append(text)
+    own = [
+        " ".join([f"Of {listed(who) if len(who) <= MOST_NAMED else plural(len(who), 'material')}:", *sentences])
+        for who, sentences in groups.items()
+    ]
+    return [*shared, *own]
+
+
+def laws_of(found: Sequence[GroupFindings]) -> dict[str, CreepLaw]:
+    """{name: law} of all that were fitted, in the order in which their equations are numbered."""
+    return {one.law.name: one.law for group in found for one in group.fits}
+
+
+# ---- tests -----------------------------------------------------------------------------------------------------------
+
+
+def compared_tests(found: Sequence[GroupFindings]) -> list[str]:
+    """How many tests, frames and values, and in what quantity values are compared."""
+    tests = sum(len(one.fit.tests) for one in found)
+    materials = f" of {plural(len(found), 'material')}" if len(found) > 1 else ""
+    compared = [compared_values(one.fit) for one in found]
+    known = [one for one in compared if one is not None]
+    if len(known) < len(found):
+        return [f"Creep laws were identified from {plural(tests, 'test')}{materials}."]
+    counts = [frame_counts(one.fit.histories, one.fit.settings.frames) for one in found]
+    measured, fitted = sum(c.measured for c in counts), sum(c.fitted for c in counts)
+    values = plural(sum(one.count for one in known), "value")
+    if measured:
+        frames = f"{fitted} of {plural(measured, 'reading')} were fitted, which makes {values} compared"
+    else:
+        frames = f"{values} were compared"
+    transforms = {one.transforms for one in known}
+    kinds = dict.fromkeys(text for one in known for text in one.kinds_of_transforms)
+    how = f"Compared were {listed([*(transforms.pop() if len(transforms) == 1 else kinds)])}."
+    followed, run_outs = sum(one.followed for one in known), sum(one.run_outs for one in known)
+    return [
+        f"Creep laws were identified from {plural(tests, 'test')}{materials}: {frames}.",
+        how,
+        *([_orthogonal(followed, run_outs)] if followed else []),
+    ]
+
+
+def _orthogonal(followed: int, run_outs: int) -> str:
+    """The residual of tests that are compared up to rupture."""
+    stopped = (
+        f" {plural(run_outs, 'test')} stopped before rupture count only where they lasted longer than predicted."
+        if run_outs
+        else ""
+    )
+    return (
+        f"The readings of {plural(followed, 'test')} followed to the end have orthogonal residuals: with a, the "
+        "difference of predicted and measured transformed strain at the time of a reading, and b, the difference of "
+        "the logarithms of the measured time and of the time at which the measured strain is predicted, the residual "
+        "is √2 |a b| / √(a² + b²) with the sign of a, a distance from the predicted curve over ln t; rupture times "
+        f"have ln(measured / predicted).{stopped}"
+    )
+
+
+def loading(found: GroupFindings) -> list[str]:
+    """What was held in uniaxial tests, what their strains are, and the elastic data that were used."""
+    histories = found.fit.histories
+    uniaxial = [h for h in histories if "strain" in h.outputs]
+    sentences = []
+    controls = {str(getattr(h.loading, "control", "")) for h in histories} - {""}
+    if len(controls) == 1:
+        sentences.append(
+            "Loads were held, so that the true stress grows with strain."
+            if controls == {"load"}
+            else "The true stress was held."
+        )
+    elif controls:
+        sentences.append("In some tests loads were held, in others the true stress.")
+    measures, elastic = {h.strain_measure for h in uniaxial}, {h.includes_elastic for h in uniaxial}
+    if len(measures) == 1 and len(elastic) == 1:
+        contains = "contain" if elastic == {True} else "do not contain"
+        sentences.append(f"Strains are {measures.pop()} and {contains} the elastic strain on loading.")
+    return [*sentences, *_elastic(histories)]
+
+
+def _elastic(histories: Sequence[History]) -> list[str]:
+    """Young's modulus and Poisson's ratio of the tests that state them, at their mean temperatures."""
+    known = [h.elastic.at(h.mean_temperature) for h in histories if h.elastic is not None]
+    if not known:
+        return []
+    moduli = _range([1e-3 * float(one.E) for one in known])
+    ratios = _range([float(one.nu) for one in known])
+    return [f"Young's modulus is {moduli} GPa and Poisson's ratio {ratios} in {plural(len(known), 'test')}."]
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = number(min(values), 4), number(max(values), 4)
+    return low if low == high else f"{low} to {high}"
+
+
+# ---- models ----------------------------------------------------------------------------------------------------------
+
+
+def models(fit: Identification) -> list[str]:
+    """By what the tests were predicted: the specimen's own words on it, the surrogate, and the reduced-order model."""
+    name = str(fit.provenance.get("specimen", "")).strip()
+    sentences = [f"The tests were predicted by the model of the specimen '{printable(name, 80)}'." if name else ""]
+    predictor = fit.predictor
+    if predictor is None:
+        return sentences
+    specimen = underlying_specimen(predictor)
+    if specimen is not predictor and not isinstance(getattr(predictor, "predictors", None), Mapping):
+        sentences[0] = f"The tests were predicted by a surrogate of the specimen '{printable(_name_of(specimen))}'."
+    tests: dict[str, tuple[Any, list[History]]] = {}
+    for history in fit.histories:
+        own = predictor_for(specimen, history)
+        tests.setdefault(_name_of(own), (own, []))[1].append(history)
+    for piece, histories in tests.values():
+        if hasattr(piece, "model_text"):
+            sentences.append(sentence(piece.model_text(histories)))
+    if reduced_order_model_of(predictor) is not None:
+        sentences.append("The global search used the reduced-order model of these finite elements.")
+    return sentences
+
+
+def _name_of(specimen: object) -> str:
+    """The name of a specimen; that of its class where it has none."""
+    return str(getattr(specimen, "name", type(specimen).__name__))
+
+
+# ---- laws ------------------------------------------------------------------------------------------------------------
+
+
+def laws(found: Sequence[GroupFindings], references: References) -> list[str]:
+    """The laws by their titles and the numbers of their equations, with what they cite, and their T_ref."""
+    tried = laws_of(found)
+    named = [
+        f"the {title_in_sentence(law)}, Eq. ({k}){references.cite(*law.references)}"
+        for k, law in enumerate(tried.values(), start=1)
+    ]
+    first = f"The law was {named[0]}." if len(named) == 1 else f"The laws tried were {'; '.join(named)}."
+    return [first, *_reference_temperature(found)]
+
+
+def _reference_temperature(found: Sequence[GroupFindings]) -> list[str]:
+    """About which temperature Arrhenius factors are, and how that was chosen where it shows."""
+    factors = {T for one in found for T in _reference_temperatures(one.fit.law)}
+    if not factors:
+        return []
+    shown = listed([f"{number(T, 6)} K" for T in sorted(factors)])
+    medians = {reference_temperature(one.fit.histories) for one in found if one.fit.histories}
+    chosen = ", the median temperature of the tests rounded to 10 °C" if factors == medians else ""
+    return [f"Rate coefficients of laws with an activation energy are those at T_ref = {shown}{chosen}."]
+
+
+def _reference_temperatures(law: CreepLaw) -> Iterable[float]:
+    rates = [*law.terms.values(), *(state.rate for state in law.states.values())]
+    exponents = (part for rate in rates for e in rate.atoms(sympy.exp) for part in sympy.Add.make_args(e.args[0]))
+    return (found.T_ref for found in map(arrhenius_exponent, exponents) if found is not None)

@@ -1,0 +1,81 @@
+"""What a stage of a study is: its kind, its result, all that this depends on, and the numbers of it that are locked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
+
+from creepkit.records import Predictor
+
+StageKind = Literal[
+    "extraction",
+    "record",
+    "quality",
+    "identification",
+    "temperature",
+    "rupture",
+    "forecast",
+    "design",
+    "export",
+    "report",
+]
+
+
+STAGE_KINDS: tuple[StageKind, ...] = get_args(StageKind)
+"""In the order in which they are made, which stands here alone; `creepkit run --only` takes these names."""
+
+
+Tick = Callable[[str, int, int], None]
+
+
+Results = Mapping[str, Any]
+"""{name of a stage: its result}."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage.
+
+    name : of its result. kind : what it makes. group : of the tests that it is about, "" for all.
+    numbers : of its result by name, which study.lock records, so that a run says whether it gives them again.
+    settings : JSON-able data of all that decides the result beside what it `needs`, names of other stages.
+    make : from the results of these, with something to report progress to. record : class of the result, by which a
+        file is read; None where the result is made again from identifications that are kept.
+    document : what of a result that no record can be read from is written down, as JSON-able data.
+    predictor : of identifications that its file holds. file : that an export is written to, "" for other stages.
+    """
+
+    name: str
+    kind: StageKind
+    group: str
+    settings: Any
+    make: Callable[[Results, Tick], Any]
+    numbers: Callable[[Any], Mapping[str, Any]]
+    needs: tuple[str, ...] = ()
+    record: Any = None
+    document: Callable[[Any], Any] | None = None
+    predictor: Predictor | None = field(default=None, repr=False)
+    file: str = ""
+
+
+def stage_name(kind: StageKind, group: str = "") -> str:
+    """The name of a stage of which each group has one."""
+    return f"{kind} of {group}" if group else kind
+
+
+def no_numbers(result: Any) -> dict[str, Any]:
+    """The numbers of a stage whose result is compared by its hash alone."""
+    return {}
+
+
+def needed_stages(stages: Sequence[Stage], kinds: Sequence[str]) -> set[str]:
+    """Names of the stages of some kinds, and of all that these need."""
+    by_name = {stage.name: stage for stage in stages}
+
+    def with_needs(stage: Stage) -> Iterator[str]:
+        yield stage.name
+        for name in stage.needs:
+            yield from with_needs(by_name[name])
+
+    return {name for stage in stages if stage.kind in kinds for name in with_needs(stage)}
