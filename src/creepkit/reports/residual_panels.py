@@ -75,9 +75,10 @@ def draw_residuals(
         axes.plot(hours, values, style, lw=0.9, color=colours[k], alpha=0.85)
         for sign, marker in ((1.0, "^"), (-1.0, "v")):
             outside = sign * values > limit
-            beyond += int(outside.sum())
-            edge = np.full(int(outside.sum()), sign * limit)
-            axes.plot(hours[outside], edge, marker, ms=3.5, color=colours[k], mec="none", clip_on=False, zorder=4)
+            if outside.any():  # a line without points would collapse the layout
+                edge = np.full(int(outside.sum()), sign * limit)
+                axes.plot(hours[outside], edge, marker, ms=3.5, color=colours[k], mec="none", clip_on=False, zorder=4)
+                beyond += edge.size
     if judged:
         axes.axhspan(-NOISE_BAND, NOISE_BAND, color="black", alpha=0.1, lw=0)
     axes.axhline(0, color="black", lw=0.8)
@@ -150,7 +151,7 @@ def _title(readings: JudgedReadings, output: str, tests: Sequence[int], fit: Ide
     whole = len(tests) == len(fit.tests)
     chi_square = readings.chi_square(None if whole else tests[0], output)
     of_tests = f", reduced chi-square {chi_square:.3g}" if whole or len(tests) == 1 else ""
-    return f"{output.replace('_', ' ')}: sd {size}{' ' + unit if unit else ''}{of_tests}"
+    return f"{output.replace('_', ' ')}: noise sd {size}{' ' + unit if unit else ''}{of_tests}"
 
 
 def _plain_label(name: str, output: str) -> str:

@@ -32,7 +32,7 @@ from creepkit.reports.html.methods_identification import rate_scatter_sentence
 from creepkit.reports.identification_plot import identification_figure
 from creepkit.reports.identification_text import rupture_rows
 from creepkit.reports.judged_readings import judged_readings
-from creepkit.reports.load_programs import SECONDS_PER_HOUR
+from creepkit.reports.load_programs import SECONDS_PER_HOUR, with_degrees
 from creepkit.reports.minimum_rate_panel import compared_minimum_rates, exponent_sentence
 from creepkit.reports.prediction_bands import fitted_curves
 from creepkit.reports.ranking import explanation, misfit_cells, misfit_columns
@@ -114,7 +114,7 @@ def _table_of_tests(fit: Identification) -> Table:
         rows.append(
             (
                 printable(test.name, 120),
-                printable(test.condition, 200),
+                printable(with_degrees(test.condition), 200),
                 "not known" if compared is None else str(compared.by_test.get(test.name, 0)),
                 "–" if readings is None else number(readings.chi_square(k), 3),
                 "–" if readings is None else number(readings.misfit_of_common_rate(k), 3),
@@ -160,7 +160,7 @@ def _table_of_ruptures(fit: Identification) -> Table:
     rows = [
         (
             printable(name, 120),
-            printable(condition, 200),
+            printable(with_degrees(condition), 200),
             f"{'> ' if r.censored else ''}{number(r.measured / SECONDS_PER_HOUR)}",
             number(r.predicted / SECONDS_PER_HOUR),
             f"{number(r.low / SECONDS_PER_HOUR)} to {number(r.high / SECONDS_PER_HOUR)}",
@@ -252,11 +252,12 @@ def _separation(ranking: Ranking) -> list[str]:
     if not np.isfinite(differences).all() or differences.max() <= 0.0:
         return []
     k = int(np.argmax(differences))
+    condition = printable(with_degrees(best.tests[k].condition), 200)
     total = float(differences.sum())
     of_all = f", of {number(total, 3)} in all tests together" if len(best.tests) > 1 else ""
     return [
         f"What separates {second.law.name} from {best.law.name} most is test {printable(best.tests[k].name, 120)} "
-        f"({printable(best.tests[k].condition, 200)}): its chi-square, under one covariance for both laws, is "
+        f"({condition}): its chi-square, under one covariance for both laws, is "
         f"{number(float(differences[k]), 3)} larger with {second.law.name}{of_all}."
     ]
 
