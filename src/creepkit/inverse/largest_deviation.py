@@ -37,7 +37,7 @@ class LargestDeviation:
         side = "above" if self.deviation > 0 else "below"
         rms = f" (rms {_amount(self.rms, unit)})" if self.rms > 0 else ""
         return (
-            f"{self.output} of '{self.test}'{rms} about {self.time:.4g} s, where it lies "
+            f"{self.output} of '{self.test}'{rms} about {self.time / 3600.0:.4g} h, where it lies "
             f"{_amount(abs(self.deviation), unit)} {side} what was measured"
         )
 

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats
-from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
+from creepkit.arrays import Floats
+from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import is_logarithmic, output_unit
+from creepkit.reports.figures import set_range
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.prediction_bands import FittedCurves
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from creepkit.inverse.identification import Identification
 
 PLOTTED_STRAIN_RATIO = 0.02
-"""Residuals of strains are drawn where a test's strain exceeds this share of its last one; below, noise fills them."""
+"""Differences of logarithms of strains are taken where a test's strain exceeds this share of its last one."""
+
+
+DASHED_BELOW_WEIGHT = 0.5
+"""Weight below which a test is drawn dashed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +34,9 @@ class TestCurve:
     hours : (frames,) h.
     measured, identified : (frames,) in the unit of the axis, offsets taken off where the axis is logarithmic.
     half_width : (frames,) of the 95 % band, in the same unit; of the logarithm where the axis is logarithmic.
-    residuals : (frames,) measured less identified, in standard deviations of the noise, or 100 times the difference of
-        their logarithms where the axis is logarithmic.
-    noise : (frames,) two standard deviations of the frame noise in the same measure.
-    residual_frames : (frames,) which residuals are drawn.
+        NaN where the law predicts nothing, as after a rupture.
+    residuals : (frames,) measured less identified, in the unit of the axis, or 100 times the difference of their
+        logarithms where the axis is logarithmic; NaN where that would be noise alone.
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
@@ -40,8 +46,6 @@ class TestCurve:
     identified: Floats
     half_width: Floats
     residuals: Floats
-    noise: Floats
-    residual_frames: Bools
     logarithmic: bool
 
     @property
@@ -57,31 +61,18 @@ def curve_of_test(fit: Identification, curves: FittedCurves, test: int, output: 
     """One output of one test of an identification, as it is drawn."""
     history = fit.histories[test]
     identified, half_width = curves.of(test, output)
-    used = usable_frames(history, output) & np.isfinite(identified)
+    used = usable_frames(history, output)
     hours, measured = history.times[used] / SECONDS_PER_HOUR, history.outputs[output][used]
-    noise = noise_standard_deviation(history, output)[used]
     identified, half_width = identified[used], half_width[used]
     if not is_logarithmic(output):
-        sd = np.where(noise > 0, noise, np.nan)
-        every = np.isfinite(sd)
-        residuals = (measured - identified) / sd
-        return TestCurve(
-            hours, measured, identified, half_width, residuals, np.full(hours.size, 2.0), every, logarithmic=False
-        )
+        return TestCurve(hours, measured, identified, half_width, measured - identified, logarithmic=False)
     offset = fit.tests[test][output].offset
     measured, identified = 100 * (measured - offset), 100 * (identified - offset)
-    positive = identified > 0
-    divisor = np.where(positive, identified, np.nan)
+    divisor = np.where(identified > 0, identified, np.nan)
     last = measured[-1] if measured.size else 0.0
+    shown = np.where(measured > max(PLOTTED_STRAIN_RATIO * last, 0.0), measured, np.nan)
     return TestCurve(
-        hours,
-        measured,
-        np.where(positive, identified, np.nan),
-        np.where(positive, 100 * half_width / divisor, np.nan),
-        100 * np.log(np.where(measured > 0, measured, np.nan) / divisor),
-        100 * 2 * 100 * noise / divisor,
-        positive & (measured > max(PLOTTED_STRAIN_RATIO * last, 0.0)),
-        logarithmic=True,
+        hours, measured, divisor, 100 * half_width / divisor, 100 * np.log(shown / divisor), logarithmic=True
     )
 
 
@@ -96,3 +87,14 @@ def axis_label(output: str) -> str:
     """Name and unit of an output."""
     name = output.replace("_", " ")
     return f"{name}, {unit_of(output)}" if unit_of(output) else name
+
+
+def line_style(weight: float) -> Literal["-", "--"]:
+    """Of the curves of a test by its weight in the fit."""
+    return "--" if weight < DASHED_BELOW_WEIGHT else "-"
+
+
+def set_time_range(axes: Axes, hours: Floats, output: str) -> None:
+    """Logarithmic where creep spans decades of time: strains, and stresses that relax."""
+    logarithmic = is_logarithmic(output) or output.startswith("stress")
+    set_range(axes, "x", float(hours.min()) if logarithmic else 0.0, float(hours.max()), logarithmic=logarithmic)

@@ -13,7 +13,7 @@ from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import is_logarithmic
 from creepkit.reports.curve_of_test import axis_label
 from creepkit.reports.figures import empty_figure, save_figure, set_range, wrapped
-from creepkit.reports.load_programs import SECONDS_PER_HOUR
+from creepkit.reports.load_programs import SECONDS_PER_HOUR, with_degrees
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,6 +52,10 @@ DIMENSION_COLOURS = ("#4d9221", "#7fbc41", "#b8e186", "#276419")
 
 NAMED_SHARE, UNNAMED = 0.02, "#000000"
 """Share of the variance from which a part stands in the legend, and the colour of others."""
+
+
+LONGEST_AXIS = 5.0
+"""Of the time of a test: beyond, an interval goes on to the right of the axis, as an arrow says."""
 
 
 SHOWN_RATIO = 1e-3
@@ -136,7 +140,7 @@ def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, *, first: b
     axes.tick_params(labelsize=7, labelbottom=False)
     axes.grid(alpha=0.25)
     if first:
-        axes.set_title(wrapped(f"{test.name}: {history.condition}", 4.4, 11.0), fontsize=8)
+        axes.set_title(wrapped(f"{test.name}: {with_degrees(history.condition)}", 4.4, 11.0), fontsize=8)
 
 
 def _last(test: TestForecast) -> float:
@@ -145,13 +149,12 @@ def _last(test: TestForecast) -> float:
 
 
 def _time_end(test: TestForecast, last: float) -> float:
-    """h, the end of the time axis: that of the test, or of an interval that begins within three times it."""
-    ends = [
-        min(t.high, 3 * 3600 * last) / SECONDS_PER_HOUR
-        for t in test.times
-        if np.isfinite(t.low) and t.low / SECONDS_PER_HOUR < last
-    ]
-    return max([last, *ends])
+    """h, the end of the time axis: that of the test, or of an interval that begins before it, up to LONGEST_AXIS."""
+    end = last
+    for time in sorted((t for t in test.times if np.isfinite(t.low)), key=lambda t: t.low):
+        if time.low / SECONDS_PER_HOUR < end:
+            end = max(end, min(time.high / SECONDS_PER_HOUR, LONGEST_AXIS * last))
+    return end
 
 
 def _measured(test: TestForecast, output: str, factor: float) -> tuple[Floats, Floats]:
@@ -175,6 +178,8 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, bottom: flo
         low, high = time.low / SECONDS_PER_HOUR, min(time.high / SECONDS_PER_HOUR, right)
         colour = RUPTURE_COLOUR if is_rupture else TIME_COLOUR
         axes.plot([low, high], [level, level], color=colour, lw=2.2, solid_capstyle="butt", zorder=4)
+        if time.high / SECONDS_PER_HOUR > right:
+            axes.plot([right], [level], ">", color=colour, ms=5, clip_on=False, zorder=5)
         if np.isfinite(time.value):
             axes.plot([time.value / SECONDS_PER_HOUR], [level], "|", color=colour, ms=9, mew=2, zorder=5)
         if np.isfinite(time.measured) and not time.censored:

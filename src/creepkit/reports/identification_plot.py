@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,22 +18,19 @@ from creepkit.reports.condition_colours import (
     stress_scale,
     temperature_scale,
 )
-from creepkit.reports.curve_of_test import TestCurve, axis_label, curve_of_test, unit_of
+from creepkit.reports.curve_of_test import TestCurve, axis_label, curve_of_test, line_style, set_time_range
 from creepkit.reports.figures import empty_figure, save_figure, set_range, wrapped
 from creepkit.reports.identification_text import rupture_rows
 from creepkit.reports.load_programs import label_of
-from creepkit.reports.prediction_bands import FittedCurves, fitted_curves, rates_of_tests
+from creepkit.reports.prediction_bands import FittedCurves, fitted_curves
 from creepkit.reports.rate_panels import draw_rates, draw_ruptures
+from creepkit.reports.residual_panels import draw_titled_residuals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from creepkit.inverse.identification import Identification
-
-
-DASHED_BELOW_WEIGHT = 0.5
-"""Weight below which a test is drawn dashed."""
 
 
 SHOWN_STRAIN_RATIO = 1e-3
@@ -97,8 +94,7 @@ def _few_tests(fit: Identification, curves: FittedCurves) -> Figure:
                 names = _outputs_of(fit, leading[output])
                 cell = grid[i, j].subgridspec(len(names), 1, hspace=0.05)
                 panels = [figure.add_subplot(cell[k]) for k in range(len(names))]
-                for axes, name in zip(panels, names, strict=True):
-                    draw_residuals(axes, fit, curves, name, leading[output], colours)
+                draw_titled_residuals(panels, fit, curves, names, leading[output], colours)
                 for axes in panels[:-1]:
                     axes.set_xlabel("")
                     axes.tick_params(labelbottom=False)
@@ -108,7 +104,7 @@ def _few_tests(fit: Identification, curves: FittedCurves) -> Figure:
                 _draw_curves([axes], fit, curves, output, [leading[output]], colours)
                 axes.set_title(_curve_title(fit), fontsize=9)
             elif kind == "rates":
-                draw_rates(axes, fit, rates_of_tests(fit, curves.prediction))
+                draw_rates(axes, fit, curves.prediction)
             else:
                 draw_ruptures(axes, fit, colours)
     _name_below(figure, fit, colours)
@@ -122,7 +118,7 @@ def _name_below(figure: Figure, fit: Identification, colours: Sequence[Any]) -> 
     labels = [label_of(history) for history in fit.histories]
     handles = [Line2D([], [], color=colour, marker=".", lw=1.3) for colour in colours]
     for handle, test in zip(handles, fit.tests, strict=True):
-        handle.set_linestyle(_line_style(test.weight))
+        handle.set_linestyle(line_style(test.weight))
     width = float(figure.get_size_inches()[0])
     columns = max(1, min(len(labels), int(width / (0.6 + 0.075 * max(map(len, labels))))))
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=8)
@@ -168,9 +164,9 @@ def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
     by_panel = list(zip(panels.flat, bottom, strict=False))
     for axes, (kind, output) in by_panel:
         if kind == "residuals":
-            draw_residuals(axes, fit, curves, output, leading[output], by_condition.colours)
+            draw_titled_residuals([axes], fit, curves, [output], leading[output], by_condition.colours)
         elif kind == "rates":
-            draw_rates(axes, fit, rates_of_tests(fit, curves.prediction))
+            draw_rates(axes, fit, curves.prediction)
         else:
             draw_ruptures(axes, fit, by_condition.colours)
     for axes in list(panels.flat)[len(bottom) :]:
@@ -180,10 +176,6 @@ def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
 
 def _outputs_of(fit: Identification, tests: Sequence[int]) -> list[str]:
     return list(dict.fromkeys(one.output for k in tests for one in fit.tests[k].outputs))
-
-
-def _line_style(weight: float) -> Literal["-", "--"]:
-    return "--" if weight < DASHED_BELOW_WEIGHT else "-"
 
 
 def _curve_title(fit: Identification) -> str:
@@ -233,7 +225,7 @@ def _draw_curves(
     for axes, tests in zip(panels, groups, strict=True):
         for k in tests:
             drawn.append(curve_of_test(fit, curves, k, output))
-            draw_curve(axes, drawn[-1], colours[k], _line_style(fit.tests[k].weight), dots=colours[k])
+            draw_curve(axes, drawn[-1], colours[k], line_style(fit.tests[k].weight), dots=colours[k])
     set_curve_ranges(panels, drawn, output)
     for axes in panels:
         axes.set(xlabel="time, h", ylabel=axis_label(output))
@@ -255,67 +247,5 @@ def set_curve_ranges(panels: Sequence[Axes], drawn: Sequence[TestCurve], output:
             set_range(axes, "y", lowest, 1.1 * largest, logarithmic=True)
         else:
             set_range(axes, "y", min(float(values.min(initial=0.0)), 0.0), max(largest, 0.0))
-        _set_time_range(axes, np.concatenate([c.hours for c in drawn]), output)
+        set_time_range(axes, np.concatenate([c.hours for c in drawn]), output)
         axes.grid(alpha=0.25)
-
-
-def _set_time_range(axes: Axes, hours: Floats, output: str) -> None:
-    """Logarithmic where creep spans decades of time: strains, and stresses that relax."""
-    logarithmic = is_logarithmic(output) or output.startswith("stress")
-    set_range(axes, "x", float(hours.min()) if logarithmic else 0.0, float(hours.max()), logarithmic=logarithmic)
-
-
-RESIDUAL_QUANTILES = (0.005, 0.995)
-"""The axis shows the residuals between these: the first frames of a test may lie far beyond."""
-
-
-def draw_residuals(
-    axes: Axes,
-    fit: Identification,
-    curves: FittedCurves,
-    output: str,
-    tests: Sequence[int],
-    colours: Sequence[Any] | Mapping[int, Any],
-) -> None:
-    """Measured less identified over time, in noises or per cent, and twice the standard deviation of the noise."""
-    hours, values, noises = [], [], []
-    for k in (k for k in tests if any(one.output == output for one in fit.tests[k].outputs)):
-        curve = curve_of_test(fit, curves, k, output)
-        frames = curve.residual_frames
-        axes.plot(
-            curve.hours[frames],
-            curve.residuals[frames],
-            _line_style(fit.tests[k].weight),
-            lw=0.9,
-            color=colours[k],
-            alpha=0.85,
-        )
-        hours.append(curve.hours[frames])
-        values.append(curve.residuals[frames])
-        noises.append(curve.noise[frames])
-    every, noise = np.concatenate(values), float(np.median(np.concatenate([*noises, np.zeros(0)]) if noises else 0.0))
-    axes.axhspan(-noise, noise, color="black", alpha=0.1, lw=0)
-    axes.axhline(0, color="black", lw=0.8)
-    low, high = np.quantile(every, RESIDUAL_QUANTILES) if every.size else (0.0, 0.0)
-    set_range(axes, "y", min(float(low), -1.5 * noise), max(float(high), 1.5 * noise), most=6)
-    if every.size:
-        _set_time_range(axes, np.concatenate(hours), output)
-    name = output.replace("_", " ")
-    measure = f"100 ln (measured / identified {name}), ≈ %" if is_logarithmic(output) else f"{name},\nnoise sd"
-    axes.set(xlabel="time, h", ylabel=measure)
-    axes.set_title(_residual_title(fit, output, noise, output == fit.tests[tests[0]].outputs[0].output), fontsize=9)
-    axes.grid(alpha=0.25)
-
-
-def _residual_title(fit: Identification, output: str, noise: float, first: bool) -> str:
-    """Reduced chi-square, and what the grey band is."""
-    if is_logarithmic(output):
-        return f"measured less identified, rms {fit.rms:.3g} of ln strain\ngrey: ±2 sd of frame noise (±{noise:.2g} %)"
-    sizes = [one.noise for m in fit.tests for one in m.outputs if one.output == output]
-    unit = unit_of(output)
-    sd = f"{float(np.median(sizes)):.2g}{' ' + unit if unit else ''}"
-    chi_square = fit.errors[output].chi_square
-    lead = "measured less identified, grey: ±2 sd of frame noise\n" if first else ""
-    judged = fit.adequacy is None or fit.adequacy.judges(output)
-    misfit = f", mean square misfit / noise² {chi_square:.3g}" if judged else " as the fit estimated it"
-    return f"{lead}{output.replace('_', ' ')}: noise sd {sd}{misfit}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -115,3 +116,11 @@ def _holds_text(pieces: list[tuple[float, float, float]], unit: str, number: Cal
 def hours_text(time: float) -> str:
     """A time in s, in hours."""
     return f"{time / SECONDS_PER_HOUR:.3g} h"
+
+
+def with_degrees(text: str) -> str:
+    """A condition as it is printed: '850 C, 43 MPa' as '850 °C, 43 MPa'."""
+    return _CELSIUS.sub(" °C", text)
+
+
+_CELSIUS = re.compile(r"(?<=\d) C(?=[,)]|$)")

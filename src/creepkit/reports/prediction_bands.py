@@ -14,6 +14,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predict_with_sensitivities
+from creepkit.inverse.defect_correction import with_correction_at_frames
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.reference_conditions import LOAD_TOLERANCE, reference_stresses
@@ -24,7 +25,9 @@ from creepkit.reports.load_programs import holds
 
 @dataclass(frozen=True, eq=False)
 class FittedCurves:
-    """What an identification predicts of its own tests, at their own nuisances and offsets.
+    """What an identification predicts of its own tests, at their own nuisances and offsets, as it was compared.
+
+    Where the predictor was corrected by a more exact one, the prediction is the corrected one.
 
     half_width : (tests, times, outputs) half width of the 95 % band from the covariance of the law's parameters and of
         explicit nuisance parameters, in the output's unit. Noise, the scatter of rates between tests and the offsets'
@@ -65,6 +68,8 @@ def _fitted_curves(fit: Identification) -> FittedCurves:
         jacobian = prediction.jacobian[0] @ coordinates.jacobian(fit.u)
     jacobian = np.concatenate([jacobian, _nuisance_jacobian(fit, prediction)], axis=-1)
     variance = np.einsum("...i,ij,...j->...", jacobian, joint_covariance(fit), jacobian)
+    if fit.numerical_error is not None:
+        prediction = with_correction_at_frames(fit.least_squares_problem, histories, prediction)
     for k, test in enumerate(fit.tests):
         for output_fit in test.outputs:
             prediction.values[:, k, :, prediction.outputs.index(output_fit.output)] += output_fit.offset

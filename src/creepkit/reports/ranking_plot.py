@@ -16,6 +16,7 @@ from creepkit.reports.condition_colours import distinct_colours, temperatures_ce
 from creepkit.reports.curve_of_test import axis_label, curve_of_test
 from creepkit.reports.figures import empty_figure, logarithmic_labels, power_of_ten, save_figure, shortened, wrapped
 from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
+from creepkit.reports.judged_readings import judged_readings
 from creepkit.reports.load_programs import program_text
 from creepkit.reports.prediction_bands import FittedCurves, fitted_curves
 
@@ -54,16 +55,18 @@ PANEL_WIDTH = 3.0
 NOT_JUDGED = "this noise is not known well enough to judge the laws by it: compare them, not with 1"
 
 
-HEAT_TITLE = (
-    "mean square deviation of each law in each test, over the noise of a frame\n"
-    "(offsets taken out, rates of single tests not; 1: noise alone)"
-)
+OWN_RATE_MISFIT = "reduced chi-square of each law in each test, its own rate and offset taken out (1: noise alone)"
+"""Of laws whose tests are at hand, judged as where it is said whether they explain them."""
+
+
+COMMON_RATE_MISFIT = "mean square misfit of each law in each test over noise², the law's rate for every test"
+"""Of identifications without their tests."""
 
 
 def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
     """Draw the misfit of each law in each test, the weights, and the curves of the credible laws over the tests.
 
-    The misfit is the reduced chi-square against the noise of a frame; the title is the verdict.
+    The misfit is that of `misfits`; the title is the verdict.
     """
     credible = [r for r in ranking.laws if r.weight > CREDIBLE_WEIGHT][:MOST_LAWS_DRAWN]
     with_tests = all(r.fit.histories and r.fit.predictor is not None for r in credible)
@@ -99,8 +102,24 @@ def misfit_of(test: TestFit) -> float:
     return sum(count * chi_square for count, chi_square in rows) / frames if frames else float("nan")
 
 
+def misfit_name(ranking: Ranking) -> str:
+    """What `misfits` are of a ranking."""
+    return OWN_RATE_MISFIT if _all_judged(ranking) else COMMON_RATE_MISFIT
+
+
+def _all_judged(ranking: Ranking) -> bool:
+    return all(judged_readings(ranked.fit) is not None for ranked in ranking.laws)
+
+
 def misfits(ranking: Ranking) -> Floats:
-    """(laws, tests) reduced chi-square of each law in each test, in the order of the ranking and of its tests."""
+    """(laws, tests) misfit of each law in each test, in the order of the ranking and of its tests.
+
+    The reduced chi-square by which laws are judged, tests with their own rates, lives and offsets; where tests or
+    their noise are not known, that against the noise of a frame with the laws' own rates.
+    """
+    if _all_judged(ranking):
+        readings = [judged_readings(ranked.fit) for ranked in ranking.laws]
+        return np.array([[one.chi_square(k) for k in range(len(ranking.best.tests))] for one in readings if one])
     return np.array([[misfit_of(test) for test in ranked.fit.tests] for ranked in ranking.laws])
 
 
@@ -125,12 +144,13 @@ def _draw_misfits(part: Any, ranking: Ranking) -> None:
             colour = "white" if value > middle * (labels[-1] / middle) ** 0.4 else "black"
             heat.text(column, row, _number(value), ha="center", va="center", fontsize=7.5, color=colour)
     extend = "max" if (finite > labels[-1]).any() else "neither"
-    bar = part.colorbar(image, ax=heat, label="mean square deviation / noise²", pad=0.01, aspect=12, extend=extend)
+    bar = part.colorbar(image, ax=heat, label="misfit / noise²", pad=0.01, aspect=12, extend=extend)
     bar.set_ticks(list(labels), labels=[_number(v) for v in labels])
     bar.ax.yaxis.set_minor_locator(NullLocator())
     adequacy = ranking.best.adequacy
     judged = adequacy is None or adequacy.outputs
-    heat.set_title(HEAT_TITLE if judged else f"{HEAT_TITLE}\n{NOT_JUDGED}", fontsize=9)
+    title = wrapped(misfit_name(ranking), 6.5, 9.0)
+    heat.set_title(title if judged else f"{title}\n{NOT_JUDGED}", fontsize=9)
     weights = [r.weight for r in ranking.laws]
     bars.barh(range(len(weights)), weights, color=_law_colours(ranking), height=0.6)
     for row, weight in enumerate(weights):

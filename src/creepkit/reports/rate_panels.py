@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.inverse.reference_conditions import reference_stresses
-from creepkit.records import ZERO_CELSIUS
+from creepkit.records import ZERO_CELSIUS, Prediction
 from creepkit.reports.condition_colours import ColourScale, temperature_scale
 from creepkit.reports.figures import place_legend_right, set_range
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
-from creepkit.reports.prediction_bands import HoldRate
+from creepkit.reports.minimum_rate_panel import compared_minimum_rates, draw_minimum_rates
+from creepkit.reports.prediction_bands import HoldRate, rates_of_tests
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,8 +29,20 @@ SMALLEST_SHARE = 1e-4
 """Of the lowest curve: rates of tests below that are not drawn."""
 
 
-def draw_rates(axes: Axes, fit: Identification, rates: Sequence[HoldRate]) -> None:
-    """Identified rate over stress with its 95 % band at some temperatures, and the rate that each test shows."""
+def draw_rates(axes: Axes, fit: Identification, prediction: Prediction) -> None:
+    """Creep rates over stress: measured minimum rates and those by the law, or the law's rate at the reference point.
+
+    prediction : of the fitted tests, at their own nuisances.
+    """
+    minimum_rates = compared_minimum_rates(fit)
+    if minimum_rates:
+        draw_minimum_rates(axes, fit, minimum_rates)
+    else:
+        _draw_reference_rates(axes, fit, rates_of_tests(fit, prediction))
+
+
+def _draw_reference_rates(axes: Axes, fit: Identification, rates: Sequence[HoldRate]) -> None:
+    """Identified rate over stress with its 95 % band at some temperatures, and that rate times what each test shows."""
     stresses = [v for h in fit.histories for v in reference_stresses(h, fit.predictor) if v > 0]
     if not stresses:
         axes.set_axis_off()
@@ -44,8 +57,8 @@ def draw_rates(axes: Axes, fit: Identification, rates: Sequence[HoldRate]) -> No
         bounds += [float(rate.min()), float(rate.max()), float(low.min()), float(high.max())]
     shown = [r for r in rates if r.rate > SMALLEST_SHARE * min(bounds)]
     for marker, label, tests in (
-        ("o", "tests", [r for r in shown if not r.stated]),
-        ("s", "minimum rates", [r for r in shown if r.stated]),
+        ("o", "law × measured /\nidentified growth\nof each test", [r for r in shown if not r.stated]),
+        ("s", "law × measured /\nidentified minimum\nrate of each test", [r for r in shown if r.stated]),
     ):
         for k, test in enumerate(tests):
             axes.plot(
@@ -66,9 +79,9 @@ def draw_rates(axes: Axes, fit: Identification, rates: Sequence[HoldRate]) -> No
     axes.grid(alpha=0.25)
     place_legend_right(axes, "95 % band:\nlaw")
     reference = fit.reference
+    initial = "\ninternal variables as at the start, not those of a test" if fit.law.states else ""
     axes.set_title(
-        f"rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.4g} h\n"
-        "tests: identified rate × measured over\nidentified growth, or minimum rate",
+        f"the law's rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.4g} h{initial}",
         fontsize=9,
     )
 

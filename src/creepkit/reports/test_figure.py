@@ -8,9 +8,11 @@ import numpy as np
 
 from creepkit.reports.curve_of_test import TestCurve, axis_label, curve_of_test, unit_of
 from creepkit.reports.figures import empty_figure, save_figure
-from creepkit.reports.identification_plot import draw_curve, draw_residuals, set_curve_ranges
+from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
+from creepkit.reports.judged_readings import judged_readings
 from creepkit.reports.load_programs import program_text
 from creepkit.reports.prediction_bands import FittedCurves
+from creepkit.reports.residual_panels import draw_residuals
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,11 +34,7 @@ def fitted_test_figure(fit: Identification, curves: FittedCurves, test: int) -> 
         draw_curve(row[0], curve, COLOUR, dots="0.25")
         set_curve_ranges([row[0]], [curve], one.output)
         row[0].set(xlabel="time, h", ylabel=axis_label(one.output))
-        draw_residuals(row[1], fit, curves, one.output, [test], colours)
-        judged = fit.adequacy is None or fit.adequacy.judges(one.output)
-        chi_square = one.errors.chi_square
-        known = judged and np.isfinite(chi_square)
-        row[1].set_title(f"mean square misfit / noise² {chi_square:.3g}" if known else "", fontsize=9)
+        row[1].set_title(draw_residuals(row[1], fit, curves, one.output, [test], colours), fontsize=9)
         for axes in row:
             axes.xaxis.label.set_fontsize(9)
             axes.yaxis.label.set_fontsize(9)
@@ -54,21 +52,41 @@ def fitted_test_text(fit: Identification, curves: FittedCurves, test: int) -> st
     parts = []
     for one in fitted.outputs:
         curve = curve_of_test(fit, curves, test, one.output)
-        parts.append(f"{axis_label(one.output).split(',')[0]}: {_end_text(curve, unit_of(one.output))}")
+        name, unit = axis_label(one.output).split(",")[0], unit_of(one.output)
+        parts.append(f"{name}: {_end_text(curve, unit)}; {_residual_text(fit, curve, test, one.output)}")
     return f"Test {history.name}, {program_text(history)}, outputs over time in h. {'. '.join(parts)}."
 
 
+WIDE_BAND = 100.0
+"""Upper over lower end of a band from which the band is said to be unbounded."""
+
+
 def _end_text(curve: TestCurve, unit: str) -> str:
-    known = np.flatnonzero(np.isfinite(curve.identified) & np.isfinite(curve.measured))
+    """The last reading, what the law predicts there or when its prediction ends, and the band."""
+    read, with_unit = np.flatnonzero(np.isfinite(curve.measured)), f" {unit}" if unit else ""
+    if not read.size:
+        return "nothing was measured"
+    known = read[np.isfinite(curve.identified[read])]
+    text = f"{read.size} readings; at {curve.hours[read[-1]]:.3g} h measured {curve.measured[read[-1]]:.3g}{with_unit}"
     if not known.size:
-        return "nothing is predicted"
-    last, (low, high) = int(known[-1]), curve.band
-    residuals = curve.residuals[curve.residual_frames & np.isfinite(curve.residuals)]
-    rms = float(np.sqrt(np.mean(residuals**2))) if residuals.size else float("nan")
-    measure = "per cent" if curve.logarithmic else "standard deviations of the noise"
-    with_unit = f" {unit}" if unit else ""
-    return (
-        f"{curve.hours.size} frames; at {curve.hours[last]:.3g} h measured {curve.measured[last]:.3g}{with_unit}, "
-        f"identified {curve.identified[last]:.3g}{with_unit}, 95 % band {low[last]:.3g} to {high[last]:.3g}; "
-        f"residuals have a root mean square of {rms:.2g} {measure}"
-    )
+        return f"{text}, the law predicts nothing"
+    if known[-1] < read[-1]:
+        return f"{text}; the law follows {known.size} readings, to {curve.hours[known[-1]]:.3g} h, and then ruptures"
+    low, high = (float(end[known[-1]]) for end in curve.band)
+    band = f"95 % band {low:.3g} to {high:.3g}"
+    if curve.logarithmic and not high <= WIDE_BAND * low:
+        band = "95 % band unbounded, as near a predicted rupture"
+    return f"{text}, identified {curve.identified[known[-1]]:.3g}{with_unit}, {band}"
+
+
+def _residual_text(fit: Identification, curve: TestCurve, test: int, output: str) -> str:
+    readings = judged_readings(fit)
+    if readings is not None and readings.mask(test, output).any():
+        values, measure = readings.residuals(test, output)[1], "standard deviations of the noise of a reading"
+        which = f"the {values.size} residuals with the test's own rate and offset"
+    else:
+        values = curve.residuals[np.isfinite(curve.residuals)]
+        measure = "per cent" if curve.logarithmic else unit_of(output)
+        which = f"{values.size} residuals"
+    rms = f"{float(np.sqrt(np.mean(values**2))):.2g} {measure}".strip() if values.size else "not known"
+    return f"{which} have a root mean square of {rms}"

@@ -3,6 +3,7 @@
 (function (page) {
   const { element, svg } = page;
   const MARGIN = { left: 66, right: 14, top: 10, bottom: 44 };
+  const LONGEST_MARGIN = 1.25; // of an axis of times, up to its next number
   const SMALLEST = { width: 200, height: 110 }, USUAL = { width: 520, height: 220 }; // of a drawing
   const LETTER = 7; // pixels of one in a label
 
@@ -42,6 +43,13 @@
       return [low, high];
     }
 
+    // The end of a linear axis of times: the next number, where that is near.
+    function lastTick(low, high) {
+      const ticks = page.ticks(low, high, false, (width - MARGIN.left - MARGIN.right) / 85);
+      const step = ticks.length > 1 ? ticks[1] - ticks[0] : 0, next = ticks.at(-1) + step;
+      return next <= LONGEST_MARGIN * high ? Math.max(next, high) : high;
+    }
+
     // What was measured and planned fills the panel; curves that leave it far behind do not shrink it.
     function rangeOf(key, series) {
       const { logarithmic } = axes[key];
@@ -58,7 +66,7 @@
         if (high / low < 1.3) return [low / 1.5, high * 1.5];
         return key === "x" ? [low / 1.05, high * 1.05] : [10 ** (Math.floor(Math.log10(low) * 4) / 4), 10 ** (Math.ceil(Math.log10(high) * 4) / 4)];
       }
-      if (key === "x") return [Math.min(0, low), 1.02 * high || 1]; // symbols at the last time stay whole
+      if (key === "x") return [Math.min(0, low), lastTick(Math.min(0, low), 1.02 * high || 1)]; // symbols at the last time stay whole
       const reach = high - low;
       if (reach === 0) return [Math.min(0, low * 0.9), (high || 1) * 1.1];
       if (low > 0 && reach > 0.35 * high) low = 0; // from zero, unless that would hide what changes

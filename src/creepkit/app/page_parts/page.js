@@ -97,6 +97,13 @@
       return { law: state.law, values: state.values, program: state.planned ? program : null, tests: shown, rate_temperature: temperature };
     }
 
+    // Which strain is drawn: that of each measured test as it was measured, of a planned one the logarithmic.
+    function strainKind() {
+      const measured = new Set(data.tests.filter((test, k) => state.tests[k] && "strain" in test.outputs).map((test) => test.measure));
+      const kinds = [...new Set([...measured, ...(state.planned || measured.size === 0 ? ["logarithmic"] : [])])];
+      return kinds.length === 1 ? kinds[0] : `of tests as measured (${[...measured].join(", ")}), planned logarithmic`;
+    }
+
     // ---- panels ------------------------------------------------------------------------------------------------
 
     function makePanels() {
@@ -106,6 +113,7 @@
       // the title names it in full
       const label = (output) => (output.title.length > LONGEST_LABEL ? output.unit : output.unit ? `${output.title}, ${output.unit}` : output.title);
       charts = new Map([...outputs].map(([name, output]) => [name, page.chart({ title: capital(output.title), x: { label: "time", logarithmic: false, choice: true }, y: { label: label(output), short: output.unit || output.title, logarithmic: false, choice: true } })]));
+      charts.get("strain")?.heading.append(element("span", { class: "help" }, ` ${strainKind()}`));
       const point = data.laws[state.law].rate_point;
       rates = page.chart({ title: "Creep rate against stress", whole: true, x: { label: "stress, MPa", logarithmic: true }, y: { label: "creep rate, 1/s", short: "1/s", logarithmic: true } });
       rates.heading.append(element("span", { class: "help" }, ` at strain ${page.format(point.strain, 2)}, ${page.duration(point.time)}`));

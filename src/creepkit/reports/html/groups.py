@@ -31,10 +31,13 @@ from creepkit.reports.html.methods_identification import rate_scatter_sentence
 from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.identification_plot import identification_figure
 from creepkit.reports.identification_text import rupture_rows
-from creepkit.reports.load_programs import SECONDS_PER_HOUR
+from creepkit.reports.judged_readings import judged_readings
+from creepkit.reports.load_programs import SECONDS_PER_HOUR, with_degrees
+from creepkit.reports.minimum_rate_panel import compared_minimum_rates, exponent_sentence
 from creepkit.reports.prediction_bands import fitted_curves
 from creepkit.reports.ranking import explanation, misfit_cells, misfit_columns
-from creepkit.reports.ranking_plot import misfit_of, ranking_figure
+from creepkit.reports.ranking_plot import misfit_name, misfit_of, ranking_figure
+from creepkit.reports.residual_panels import residual_caption
 from creepkit.reports.test_figure import fitted_test_figure, fitted_test_text
 
 if TYPE_CHECKING:
@@ -56,13 +59,18 @@ def curve_blocks(found: GroupFindings, figures: PageFigures) -> list[Block]:
     fit = found.fit
     if not fit.histories or fit.predictor is None:
         return [Paragraph("No curves are drawn: the tests were not given with this identification.", "note")]
+    minimum_rates = compared_minimum_rates(fit)
+    panels = ["minimum creep rate over stress" if minimum_rates else "creep rate of the law over stress"]
+    panels += ["time to rupture, identified over measured"] if rupture_rows(fit) else []
+    exponents = exponent_sentence(minimum_rates) if minimum_rates else ""
+    exponents = f" Minimum creep rates, {exponents}." if exponents else ""
     return [
         figures.picture(
             lambda: identification_figure(fit),
             f"Identified law and tests{_of(found)}",
-            f"Curves of {plural(len(fit.histories), 'test')} over time with the law's 95 % bands, residuals, and creep "
-            "rates over stress. The table of tests holds the numbers.",
-            "Measured (dots) and identified (lines with 95 % band); residuals; creep rate over stress.",
+            f"Curves of {plural(len(fit.histories), 'test')} over time with the law's 95 % bands, residuals, "
+            f"{', '.join(panels)}.{exponents} The table of tests holds the numbers.",
+            f"Measured (dots) and identified (lines with 95 % band); {residual_caption(fit)}; {'; '.join(panels)}.",
         )
     ]
 
@@ -77,7 +85,9 @@ def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[B
     if not fit.histories or fit.predictor is None or not with_frames:
         return blocks
     curves = fitted_curves(fit)
-    worst = sorted(with_frames, key=lambda k: -np.nan_to_num(misfit_of(fit.tests[k])))[:most]
+    readings = judged_readings(fit)
+    misfits = [misfit_of(test) if readings is None else readings.chi_square(k) for k, test in enumerate(fit.tests)]
+    worst = sorted(with_frames, key=lambda k: -np.nan_to_num(misfits[k]))[:most]
     if len(worst) < len(with_frames):
         blocks.append(
             Paragraph(f"Drawn are the {len(worst)} of {len(with_frames)} tests whose misfit is largest.", "note")
@@ -89,8 +99,7 @@ def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[B
                 partial(fitted_test_figure, fit, curves, k),
                 f"Test {name}",
                 fitted_test_text(fit, curves, k),
-                f"{name}: measured (dots), identified with 95 % band of the law, and measured less identified; grey: "
-                "two standard deviations of the noise of a reading.",
+                f"{name}: measured (dots), identified with 95 % band of the law, and {residual_caption(fit)}.",
             )
         )
     return blocks
@@ -98,16 +107,17 @@ def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[B
 
 def _table_of_tests(fit: Identification) -> Table:
     rows = []
-    compared = compared_values(fit)
-    for test in fit.tests:
+    compared, readings = compared_values(fit), judged_readings(fit)
+    for k, test in enumerate(fit.tests):
         first = test.outputs[0] if test.outputs else None
         unit = f" {output_unit(first.output)}" if first is not None and output_unit(first.output) else ""
         rows.append(
             (
                 printable(test.name, 120),
-                printable(test.condition, 200),
+                printable(with_degrees(test.condition), 200),
                 "not known" if compared is None else str(compared.by_test.get(test.name, 0)),
-                "–" if first is None or not noise_judged(fit) else number(misfit_of(test), 3),
+                "–" if readings is None else number(readings.chi_square(k), 3),
+                "–" if readings is None else number(readings.misfit_of_common_rate(k), 3),
                 "–" if first is None else number(first.errors.relative_squared_error, 2),
                 "–" if first is None else f"{number(first.offset, 2)}{unit}",
                 number(test.rate_factor, 3),
@@ -115,42 +125,30 @@ def _table_of_tests(fit: Identification) -> Table:
             )
         )
     columns = (
-        *("test", "condition", "values compared", "mean square misfit / noise²"),
+        *("test", "condition", "values compared", "reduced chi-square, own rate", "misfit, the law's rate"),
         *("relative squared error", "offset", "rate × law", "weight"),
     )
     caption = (
-        "Tests: mean square misfit over the squared noise of a reading (1: noise alone), with the law's own rate for "
-        "every test; relative squared error of the first output (sum of squared differences over that about the mean "
-        "of the test), and its offset; the test's own factor on the rate, which the misfit leaves out; weight of the "
-        "test in the fit (1: as any other, less for one far from the others). Whether the law explains the tests is "
-        "judged by another number, the reduced chi-square of the findings, with the tests' own rates. A dash: the law "
-        "predicts no value at some of the readings, as after a rupture that it puts too early"
+        "Tests: reduced chi-square of each, its own rate, rupture life and offset taken out, by which the law is "
+        "judged: over all tests it is that of the findings, 1 is noise alone. Beside it the mean square misfit over "
+        "the squared noise of the same readings with the law's rate for every test: the scatter between tests is in "
+        "it, and no fault of the law. Relative squared error of the first output with the law's rate (sum of squared "
+        "differences over that about the mean of the test; a dash: the law predicts no value at some of the readings, "
+        "as after a rupture that it puts too early), and its offset; the test's own factor on the rate; weight of the "
+        "test in the fit (1: as any other, less for one far from the others)"
     )
-    return Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6, 7))
-
-
-def noise_judged(fit: Identification) -> bool:
-    """Whether the noise of some output is known well enough for misfits over noise to mean anything."""
-    return fit.adequacy is None or bool(fit.adequacy.outputs)
+    return Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6, 7, 8))
 
 
 def _without_misfit(fit: Identification) -> list[str]:
     """Why chi-square of tests is a dash in their table, a sentence for each reason."""
-    if not noise_judged(fit):
+    readings = judged_readings(fit)
+    if readings is None:
+        if not fit.histories or fit.predictor is None:
+            return ["χ² is a dash: the tests were not given with this identification."]
         return ["χ² is a dash: the noise of a reading is not known well enough to judge by, as the findings say."]
-    with_frames = [test for test in fit.tests if test.outputs and np.isnan(misfit_of(test))]
-    ended = [t for t in with_frames if any(np.isnan(one.errors.mean_squared_error) for one in t.outputs)]
-    known = {id(test) for test in ended}
-    others = [test for test in with_frames if id(test) not in known]
-    sentences = []
-    if ended:
-        why = (
-            "the law predicts no value for some of its readings, as that of a test which by the law has ruptured before"
-        )
-        sentences.append(f"χ² is a dash where {why}: {_listed_tests(ended)}.")
-    if others:
-        sentences.append(f"χ² is a dash where the noise of a reading is not known: {_listed_tests(others)}.")
-    return sentences
+    others = [t for k, t in enumerate(fit.tests) if t.outputs and not readings.mask(k).any()]
+    return [f"χ² is a dash where the noise of a reading is not known: {_listed_tests(others)}."] if others else []
 
 
 def _listed_tests(tests: Sequence[TestFit]) -> str:
@@ -162,7 +160,7 @@ def _table_of_ruptures(fit: Identification) -> Table:
     rows = [
         (
             printable(name, 120),
-            printable(condition, 200),
+            printable(with_degrees(condition), 200),
             f"{'> ' if r.censored else ''}{number(r.measured / SECONDS_PER_HOUR)}",
             number(r.predicted / SECONDS_PER_HOUR),
             f"{number(r.low / SECONDS_PER_HOUR)} to {number(r.high / SECONDS_PER_HOUR)}",
@@ -227,13 +225,12 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
             figures.picture(
                 lambda: ranking_figure(ranking),
                 f"Misfit of each law in each test{_of(found)}",
-                f"Mean square deviation over noise of {plural(len(ranking.laws), 'law')} in "
+                f"{sentence(misfit_name(ranking))} {plural(len(ranking.laws), 'law')} in "
                 f"{plural(len(ranking.best.tests), 'test')}, the weights of the laws, and the curves of the credible "
                 f"ones. {' '.join(separation)} Weights: "
                 + ", ".join(f"{title_in_sentence(r.fit.law)} {r.weight:.3f}" for r in ranking.laws)
                 + ".",
-                "Where the laws differ: mean square misfit of each law in each test over the noise of a reading, "
-                "without the tests' own factors on the rate, and weights.",
+                f"Where the laws differ: {misfit_name(ranking)}, and weights.",
             )
         )
     return blocks
@@ -255,11 +252,12 @@ def _separation(ranking: Ranking) -> list[str]:
     if not np.isfinite(differences).all() or differences.max() <= 0.0:
         return []
     k = int(np.argmax(differences))
+    condition = printable(with_degrees(best.tests[k].condition), 200)
     total = float(differences.sum())
     of_all = f", of {number(total, 3)} in all tests together" if len(best.tests) > 1 else ""
     return [
         f"What separates {second.law.name} from {best.law.name} most is test {printable(best.tests[k].name, 120)} "
-        f"({printable(best.tests[k].condition, 200)}): its chi-square, under one covariance for both laws, is "
+        f"({condition}): its chi-square, under one covariance for both laws, is "
         f"{number(float(differences[k]), 3)} larger with {second.law.name}{of_all}."
     ]
 
@@ -271,17 +269,24 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
     """Noise and scatter as they were estimated, and explicit nuisance parameters."""
     fit = found.fit
     noise = [
-        (name.replace("_", " "), number(one.noise, 2), number(one.offset, 2), output_unit(name) or "1")
+        (
+            name.replace("_", " "),
+            _judged_noise(fit, name),
+            number(one.noise, 2),
+            number(one.offset, 2),
+            output_unit(name) or "1",
+        )
         for name, one in fit.noise_model.outputs.items()
     ]
     blocks: list[Block] = [Paragraph(rate_scatter_sentence(fit))]
     if noise:
         blocks.append(
             Table(
-                "Noise as it was estimated, one standard deviation",
-                ("output", "of a reading", "of the offset of a test", "unit"),
+                "Noise as it was estimated, one standard deviation: of a reading from what its test states or its "
+                "neighbouring readings show, by which the law is judged; and in the weights of the fit",
+                ("output", "of a reading", "of a reading, one for all in the fit", "of the offset of a test", "unit"),
                 noise,
-                numeric=(1, 2),
+                numeric=(1, 2, 3),
             )
         )
     rows = [
@@ -299,6 +304,16 @@ def nuisance_blocks(found: GroupFindings) -> list[Block]:
         columns = ("nuisance parameter", "of", "estimate", "prior", "unit", "deviation over sd of the prior")
         blocks.append(Table("Nuisance parameters estimated beside the law", columns, rows, numeric=(2, 3, 5)))
     return [*blocks, *correlation_table(fit)]
+
+
+def _judged_noise(fit: Identification, output: str) -> str:
+    """The noise of a reading by which the law is judged; its ends where readings differ."""
+    readings = judged_readings(fit)
+    ends = None if readings is None else readings.noise(output=output)
+    if ends is None:
+        return "–"
+    low, high = (number(end, 2) for end in ends)
+    return low if low == high else f"{low} to {high}"
 
 
 def _nuisance_unit(nuisance: NuisanceEstimate, fit: Identification) -> str:

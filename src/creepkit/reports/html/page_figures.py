@@ -21,7 +21,9 @@ class PageFigures:
     def __init__(self) -> None:
         self.count = 0
 
-    def picture(self, draw: Callable[[], Figure], title: str, description: str, caption: str) -> Picture | Paragraph:
+    def picture(
+        self, draw: Callable[[], Figure], title: str, description: str, caption: str, *, shows_values: bool = False
+    ) -> Picture | Paragraph:
         """What `draw` draws with its alternative text (title and description) and a caption, which gets its number.
 
         Its own heading is left out: the page says the same above it. A figure that cannot be drawn is a paragraph that
@@ -34,4 +36,4 @@ class PageFigures:
         self.count += 1
         figure.suptitle("")
         svg = svg_text(figure, f"f{self.count}", title, description)
-        return Picture(Markup(svg), f"Figure {self.count}. {caption}")
+        return Picture(Markup(svg), f"Figure {self.count}. {caption}", shows_values)

@@ -29,6 +29,7 @@ from creepkit.reports.html.law_names import LawNames
 from creepkit.reports.html.law_tables import LAW_REJECTED
 from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.instrument_records import alignment_text, imposed_text
+from creepkit.reports.load_programs import with_degrees
 from creepkit.reports.rupture import rupture_text, strength_rows
 from creepkit.reports.rupture_plot import rupture_figure
 from creepkit.reports.temperature_law import plot_temperature_law, temperature_law_text, temperature_study_text
@@ -232,7 +233,7 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures, *, nam
         _forecast_table(forecast),
     ]
     if any(test.outputs for test in forecast.tests):
-        ends = " ".join(f"{printable(row[0], 80)}: {printable(row[2], 200)}." for row in _forecast_cells(forecast)[:12])
+        ends = " ".join(sentence(f"{printable(row[0], 80)}: {row[2]}") for row in _forecast_cells(forecast)[:12])
         blocks.append(
             figures.picture(
                 lambda: forecast_figure(forecast),
@@ -263,7 +264,7 @@ def _forecast_cells(forecast: Forecast) -> list[tuple[str, ...]]:
     rows = []
     for test, condition, end, *cells in forecast_rows(forecast):
         parted = ["; ".join(cell.splitlines()) for cell in cells]
-        rows.append(tuple(map(printable, (test, condition, end, *parted))))
+        rows.append(tuple(map(printable, (test, with_degrees(condition), end, *parted))))
     return rows
 
 
@@ -297,6 +298,7 @@ def _design_blocks(name: str, design: Design, figures: PageFigures, *, names: La
                 "Map of the expected information for an hour of machine time over first load and duration, left of "
                 "constant loads, right of loads that change.",
                 "Expected information for an hour of machine time over first load and duration; the plan is marked.",
+                shows_values=True,
             )
         )
     lines = [line.strip() for line in direction_lines(design) if line.strip()]
