@@ -32,7 +32,8 @@ from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.scatter_of_lives import with_scatter_of_lives
-from creepkit.inverse.unmodelled_effects import UnmodelledEffect, with_random_effects
+from creepkit.inverse.unmodelled_effect import UnmodelledEffect
+from creepkit.inverse.unmodelled_effects import with_random_effects
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution
 from creepkit.records import History, is_logarithmic
 
@@ -130,7 +131,8 @@ def adequacy_with_remedies(
     remedies = [
         effect.description
         for effect in effects
-        if adequacy_of(
+        if not effect.common
+        and adequacy_of(
             problem, with_random_effects(linear, [effect]), noise_model, predictor_errors, histories, known
         ).explains
     ]

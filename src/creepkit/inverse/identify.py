@@ -63,7 +63,8 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     restricted_covariance,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note
+from creepkit.inverse.unmodelled_effect import unmodelled_note
+from creepkit.inverse.unmodelled_effects import unmodelled_effects
 from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
@@ -283,13 +284,16 @@ def _result(
     working_estimator = _working_estimator(problem, numerical_error)
     noise_model, covariance, freedom = _uncertainty(best, working_estimator, len(histories))
     linear = best.linearised or linearised(problem, x, residuals)
-    unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories)
+    fitting_noise = (
+        None if best.linearised is not None else with_single_value_weight(best.working_noise, problem.observations)
+    )
+    unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories, fitting_noise)
     scatter = rate_scatter(
         problem,
         x,
         residuals,
         noise_model,
-        [effect.residual_change for effect in unmodelled if is_length_nuisance(effect.kind)],
+        [effect.residual_change for effect in unmodelled if is_length_nuisance(effect.kind) and not effect.common],
     )
     prediction = predict(
         problem.predictor,

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from creepkit.exporters.mathml import law_equations, symbol_element
 from creepkit.inverse.duration import STRAIN_OF_UNKNOWN_DURATION, duration_known
 from creepkit.inverse.uncertainty.laplace_approximation import cut_interval_notes
-from creepkit.inverse.unmodelled_effects import TAKEN_FOR_GRANTED
+from creepkit.inverse.unmodelled_effect import NOT_INCLUDED
 from creepkit.reports.html.elements import (
     Block,
     Formula,
@@ -138,12 +138,10 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     else:
         blocks.append(Paragraph("The tests determine every parameter, given this law."))
     blocks += credible_values(found.ranking)
-    unmodelled = [
-        sentence(f"{effect.description}, which changes the rate by {effect.change_text}") for effect in fit.unmodelled
-    ]
+    unmodelled = [sentence(effect.sentence) for effect in fit.unmodelled]
     if unmodelled:
-        blocks += [Paragraph("The intervals do not include:"), Items(unmodelled)]
-    notes = [note for note in fit.notes if not (fit.unmodelled and note.startswith(TAKEN_FOR_GRANTED))]  # said above
+        blocks += [Paragraph(f"{sentence(NOT_INCLUDED)} The rate amid the tests would move:"), Items(unmodelled)]
+    notes = [note for note in fit.notes if not (fit.unmodelled and note.startswith(NOT_INCLUDED))]  # said above
     cut = cut_interval_notes(fit.law, fit.estimates) if misfit else ()  # of values that say nothing of the tests
     notes = [note for note in notes if note not in cut]
     remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *map(LawNames.of(found.fits).in_text, notes)])))
