@@ -112,6 +112,8 @@ def adequacy_of(
         rate_scatter=scatter,
         rate_trend_p_value=trend,
         expected_chi_square=known.expected(share_of_freedom, known.judged),
+        critical_chi_square=known.critical(SIGNIFICANCE / len(p_values), share_of_freedom, known.judged),
+        smallest_p_value=min(p_values),
     )
 
 

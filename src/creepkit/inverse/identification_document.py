@@ -79,7 +79,16 @@ CODEC = RecordCodec(
             "correlation_length": POSITIVE,
         },
         Adequacy: dict.fromkeys(
-            ("chi_square", "freedom", "p_value", "correlation", "rate_scatter", "rate_trend_p_value"),
+            (
+                "chi_square",
+                "freedom",
+                "p_value",
+                "correlation",
+                "rate_scatter",
+                "rate_trend_p_value",
+                "critical_chi_square",
+                "smallest_p_value",
+            ),
             NOT_NEGATIVE_OR_NAN,
         ),
         OutputAdequacy: {"frames": NOT_NEGATIVE, "noise": POSITIVE, "discrepancy": NOT_NEGATIVE},

@@ -284,17 +284,10 @@ def _result(
     working_estimator = _working_estimator(problem, numerical_error)
     noise_model, covariance, freedom = _uncertainty(best, working_estimator, len(histories))
     linear = best.linearised or linearised(problem, x, residuals)
-    fitting_noise = (
-        None if best.linearised is not None else with_single_value_weight(best.working_noise, problem.observations)
-    )
-    unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories, fitting_noise)
-    scatter = rate_scatter(
-        problem,
-        x,
-        residuals,
-        noise_model,
-        [effect.residual_change for effect in unmodelled if is_length_nuisance(effect.kind) and not effect.common],
-    )
+    working_noise = None if best.linearised is not None else best.working_noise
+    unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories, working_noise)
+    lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
+    scatter = rate_scatter(problem, x, residuals, noise_model, lengths)
     prediction = predict(
         problem.predictor,
         law,

@@ -108,6 +108,14 @@ class UnmodelledEffect:
         return f"{'independent errors' if several else 'an error'} of {size} in the {self.kind} of {each}"
 
 
+def combined_change_text(effects: Sequence[UnmodelledEffect]) -> str:
+    """The root sum of squares of the changes of the rate by all of them; "" where there are none."""
+    if not effects:
+        return ""
+    total = float(np.sqrt(sum(e.rate_change**2 for e in effects)))
+    return f"a factor of {np.exp(total):.2g}" if total >= LARGEST_PER_CENT else f"{100 * total:.2g} %"
+
+
 def unmodelled_note(effects: Sequence[UnmodelledEffect]) -> tuple[str, ...]:
     """One sentence on what intervals do not include, with what it would do to the rate; none where that is little."""
     parts = [e.sentence for e in effects if abs(e.rate_change) > NOTEWORTHY_CHANGE]

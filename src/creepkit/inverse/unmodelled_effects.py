@@ -33,6 +33,7 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.quantities import gradient, log_rate
 from creepkit.inverse.unmodelled_effect import DRIFT, UnmodelledEffect
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
+from creepkit.inverse.working_noise import with_single_value_weight
 from creepkit.language import CreepLaw, strain, time
 from creepkit.records import Dimension, History, Nuisance, Program, dimension_named, dimensions_of, output_unit
 
@@ -56,6 +57,7 @@ def unmodelled_effects(
 
     working_noise : under which the values were found where that is not `noise_model`, as of frames of equal weight.
     """
+    fitting_noise = None if working_noise is None else with_single_value_weight(working_noise, problem.observations)
     kinds = {n.kind for n in problem.settings.nuisances}
     common_kinds = {n.kind for n in problem.settings.nuisances if n.scope != "test"}
     changes: list[tuple[str, float, str, Floats]] = []
@@ -75,14 +77,14 @@ def unmodelled_effects(
     effects = []
     for kind, size, unit, change in changes:
         by_test = _rate_changes(
-            problem, x, linear, working_noise or _with_scatter_of(change, problem, linear, noise_model), change
+            problem, x, linear, fitting_noise or _with_scatter_of(change, problem, linear, noise_model), change
         )
         rate_change = float(np.sqrt((by_test**2).sum()))
         likeness = _likeness_of_hardening(problem, x, linear, factor, change) if kind == DRIFT else (np.nan, np.nan)
         effect = UnmodelledEffect(kind, size, unit, rate_change, size * likeness[0], likeness[1], change, tests=count)
         effects.append(replace(effect, activation_energy=energy, assumed=assumed) if kind == DRIFT else effect)
     for kind, size, unit, change in common:
-        rate_change = float(_rate_changes(problem, x, linear, working_noise or noise_model, change).sum())
+        rate_change = float(_rate_changes(problem, x, linear, fitting_noise or noise_model, change).sum())
         effect = UnmodelledEffect(kind, size, unit, rate_change, common=True, tests=count)
         of_heat = kind == "temperature"
         effects.append(replace(effect, activation_energy=energy, assumed=assumed) if of_heat else effect)

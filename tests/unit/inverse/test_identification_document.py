@@ -26,6 +26,7 @@ ADEQUACY = Adequacy(
     "leaves a discrepancy",
     (OutputAdequacy("strain", 80, 2e-5, "estimated", 3.25, 1e-4, 3e-5),),
     3.25, 78.0, 1e-4, 0.4, LargestDeviation("bar 1", "strain", 5400.0, -4e-5, 2.0), ("thickness", "offset of strain"),
+    critical_chi_square=1.5, smallest_p_value=5e-5,
 )  # fmt: skip
 ERROR = NumericalError("bulge", "bulge on a finer mesh", {"amplitude": 5e-4}, 0.33, 0.2, ("D4",))
 EFFECTS = (

@@ -23,6 +23,14 @@ def test_names_are_replaced_as_a_whole():
     assert text == f"decisive: {both}, not Norton power law (Norton power law: 0.2) or strain-hardening(m=0)"
 
 
+def test_a_dependence_on_temperature_that_all_laws_share_is_left_out():
+    warm, steady = HARDENING.times(ck.arrhenius()), NORTON.times(ck.arrhenius())
+    text = f"the best is {warm.name}, not {steady.name}"
+    assert LawNames([warm, steady]).in_text(text) == "the best is strain-hardening power law, not Norton power law"
+    other = LawNames([warm, NORTON]).in_text(text)
+    assert "strain-hardening power law with Arrhenius temperature dependence" in other
+
+
 def test_a_law_called_by_a_word_of_findings_keeps_its_name():
     names = LawNames([NORTON.rename("best"), HARDENING.rename("combined")])
     text = "of 2 laws tried combined is best"

@@ -242,7 +242,7 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     least, x = _least_chi_square(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
-    description = f"{law.name} with {100 * SHARE:.0f} % of the rate from {other.law.name}"
+    description = f"its sum with {other.law.name}, which carries {100 * SHARE:.0f} % of the rate,"
     excess = least - _chi_square(best.problem, best.x)
     return AlteredLaw("sum", problem, x, excess, share.jacobian(x), other.law.name, description)
 

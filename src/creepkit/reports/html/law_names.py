@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from creepkit.reports.html.elements import printable
@@ -43,11 +43,24 @@ def _small(title: str) -> str:
     return f"{title[:1].lower()}{title[1:]}" if COMMON_WORD.match(title) else title
 
 
+DEPENDENCE = re.compile(r" with [\w -]+ temperature dependence$")
+"""At the end of a title of a law with temperature."""
+
+
+def _without_shared_dependence(titles: Mapping[str, str]) -> dict[str, str]:
+    """{name: title}, short where every title ends with the same dependence on temperature, which tells none apart."""
+    endings = {match[0] if (match := DEPENDENCE.search(title)) else "" for title in titles.values()}
+    if len(endings) != 1 or len(titles) < 2:
+        return dict(titles)
+    (ending,) = endings
+    return {name: title.removesuffix(ending) for name, title in titles.items()}
+
+
 class LawNames:
     """Names of laws in a text, replaced by titles."""
 
     def __init__(self, laws: Iterable[CreepLaw]) -> None:
-        titles = {law.name: title_in_sentence(law) for law in laws}
+        titles = _without_shared_dependence({law.name: title_in_sentence(law) for law in laws})
         shared = Counter(titles.values())
         self.titles = {
             name: title if shared[title] == 1 else f"{title} ({name})"  # which of them is meant, its name says

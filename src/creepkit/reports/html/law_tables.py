@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
 from creepkit.reports.html.elements import Block, Paragraph, Table, number, printable, with_interval
 from creepkit.reports.identification_text import rejected
 
@@ -43,7 +44,7 @@ def credible_values(ranking: Ranking | None) -> list[Block]:
             law_title(one.fit.law),
             f"{one.weight:.3f}",
             e.name,
-            *with_interval(e.value, e.low, e.high),
+            *with_interval(e.value, e.low, e.high, bound_marks(one.fit.law, e)),
             "" if e.unit == "1" else e.unit,
             LAW_REJECTED if rejected(one.fit) else e.verdict,
         )

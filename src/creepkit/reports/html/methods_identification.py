@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.nuisance_plausibility import nuisance_unit
@@ -258,6 +259,8 @@ def rate_scatter_sentence(fit: Identification) -> str:
     if rates[0].sd is not None:
         return f"The creep rates of single tests have a Gaussian prior: they scatter by {size}, as was given."
     if _rate_estimated(fit):
+        if fit.noise_model.rate <= UNDETECTED_SCATTER:
+            return "No scatter of the creep rates of single tests about the law was detected."
         return f"The creep rates of single tests scatter by {size}, as was estimated."
     cannot = f"{plural(len(fit.tests), 'test')} cannot show it"
     if fit.noise_model.rate == 0.0 or fit.settings.weights == "likelihood":

@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.duration import duration_known
+from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.reports.design import cheapest_text, design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
@@ -230,7 +231,7 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
         rows = [
             (
                 e.name,
-                *with_interval(e.value, e.low, e.high),
+                *with_interval(e.value, e.low, e.high, bound_marks(law.law, e)),
                 "" if e.unit == "1" else e.unit,
                 e.verdict if rejected is None else LAW_REJECTED,
             )
@@ -290,8 +291,8 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures, *, nam
             f"By {laws}: if the law is right, bands and intervals hold a measured value of a single test with a "
             f"probability of {100 * forecast.level:g} %."
             + (
-                " The law does not explain the tests, so that this probability is not earned: treat the bands as a "
-                "lower bound of the uncertainty."
+                " The law does not explain the tests, so that this probability is not earned: that the form of the law "
+                "is wrong is not in the bands."
                 if forecast.rejected
                 else ""
             )
@@ -306,7 +307,8 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures, *, nam
                 f"Forecasts{_of(name)}",
                 "Forecast curves over time with pointwise and simultaneous bands, and what the variance is made of. "
                 f"{ends}",
-                f"Forecast with bands of {100 * forecast.level:g} %, and below it what the variance is made of.",
+                f"Forecast with bands of {100 * forecast.level:g} % (drawn), and below it shares of the variance, "
+                "which are of first order.",
             )
         )
     remarks: dict[str, list[str]] = {}
