@@ -122,7 +122,7 @@ def _table_of_tests(fit: Identification) -> Table:
         "Tests: mean square misfit over the squared noise of a reading (1: noise alone), with the law's own rate for "
         "every test; relative squared error of the first output (sum of squared differences over that about the mean "
         "of the test), and its offset; the test's own factor on the rate, which the misfit leaves out; weight of the "
-        "test in the fit (1: as any other, less for one far from the others). Whether the law explains the tests is "
+        "test in the fit (1: as any other, less for one far from the others). Whether the tests contradict the law is "
         "judged by another number, the reduced chi-square of the findings, with the tests' own rates. A dash: the law "
         "predicts no value at some of the readings, as after a rupture that it puts too early"
     )

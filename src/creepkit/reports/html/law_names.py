@@ -26,7 +26,7 @@ COMMON_WORD = re.compile(
 
 
 SENTENCE_WORD = re.compile(
-    r"a|above|alone|and|another|asked|at|be|best|but|by|decisive|does|each|effect|explains?|first|for|from|has|in|its?"
+    r"a|above|alone|and|another|asked|at|be|best|but|by|carries|contradicted|decisive|does|each|effect|explains?|first|for|from|has|in|its?"
     r"|laws?|least|more|most|nearly|noise|none|not|of|only|or|rates?|second|share|stress|sum|tests?|that|the|them|these"
     r"|threshold|time|to|tried|was|weight|were|whether|which|with|would"
 )

@@ -126,8 +126,8 @@ def test_what_the_tests_allow_beside_it_is_said():
     found = verdict_of(ranking([0.99, 0.01], challenges=(SUM, DRIFT)))
     assert found == (
         "not decisive: of 2 laws tried norton has nearly all the weight (weight 0.99 of the laws tried) and is not "
-        "contradicted by the tests; but norton+sinh with 30 % of the rate from sinh explains them as well; and a temperature drift "
-        "would leave it a weight of 0.52"
+        "contradicted by the tests; but norton+sinh with 30 % of the rate from sinh explains them as well; and a "
+        "temperature drift would leave it a weight of 0.52"
     )
 
 
