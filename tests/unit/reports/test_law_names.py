@@ -11,6 +11,7 @@ def test_titles_within_a_sentence():
     assert title_in_sentence(HARDENING) == "strain-hardening power law"
     warm = HARDENING.times(ck.arrhenius())
     assert title_in_sentence(warm) == "strain-hardening power law with Arrhenius temperature dependence"
+    assert title_in_sentence(ck.law("mpc-omega")) == "MPC Omega"  # what follows a colon explains the title
     assert title_in_sentence(HARDENING + NORTON) == "strain-hardening power law + Norton power law"
 
 

@@ -241,7 +241,7 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
 
 def _separation(ranking: Ranking) -> list[str]:
     """The test that speaks most for the best law against the second, and by how much the second is worse in all."""
-    if len(ranking.laws) < 2 or ranking.criterion == "hold-out":
+    if len(ranking.laws) < 2 or ranking.criterion == "hold-out" or len(ranking.best.tests) < 2:
         return []
     fits, second = [one.fit for one in ranking.laws], ranking.laws[1]
     if any(fit.linearised is None for fit in fits):
@@ -263,7 +263,7 @@ def _separation(ranking: Ranking) -> list[str]:
     test = f"test {printable(fits[0].tests[k].name, 120)} ({printable(fits[0].tests[k].condition, 200)})"
     criterion = criterion_name(ranking)
     return [
-        f"What separates {name} from {fits[0].law.name} most is {test}: {share if len(fits[0].tests) > 1 else ''}"
+        f"What separates {name} from {fits[0].law.name} most is {test}: {share}"
         f"{criterion} of {name} is {number(second.excess, 3)} larger in all."
     ]
 

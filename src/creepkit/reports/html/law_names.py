@@ -34,8 +34,12 @@ SENTENCE_WORD = re.compile(
 
 
 def title_in_sentence(law: CreepLaw) -> str:
-    """The title of a law within a sentence: without abbreviations in brackets; its name where it has none."""
+    """The title of a law within a sentence: without abbreviations in brackets, and what follows a colon.
+
+    The name of a law that has no title.
+    """
     parts = re.sub(r"\s*\([A-Z]{2,4}\)", "", printable(law.title, LONGEST_TITLE)).split(" + ")
+    parts = [part.partition(": ")[0] for part in parts]
     return " + ".join(map(_small, parts)) if law.title else printable(law.name, LONGEST_TITLE)
 
 
