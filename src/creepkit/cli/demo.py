@@ -129,7 +129,13 @@ def _print_ranking(ranking: Ranking) -> None:
 
 def _print_values(fit: Identification) -> None:
     """The identified values with 95 % intervals, three a line."""
-    texts = [f"{e.name} = {e.value:.4g} [{e.low:.3g}, {e.high:.3g}] {e.unit}".rstrip() for e in fit.estimates]
+    from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
+
+    marks = [bound_marks(fit.law, e) for e in fit.estimates]
+    texts = [
+        f"{e.name} = {e.value:.4g} [{e.low:.3g}{low}, {e.high:.3g}{high}] {e.unit}".rstrip()
+        for e, (low, high) in zip(fit.estimates, marks, strict=True)
+    ]
     for start in range(0, len(texts), 3):
         typer.echo("  " + ", ".join(texts[start : start + 3]))
 

@@ -21,7 +21,7 @@ from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
-from creepkit.inverse.uncertainty.laplace_approximation import Estimate, verdict_of_interval
+from creepkit.inverse.uncertainty.laplace_approximation import Estimate, interval_ends, verdict_of_interval
 from creepkit.inverse.uncertainty.mixture_distribution import MixtureDistribution
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
@@ -283,7 +283,8 @@ def export_notes(temperature_law: TemperatureLaw) -> list[str]:
     """Validity, intervals and forms of a law, as comments of an export."""
     low, high = temperature_law.temperature_range
     parameter_lines = [
-        f"{e.name} = {e.value:.8g} [{e.low:.4g}, {e.high:.4g}] {e.unit}: {e.verdict}" for e in temperature_law.estimates
+        f"{e.name} = {e.value:.8g} [{', '.join(interval_ends(temperature_law.law, e))}] {e.unit}: {e.verdict}"
+        for e in temperature_law.estimates
     ]
     forms = [
         f"{name}: {', '.join(form.name for form in form_weights)}"

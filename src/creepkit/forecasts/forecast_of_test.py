@@ -379,9 +379,9 @@ def _caution(laws: Sequence[LawDraws]) -> str:
         if open_ and not has_sampled_draws(draws.fit):
             outside = f"{100 * draws.outside:.0f} % of them"
             return (
-                f"the band is not that of the tests, and may be far too wide: they do not determine {', '.join(open_)}"
-                f", and its draws are Gaussian about the values, not compared with the tests; {outside} "
-                "lay outside the bounds of the law and were left out"
+                f"the band is not that of the tests, and what parameters add to it may be far too wide: tests do not "
+                f"determine {', '.join(open_)}, and its draws are Gaussian about the values, not compared with the "
+                f"tests; {outside} lay outside the bounds of the law and were left out"
             )
     return ""
 

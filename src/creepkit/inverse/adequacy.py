@@ -10,10 +10,15 @@ import numpy as np
 from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
+from creepkit.inverse.variance_components import SMALLEST_RATE_SCATTER
 from creepkit.records import output_unit
 
 IMPLAUSIBLE_CHI_SQUARE = 0.05
 """Reduced chi-square below which the noise that was stated is questioned: 4.5 times what the frames show."""
+
+
+UNDETECTED_SCATTER = 1.5 * SMALLEST_RATE_SCATTER
+"""Of ln rate between tests: an estimate that is not above is at its lower bound."""
 
 
 LARGEST_SCATTER = 1.0
@@ -28,8 +33,8 @@ NOTEWORTHY_EXPECTATION = 1.05
 """Mean reduced chi-square of a right law from which on it is said beside the one that was found."""
 
 
-LARGEST_SHOWN_P_VALUE = 0.99
-"""p-values above are shown as such: the least of several times their number is cut at 1."""
+SMALLEST_SHOWN_P_VALUE = 1e-12
+"""p-values below are shown as such."""
 
 
 AdequacyVerdict = Literal["explains", "leaves a discrepancy", "cannot be judged"]
@@ -72,7 +77,9 @@ class Adequacy:
         of a bend of these rates over stress, by which a law shows that it misses the dependence on stress.
     implausible : nuisances that lie far from their priors, without which the law would not explain the tests.
     expected_chi_square : what `chi_square` is in the mean if the law is right: above one where noise is estimated from
-        few frames. not_judged : the outputs, where nothing can be judged, and few_frames : the tests, each with how
+        few frames. critical_chi_square : the reduced chi-square beyond which the tests contradict the law.
+    smallest_p_value : of all outputs together and of each, before it is multiplied by their number.
+    not_judged : the outputs, where nothing can be judged, and few_frames : the tests, each with how
         many frames it has, where these are too few to show the noise.
     """
 
@@ -90,6 +97,8 @@ class Adequacy:
     expected_chi_square: float = 1.0
     not_judged: tuple[str, ...] = ()
     few_frames: tuple[tuple[str, int], ...] = ()
+    critical_chi_square: float = float("nan")
+    smallest_p_value: float = float("nan")
 
     @property
     def explains(self) -> bool:
@@ -112,12 +121,12 @@ class Adequacy:
 
     @property
     def qualification(self) -> str:
-        """What follows "explains the tests" where it takes nuisances of implausible size; "" where it does not."""
+        """What follows "not contradicted" where it takes nuisances of implausible size; "" where it does not."""
         if not self.implausible:
             return ""
         more = len(self.implausible) - 1
         others = f" (and {more} more such nuisance{'s' * (more > 1)})" if more else ""
-        return f" only with {self.implausible[0].description}{others}"
+        return f", but only with {self.implausible[0].description}{others}"
 
     @property
     def discrepancy_in_noises(self) -> float:
@@ -126,21 +135,40 @@ class Adequacy:
 
     @property
     def _chi_square_text(self) -> str:
-        expected = ""
+        remarks = []
+        if self.critical_chi_square > 0:
+            remarks.append(f"critical value {self.critical_chi_square:.3g}")
         if self.expected_chi_square > NOTEWORTHY_EXPECTATION:
-            expected = f" (expected {self.expected_chi_square:.3g} for a correct law, as the noise itself is estimated)"
-        return f"reduced chi-square {self.chi_square:.3g} with {self.freedom:.0f} degrees of freedom{expected}"
+            remarks.append(
+                f"expected {self.expected_chi_square:.3g} for a correct law, as the noise itself is estimated"
+            )
+        said = f" ({'; '.join(remarks)})" if remarks else ""
+        return f"reduced chi-square {self.chi_square:.3g} with {self.freedom:.0f} degrees of freedom{said}"
 
     @property
     def _p_value_text(self) -> str:
-        """The p-value; where it is the least of several, how many."""
-        p, count = self.p_value, len(self.outputs)
-        several = f" (Bonferroni, {count + 1} comparisons)" if count > 1 else ""
-        if p > LARGEST_SHOWN_P_VALUE:
-            return f"p > {LARGEST_SHOWN_P_VALUE:g}{several}"
-        if p <= 1e-12:
-            return f"p < 1e-12{several}"
-        return f"p = {p:.{2 if self.explains else 1}g}{several}"
+        """The p-value; where it is the least of several times their number, how many and that one itself."""
+        count = len(self.outputs) + 1
+        if count == 2:
+            return p_value_text(self.p_value)
+        adjusted = f"{p_value_text(self.p_value)} adjusted for {count} comparisons (Bonferroni)"
+        return (
+            adjusted
+            if np.isnan(self.smallest_p_value)
+            else f"smallest {p_value_text(self.smallest_p_value)}, {adjusted}"
+        )
+
+    @property
+    def verdict_text(self) -> str:
+        """The verdict in few words, with the p-value, or what is left in noises; "?" where nothing can be judged."""
+        if self.verdict == "cannot be judged":
+            return "?"
+        if self.explains:
+            large = f", but only with a large {self.implausible[0].kind}" if self.implausible else ""
+            return f"not contradicted ({p_value_text(self.p_value)}){large}"
+        noises = self.discrepancy_in_noises
+        left = f"leaves {noises_text(noises)} noises" if noises > 0 else "rates of tests are not followed"
+        return f"contradicted: {left}"
 
     def __getitem__(self, output: str) -> OutputAdequacy:
         for one in self.outputs:
@@ -149,23 +177,21 @@ class Adequacy:
         raise KeyError(output)
 
     def __str__(self) -> str:
-        """One sentence: the verdict, with what is left and where."""
+        """One sentence, to follow "the law": the verdict, with what is left and where."""
         if self.verdict == "cannot be judged":
             return f"cannot be judged: {how_to_state_noise(self.not_judged, self.few_frames)}"
         source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
         if self.explains:
             slow = np.isfinite(self.correlation)
             correlated = "; what is left is autocorrelated, noise or the law's own" if slow else ""
-            scatter = ""
-            if self.rate_scatter > 0:
-                scatter = f", with rates of tests that scatter by {100 * self.rate_scatter:.2g} %"
+            scatter = f" ({rate_scatter_text(self.rate_scatter)})" if self.rate_scatter > 0 else ""
             if self.chi_square < IMPLAUSIBLE_CHI_SQUARE:
                 scatter += " (far larger than what the readings show: check its unit)"
             found = f"{self._chi_square_text}, {self._p_value_text}{correlated}"
-            return f"explains the tests to their {source} noise{self.qualification}{scatter}: {found}"
+            return f"is not contradicted by the tests at their {source} noise{self.qualification}{scatter}: {found}"
         parts = [
             f"{o.discrepancy:.2g}{' ' + output_unit(o.output) if output_unit(o.output) else ''} of {o.output} "
-            f"({o.discrepancy_in_noises:.2g} times its {o.noise_source} noise)"
+            f"({noises_text(o.discrepancy_in_noises)} times its {o.noise_source} noise)"
             for o in sorted(self.outputs, key=lambda o: -o.discrepancy_in_noises)
             if o.discrepancy > 0
         ]
@@ -178,3 +204,22 @@ class Adequacy:
             where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
         rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained"
         return f"{rest} ({self._chi_square_text}, {self._p_value_text}){where}"
+
+
+def p_value_text(p: float) -> str:
+    """A probability as "p = 0.028"."""
+    if p <= SMALLEST_SHOWN_P_VALUE:
+        return f"p < {SMALLEST_SHOWN_P_VALUE:g}"
+    return f"p = {p:.{2 if p >= 1e-3 else 1}g}"
+
+
+def noises_text(noises: float) -> str:
+    """Multiples of a noise to two digits, without a power of ten."""
+    return f"{float(f'{noises:.2g}'):g}" if np.isfinite(noises) and noises < 1e5 else f"{noises:.2g}"
+
+
+def rate_scatter_text(scatter: float) -> str:
+    """What was found of the scatter of rates between tests; scatter : of ln rate, one standard deviation."""
+    if scatter <= UNDETECTED_SCATTER:
+        return "no scatter of rates between tests was detected"
+    return f"rates of tests scatter by {100 * scatter:.2g} %"

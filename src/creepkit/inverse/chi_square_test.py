@@ -29,7 +29,8 @@ from creepkit.inverse.noise_covariance import predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
-from creepkit.inverse.unmodelled_effects import UnmodelledEffect, with_random_effects
+from creepkit.inverse.unmodelled_effect import UnmodelledEffect
+from creepkit.inverse.unmodelled_effects import with_random_effects
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.records import History, is_logarithmic
 
@@ -101,6 +102,8 @@ def adequacy_of(
         rate_scatter=scatter,
         rate_trend_p_value=trend,
         expected_chi_square=known.expected(share_of_freedom, known.judged),
+        critical_chi_square=known.critical(SIGNIFICANCE / len(p_values), share_of_freedom, known.judged),
+        smallest_p_value=min(p_values),
     )
 
 
@@ -120,7 +123,8 @@ def adequacy_with_remedies(
     remedies = [
         effect.description
         for effect in effects
-        if adequacy_of(
+        if not effect.common
+        and adequacy_of(
             problem, with_random_effects(linear, [effect]), noise_model, predictor_errors, histories, known
         ).explains
     ]

@@ -27,7 +27,7 @@ from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, delta_method, interval_quantile
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
-from creepkit.inverse.unmodelled_effects import UnmodelledEffect
+from creepkit.inverse.unmodelled_effect import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import History, Nuisance, Prediction, Predictor

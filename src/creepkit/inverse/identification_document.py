@@ -26,7 +26,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.inverse.uncertainty.stored_rate_scatter import problem_with
-from creepkit.inverse.unmodelled_effects import UnmodelledEffect
+from creepkit.inverse.unmodelled_effect import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.records import Nuisance
@@ -79,7 +79,16 @@ CODEC = RecordCodec(
             "correlation_length": POSITIVE,
         },
         Adequacy: dict.fromkeys(
-            ("chi_square", "freedom", "p_value", "correlation", "rate_scatter", "rate_trend_p_value"),
+            (
+                "chi_square",
+                "freedom",
+                "p_value",
+                "correlation",
+                "rate_scatter",
+                "rate_trend_p_value",
+                "critical_chi_square",
+                "smallest_p_value",
+            ),
             NOT_NEGATIVE_OR_NAN,
         ),
         OutputAdequacy: {"frames": NOT_NEGATIVE, "noise": POSITIVE, "discrepancy": NOT_NEGATIVE},
@@ -88,7 +97,9 @@ CODEC = RecordCodec(
         NumericalError: {"noises": NOT_NEGATIVE, "shift": NOT_NEGATIVE_OR_NAN},
         UnmodelledEffect: {
             "size": NOT_NEGATIVE,
-            "rate_change": NOT_NEGATIVE_OR_NAN,
+            "rate_change": NAN_ALLOWED,
+            "tests": NOT_NEGATIVE,
+            "activation_energy": NAN_ALLOWED,
             "like_hardening": NAN_ALLOWED,
             "hardening_correlation": NOT_NEGATIVE_OR_NAN,
         },

@@ -69,7 +69,8 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     restricted_covariance,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note
+from creepkit.inverse.unmodelled_effect import unmodelled_note
+from creepkit.inverse.unmodelled_effects import unmodelled_effects
 from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
@@ -251,14 +252,10 @@ def _result(
     working_estimator = _working_estimator(problem, numerical_error)
     noise_model, covariance, freedom = _uncertainty(best, working_estimator, len(histories))
     linear = best.linearised or linearised(problem, x, residuals)
-    unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories)
-    scatter = rate_scatter(
-        problem,
-        x,
-        residuals,
-        noise_model,
-        [effect.residual_change for effect in unmodelled if is_length_nuisance(effect.kind)],
-    )
+    working_noise = None if best.linearised is not None else best.working_noise
+    unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories, working_noise)
+    lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
+    scatter = rate_scatter(problem, x, residuals, noise_model, lengths)
     prediction = predict(
         problem.predictor,
         law,

@@ -81,9 +81,24 @@ class KnownNoise:
         total = sum(freedom for freedom, _ in groups)
         if len(groups) == 1:
             return chance_of_larger(reduced, total, groups[0][1])
-        mean = total * self.expected(share_of_freedom, mask)
-        variance = sum(freedom**2 * _variance_of_f(freedom, nu) for freedom, nu in groups)
+        mean, variance = self._moments(share_of_freedom, mask)
         return float(chi2.sf(reduced * total * 2.0 * mean / variance, 2.0 * mean**2 / variance))
+
+    def critical(self, chance: float, share_of_freedom: float, mask: Bools) -> float:
+        """The reduced chi-square that is exceeded with a probability `chance`: the inverse of chance_of_larger."""
+        groups = self._groups(share_of_freedom, mask)
+        total = sum(freedom for freedom, _ in groups)
+        if len(groups) == 1:
+            nu = groups[0][1]
+            return float(chi2.isf(chance, total) / total if np.isinf(nu) else f.isf(chance, total, nu))
+        mean, variance = self._moments(share_of_freedom, mask)
+        return float(chi2.isf(chance, 2.0 * mean**2 / variance) * variance / (2.0 * mean * total))
+
+    def _moments(self, share_of_freedom: float, mask: Bools) -> tuple[float, float]:
+        """Mean and variance of chi-square, the sum over groups."""
+        groups = self._groups(share_of_freedom, mask)
+        mean = sum(freedom for freedom, _ in groups) * self.expected(share_of_freedom, mask)
+        return mean, sum(freedom**2 * _variance_of_f(freedom, nu) for freedom, nu in groups)
 
     def expected(self, share_of_freedom: float, mask: Bools) -> float:
         """The mean reduced chi-square of a law that is right: one where noise is stated, that of F where estimated.

@@ -6,27 +6,35 @@ usual size), moves the values by
 
     du = -(J'C^-1 J + P)^-1 J'C^-1 s
 
-to first order, and with it the rate. The same effects, as random effects in the covariance, show whether the choice of
-a law rests on their absence (see selection.challenges).
+to first order, and with it the rate. C is the covariance under which values are found. Where the scatter of rates is
+estimated from the tests, independent errors of them are found as such scatter: C then holds the scatter that they make,
+and each test weighs as much as any other, however small the scatter is without them. An error common to all tests
+makes no scatter (see inverse.common_errors).
+
+The same effects, as random effects in the covariance, show whether the choice of a law rests on their absence (see
+selection.challenges).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import sympy
 
 from creepkit.arrays import Floats
+from creepkit.inverse.common_errors import activation_energy, common_errors, log_rate_per_kelvin
 from creepkit.inverse.composite_predictor import predict_with_sensitivities, predictor_for, supports_nuisance
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel
+from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.quantities import gradient, log_rate
-from creepkit.inverse.variance_components import LinearisedProblem
-from creepkit.language import CreepLaw, strain, temperature, time
+from creepkit.inverse.unmodelled_effect import DRIFT, UnmodelledEffect
+from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
+from creepkit.inverse.working_noise import with_single_value_weight
+from creepkit.language import CreepLaw, strain, time
 from creepkit.records import Dimension, History, Nuisance, Program, dimension_named, dimensions_of, output_unit
 
 OFFSET_IN_NOISES = 3.0
@@ -37,105 +45,82 @@ USUAL_DRIFT = 5.0
 """K over a test: what furnaces drift where nobody looks."""
 
 
-USUAL_ACTIVATION_ENERGY = 400e3
-"""J/mol, of the rate of a law that knows no temperature: of nickel alloys and austenitic steels, within 30 %."""
-
-
-GAS_CONSTANT = 8.314462618
-"""J/(mol K)."""
-
-
-DRIFT = "temperature drift"
-
-
-NOTEWORTHY_CHANGE = 0.01
-"""Of the rate, from which on an effect is named."""
-
-
-LARGEST_PER_CENT = 0.4
-"""Of ln rate, from which on its change is given as a factor."""
-
-
-TAKEN_FOR_GRANTED = "intervals take for granted what no nuisance parameter models"
-"""How the note on unmodelled effects begins."""
-
-
-LARGEST_DRIFT = 30.0
-"""K, of a furnace over a test: a larger drift explains nothing that anybody measures."""
-
-
-LIKE_HARDENING = 0.8
-"""Correlation from which on a drift looks like hardening."""
-
-
-@dataclass(frozen=True, eq=False)
-class UnmodelledEffect:
-    """An effect for which an identification has no nuisance parameter.
-
-    kind : of the nuisance parameter that would stand for it. size : of one standard deviation, and its unit.
-    rate_change : of ln of the rate at the reference point, by one standard deviation in each test.
-    like_hardening : the size, in the same unit, that looks most like the hardening of the law itself, NaN where it has
-        none, and hardening_correlation : how much like it, in the residuals, 1 for the same.
-    residual_change : (tests, observations) -, of the residuals, by one standard deviation; saved in kept fits alone.
-    """
-
-    kind: str
-    size: float
-    unit: str
-    rate_change: float
-    like_hardening: float = float("nan")
-    hardening_correlation: float = float("nan")
-    residual_change: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
-
-    @property
-    def description(self) -> str:
-        """What, and of which size."""
-        article = "an" if self.kind[0] in "aeiou" else "a"
-        return f"{article} {self.kind} of {self.size:.2g} {self.unit}".strip()
-
-    @property
-    def change_text(self) -> str:
-        """By how much it changes the rate at the reference point: in per cent, large ones as a factor."""
-        if self.rate_change < LARGEST_PER_CENT:
-            return f"{100 * float(np.expm1(self.rate_change)):.2g} %"
-        return f"a factor of {float(np.exp(self.rate_change)):.2g}"
-
-
 def unmodelled_effects(
     problem: LeastSquaresProblem,
     x: Floats,
     linear: LinearisedProblem,
     noise_model: NoiseModel,
     full_histories: Sequence[History],
+    working_noise: NoiseModel | None = None,
 ) -> tuple[UnmodelledEffect, ...]:
-    """The effects that no nuisance parameter of the problem stands for; x : (unknowns,) its optimum."""
+    """The effects that no nuisance parameter of the problem stands for; x : (unknowns,) its optimum.
+
+    working_noise : under which the values were found where that is not `noise_model`, as of frames of equal weight.
+    """
+    fitting_noise = None if working_noise is None else with_single_value_weight(working_noise, problem.observations)
     kinds = {n.kind for n in problem.settings.nuisances}
+    common_kinds = {n.kind for n in problem.settings.nuisances if n.scope != "test"}
     changes: list[tuple[str, float, str, Floats]] = []
+    common = [(e.kind, e.size, e.unit, e.change) for e in common_errors(problem, x, linear)]
     for dimension in tolerated_dimensions(problem):
-        if kinds.isdisjoint(dimension.names):
-            changes += _dimension(problem, x, linear, dimension.names[-1])
+        found = [] if common_kinds & set(dimension.names) else _dimension(problem, x, linear, dimension.names[-1])
+        changes += found if kinds.isdisjoint(dimension.names) else []
+        common += found if len(problem.histories) > 1 else []
     if "offset" not in kinds:
         changes += _offset(problem, linear)
     drifting_kinds = {DRIFT, "rate drift"}
     if not kinds & drifting_kinds and not any(isinstance(h.temperature, Program) for h in full_histories):
         changes += _drift(problem, x, linear)
-    if not changes:
-        return ()
     factor = CovarianceFactor.of_residuals(linear.residuals, noise_model)
-    solution = linear.solve(factor)
-    coordinates, count = problem.coordinates, problem.parameter_count
-    scale = np.sqrt(np.diag(solution.covariance))
-    free_parameters = np.flatnonzero(linear.free[:count])
-    derivative = gradient(log_rate(coordinates, coordinates.reference.stress), x[:count], np.ones(count))
-    row = np.zeros(scale.size)
-    row[: free_parameters.size] = derivative[free_parameters]
+    energy, assumed = activation_energy(problem, x)
+    count = len(problem.histories)
     effects = []
     for kind, size, unit, change in changes:
-        by_test = np.einsum("tep,te->tp", solution.weighted_jacobian, change) @ solution.covariance @ row
+        by_test = _rate_changes(
+            problem, x, linear, fitting_noise or _with_scatter_of(change, problem, linear, noise_model), change
+        )
         rate_change = float(np.sqrt((by_test**2).sum()))
         likeness = _likeness_of_hardening(problem, x, linear, factor, change) if kind == DRIFT else (np.nan, np.nan)
-        effects.append(UnmodelledEffect(kind, size, unit, rate_change, size * likeness[0], likeness[1], change))
+        effect = UnmodelledEffect(kind, size, unit, rate_change, size * likeness[0], likeness[1], change, tests=count)
+        effects.append(replace(effect, activation_energy=energy, assumed=assumed) if kind == DRIFT else effect)
+    for kind, size, unit, change in common:
+        rate_change = float(_rate_changes(problem, x, linear, fitting_noise or noise_model, change).sum())
+        effect = UnmodelledEffect(kind, size, unit, rate_change, common=True, tests=count)
+        of_heat = kind == "temperature"
+        effects.append(replace(effect, activation_energy=energy, assumed=assumed) if of_heat else effect)
     return tuple(effects)
+
+
+def _rate_changes(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel, change: Floats
+) -> Floats:
+    """(tests,) changes of ln of the rate at the reference point by changes of the residuals of each test."""
+    solution = linear.solve(CovarianceFactor.of_residuals(linear.residuals, noise_model))
+    coordinates, count = problem.coordinates, problem.parameter_count
+    free_parameters = np.flatnonzero(linear.free[:count])
+    derivative = gradient(log_rate(coordinates, coordinates.reference.stress), x[:count], np.ones(count))
+    row = np.zeros(len(solution.covariance))
+    row[: free_parameters.size] = derivative[free_parameters]
+    return np.asarray(-np.einsum("tep,te->tp", solution.weighted_jacobian, change) @ solution.covariance @ row)
+
+
+def _with_scatter_of(
+    change: Floats, problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel
+) -> NoiseModel:
+    """The noise model with the scatter of rates that independent errors of tests would be estimated as.
+
+    change : (tests, observations) -, of the residuals by one standard deviation. Of each test its projection on a
+    change of ln of the rate counts.
+    """
+    fixed = components_fixed_by_priors(problem.settings.nuisances, list(noise_model.outputs))
+    if not noise_model.rate > 0 or ("", "rate") in fixed:
+        return noise_model
+    sensitivity = linear.residuals.log_rate_sensitivity
+    weighted = CovarianceFactor.of_residuals(linear.residuals, noise_model).inverse_times(sensitivity)
+    information = np.maximum((sensitivity * weighted).sum(axis=1), 1e-300)
+    like_rates = (change * weighted).sum(axis=1) / information
+    scatter = float(np.hypot(noise_model.rate, np.sqrt(np.mean(like_rates**2))))
+    return replace(noise_model, rate=min(scatter, LARGEST_RATE_SCATTER))
 
 
 def tolerated_dimensions(problem: LeastSquaresProblem) -> list[Dimension]:
@@ -143,22 +128,6 @@ def tolerated_dimensions(problem: LeastSquaresProblem) -> list[Dimension]:
     predictors = [predictor_for(problem.predictor, h) for h in problem.histories]
     lengths = {d.name: d for p in predictors for d in dimensions_of(p) if d.tolerance > 0.0}
     return list(lengths.values())
-
-
-def unmodelled_note(effects: Sequence[UnmodelledEffect]) -> tuple[str, ...]:
-    """One sentence on what intervals do not include, with what it would do to the rate; none where that is little."""
-    parts = [f"{e.description} {e.change_text}" for e in effects if e.rate_change > NOTEWORTHY_CHANGE]
-    sentences = []
-    if parts:
-        sentences.append(f"{TAKEN_FOR_GRANTED}; the rate at the reference would change: by {', by '.join(parts)}")
-    for effect in effects:
-        plausible = abs(effect.like_hardening) < LARGEST_DRIFT
-        if plausible and effect.hardening_correlation > LIKE_HARDENING:
-            sentences.append(
-                f"no temperature was recorded: a drift of {effect.like_hardening:+.2g} K over a test would look like "
-                f"the hardening of this law (correlation {effect.hardening_correlation:.2f})"
-            )
-    return tuple(sentences)
 
 
 def _likeness_of_hardening(
@@ -250,7 +219,7 @@ def _drift(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -
     long as the load is constant; where it changes, the advance counts in the new, faster, clock.
     """
     observations, residuals = problem.observations, linear.residuals
-    factor = _log_rate_per_kelvin(problem, x) * USUAL_DRIFT
+    factor = log_rate_per_kelvin(problem, x) * USUAL_DRIFT
     predicted = observations.inverse(residuals.values + observations.transformed_values)
     change = np.zeros_like(predicted)
     for test, history in enumerate(problem.histories):
@@ -290,16 +259,6 @@ def _advance(history: History, times: Floats, values: Floats, *, explicit_time: 
             change[part], advance, last_slope = slope * clock, float(clock[-1]), float(slope[-1])
         begin = end
     return change
-
-
-def _log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats) -> float:
-    """d ln rate / dT, 1/K, of the law; of one that knows no temperature by the usual activation energy."""
-    T = problem.coordinates.reference.temperature
-    if not problem.law.uses(temperature):
-        return USUAL_ACTIVATION_ENERGY / (GAS_CONSTANT * max(T, 1000.0) ** 2)
-    coordinates, u = problem.coordinates, x[: problem.parameter_count]
-    up, down = (float(log_rate(coordinates, coordinates.reference.stress, T + s)(u)) for s in (1.0, -1.0))
-    return 0.5 * (up - down)
 
 
 def with_random_effects(linear: LinearisedProblem, effects: Sequence[UnmodelledEffect]) -> LinearisedProblem:

@@ -108,6 +108,10 @@ SHORTEST_CORRELATION, SHORTEST_DISCREPANCY = 0.05, 0.25
 """Shortest correlations of an instrument's noise and of a discrepancy: a hundredth and a twentieth of a test."""
 
 
+SMALLEST_RATE_SCATTER = 1e-4
+"""Of ln rate between tests, where an estimate of none ends."""
+
+
 LARGEST_RATE_SCATTER = 1.0
 """Of ln rate between tests, a factor of 2.7: a law that needs more misses what the tests differ in."""
 
@@ -229,7 +233,7 @@ class _Likelihood:
 def _bounds(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> tuple[float, float]:
     """Bounds of the logarithm of a component: an offset up to the typical output itself."""
     if name == "rate":
-        return float(np.log(1e-4)), float(np.log(LARGEST_RATE_SCATTER))
+        return float(np.log(SMALLEST_RATE_SCATTER)), float(np.log(LARGEST_RATE_SCATTER))
     if name == "discrepancy_length":
         return float(np.log(SHORTEST_DISCREPANCY)), float(np.log(LONGEST_CORRELATION))
     if name == "discrepancy":

@@ -42,7 +42,7 @@ def _test_lines(test: TestForecast) -> list[str]:
     leading = next(iter(test.outputs.values()), None)
     if leading is not None:
         parts = ", ".join(f"{part} {100 * share:.0f} %" for part, share in end_shares(leading).items())
-        lines.append(f"  its band at the end is made of: {parts}")
+        lines.append(f"  shares of the variance at its end, to first order: {parts}")
     lines += [f"  {test.extrapolation}"] if test.extrapolation else []
     return [*lines, *(f"  note: {note}" for note in test.notes)]
 
@@ -63,12 +63,20 @@ def _end_text(one: OutputForecast) -> str:
 def _time_text(one: TimeForecast, end: float) -> str:
     if not math.isfinite(one.low) and not math.isfinite(one.measured):
         return f"{one.event}: not within the test of {_hours(end)} h (probability of it {one.chance:.2g})"
-    value, low, high = (_hours(v) for v in (one.value, one.low, one.high))
-    text = f"{one.event}: {value} [{low}, {high}] h"
+    text = f"{one.event}: {_median_and_interval(one)} h"
     if math.isfinite(one.measured):
         where = {True: "inside", False: "outside", None: ""}[one.inside]
         return f"{text}, measured {'> ' if one.censored else ''}{_hours(one.measured)} h, {where}"
-    return f"{text}; before the end of the test at {_hours(end)} h with probability {one.chance:.2g}"
+    return f"{text}; {_chance(one, end)}"
+
+
+def _median_and_interval(one: TimeForecast) -> str:
+    return f"median {_hours(one.median)} [{_hours(one.low)}, {_hours(one.high)}]"
+
+
+def _chance(one: TimeForecast, end: float) -> str:
+    """The probability of what was asked: that it comes before the last time of the test, s."""
+    return f"before the end of the test at {_hours(end)} h with probability {one.chance:.2g}"
 
 
 def _hours(seconds: float) -> str:
@@ -128,7 +136,9 @@ def forecast_rows(forecast: Forecast) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for test in forecast.tests:
         leading = next(iter(test.outputs.values()), None)
-        times = "\n".join(f"{t.event}: {_hours(t.value)} [{_hours(t.low)}, {_hours(t.high)}]" for t in test.times)
+        times = "\n".join(
+            f"{t.event}: {_median_and_interval(t)}, {_chance(t, float(test.history.times[-1]))}" for t in test.times
+        )
         measured = explained = ""
         if test.score is not None:
             inside = [f"{name} {100 * share:.0f} % inside" for name, share in test.score.inside.items()]

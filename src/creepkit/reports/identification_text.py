@@ -8,9 +8,11 @@ from dataclasses import asdict
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
+from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.nuisance_plausibility import nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
+from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import is_logarithmic, kind_and_start, output_unit
 from creepkit.reports.stress_exponents import reference_sentences
@@ -69,12 +71,19 @@ def _values(fit: Identification) -> list[str]:
         unit = "" if e.unit == "1" else f" {e.unit}"
         note = "" if e.verdict == "determined" else f"   <- {e.verdict}"
         note += " by these data" if e.verdict == "not determined" else ""
-        lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{e.low:.4g}, {e.high:.4g}]{unit}{note}")
+        low, high = interval_ends(fit.law, e)
+        lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{low}, {high}]{unit}{note}")
     return lines
 
 
 def _reference(fit: Identification) -> list[str]:
     return [f"  {line}" for line in reference_sentences(fit)]
+
+
+def scatter_of_rates(fit: Identification) -> str:
+    """One standard deviation of ln rate between tests, in per cent; whether an estimate of it found none."""
+    rate = fit.noise_model.rate
+    return "none detected" if 0.0 < rate <= UNDETECTED_SCATTER else f"{100 * rate:.2g} %"
 
 
 def _tests(count: int) -> str:
@@ -89,7 +98,7 @@ def _strains(fit: Identification) -> list[str]:
     tests = [m for m in fit.tests if m.outputs and m.outputs[0].output == name]
     return [
         f"  {_tests(len(tests))}, {sum(m.frames for m in tests)} frames: {_rms_label(fit)} {fit.rms:.3g}",
-        f"  scatter (one sd): rate between tests {100 * fit.noise_model.rate:.0f} %, "
+        f"  scatter (one sd): rate between tests {scatter_of_rates(fit)}, "
         f"loading strain {noise.offset:.2g}, frame noise {noise.noise:.2g}, "
         f"what the law cannot follow {_discrepancy_of_strain(fit):.1f} % of strain",
     ]
@@ -124,7 +133,7 @@ def _minimum_rates(fit: Identification) -> list[str]:
     lines = [
         f"  minimum rates of {_tests(len(rows))} without frames: predicted over measured {text}; {within_interval} "
         f"within the 95 % interval of a single test{_if_the_law_holds(fit)}; "
-        f"rates between tests scatter by {100 * fit.noise_model.rate:.0f} %"
+        f"scatter of rates between tests {scatter_of_rates(fit)}"
     ]
     if len(rows) > LISTED_TESTS:
         return lines
@@ -191,7 +200,7 @@ def _linear_outputs(fit: Identification) -> list[str]:
         )
     if lines and not logarithmic_output(fit):
         count = _tests(len(fit.tests))
-        lines.append(f"  {count}; scatter of the rate between tests (one sd) {100 * fit.noise_model.rate:.0f} %")
+        lines.append(f"  {count}; scatter of the rate between tests (one sd) {scatter_of_rates(fit)}")
     return lines
 
 
@@ -249,12 +258,16 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
     """
     lines = [f"identified with creepkit {fit.provenance.get('creepkit', '')} from {_tests(len(fit.tests))}"]
     lines += [f"verdict on the law: {verdict}"] if verdict else []
-    said = "if the law held, which the tests reject" if rejected(fit) else ""
+    if_held = "if the law held, which the tests reject"
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
-        lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {e.low:.4g} to {e.high:.4g}, {said or e.verdict}")
+        interval = " to ".join(interval_ends(fit.law, e))
+        said = e.verdict
+        if rejected(fit):
+            said = if_held if e.verdict == "determined" else f"{e.verdict} {if_held}"
+        lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {interval}, {said}")
     lines += _range_lines(fit)
-    rate_scatter = f"rates of single tests scatter by {100 * fit.noise_model.rate:.0f} % (one sd)"
+    rate_scatter = f"scatter of rates between tests (one sd) {scatter_of_rates(fit)}"
     logarithmic = logarithmic_output(fit)
     errors_text = [f"rms of ln {logarithmic} {fit.rms:.3g}"] if logarithmic in fit.errors else []
     errors_text += [

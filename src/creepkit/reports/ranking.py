@@ -21,7 +21,9 @@ _CRITERION_NAMES = {"bic": "BIC", "aicc": "AICc", "hold-out": "hold-out"}
 def ranking_text(ranking: Ranking) -> str:
     """The verdict, then a line for each law."""
     width = max(len(r.fit.law.name) for r in ranking.laws)
-    header = f"{'law':{width}}   weight  {_CRITERION_NAMES[ranking.criterion]} - best  chi-square  explains the tests"
+    header = (
+        f"{'law':{width}}   weight  {_CRITERION_NAMES[ranking.criterion]} - best  chi-square  by the noise of the tests"
+    )
     rows = [
         f"{r.fit.law.name:{width}}   {r.weight:6.3f}  {r.excess:10.1f}  {r.chi_square:10.1f}  {explanation(r.fit)}"
         for r in ranking.laws
@@ -32,16 +34,8 @@ def ranking_text(ranking: Ranking) -> str:
 
 
 def explanation(fit: Identification) -> str:
-    """Whether a law explains the tests to their noise, and what it leaves, in noises."""
-    if fit.adequacy is None or fit.adequacy.verdict == "cannot be judged":
-        return "?"
-    if fit.adequacy.explains and fit.adequacy.implausible:
-        kind = fit.adequacy.implausible[0].kind
-        return f"only with a large {kind}"
-    if fit.adequacy.explains:
-        return "yes"
-    noises = fit.adequacy.discrepancy_in_noises
-    return f"no: leaves {noises:.2g} noises" if noises > 0 else "no: rates of tests are not followed"
+    """Whether the tests contradict a law at their noise, with the p-value, and what it leaves, in noises."""
+    return "?" if fit.adequacy is None else fit.adequacy.verdict_text
 
 
 def equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
@@ -65,7 +59,7 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
         )
         for entry in ranking.laws
     ]
-    columns = ("law", "parameters", *misfit_columns(ranking.best), "BIC - best", "weight", "explains the tests")
+    columns = ("law", "parameters", *misfit_columns(ranking.best), "BIC - best", "weight", "by the noise of the tests")
     print_table(f"{test_count} tests", columns, rows)
     equivalent = [] if ranking.decisive else [f"- {pair}" for pair in equivalents_among_remaining(ranking)]
     failed = [f"- left out: {name}: {reason}" for name, reason in ranking.failed.items()]
@@ -90,11 +84,13 @@ def misfit_columns(fit: Identification) -> tuple[str, ...]:
 
 def misfit_cells(fit: Identification) -> tuple[str, ...]:
     """The misfit of the first output, and the scatter of rates between tests."""
+    from creepkit.reports.identification_text import scatter_of_rates  # heavy, as below
+
     if not fit.errors:
-        return _single_value_misfit(fit)[1], f"{100 * fit.noise_model.rate:.0f} %"
+        return _single_value_misfit(fit)[1], scatter_of_rates(fit)
     output = next(iter(fit.errors))
     misfit = f"{fit.rms:.3f}" if _is_logarithmic(output) else f"{fit.errors[output].relative_squared_error:.3g}"
-    return misfit, f"{100 * fit.noise_model.rate:.0f} %"
+    return misfit, scatter_of_rates(fit)
 
 
 def _single_value_misfit(fit: Identification) -> tuple[str, str]:

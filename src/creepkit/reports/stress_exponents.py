@@ -6,9 +6,11 @@ formula, and that of bars which are compared at one strain, as measured rates ar
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.uncertainty.state_at_strain import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.language import strain, time
 from creepkit.records import ZERO_CELSIUS
@@ -79,17 +81,33 @@ def reference_sentences(fit: Identification, text: NumberText = plain_number) ->
             f"is {formula} (95 % intervals in brackets)"
         ]
     state_text = f"a strain of {text(r.strain, 2)} and {text(r.time / SECONDS_PER_HOUR, 3)} h"
+    # Of a law of stress, temperature and strain the derivative at constant strain is what bars at one strain show.
+    other = "" if held == "strain" else "; bars compared at one strain show another exponent where their times differ"
+    if fit.law.states:
+        other = "; bars compared at one strain show another exponent, as their internal variables differ there"
     initial = " with internal variables as at the beginning" if fit.law.states else ""
     return [
         f"at {at}, {state_text}{initial}, the law's formula has a creep rate of {rate} 1/s and, at constant {held}, "
-        f"the stress exponent d ln rate / d ln stress of {formula} (95 % intervals in brackets); bars compared at one "
-        "strain may show another exponent"
+        f"the stress exponent d ln rate / d ln stress of {formula} (95 % intervals in brackets){other}"
     ]
 
 
 def _interval(values: tuple[float, ...], text: NumberText) -> str:
     value, low, high = values
-    return f"{text(value, 3)} [{text(low, 3)}, {text(high, 3)}]"
+    digits = interval_digits(value, low, high)
+    return f"{text(value, digits)} [{text(low, digits)}, {text(high, digits)}]"
+
+
+FEWEST_DIGITS, MOST_DIGITS = 3, 7
+"""Of a value with its interval."""
+
+
+def interval_digits(value: float, low: float, high: float) -> int:
+    """Digits with which the ends of an interval differ from its value."""
+    distances = [abs(end - value) for end in (low, high) if math.isfinite(end) and end != value]
+    if not distances or value == 0.0 or not math.isfinite(value):
+        return FEWEST_DIGITS
+    return min(max(FEWEST_DIGITS, math.floor(math.log10(abs(value) / min(distances))) + 2), MOST_DIGITS)
 
 
 def constant_load_sentence(fit: Identification) -> str:
@@ -100,6 +118,8 @@ def constant_load_sentence(fit: Identification) -> str:
     growth = fit.ranges["strain"][1]
     scatter = fit.noise_model.rate
     beside = f"rates of single tests scatter by {100 * scatter:.2g} % (one standard deviation) beside it"
+    if 0 < scatter <= UNDETECTED_SCATTER:
+        beside = "no scatter of rates between tests was detected beside it"
     if not scatter > 0:
         beside = "the scatter of rates between tests is not known beside it"
     return (

@@ -12,7 +12,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.discovery.regression import INFINITE_FREEDOM
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_ends, interval_quantile
 from creepkit.language import Param
 from creepkit.language.printing import expression_text
 from creepkit.reports.figures import empty_figure, place_legend_right, save_figure, set_range
@@ -198,7 +198,8 @@ def _parameter_lines(temperature_law: TemperatureLaw) -> list[str]:
     for e in temperature_law.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
         note = "" if e.verdict == "determined" else f"   <- {e.verdict}"
-        lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{e.low:.4g}, {e.high:.4g}]{unit}{note}")
+        ends = interval_ends(temperature_law.law, e)
+        lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{ends[0]}, {ends[1]}]{unit}{note}")
     return lines
 
 

@@ -12,7 +12,7 @@ from creepkit.inverse.chi_square_test import adequacy_of
 from creepkit.inverse.frame_noise import frame_noise
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
-from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
+from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, KnownNoise, chance_of_larger
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -249,7 +249,7 @@ def test_the_sentence_of_a_discrepancy_says_how_much_where_and_what_would_help()
     found = Adequacy("leaves a discrepancy", (WIDTH, AMPLITUDE), 4.1, 77.0, 3e-9, 0.3, WHERE, ("thickness",))
     assert str(found) == (
         "leaves 0.0037 mm of amplitude (2.5 times its stated noise) unexplained (reduced chi-square 4.1 with "
-        "77 degrees of freedom, p = 3e-09 (Bonferroni, 3 comparisons)); "
+        "77 degrees of freedom, p = 3e-09 adjusted for 3 comparisons (Bonferroni)); "
         "most in amplitude of 'D3' about 5400 s, where it lies 0.0041 mm below what was measured; it would "
         "explain them with thickness, which nobody modelled"
     )
@@ -270,7 +270,7 @@ def test_noise_from_few_frames_says_what_chi_square_a_right_law_has():
     found = judged(tests := gauged(12, stated=False), *at_the_truth(tests))
     nu = FREEDOM_PER_FRAME * 40
     assert found.expected_chi_square == pytest.approx(nu / (nu - 2.0))
-    assert f"(expected {nu / (nu - 2.0):.3g} for a correct law, as the noise itself is estimated)" in str(found)
+    assert f"; expected {nu / (nu - 2.0):.3g} for a correct law, as the noise itself is estimated)" in str(found)
 
 
 def test_outputs_that_only_together_are_beyond_chance_have_left_something(stated):
@@ -286,7 +286,41 @@ def test_outputs_that_only_together_are_beyond_chance_have_left_something(stated
 def test_the_sentence_of_a_law_that_explains():
     found = Adequacy("explains", (AMPLITUDE, WIDTH), 1.04, 77.0, 0.38, float("nan"), WHERE)
     judged_text = (
-        "explains the tests to their stated and estimated noise: reduced chi-square 1.04 with 77 degrees of freedom"
+        "is not contradicted by the tests at their stated and estimated noise: reduced chi-square 1.04 with 77 degrees "
+        "of freedom"
     )
-    assert str(found) == f"{judged_text}, p = 0.38 (Bonferroni, 3 comparisons)"
-    assert str(replace(found, p_value=1.0)) == f"{judged_text}, p > 0.99 (Bonferroni, 3 comparisons)"
+    assert str(found) == f"{judged_text}, p = 0.38 adjusted for 3 comparisons (Bonferroni)"
+    whole = replace(found, p_value=1.0, smallest_p_value=0.35, critical_chi_square=1.51)
+    assert str(whole) == (
+        f"{judged_text} (critical value 1.51), smallest p = 0.35, p = 1 adjusted for 3 comparisons (Bonferroni)"
+    )
+    assert whole.verdict_text == "not contradicted (p = 1)"
+    assert str(replace(found, outputs=(AMPLITUDE,), rate_scatter=1e-4)).endswith("degrees of freedom, p = 0.38")
+    assert "(no scatter of rates between tests was detected)" in str(replace(found, rate_scatter=1e-4))
+    assert "(rates of tests scatter by 2.3 %)" in str(replace(found, rate_scatter=0.023))
+
+
+def test_what_is_left_is_said_without_powers_of_ten():
+    left = Adequacy("leaves a discrepancy", (replace(AMPLITUDE, chi_square=1e4 + 1.0),), 1e4, 77.0, 0.0, 0.3, WHERE)
+    assert left.verdict_text == "contradicted: leaves 100 noises"
+    assert "(100 times its stated noise)" in str(left)
+
+
+@pytest.mark.parametrize("freedom", [[np.inf, np.inf], [8.0], [8.0, 8.0, 12.0], [np.inf, 8.0]])
+def test_the_critical_chi_square_is_exceeded_with_the_probability_that_it_is_for(freedom):
+    mask = np.ones((len(freedom), 40), bool)
+    known = KnownNoise(mask, np.ones(mask.shape), np.repeat(np.array(freedom)[:, None], 40, axis=1))
+    critical = known.critical(0.003, 0.95, mask)
+    assert known.chance_of_larger(critical, 0.95, mask) == pytest.approx(0.003, rel=1e-6)
+
+
+def test_few_tests_whose_noise_is_estimated_contradict_only_what_misses_them_by_far():
+    """Of 40 frames each, noise known to 8 degrees of freedom: quantiles of F and of the sum over six, in the docs."""
+
+    def critical(tests):
+        mask = np.ones((tests, 40), bool)
+        return KnownNoise(mask, np.ones(mask.shape), np.full(mask.shape, 8.0)).critical(0.003, 1.0, mask)
+
+    assert critical(1) == pytest.approx(f.isf(0.003, 40, 8), rel=1e-9)
+    assert critical(1) == pytest.approx(7.0, abs=0.3)
+    assert critical(6) == pytest.approx(2.7, abs=0.2)

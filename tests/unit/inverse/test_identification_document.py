@@ -18,7 +18,7 @@ from creepkit.inverse.identify import identify
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.unmodelled_effects import UnmodelledEffect
+from creepkit.inverse.unmodelled_effect import UnmodelledEffect
 from creepkit.laws.norton import NORTON
 from helpers.steady_rate_predictor import Steady, planted
 
@@ -26,11 +26,13 @@ ADEQUACY = Adequacy(
     "leaves a discrepancy",
     (OutputAdequacy("strain", 80, 2e-5, "estimated", 3.25, 1e-4, 3e-5),),
     3.25, 78.0, 1e-4, 0.4, LargestDeviation("bar 1", "strain", 5400.0, -4e-5, 2.0), ("thickness", "offset of strain"),
+    critical_chi_square=1.5, smallest_p_value=5e-5,
 )  # fmt: skip
 ERROR = NumericalError("bulge", "bulge on a finer mesh", {"amplitude": 5e-4}, 0.33, 0.2, ("D4",))
 EFFECTS = (
     UnmodelledEffect("thickness", 0.01, "mm", 0.08),
     UnmodelledEffect("temperature drift", 5.0, "K over a test", 0.05, -3.1, 0.93, np.ones((2, 40))),
+    UnmodelledEffect("temperature", 3.0, "K", -0.14, common=True, tests=2, activation_energy=4e5, assumed=True),
 )
 NOISE = NoiseModel({"strain": OutputNoise(2e-5, 0.01, 3e-5, 0.02, 0.3, 1.5e-5)}, 0.1, 2.5, 1.7)
 SAMPLES = np.random.default_rng(0).normal(size=(400, 2))
@@ -63,7 +65,7 @@ def test_all_parts_come_back_from_a_file(fit, tmp_path):
 
 def test_effects_come_back_but_for_their_residuals(fit):
     again = identification_from_json(identification_to_json(with_everything(fit))).unmodelled
-    assert [e.description for e in again] == [e.description for e in EFFECTS]
+    assert [e.sentence for e in again] == [e.sentence for e in EFFECTS]
     assert np.isnan(again[0].like_hardening)
     assert np.isnan(again[0].hardening_correlation)
     assert (again[1].like_hardening, again[1].hardening_correlation) == (-3.1, 0.93)

@@ -158,7 +158,7 @@ def test_findings_come_first_and_say_what_was_found() -> None:
     body = html[html.index("<main") :]
     first = body[: body.index('id="curves"')]
     assert "<math" in first
-    assert "explains the tests" in first
+    assert "not contradicted by the tests" in first
     for estimate in best.estimates:
         assert with_interval(estimate.value, estimate.low, estimate.high)[0] in first
     order = re.findall(r'<section id="([a-z]+)"', body)

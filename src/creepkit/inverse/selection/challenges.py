@@ -36,7 +36,8 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.selection.discrimination import under_common_covariance
-from creepkit.inverse.unmodelled_effects import UnmodelledEffect, with_random_effects
+from creepkit.inverse.unmodelled_effect import UnmodelledEffect
+from creepkit.inverse.unmodelled_effects import with_random_effects
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Param, stress
 
@@ -241,7 +242,7 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     least, x = _least_chi_square(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
-    description = f"{law.name} with {100 * SHARE:.0f} % of the rate from {other.law.name}"
+    description = f"its sum with {other.law.name}, which carries {100 * SHARE:.0f} % of the rate,"
     excess = least - _chi_square(best.problem, best.x)
     return AlteredLaw("sum", problem, x, excess, share.jacobian(x), other.law.name, description)
 
@@ -367,10 +368,10 @@ def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
     """The unmodelled effects, one by one, with which the first law no longer has nearly all the weight."""
     if any(fit.linearised is None for fit in fits):  # they were not made by likelihood
         return ()
-    kinds = dict.fromkeys(effect.kind for fit in fits for effect in fit.unmodelled)
+    kinds = dict.fromkeys(effect.kind for fit in fits for effect in fit.unmodelled if not effect.common)
     challenges = []
     for kind in kinds:
-        effects = [next((e for e in fit.unmodelled if e.kind == kind), None) for fit in fits]
+        effects = [next((e for e in fit.unmodelled if e.kind == kind and not e.common), None) for fit in fits]
         if any(effect is None or not effect.residual_change.size for effect in effects):
             continue
         weights = _weights_with(fits, [e for e in effects if e is not None])

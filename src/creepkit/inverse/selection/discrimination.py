@@ -25,6 +25,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import bic_penalty
+from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import Residuals, autocorrelated_components
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
@@ -52,17 +53,17 @@ class CommonCovarianceFits:
 
 def under_common_covariance(fits: Sequence[Identification]) -> CommonCovarianceFits:
     """All laws under the covariance of the one that explains best with its own."""
-    linearised = [_linearised(fit) for fit in fits]
-    own_scores = [_score_under_own_covariance(fit, linear) for fit, linear in zip(fits, linearised, strict=True)]
+    problems = [_linearised(fit) for fit in fits]
+    own_scores = [_score_under_own_covariance(fit, linear) for fit, linear in zip(fits, problems, strict=True)]
     reference_law = int(np.argmin(own_scores))
-    noise_model, reference_residuals = fits[reference_law].noise_model, linearised[reference_law].residuals
+    noise_model, reference_residuals = fits[reference_law].noise_model, problems[reference_law].residuals
     results = [
         _optimum_under(
             linear,
             CovarianceFactor.of_residuals(_with_covariance_of(reference_residuals, linear.residuals), noise_model),
             len(identification.u),
         )
-        for linear, identification in zip(linearised, fits, strict=True)
+        for linear, identification in zip(problems, fits, strict=True)
     ]
     independent_frames = effective_sample_size(reference_residuals, noise_model)
     chi_squares, log_determinants, whitened = zip(*results, strict=True)
@@ -192,25 +193,22 @@ def equivalent_laws(ranking: WeightedLaws) -> tuple[EquivalentLaws, ...]:
 
 
 def _whitened_residuals(fits: Sequence[Identification]) -> Floats:
-    """(laws, data) - whitened residuals of all laws at their optima under one covariance.
-
-    Identifications by likelihood keep their linearised problem; others take the covariance of the first.
-    """
-    if all(fit.linearised is not None for fit in fits):
-        return under_common_covariance(fits).whitened
-    common = fits[0].least_squares_problem
-    return np.array([common.whiten(fit.residuals_of(fit.least_squares_problem).values) for fit in fits])
+    """(laws, data) - whitened residuals of all laws at their optima under one covariance."""
+    return under_common_covariance([_with_linearised(fit) for fit in fits]).whitened
 
 
-def chi_square_by_test(first: Identification, second: Identification) -> Floats:
-    """(laws, tests) - chi-square of two laws in each test at their optima under one covariance, without priors."""
-    fits = [first, second]
+def _with_linearised(fit: Identification) -> Identification:
+    """The identification with its problem made linear at its values, as those by likelihood have it."""
+    if fit.linearised is not None:
+        return fit
+    problem = fit.least_squares_problem
+    return replace(fit, linearised=linearised(problem, fit.x, problem.residuals(fit.x)))
+
+
+def chi_square_by_test(fits: Sequence[Identification]) -> Floats:
+    """(laws, tests) - chi-square of laws in each test at their optima under one covariance, without priors."""
     whitened = _whitened_residuals(fits)
-    if all(fit.linearised is not None for fit in fits):
-        return np.asarray((whitened.reshape(len(fits), len(first.tests), -1) ** 2).sum(axis=2))
-    tests = np.nonzero(first.least_squares_problem.observations.present)[0]
-    count = len(first.tests)
-    return np.array([np.bincount(tests, weights=row**2, minlength=count) for row in whitened])
+    return np.asarray((whitened.reshape(len(fits), len(fits[0].tests), -1) ** 2).sum(axis=2))
 
 
 def _reduction_between(first: Identification, second: Identification) -> tuple[str, str]:

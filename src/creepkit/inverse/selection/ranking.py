@@ -167,7 +167,7 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
         return f"none of {count} laws tried explains the tests; the best, {best} ({weight}{others}), {adequacy}"
     if best in ranking.further:
         asked, more = count - len(ranking.further), len(ranking.further)
-        found = f"of {more} more that were tried, {best} does ({weight})"
+        found = f"of {more} more that were tried, {best} is not contradicted by them ({weight})"
         none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
         return f"{none} the tests; {found}: plan tests that can refute it"
     if len(names) > 1:
@@ -180,7 +180,8 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
         only = "" if adequacy is None else adequacy.qualification
         but = "; and ".join(challenge.sentence for challenge in ranking.challenges)
         return (
-            f"of {count} laws tried {best} has nearly all the weight ({weight}) and explains the tests{only}, but {but}"
+            f"of {count} laws tried {best} has nearly all the weight ({weight}) and is not contradicted by the tests"
+            f"{only}; but {but}"
         )
     return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}"
 

@@ -285,11 +285,30 @@ def cut_intervals(law: CreepLaw, estimates: Sequence[Estimate]) -> dict[str, flo
     """{parameter that the tests bound on one side only: bound at which its interval ends}."""
     found = {}
     for one in estimates:
-        ends = zip(law.table[one.name].bounds, (one.low, one.high), strict=True)
-        cut = [b for b, end in ends if np.isclose(b, end, rtol=1e-9, atol=0.0)]  # bounds of rates are far below 1e-8
+        bounds = law.table[one.name].bounds
+        cut = [b for b, is_cut in zip(bounds, ends_at_bounds(law, one), strict=True) if is_cut]
         if one.verdict in ("determined", ONE_SIDED) and cut:
             found[one.name] = cut[0]
     return found
+
+
+def ends_at_bounds(law: CreepLaw, estimate: Estimate) -> tuple[bool, bool]:
+    """Whether the lower and the upper end of an interval are bounds of the search, and not found by the tests."""
+    ends = zip(law.table[estimate.name].bounds, (estimate.low, estimate.high), strict=True)
+    low, high = (bool(np.isclose(b, end, rtol=1e-9, atol=0.0)) for b, end in ends)  # rates are far below 1e-8
+    return low, high
+
+
+def bound_marks(law: CreepLaw, estimate: Estimate) -> tuple[str, str]:
+    """What stands behind the ends of an interval in every table and text: which of them are bounds of the search."""
+    low, high = (" (search bound)" if at_bound else "" for at_bound in ends_at_bounds(law, estimate))
+    return low, high
+
+
+def interval_ends(law: CreepLaw, estimate: Estimate) -> tuple[str, str]:
+    """The ends of a 95 % interval in plain text, with those marked that are bounds of the search."""
+    marks = bound_marks(law, estimate)
+    return f"{estimate.low:.4g}{marks[0]}", f"{estimate.high:.4g}{marks[1]}"
 
 
 def verdict_of_interval(value: float, interval: tuple[float, float], bounds: tuple[float, float]) -> str:

@@ -150,16 +150,19 @@ def number(value: float, digits: int = 4) -> str:
     return _with_power(mantissa, exponent) if exponent else mantissa.replace("-", "−")
 
 
-def with_interval(value: float, low: float, high: float) -> tuple[str, str]:
-    """A value, and 'low to high': two significant digits of the distance between them, and two digits at least."""
+def with_interval(value: float, low: float, high: float, marks: tuple[str, str] = ("", "")) -> tuple[str, str]:
+    """A value, and 'low to high': two significant digits of the distance between them, and two digits at least.
+
+    marks : what stands behind the ends.
+    """
     distances = [abs(value - end) if end != value else math.nan for end in (low, high)]
     if not any(map(math.isfinite, distances)):
-        return number(value, 5), f"{number(low)} to {number(high)}"
+        return number(value, 5), f"{number(low)}{marks[0]} to {number(high)}{marks[1]}"
     nearest = min(one for one in distances if math.isfinite(one))
     ends = [
         _to_place(end, one if math.isfinite(one) else nearest) for end, one in zip((low, high), distances, strict=True)
     ]
-    return _to_place(value, nearest), " to ".join(ends)
+    return _to_place(value, nearest), " to ".join(f"{end}{mark}" for end, mark in zip(ends, marks, strict=True))
 
 
 def _to_place(value: float, distance: float) -> str:

@@ -9,8 +9,8 @@ from markupsafe import Markup
 
 from creepkit.exporters.mathml import law_equations, symbol_element
 from creepkit.inverse.duration import STRAIN_OF_UNKNOWN_DURATION, duration_known
-from creepkit.inverse.uncertainty.laplace_approximation import cut_interval_notes
-from creepkit.inverse.unmodelled_effects import TAKEN_FOR_GRANTED
+from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
+from creepkit.inverse.unmodelled_effect import NOT_INCLUDED
 from creepkit.reports.html.elements import (
     Block,
     Formula,
@@ -138,14 +138,10 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     else:
         blocks.append(Paragraph("The tests determine every parameter, given this law."))
     blocks += credible_values(found.ranking)
-    unmodelled = [
-        sentence(f"{effect.description}, which changes the rate by {effect.change_text}") for effect in fit.unmodelled
-    ]
+    unmodelled = [sentence(effect.sentence) for effect in fit.unmodelled]
     if unmodelled:
-        blocks += [Paragraph("The intervals do not include:"), Items(unmodelled)]
-    notes = [note for note in fit.notes if not (fit.unmodelled and note.startswith(TAKEN_FOR_GRANTED))]  # said above
-    cut = cut_interval_notes(fit.law, fit.estimates) if misfit else ()  # of values that say nothing of the tests
-    notes = [note for note in notes if note not in cut]
+        blocks += [Paragraph(f"{sentence(NOT_INCLUDED)} The rate amid the tests would move:"), Items(unmodelled)]
+    notes = [note for note in fit.notes if not (fit.unmodelled and note.startswith(NOT_INCLUDED))]  # said above
     remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *map(LawNames.of(found.fits).in_text, notes)])))
     return [*blocks, Paragraph("Remarks:"), Items(remarks)] if remarks else blocks
 
@@ -155,21 +151,21 @@ def _undetermined(fit: Identification) -> list[str]:
 
 
 def _values(fit: Identification) -> Table:
-    """Values with intervals; of a law that the tests reject without what these tests would determine of it."""
+    """Values with intervals; of a law that the tests reject only which of them these would not determine."""
     table, symbols = fit.law.table, {str(symbol): symbol for symbol in fit.law.params}
     rows = [
         (
             Markup(symbol_element(symbols[e.name])),
             table[e.name].meaning,
-            *with_interval(e.value, e.low, e.high),
+            *with_interval(e.value, e.low, e.high, bound_marks(fit.law, e)),
             "" if e.unit == "1" else e.unit,
-            *(() if rejected(fit) else (e.verdict,)),
+            "–" if rejected(fit) and e.verdict == "determined" else e.verdict,
         )
         for e in fit.estimates
     ]
     interval = "95 % interval, if the law held" if rejected(fit) else "95 % interval"
-    last = () if rejected(fit) else ("by these tests, given this law",)
-    columns = ("parameter", "meaning", "value", interval, "unit", *last)
+    last = "by these tests, if the law held" if rejected(fit) else "by these tests, given this law"
+    columns = ("parameter", "meaning", "value", interval, "unit", last)
     caption = "Values for stress in MPa as a ratio to 1 MPa, and time in s as a ratio to 1 s"
     caption = f"A law that does not fit the tests: v{caption[1:]}" if rejected(fit) else caption
     return Table(caption, columns, rows, numeric=(2, 3))

@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.errors import CreepkitError
 from creepkit.inverse.nuisance_plausibility import nuisance_unit
-from creepkit.inverse.selection.discrimination import chi_square_by_test
+from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, chi_square_by_test
 from creepkit.records import output_unit
 from creepkit.reports.html.compared_values import compared_values
 from creepkit.reports.html.elements import (
@@ -206,9 +206,9 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
         )
         for one in ranking.laws
     ]
-    criterion = {"bic": "BIC", "aicc": "AICc"}.get(ranking.criterion, ranking.criterion)
     columns = (
-        *("law", "parameters", *misfit_columns(ranking.best), f"{criterion} − best", "weight", "explains the tests"),
+        *("law", "parameters", *misfit_columns(ranking.best)),
+        *(f"{criterion_name(ranking)} − best", "weight", "by the noise of the tests"),
     )
     blocks: list[Block] = [Table("Laws tried, the best first", columns, rows, numeric=(1, 2, 3, 4, 5))]
     separation = [names.in_text(text) for text in _separation(ranking)]
@@ -237,29 +237,37 @@ def ranking_blocks(found: GroupFindings, figures: PageFigures, *, drawn: bool) -
 
 
 def _separation(ranking: Ranking) -> list[str]:
-    """The test that speaks most for the best law against the second, by its share of what is compared."""
-    if len(ranking.laws) < 2 or ranking.criterion == "hold-out":
+    """The test that speaks most for the best law against the second, and by how much the second is worse in all."""
+    if len(ranking.laws) < 2 or ranking.criterion == "hold-out" or len(ranking.best.tests) < 2:
         return []
-    best, second = ranking.laws[0].fit, ranking.laws[1].fit
-    at_hand = all(f.linearised is not None or (f.histories and f.predictor is not None) for f in (best, second))
-    if not at_hand:
+    fits, second = [one.fit for one in ranking.laws], ranking.laws[1]
+    if any(fit.linearised is None for fit in fits):
+        fits = fits[:2]  # others cost a prediction each
+    if any(fit.linearised is None and (not fit.histories or fit.predictor is None) for fit in fits):
         return []
     try:
-        chi_square = chi_square_by_test(best, second)
+        chi_square = chi_square_by_test(fits)
     except CreepkitError:
         return []
     differences = chi_square[1] - chi_square[0]
-    if not np.isfinite(differences).all() or differences.max() <= 0.0:
+    if not np.isfinite(differences).all():
         return []
-    k = int(np.argmax(differences))
-    condition = printable(with_degrees(best.tests[k].condition), 200)
-    total = float(differences.sum())
-    of_all = f", of {number(total, 3)} in all tests together" if len(best.tests) > 1 else ""
+    if min(float(differences.sum()), second.excess) < DISTINGUISHABLE_CHI_SQUARE:
+        return []
+    k, name = int(np.argmax(differences)), second.fit.law.name
+    against = float(np.maximum(differences, 0.0).sum())
+    share = f"{100 * float(differences[k]) / against:.0f} % of the chi-square that speaks against {name} is its own; "
+    test = f"test {printable(fits[0].tests[k].name, 120)} ({printable(with_degrees(fits[0].tests[k].condition), 200)})"
+    criterion = criterion_name(ranking)
     return [
-        f"What separates {second.law.name} from {best.law.name} most is test {printable(best.tests[k].name, 120)} "
-        f"({condition}): its chi-square, under one covariance for both laws, is "
-        f"{number(float(differences[k]), 3)} larger with {second.law.name}{of_all}."
+        f"What separates {name} from {fits[0].law.name} most is {test}: {share}"
+        f"{criterion} of {name} is {number(second.excess, 3)} larger in all."
     ]
+
+
+def criterion_name(ranking: Ranking) -> str:
+    """The abbreviation of the criterion by which laws are ranked."""
+    return {"bic": "BIC", "aicc": "AICc"}.get(ranking.criterion, ranking.criterion)
 
 
 # ---- nuisance parameters ---------------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from creepkit.reports.html.elements import printable
@@ -26,7 +26,7 @@ COMMON_WORD = re.compile(
 
 
 SENTENCE_WORD = re.compile(
-    r"a|above|alone|and|another|asked|at|be|best|but|by|decisive|does|each|effect|explains?|first|for|from|has|in|its?"
+    r"a|above|alone|and|another|asked|at|be|best|but|by|carries|contradicted|decisive|does|each|effect|explains?|first|for|from|has|in|its?"
     r"|laws?|least|more|most|nearly|noise|none|not|of|only|or|rates?|second|share|stress|sum|tests?|that|the|them|these"
     r"|threshold|time|to|tried|was|weight|were|whether|which|with|would"
 )
@@ -34,8 +34,12 @@ SENTENCE_WORD = re.compile(
 
 
 def title_in_sentence(law: CreepLaw) -> str:
-    """The title of a law within a sentence: without abbreviations in brackets; its name where it has none."""
+    """The title of a law within a sentence: without abbreviations in brackets, and what follows a colon.
+
+    The name of a law that has no title.
+    """
     parts = re.sub(r"\s*\([A-Z]{2,4}\)", "", printable(law.title, LONGEST_TITLE)).split(" + ")
+    parts = [part.partition(": ")[0] for part in parts]
     return " + ".join(map(_small, parts)) if law.title else printable(law.name, LONGEST_TITLE)
 
 
@@ -43,11 +47,24 @@ def _small(title: str) -> str:
     return f"{title[:1].lower()}{title[1:]}" if COMMON_WORD.match(title) else title
 
 
+DEPENDENCE = re.compile(r" with [\w -]+ temperature dependence$")
+"""At the end of a title of a law with temperature."""
+
+
+def _without_shared_dependence(titles: Mapping[str, str]) -> dict[str, str]:
+    """{name: title}, short where every title ends with the same dependence on temperature, which tells none apart."""
+    endings = {match[0] if (match := DEPENDENCE.search(title)) else "" for title in titles.values()}
+    if len(endings) != 1 or len(titles) < 2:
+        return dict(titles)
+    (ending,) = endings
+    return {name: title.removesuffix(ending) for name, title in titles.items()}
+
+
 class LawNames:
     """Names of laws in a text, replaced by titles."""
 
     def __init__(self, laws: Iterable[CreepLaw]) -> None:
-        titles = {law.name: title_in_sentence(law) for law in laws}
+        titles = _without_shared_dependence({law.name: title_in_sentence(law) for law in laws})
         shared = Counter(titles.values())
         self.titles = {
             name: title if shared[title] == 1 else f"{title} ({name})"  # which of them is meant, its name says

@@ -8,6 +8,7 @@ import numpy as np
 from markupsafe import Markup
 
 from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION
+from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
 from creepkit.reports.contents import ExportedFile
 from creepkit.reports.html.elements import Block, Paragraph, Table, number, printable, with_interval
 from creepkit.reports.identification_text import rejected
@@ -47,7 +48,7 @@ def credible_values(ranking: Ranking | None) -> list[Block]:
             law_title(one.fit.law),
             f"{one.weight:.3f}",
             e.name,
-            *with_interval(e.value, e.low, e.high),
+            *with_interval(e.value, e.low, e.high, bound_marks(one.fit.law, e)),
             "" if e.unit == "1" else e.unit,
             LAW_REJECTED if rejected(one.fit) else e.verdict,
         )

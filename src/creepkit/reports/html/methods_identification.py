@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.nuisance_plausibility import nuisance_unit
 from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
@@ -228,6 +229,8 @@ def _scatter_text(fit: Identification, percent: str, tests: str) -> str:
     if rates[0].sd is not None:
         return f"The creep rates of single tests have a Gaussian prior: they scatter by {size}, as was given."
     if _rate_estimated(fit):
+        if fit.noise_model.rate <= UNDETECTED_SCATTER:
+            return "No scatter of the creep rates of single tests about the law was detected."
         return f"The creep rates of single tests scatter by {size}, as was estimated."
     cannot = f"{tests} cannot show it"
     if fit.noise_model.rate == 0.0 or fit.settings.weights == "likelihood":

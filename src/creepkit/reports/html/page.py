@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from creepkit.inverse.unmodelled_effect import combined_change_text
 from creepkit.reports.attachments import embed
 from creepkit.reports.html.closing import closing_sections
 from creepkit.reports.html.data_section import data_section
@@ -31,7 +32,8 @@ from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.html.sliders import fragment_style, script_policy, slider_sections
 from creepkit.reports.html.stage_sections import stage_sections, strength_blocks
 from creepkit.reports.identification_text import rejected
-from creepkit.reports.stress_exponents import rate_and_exponent
+from creepkit.reports.ranking import explanation
+from creepkit.reports.stress_exponents import interval_digits, rate_and_exponent
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -150,7 +152,7 @@ def _overview(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
     decided = f" The choice of the law is decisive in {decisive} of {len(compared)}." if compared else ""
     return (
         f"Laws were identified of {len(found)} of {plural(len(contents.groups), 'material')}. The best law is {named}. "
-        f"It explains the tests to their noise in {explained} of {len(found)}.{decided}"
+        f"The tests do not contradict it at their noise in {explained} of {len(found)}.{decided}"
     )
 
 
@@ -158,38 +160,46 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
     rows = []
     for one in found:
         fit, r = one.fit, one.fit.reference
-        rate, exponent = ([number(v, 3) for v in interval] for interval in rate_and_exponent(fit))
+        rate, exponent = (_with_interval(values) for values in rate_and_exponent(fit))
         weight = "–" if one.ranking is None else f"{one.ranking.laws[0].weight:.2f}"
-        adequacy = "?" if fit.adequacy is None else "yes" if fit.adequacy.explains else "no"
-        adequacy = "?" if fit.adequacy is not None and fit.adequacy.verdict == "cannot be judged" else adequacy
         rows.append(
             (
                 printable(one.name, 120),
                 law_title(fit.law),
                 weight,
-                adequacy,
+                explanation(fit),
                 "–" if one.decisive is None else "yes" if one.decisive else "no",
                 number(r.stress, 3),
-                "–" if rejected(fit) else f"{rate[0]} ({rate[1]} to {rate[2]})",
-                "–" if rejected(fit) else f"{exponent[0]} ({exponent[1]} to {exponent[2]})",
+                "–" if rejected(fit) else rate,
+                "–" if rejected(fit) else combined_change_text(fit.unmodelled) or "–",
+                "–" if rejected(fit) else exponent,
             )
         )
     columns = (
         "material",
         "best law",
         "weight",
-        "explains the tests",
+        "by the noise of the tests",
         "decisive",
         "at MPa",
         "creep rate there, 1/s",
+        "rate: not in the interval",
         "stress exponent",
     )
     caption = (
         "Materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests, of laws that fit "
-        "the tests. Decisive: one law has more than 95 % of the weight, explains the tests, and no other law or effect "
-        "that was tried does so too; the verdict of each material says what is missing"
+        "the tests. Not in the interval: by how much the rate would move with what no nuisance parameter models, such "
+        "as errors of temperature and load common to all tests, each of the size that the findings state (root sum of "
+        "squares). Decisive: one law has more than 95 % of the weight, the tests do not contradict it, and no other "
+        "law or effect that was tried does as well; the verdict of each material says what is missing"
     )
-    return Table(caption, columns, rows, numeric=(2, 5, 6, 7))
+    return Table(caption, columns, rows, numeric=(2, 5, 6, 7, 8))
+
+
+def _with_interval(values: tuple[float, ...]) -> str:
+    value, low, high = values
+    digits = interval_digits(value, low, high)
+    return f"{number(value, digits)} ({number(low, digits)} to {number(high, digits)})"
 
 
 def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> list[PageSection]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, TypeVar
 
+from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
 from creepkit.reports.design import cheapest_text, design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
@@ -161,7 +162,7 @@ def _temperature_blocks(name: str, result: TemperatureStudy | TemperatureLaw, fi
         rows = [
             (
                 e.name,
-                *with_interval(e.value, e.low, e.high),
+                *with_interval(e.value, e.low, e.high, bound_marks(law.law, e)),
                 "" if e.unit == "1" else e.unit,
                 e.verdict if rejected is None else LAW_REJECTED,
             )
@@ -224,8 +225,8 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures, *, nam
             f"By {laws}: if the law is right, bands and intervals hold a measured value of a single test with a "
             f"probability of {100 * forecast.level:g} %."
             + (
-                " The law does not explain the tests, so that this probability is not earned: treat the bands as a "
-                "lower bound of the uncertainty."
+                " The law does not explain the tests, so that this probability is not earned: that the form of the law "
+                "is wrong is not in the bands."
                 if forecast.rejected
                 else ""
             )
@@ -240,7 +241,8 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures, *, nam
                 f"Forecasts{_of(name)}",
                 "Forecast curves over time with pointwise and simultaneous bands, and what the variance is made of. "
                 f"{ends}",
-                f"Forecast with bands of {100 * forecast.level:g} %, and below it what the variance is made of.",
+                f"Forecast with bands of {100 * forecast.level:g} % (drawn), and below it shares of the variance, "
+                "which are of first order.",
             )
         )
     remarks: dict[str, list[str]] = {}

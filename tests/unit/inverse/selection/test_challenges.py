@@ -76,7 +76,7 @@ def test_a_share_of_another_law_is_not_excluded_by_a_narrow_range(power_law_narr
     assert found.kind == "sum"
     assert found.subject == "norton+hyperbolic-sine"
     assert found.sentence.startswith(
-        "norton+hyperbolic-sine with 30 % of the rate from hyperbolic-sine explains them as well (its "
+        "its sum with hyperbolic-sine, which carries 30 % of the rate, explains them as well (its "
     )
 
 

@@ -107,8 +107,8 @@ def test_an_effect_with_which_a_law_would_explain_is_named():
 def test_a_law_that_nobody_asked_for_is_a_proposal():
     found = verdict_of(ranking([0.99, 0.01, 0.0], [EXPLAINS, LEAVES, LEAVES], further=("norton", "theta")))
     assert found == (
-        "not decisive: the law asked for does not explain the tests; of 2 more that were tried, norton does (weight "
-        "0.99 of the laws tried): plan tests that can refute it"
+        "not decisive: the law asked for does not explain the tests; of 2 more that were tried, norton is not "
+        "contradicted by them (weight 0.99 of the laws tried): plan tests that can refute it"
     )
     two = verdict_of(ranking([0.99, 0.01, 0.0], [EXPLAINS, LEAVES, LEAVES], further=("norton",)))
     assert two.startswith("not decisive: none of the 2 laws asked for explains the tests; of 1 more")
@@ -125,9 +125,9 @@ def test_laws_that_cannot_be_told_apart_are_named():
 def test_what_the_tests_allow_beside_it_is_said():
     found = verdict_of(ranking([0.99, 0.01], challenges=(SUM, DRIFT)))
     assert found == (
-        "not decisive: of 2 laws tried norton has nearly all the weight (weight 0.99 of the laws tried) and explains "
-        "the tests, but norton+sinh with 30 % of the rate from sinh explains them as well; and a temperature drift "
-        "would leave it a weight of 0.52"
+        "not decisive: of 2 laws tried norton has nearly all the weight (weight 0.99 of the laws tried) and is not "
+        "contradicted by the tests; but norton+sinh with 30 % of the rate from sinh explains them as well; and a "
+        "temperature drift would leave it a weight of 0.52"
     )
 
 
