@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from creepkit.inverse.known_noise import how_to_state_noise
+from creepkit.inverse.contradicting_values import ContradictingValues
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.records import output_unit
@@ -74,6 +75,7 @@ class Adequacy:
     expected_chi_square : what `chi_square` is in the mean if the law is right: above one where noise is estimated from
         few frames. not_judged : the outputs, where nothing can be judged, and few_frames : the tests, each with how
         many frames it has, where these are too few to show the noise.
+    contradicting : minimum rates and rupture times that contradict one another by the law, beyond their own scatter.
     """
 
     verdict: AdequacyVerdict
@@ -90,11 +92,16 @@ class Adequacy:
     expected_chi_square: float = 1.0
     not_judged: tuple[str, ...] = ()
     few_frames: tuple[tuple[str, int], ...] = ()
+    contradicting: ContradictingValues | None = None
 
     @property
     def explains(self) -> bool:
         """Whether the law explains the tests to their noise."""
         return self.verdict == "explains"
+
+    def with_contradicting(self, values: ContradictingValues | None) -> Adequacy:
+        """The same, rejected where minimum rates and rupture times contradict one another by the law."""
+        return self if values is None else replace(self, verdict="leaves a discrepancy", contradicting=values)
 
     def judges(self, output: str) -> bool:
         """Whether the noise of an output is known well enough to judge a law by."""
@@ -163,6 +170,8 @@ class Adequacy:
                 scatter += " (far larger than what the readings show: check its unit)"
             found = f"{self._chi_square_text}, {self._p_value_text}{correlated}"
             return f"explains the tests to their {source} noise{self.qualification}{scatter}: {found}"
+        if self.contradicting is not None and not self.outputs:
+            return f"does not explain the tests: {self.contradicting}"
         parts = [
             f"{o.discrepancy:.2g}{' ' + output_unit(o.output) if output_unit(o.output) else ''} of {o.output} "
             f"({o.discrepancy_in_noises:.2g} times its {o.noise_source} noise)"
@@ -173,6 +182,8 @@ class Adequacy:
             parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
         elif self.rate_trend_p_value < TREND_SIGNIFICANCE:
             parts.append(f"rates of tests that bend over the stress (p = {self.rate_trend_p_value:.1g})")
+        if self.contradicting is not None:
+            parts.append(str(self.contradicting))
         where = f"; most in {self.largest}" if self.largest is not None else ""
         if self.remedies:
             where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"

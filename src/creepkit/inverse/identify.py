@@ -21,6 +21,7 @@ from creepkit.inverse.composite_predictor import (
     search_predictor_of,
     through_for_law,
 )
+from creepkit.inverse.contradicting_values import contradicting_values
 from creepkit.inverse.defect_correction import (
     NumericalError,
     correct_defect,
@@ -48,6 +49,7 @@ from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rupture_prediction import compare_rupture_times
+from creepkit.inverse.rupture_use import compared_tests, compares_rupture_times
 from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.multistart import EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct
@@ -120,6 +122,8 @@ def identify_values(
     """As identify(), without samples of the posterior where a value is at its bound."""
     settings = settings or IdentificationSettings()
     known, through, notes = predictors_for_law(law, using, through)
+    compared = compared_tests(law, histories, settings)
+    histories = compared.histories
     if notes:
         how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
         fit = identify_values(law, histories, known, through=through, **how)
@@ -142,7 +146,8 @@ def identify_values(
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
-        return _result(histories, best, search_outcome, numerical_error)
+        fit = _result(histories, best, search_outcome, numerical_error)
+    return replace(fit, notes=(*compared.notes, *fit.notes))
 
 
 def _gradient(best: EstimationResult) -> Floats:
@@ -303,7 +308,9 @@ def _result(
     prediction = with_correction_at_frames(problem, histories, prediction)
     law_covariance = positive_semidefinite(covariance[:count, :count])
     known = coordinates, u, scatter, noise_model, histories, problem.predictor
-    single_values = [*zip(compare_rupture_times(*known), compare_minimum_rates(*known), strict=True)]
+    used = compares_rupture_times(law, problem.settings)
+    ends = compare_rupture_times(*known, without_curves=used)
+    single_values = [*zip(ends, compare_minimum_rates(*known), strict=True)]
     random_effects = predicted_random_effects(residuals, noise_model)
     tests = test_fits(problem, residuals, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
@@ -312,7 +319,7 @@ def _result(
     implausible = implausible_nuisances(problem, random_effects, nuisance_estimates)
     adequacy = adequacy_with_remedies(
         problem, linear, noise_model, working_estimator.predictor_errors, histories, unmodelled
-    )
+    ).with_contradicting(contradicting_values(histories, single_values))
     estimates = parameter_estimates(law, coordinates, u, law_covariance, interval_quantile(freedom))
     return Identification(
         law=law,

@@ -51,6 +51,7 @@ from creepkit.inverse.search.local_refinement import (
     bounded_least_squares,
     robust_loss,
 )
+from creepkit.inverse.rupture_use import compares_rupture_times
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
@@ -134,7 +135,8 @@ class LeastSquaresProblem:
         check_minimum_rates(law, histories, predictor)
         tests = [thinned_history(h, settings.frames) for h in histories]
         coordinates = Coordinates(law, reference or ReferencePoint.from_histories(tests, predictor))
-        observations = ObservationVector.from_histories(tests, predictor, histories)
+        rupture_times = compares_rupture_times(law, settings)
+        observations = ObservationVector.from_histories(tests, predictor, histories, rupture_times=rupture_times)
         check_nuisance_law(settings.nuisances, law)
         nuisances = NuisanceParameters.from_histories(settings.nuisances, tests, predictor)
         check_creep(observations, tests)

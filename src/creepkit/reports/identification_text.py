@@ -119,7 +119,7 @@ def _minimum_rates(fit: Identification) -> list[str]:
     if not rows:
         return []
     ratios = [r.ratio for _, _, r in rows if math.isfinite(r.ratio)]
-    text = f"{min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}" if ratios else "not predicted"
+    text = _spread(ratios) if ratios else "not predicted"
     within_interval = sum(r.low <= r.measured <= r.high for _, _, r in rows)
     lines = [
         f"  minimum rates of {_tests(len(rows))} without frames: predicted over measured {text}; {within_interval} "
@@ -142,18 +142,26 @@ def _ruptures(fit: Identification) -> list[str]:
     ruptures = rupture_rows(fit)
     if not ruptures:
         return []
+    if not any(r.used for _, _, r in ruptures):
+        measured = [r.ratio for _, _, r in ruptures if not r.censored]
+        text = f": time predicted over measured {_spread(measured)}" if measured else ""
+        return [f"  rupture times of {_tests(len(ruptures))} were not used{text}"]
     ratios, censored = [r.ratio for _, _, r in ruptures if not r.censored], [r for _, _, r in ruptures if r.censored]
     line = f"  rupture: {len(ratios)} of {_tests(len(fit.tests))} broke"
     if ratios:
         within_interval = sum(r.low <= r.measured <= r.high for _, _, r in ruptures if not r.censored)
         line += (
-            f"; time predicted over measured {min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}; "
+            f"; time predicted over measured {_spread(ratios)}; "
             f"{within_interval} within the 95 % interval of a single test{_if_the_law_holds(fit)}"
         )
     if censored:
         unexpected = sum(r.predicted < r.measured for r in censored)
         line += f"; {len(censored)} stopped before, of which {unexpected or 'none'} should have broken"
     return [line, *(_rupture_table(ruptures) if len(ruptures) <= LISTED_TESTS else [])]
+
+
+def _spread(ratios: Sequence[float]) -> str:
+    return f"{min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}"
 
 
 def _if_the_law_holds(fit: Identification) -> str:

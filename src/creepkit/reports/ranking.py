@@ -40,6 +40,8 @@ def explanation(fit: Identification) -> str:
         return f"only with a large {kind}"
     if fit.adequacy.explains:
         return "yes"
+    if fit.adequacy.contradicting is not None:
+        return "no: rates contradict rupture times"
     noises = fit.adequacy.discrepancy_in_noises
     return f"no: leaves {noises:.2g} noises" if noises > 0 else "no: rates of tests are not followed"
 

@@ -200,7 +200,7 @@ def settings_of(file: StudyFile) -> IdentificationSettings:
     base = ck.IdentificationSettings()
     if model.identification is not None:
         part = model.identification
-        for name in ("starts", "frames", "loss", "test_loss", "weights"):
+        for name in ("starts", "frames", "loss", "test_loss", "weights", "rupture_times"):
             value = getattr(part, name)
             if value is not None:
                 with file.at("identification", name):

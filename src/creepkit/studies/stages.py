@@ -208,7 +208,7 @@ class Stages:
         need = "" if law is not None else self._needed(place, "identification", group)
 
         def make(results: Results, tick: Tick) -> Any:
-            chosen = law if law is not None else self._law_without_temperature(results[need], group)
+            chosen, how = (law, settings) if law is not None else self._law_without_temperature(results[need], group)
             options: dict[str, Any] = {"forms": part.forms or None, "prior": part.prior_odds or None}
             options = {name: value for name, value in options.items() if value is not None}
             if part.parameters is not None:
@@ -220,7 +220,7 @@ class Stages:
                 using,
                 moduli=part.moduli,
                 within=within,
-                settings=settings,
+                settings=how,
                 progress=tick,
                 **options,
             )
@@ -239,12 +239,18 @@ class Stages:
         name = stage_name("temperature", group.name)
         return Stage(name, "temperature", group.name, described, make, needs, document=_temperature_document)
 
-    def _law_without_temperature(self, ranking: Ranking, group: TestGroup) -> CreepLaw:
-        """The candidate that is best; where another law was found to be, the best of the candidates."""
+    def _law_without_temperature(
+        self, ranking: Ranking, group: TestGroup
+    ) -> tuple[CreepLaw, IdentificationSettings]:
+        """The candidate that is best, and the settings of its identification, so that its values are the same again.
+
+        Where another law was found to be the best, it is the best of the candidates.
+        """
         named = {fitted.name: law for law, fitted in self._laws(group)}
-        return next(
-            (named[one.fit.law.name] for one in ranking.laws if one.fit.law.name in named), next(iter(named.values()))
-        )
+        fit = next((one.fit for one in ranking.laws if one.fit.law.name in named), None)
+        if fit is None:
+            return next(iter(named.values())), ranking.best.settings
+        return named[fit.law.name], fit.settings
 
     def _rupture(self, group: TestGroup) -> Stage:
         import creepkit as ck
