@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.contradicting_values import ContradictingValues
+from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.records import output_unit

@@ -88,8 +88,8 @@ def contradicting_values(
     p_value = min(1.0, p_value * len(results))
     if p_value >= SIGNIFICANCE:
         return None
-    means = (float(np.exp(np.nanmean(np.where(np.isfinite(y), y, np.nan)))) for y in (rates, times))
-    return ContradictingValues(count, *means, float(np.exp(scatter)), p_value)
+    rate_ratio, time_ratio = (float(np.exp(y[np.isfinite(y)].mean())) for y in (rates, times))
+    return ContradictingValues(count, rate_ratio, time_ratio, float(np.exp(scatter)), p_value)
 
 
 def _log(ratio: float) -> float:
@@ -100,7 +100,7 @@ def _log(ratio: float) -> float:
 def _regression(histories: Sequence[History], y: Floats) -> tuple[int, float, float] | None:
     """How many values, their scatter about a constant and trends, and the p-value of these; None of too few values."""
     known = np.flatnonzero(np.isfinite(y))
-    tests = [histories[k] for k in known]
+    tests = [histories[int(k)] for k in known]
     columns = [np.ones(known.size)]
     for x in (
         np.log([float(np.abs(h.loading.program().values).max()) for h in tests]),

@@ -84,7 +84,10 @@ CODEC = RecordCodec(
             NOT_NEGATIVE_OR_NAN,
         ),
         OutputAdequacy: {"frames": NOT_NEGATIVE, "noise": POSITIVE, "discrepancy": NOT_NEGATIVE},
-        ContradictingValues: {"scatter": POSITIVE, **dict.fromkeys(("rate_ratio", "time_ratio", "p_value"), NOT_NEGATIVE)},
+        ContradictingValues: {
+            "scatter": POSITIVE,
+            **dict.fromkeys(("rate_ratio", "time_ratio", "p_value"), NOT_NEGATIVE),
+        },
         ImplausibleNuisance: {"standard_deviations": NOT_NEGATIVE, "size": POSITIVE, "share": NOT_NEGATIVE_OR_NAN},
         LargestDeviation: {"rms": NOT_NEGATIVE},
         NumericalError: {"noises": NOT_NEGATIVE, "shift": NOT_NEGATIVE_OR_NAN},

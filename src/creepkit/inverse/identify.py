@@ -44,7 +44,6 @@ from creepkit.inverse.iterative_estimation import (
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
-from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS, NoiseModel, initial_noise_model
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -59,17 +58,15 @@ from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with
 from creepkit.inverse.uncertainty.laplace_approximation import (
     cut_interval_notes,
     interval_quantile,
-    laplace_covariance,
     parameter_estimates,
     positive_semidefinite,
-    restricted_covariance,
 )
+from creepkit.inverse.uncertainty.of_estimation import uncertainty_of
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note
-from creepkit.inverse.variance_components import estimate_variance_components
-from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator
 from creepkit.language import CreepLaw
-from creepkit.records import History, Nuisance, Predictor, is_length_nuisance
+from creepkit.records import History, Predictor, is_length_nuisance
 
 MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 """How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
@@ -286,7 +283,7 @@ def _result(
     law, coordinates, count = problem.law, problem.coordinates, problem.parameter_count
     u = x[:count]
     working_estimator = _working_estimator(problem, numerical_error)
-    noise_model, covariance, freedom = _uncertainty(best, working_estimator, len(histories))
+    noise_model, covariance, freedom = uncertainty_of(best, working_estimator, len(histories))
     linear = best.linearised or linearised(problem, x, residuals)
     unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories)
     scatter = rate_scatter(
@@ -360,43 +357,6 @@ def _result(
             problem, covariance_factor=CovarianceFactor.of_residuals(residuals, noise_model), loss="linear"
         ),
     )
-
-
-def _uncertainty(
-    best: EstimationResult, working_estimator: WorkingNoiseEstimator, tests: int
-) -> tuple[NoiseModel, Floats, float]:
-    """The noise model, the posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom."""
-    problem, x = best.problem, best.minimum.x
-    settings = problem.settings
-    if best.linearised is not None:
-        fixed = working_estimator.unestimated_drift_components(best.working_noise)
-        return best.working_noise, *restricted_covariance(
-            best.linearised, best.working_noise, settings.nuisances, fixed, problem.parameter_count
-        )
-    nuisances = _with_assumed_rate(settings.nuisances, tests)
-    at_prior_means = problem.nuisance_parameters.integrate_out(best.residuals, x[problem.parameter_count :])
-    noise_model = estimate_variance_components(
-        at_prior_means,
-        initial_noise_model(working_estimator.with_measured_noise(best.working_noise), nuisances),
-        nuisances,
-    )
-    rate_is_given = any(n.kind == "rate" and n.sd is not None for n in nuisances)
-    fitting_noise = with_single_value_weight(best.working_noise, problem.observations)
-    return noise_model, *laplace_covariance(
-        best.residuals,
-        fitting_noise,
-        noise_model,
-        problem.bounds,
-        problem.nuisance_parameters,
-        rate_known=rate_is_given,
-    )
-
-
-def _with_assumed_rate(nuisances: Sequence[Nuisance], tests: int) -> tuple[Nuisance, ...]:
-    """The nuisances, with the scatter between tests assumed where too few tests could show it."""
-    if tests >= MINIMUM_TESTS:
-        return tuple(nuisances)
-    return tuple(replace(n, sd=ASSUMED_RATE_SD) if n.kind == "rate" and n.sd is None else n for n in nuisances)
 
 
 def refit(fit: Identification, histories: Sequence[History]) -> Identification:

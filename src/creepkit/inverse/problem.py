@@ -43,6 +43,7 @@ from creepkit.inverse.residuals import (
     residuals_at_measured_values,
     residuals_of_prediction,
 )
+from creepkit.inverse.rupture_use import compares_rupture_times
 from creepkit.inverse.search.local_refinement import (
     AdditionalResiduals,
     Minimum,
@@ -51,7 +52,6 @@ from creepkit.inverse.search.local_refinement import (
     bounded_least_squares,
     robust_loss,
 )
-from creepkit.inverse.rupture_use import compares_rupture_times
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw

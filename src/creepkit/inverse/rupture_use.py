@@ -103,15 +103,20 @@ def compares_rupture_times(law: CreepLaw, settings: IdentificationSettings) -> b
 def compared_tests(law: CreepLaw, histories: Sequence[History], settings: IdentificationSettings) -> ComparedTests:
     """The tests without those that say nothing but an end that is not compared with the law.
 
-    FitError where no other is left.
+    A test that states nothing at all is left out where there are others. FitError where no other is left.
     """
+    silent = [h for h in histories if not h.outputs and h.minimum_rate is None and not h.end_known]
+    if silent and len(silent) < len(histories):
+        rest = compared_tests(law, [h for h in histories if not any(h is one for one in silent)], settings)
+        note = f"left out, for they state neither readings, nor a minimum rate, nor an end: {_named(silent)}"
+        return replace(rest, notes=(*rest.notes, note))
     if compares_rupture_times(law, settings):
         return ComparedTests(tuple(histories), True)
     ends = [h for h in histories if not h.outputs and h.end_known]
     if not ends:
         return ComparedTests(tuple(histories), False)
     out = [h for h in ends if h.minimum_rate is None]
-    kept = tuple(h for h in histories if h not in out)
+    kept = tuple(h for h in histories if not any(h is one for one in out))
     if not kept:
         raise FitError(
             f"law '{law.name}' has no tertiary creep, so that it breaks by loss of section alone, and these tests "
@@ -120,16 +125,19 @@ def compared_tests(law: CreepLaw, histories: Sequence[History], settings: Identi
         )
     why = (
         "this law has no tertiary creep and breaks by loss of section alone (rupture_times='use' compares them)"
-        if settings.rupture_times == "auto"
+        if not has_tertiary_creep(law)
         else "rupture_times is 'ignore'"
     )
     count = f"{len(ends)} test{'s' if len(ends) > 1 else ''} without curves"
     note = f"the ends of {count} (rupture times and run-outs) were not used: {why}"
     if out:
-        named = ", ".join(f"'{h.name}'" for h in out[:MOST_NAMED])
-        more = f" and {len(out) - MOST_NAMED} more" if len(out) > MOST_NAMED else ""
-        note += f"; left out, for they state nothing else: {named}{more}"
+        note += f"; left out, for they state nothing else: {_named(out)}"
     return ComparedTests(kept, False, (note,))
+
+
+def _named(tests: Sequence[History]) -> str:
+    more = f" and {len(tests) - MOST_NAMED} more" if len(tests) > MOST_NAMED else ""
+    return ", ".join(f"'{h.name}'" for h in tests[:MOST_NAMED]) + more
 
 
 def common_rupture_times(laws: Sequence[CreepLaw], settings: IdentificationSettings) -> IdentificationSettings:

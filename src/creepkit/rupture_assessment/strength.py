@@ -1,9 +1,9 @@
 """Rupture strength: the stress at which a test lasts a given time, with bounds, of one method or an average of several.
 
-The distribution of log10 of the rupture time at a stress and temperature is a mixture over methods by their weights. The
-strengths that are bounded are those about the estimate at which the time asked for lies between the quantiles of that
-distribution (Fieller's construction for a curve): of a wider kind of bound they hold those of a narrower one. A bound
-exists where a quantile reaches the time.
+The distribution of log10 of the rupture time at a stress and temperature is a mixture over methods by their weights.
+Between the bounds of a strength lie the stresses about the estimate at which the time asked for lies between quantiles
+of that distribution (Fieller's construction for a curve), so that those of a wider kind hold those of a narrower one. A
+bound exists where a quantile reaches the time.
 """
 
 from __future__ import annotations

@@ -30,7 +30,6 @@ def identified_laws(
 ) -> Ranking:
     """Each law identified by itself, and all ranked. how : search and penalty."""
     import creepkit as ck
-
     from creepkit.inverse.rupture_use import common_rupture_times
 
     fits, (search, penalty) = [], how

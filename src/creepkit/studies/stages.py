@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.fingerprints import predictor_fingerprint
 from creepkit.inverse.kept_fits import history_digest
-from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, with_arrhenius
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.quality import DataQuality
 from creepkit.records import ZERO_CELSIUS, History, Predictor
 from creepkit.reports.contents import ExportedFile
@@ -21,6 +21,7 @@ from creepkit.studies.study_file import StudyFile
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.language import CreepLaw
@@ -133,12 +134,8 @@ class Stages:
 
     def _laws(self, group: TestGroup) -> list[tuple[CreepLaw, CreepLaw]]:
         """Pairs of a candidate as it is named, and as it is fitted to a group."""
-        part = self.file.model.identification
-        assert part is not None
         named = arguments.laws_of(self.file)
-        if part.temperature == "none":
-            return [(law, law) for law in named]
-        return [(law, with_arrhenius(law, group.histories)) for law in named]
+        return [(law, arguments.law_as_fitted(self.file, law, group.histories)) for law in named]
 
     # ---- stages ------------------------------------------------------------------------------------------------------
 
@@ -208,7 +205,7 @@ class Stages:
         need = "" if law is not None else self._needed(place, "identification", group)
 
         def make(results: Results, tick: Tick) -> Any:
-            chosen, how = (law, settings) if law is not None else self._law_without_temperature(results[need], group)
+            chosen, fit = (law, None) if law is not None else self._best_candidate(results[need], group)
             options: dict[str, Any] = {"forms": part.forms or None, "prior": part.prior_odds or None}
             options = {name: value for name, value in options.items() if value is not None}
             if part.parameters is not None:
@@ -220,13 +217,14 @@ class Stages:
                 using,
                 moduli=part.moduli,
                 within=within,
-                settings=how,
+                settings=settings if fit is None else fit.settings,
                 progress=tick,
                 **options,
             )
             if study.temperature_law is None:
                 raise StudyError(study.notes[-1])
-            return study
+            # One law has one set of values: those of its identification, with what the study bounds and fixes.
+            return study if fit is None or part.moduli else replace(study, joint_fit=fit)
 
         described = [
             part.model_dump(),
@@ -239,18 +237,14 @@ class Stages:
         name = stage_name("temperature", group.name)
         return Stage(name, "temperature", group.name, described, make, needs, document=_temperature_document)
 
-    def _law_without_temperature(
-        self, ranking: Ranking, group: TestGroup
-    ) -> tuple[CreepLaw, IdentificationSettings]:
-        """The candidate that is best, and the settings of its identification, so that its values are the same again.
+    def _best_candidate(self, ranking: Ranking, group: TestGroup) -> tuple[CreepLaw, Identification | None]:
+        """The candidate that is best, without temperature, and its identification from all tests of the group.
 
-        Where another law was found to be the best, it is the best of the candidates.
+        Where another law was found to be the best, it is the best of the candidates; None where none was identified.
         """
         named = {fitted.name: law for law, fitted in self._laws(group)}
         fit = next((one.fit for one in ranking.laws if one.fit.law.name in named), None)
-        if fit is None:
-            return next(iter(named.values())), ranking.best.settings
-        return named[fit.law.name], fit.settings
+        return (next(iter(named.values())) if fit is None else named[fit.law.name]), fit
 
     def _rupture(self, group: TestGroup) -> Stage:
         import creepkit as ck

@@ -19,6 +19,7 @@ from creepkit.inverse.observation_vector import (
     thinned_history,
 )
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
+from creepkit.inverse.rupture_use import compares_rupture_times
 from creepkit.records import output_unit
 from creepkit.reports.html.elements import number, plural
 
