@@ -109,7 +109,7 @@ def _discrepancy_of_strain(fit: Identification) -> float:
 
 
 def _rms_label(fit: Identification) -> str:
-    whole = any(m.rupture is not None for m in fit.tests)
+    whole = bool(rupture_rows(fit))
     return "rms distance in ln strain and ln time" if whole else "rms of ln strain"
 
 
@@ -139,13 +139,9 @@ def _minimum_rates(fit: Identification) -> list[str]:
 
 def _ruptures(fit: Identification) -> list[str]:
     """Rupture times, predicted over measured, and each test's where they are few."""
-    ruptures = rupture_rows(fit)
+    ruptures, lines = rupture_rows(fit), _unused_ends(fit)
     if not ruptures:
-        return []
-    if not any(r.used for _, _, r in ruptures):
-        measured = [r.ratio for _, _, r in ruptures if not r.censored]
-        text = f": time predicted over measured {_spread(measured)}" if measured else ""
-        return [f"  rupture times of {_tests(len(ruptures))} were not used{text}"]
+        return lines
     ratios, censored = [r.ratio for _, _, r in ruptures if not r.censored], [r for _, _, r in ruptures if r.censored]
     line = f"  rupture: {len(ratios)} of {_tests(len(fit.tests))} broke"
     if ratios:
@@ -157,7 +153,15 @@ def _ruptures(fit: Identification) -> list[str]:
     if censored:
         unexpected = sum(r.predicted < r.measured for r in censored)
         line += f"; {len(censored)} stopped before, of which {unexpected or 'none'} should have broken"
-    return [line, *(_rupture_table(ruptures) if len(ruptures) <= LISTED_TESTS else [])]
+    return [line, *(_rupture_table(ruptures) if len(ruptures) <= LISTED_TESTS else []), *lines]
+
+
+def _unused_ends(fit: Identification) -> list[str]:
+    """What the law would say of rupture times that it was not compared with."""
+    ends = [m.rupture for m in fit.tests if m.rupture is not None and not m.rupture.used]
+    ratios = [end.ratio for end in ends if not end.censored and math.isfinite(end.ratio)]
+    text = f": time predicted over measured {_spread(ratios)}" if ratios else ""
+    return [f"  ends of {_tests(len(ends))} were not used{text}"] if ends else []
 
 
 def _spread(ratios: Sequence[float]) -> str:
@@ -302,8 +306,8 @@ MOST_TEMPERATURES_NAMED = 12
 
 
 def rupture_rows(fit: Identification) -> list[tuple[str, str, RuptureComparison]]:
-    """(test, condition, rupture) of the tests whose end is known."""
-    return [(m.name, m.condition, m.rupture) for m in fit.tests if m.rupture is not None]
+    """(test, condition, rupture) of the tests whose end is known and was compared with the law."""
+    return [(m.name, m.condition, m.rupture) for m in fit.tests if m.rupture is not None and m.rupture.used]
 
 
 def confirmation_text(confirmation: Confirmation) -> str:
