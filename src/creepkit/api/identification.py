@@ -37,6 +37,7 @@ class SettingChanges(TypedDict, total=False):
     test_loss: str
     further_laws: int
     suspect_frames: Literal["exclude", "keep"]
+    rupture_times: Literal["auto", "use", "ignore"]
 
 
 def identify(

@@ -218,9 +218,11 @@ def select_laws(laws: Sequence[CreepLaw], histories: list[History], **options: A
 def rank_laws(laws: Sequence[CreepLaw], histories: list[History], **options: Any) -> Ranking:
     """Fit each law, showing progress, and rank them."""
     import creepkit as ck
+    from creepkit.inverse.rupture_use import common_rupture_times
     from creepkit.inverse.selection import rank
 
     fits = []
+    options["rupture_times"] = common_rupture_times(laws, ck.IdentificationSettings()).rupture_times
     with ProgressBar() as progress:
         for law in laws:
 

@@ -157,7 +157,8 @@ def candidate_form(
     if isinstance(temperature_form, TemperatureFactor):
         if not is_rate_coefficient:
             return None
-        temperature_form = factor_as_form(temperature_form, len(law.terms) == 1 and "Q" not in law.names)
+        of_creep = any(symbol in term.free_symbols for term in law.terms.values())  # else of an internal variable
+        temperature_form = factor_as_form(temperature_form, of_creep and len(law.terms) == 1 and "Q" not in law.names)
     try:
         expression, extra = temperature_form.build(symbol, param)
     except LawError:

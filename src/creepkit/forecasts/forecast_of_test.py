@@ -328,7 +328,11 @@ def _extrapolated_times(fit: Identification, history: History, asked: Sequence[T
             parts.append(f"{one.event} after {one.value / HOUR:.3g} h (the longest test: {longest / HOUR:.3g} h)")
         elif one.output == "strain" and one.target > (1.0 + NEARBY["strain"]) * largest:
             parts.append(f"{one.event} (the tests reach {largest:.3g})")
-        elif not one.output and np.isfinite(one.value) and not any(m.rupture is not None for m in fit.tests):
+        elif (
+            not one.output
+            and np.isfinite(one.value)
+            and not any(m.rupture is not None and m.rupture.used for m in fit.tests)
+        ):
             parts.append(f"{one.event} (no test broke)")
     return parts
 

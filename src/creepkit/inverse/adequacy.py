@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from creepkit.inverse.contradicting_values import ContradictingValues
 from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
@@ -81,6 +82,7 @@ class Adequacy:
     smallest_p_value : of all outputs together and of each, before it is multiplied by their number.
     not_judged : the outputs, where nothing can be judged, and few_frames : the tests, each with how
         many frames it has, where these are too few to show the noise.
+    contradicting : minimum rates and rupture times that contradict one another by the law, beyond their own scatter.
     """
 
     verdict: AdequacyVerdict
@@ -99,11 +101,16 @@ class Adequacy:
     few_frames: tuple[tuple[str, int], ...] = ()
     critical_chi_square: float = float("nan")
     smallest_p_value: float = float("nan")
+    contradicting: ContradictingValues | None = None
 
     @property
     def explains(self) -> bool:
         """Whether the law explains the tests to their noise."""
         return self.verdict == "explains"
+
+    def with_contradicting(self, values: ContradictingValues | None) -> Adequacy:
+        """The same, rejected where minimum rates and rupture times contradict one another by the law."""
+        return self if values is None else replace(self, verdict="leaves a discrepancy", contradicting=values)
 
     def judges(self, output: str) -> bool:
         """Whether the noise of an output is known well enough to judge a law by."""
@@ -166,6 +173,8 @@ class Adequacy:
         if self.explains:
             large = f", but only with a large {self.implausible[0].kind}" if self.implausible else ""
             return f"not contradicted ({p_value_text(self.p_value)}){large}"
+        if self.contradicting is not None:
+            return "contradicted: rates contradict rupture times"
         noises = self.discrepancy_in_noises
         left = f"leaves {noises_text(noises)} noises" if noises > 0 else "rates of tests are not followed"
         return f"contradicted: {left}"
@@ -189,6 +198,8 @@ class Adequacy:
                 scatter += " (far larger than what the readings show: check its unit)"
             found = f"{self._chi_square_text}, {self._p_value_text}{correlated}"
             return f"is not contradicted by the tests at their {source} noise{self.qualification}{scatter}: {found}"
+        if self.contradicting is not None and not self.outputs:
+            return f"does not explain the tests: {self.contradicting}"
         parts = [
             f"{o.discrepancy:.2g}{' ' + output_unit(o.output) if output_unit(o.output) else ''} of {o.output} "
             f"({noises_text(o.discrepancy_in_noises)} times its {o.noise_source} noise)"
@@ -199,6 +210,8 @@ class Adequacy:
             parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
         elif self.rate_trend_p_value < TREND_SIGNIFICANCE:
             parts.append(f"rates of tests that bend over the stress (p = {self.rate_trend_p_value:.1g})")
+        if self.contradicting is not None:
+            parts.append(str(self.contradicting))
         where = f"; most in {self.largest}" if self.largest is not None else ""
         if self.remedies:
             where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"

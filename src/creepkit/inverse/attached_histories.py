@@ -11,6 +11,7 @@ from creepkit.inverse.history_checks import without_suspect_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_notes import data_digest
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.rupture_use import compared_tests
 from creepkit.records import History, Predictor
 
 
@@ -19,6 +20,7 @@ def with_attached(fit: Identification, tests: Sequence[History], predictor: Pred
 
     FitWarning where the tests are not those that it was made from: other frames, values, weights or nuisances.
     """
+    tests = compared_tests(fit.law, tests, fit.settings).histories
     attached = replace(fit, histories=tuple(tests), predictor=predictor, problem=None)
     known = fit.provenance.get("data")
     sound = tuple(without_suspect_frames(tests, fit.settings))

@@ -109,6 +109,7 @@ class RuptureComparison:
     measured : s, when it ruptured, or how long it lasted where it was stopped before (`censored`).
     predicted : s, by the law alone; infinite where the law predicts no rupture.
     low, high : 95 % interval for a single test, from the parameters and the scatter between tests.
+    used : whether the law was compared with it; else it stands beside a law that was identified without it.
     """
 
     measured: float
@@ -116,6 +117,7 @@ class RuptureComparison:
     predicted: float
     low: float
     high: float
+    used: bool = True
 
     @property
     def ratio(self) -> float:

@@ -13,6 +13,7 @@ from creepkit.files.json_documents import DocumentFormat, check_heading, read_js
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError, ValueCodec
 from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
+from creepkit.inverse.contradicting_values import ContradictingValues
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, RateComparison, RuptureComparison, TestFit
 from creepkit.inverse.identification import Identification
@@ -92,6 +93,10 @@ CODEC = RecordCodec(
             NOT_NEGATIVE_OR_NAN,
         ),
         OutputAdequacy: {"frames": NOT_NEGATIVE, "noise": POSITIVE, "discrepancy": NOT_NEGATIVE},
+        ContradictingValues: {
+            "scatter": POSITIVE,
+            **dict.fromkeys(("rate_ratio", "time_ratio", "p_value"), NOT_NEGATIVE),
+        },
         ImplausibleNuisance: {"standard_deviations": NOT_NEGATIVE, "size": POSITIVE, "share": NOT_NEGATIVE_OR_NAN},
         LargestDeviation: {"rms": NOT_NEGATIVE},
         NumericalError: {"noises": NOT_NEGATIVE, "shift": NOT_NEGATIVE_OR_NAN},

@@ -20,6 +20,7 @@ from creepkit.inverse.composite_predictor import (
     refined_of,
     through_for_law,
 )
+from creepkit.inverse.contradicting_values import contradicting_values
 from creepkit.inverse.defect_correction import (
     NumericalError,
     correct_defect,
@@ -49,11 +50,11 @@ from creepkit.inverse.iterative_estimation import (
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
-from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS, NoiseModel, initial_noise_model
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rupture_prediction import compare_rupture_times
+from creepkit.inverse.rupture_use import compared_tests, compares_rupture_times
 from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.multistart import MultiStart
@@ -63,18 +64,16 @@ from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with
 from creepkit.inverse.uncertainty.laplace_approximation import (
     cut_interval_notes,
     interval_quantile,
-    laplace_covariance,
     parameter_estimates,
     positive_semidefinite,
-    restricted_covariance,
 )
+from creepkit.inverse.uncertainty.of_estimation import uncertainty_of
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.unmodelled_effect import unmodelled_note
 from creepkit.inverse.unmodelled_effects import unmodelled_effects
-from creepkit.inverse.variance_components import estimate_variance_components
-from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator
 from creepkit.language import CreepLaw
-from creepkit.records import History, Nuisance, Predictor, is_length_nuisance
+from creepkit.records import History, Predictor, is_length_nuisance
 
 MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 """How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
@@ -127,6 +126,8 @@ def identify_values(
     """As identify(), without samples of the posterior where a value is at its bound."""
     settings = settings or IdentificationSettings()
     known, through, notes = predictors_for_law(law, using, through)
+    compared = compared_tests(law, histories, settings)
+    histories = compared.histories
     if notes:
         how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
         fit = identify_values(law, histories, known, through=through, **how)
@@ -149,7 +150,8 @@ def identify_values(
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
-        return _result(histories, best, search_outcome, numerical_error)
+        fit = _result(histories, best, search_outcome, numerical_error)
+    return replace(fit, notes=(*compared.notes, *fit.notes))
 
 
 def _gradient(best: EstimationResult) -> Floats:
@@ -250,7 +252,7 @@ def _result(
     law, coordinates, count = problem.law, problem.coordinates, problem.parameter_count
     u = x[:count]
     working_estimator = _working_estimator(problem, numerical_error)
-    noise_model, covariance, freedom = _uncertainty(best, working_estimator, len(histories))
+    noise_model, covariance, freedom = uncertainty_of(best, working_estimator, len(histories))
     linear = best.linearised or linearised(problem, x, residuals)
     working_noise = None if best.linearised is not None else best.working_noise
     unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories, working_noise)
@@ -268,7 +270,9 @@ def _result(
     prediction = with_correction_at_frames(problem, histories, prediction)
     law_covariance = positive_semidefinite(covariance[:count, :count])
     known = coordinates, u, scatter, noise_model, histories, problem.predictor
-    single_values = [*zip(compare_rupture_times(*known), compare_minimum_rates(*known), strict=True)]
+    used = compares_rupture_times(law, problem.settings)
+    ends = compare_rupture_times(*known, without_curves=used)
+    single_values = [*zip(ends, compare_minimum_rates(*known), strict=True)]
     random_effects = predicted_random_effects(residuals, noise_model)
     tests = test_fits(problem, residuals, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
@@ -277,7 +281,7 @@ def _result(
     implausible = implausible_nuisances(problem, random_effects, nuisance_estimates)
     adequacy = adequacy_with_remedies(
         problem, linear, noise_model, working_estimator.predictor_errors, histories, unmodelled
-    )
+    ).with_contradicting(contradicting_values(histories, single_values))
     estimates = parameter_estimates(law, coordinates, u, law_covariance, interval_quantile(freedom))
     return Identification(
         law=law,
@@ -322,43 +326,6 @@ def _result(
             problem, covariance_factor=CovarianceFactor.of_residuals(residuals, noise_model), loss="linear"
         ),
     )
-
-
-def _uncertainty(
-    best: EstimationResult, working_estimator: WorkingNoiseEstimator, tests: int
-) -> tuple[NoiseModel, Floats, float]:
-    """The noise model, the posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom."""
-    problem, x = best.problem, best.minimum.x
-    settings = problem.settings
-    if best.linearised is not None:
-        fixed = working_estimator.unestimated_drift_components(best.working_noise)
-        return best.working_noise, *restricted_covariance(
-            best.linearised, best.working_noise, settings.nuisances, fixed, problem.parameter_count
-        )
-    nuisances = _with_assumed_rate(settings.nuisances, tests)
-    at_prior_means = problem.nuisance_parameters.integrate_out(best.residuals, x[problem.parameter_count :])
-    noise_model = estimate_variance_components(
-        at_prior_means,
-        initial_noise_model(working_estimator.with_measured_noise(best.working_noise), nuisances),
-        nuisances,
-    )
-    rate_is_given = any(n.kind == "rate" and n.sd is not None for n in nuisances)
-    fitting_noise = with_single_value_weight(best.working_noise, problem.observations)
-    return noise_model, *laplace_covariance(
-        best.residuals,
-        fitting_noise,
-        noise_model,
-        problem.bounds,
-        problem.nuisance_parameters,
-        rate_known=rate_is_given,
-    )
-
-
-def _with_assumed_rate(nuisances: Sequence[Nuisance], tests: int) -> tuple[Nuisance, ...]:
-    """The nuisances, with the scatter between tests assumed where too few tests could show it."""
-    if tests >= MINIMUM_TESTS:
-        return tuple(nuisances)
-    return tuple(replace(n, sd=ASSUMED_RATE_SD) if n.kind == "rate" and n.sd is None else n for n in nuisances)
 
 
 def refit(fit: Identification, histories: Sequence[History]) -> Identification:

@@ -148,11 +148,21 @@ class ObservationVector:
 
     @classmethod
     def from_histories(
-        cls, histories: Sequence[History], predictor: Predictor, full: Sequence[History] | None = None
+        cls,
+        histories: Sequence[History],
+        predictor: Predictor,
+        full: Sequence[History] | None = None,
+        *,
+        rupture_times: bool = True,
     ) -> ObservationVector:
-        """The observations of histories; noise is estimated from `full`, the same before frames were left out."""
+        """The observations of histories; noise is estimated from `full`, the same before frames were left out.
+
+        rupture_times : whether ends of tests without frames are among them.
+        """
         full = histories if full is None else full
-        followed_to_rupture = np.array([h.end_known and predicts_rupture(predictor, h) for h in histories])
+        followed_to_rupture = np.array(
+            [h.end_known and (rupture_times or bool(h.outputs)) and predicts_rupture(predictor, h) for h in histories]
+        )
         outputs_by_test = [
             _observed_outputs(h, predictor, followed=bool(w))
             for h, w in zip(histories, followed_to_rupture, strict=True)

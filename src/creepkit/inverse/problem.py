@@ -43,6 +43,7 @@ from creepkit.inverse.residuals import (
     residuals_at_measured_values,
     residuals_of_prediction,
 )
+from creepkit.inverse.rupture_use import compares_rupture_times
 from creepkit.inverse.search.local_refinement import (
     AdditionalResiduals,
     Minimum,
@@ -134,7 +135,8 @@ class LeastSquaresProblem:
         check_minimum_rates(law, histories, predictor)
         tests = [thinned_history(h, settings.frames) for h in histories]
         coordinates = Coordinates(law, reference or ReferencePoint.from_histories(tests, predictor))
-        observations = ObservationVector.from_histories(tests, predictor, histories)
+        rupture_times = compares_rupture_times(law, settings)
+        observations = ObservationVector.from_histories(tests, predictor, histories, rupture_times=rupture_times)
         check_nuisance_law(settings.nuisances, law)
         nuisances = NuisanceParameters.from_histories(settings.nuisances, tests, predictor)
         check_creep(observations, tests)

@@ -107,10 +107,12 @@ def compare_rupture_times(
     noise_model: NoiseModel,
     histories: Sequence[History],
     predictor: Predictor,
+    *,
+    without_curves: bool = True,
 ) -> list[RuptureComparison | None]:
     """Measured against predicted, for every history; None where its end is not known or not predicted.
 
-    u : (parameters,) conditioned coordinates.
+    u : (parameters,) conditioned coordinates. without_curves : whether ends of tests without frames were compared.
     """
     followed = [k for k, h in enumerate(histories) if h.end_known and predicts_rupture(predictor, h)]
     comparisons: list[RuptureComparison | None] = [None] * len(histories)
@@ -120,5 +122,7 @@ def compare_rupture_times(
     times = predict_rupture_times(coordinates, u, scatter, noise_model, tests, predictor)
     for k, history, time, low, high in zip(followed, tests, *times, strict=True):
         measured = history.rupture_time or float(history.times[-1])
-        comparisons[k] = RuptureComparison(measured, history.unruptured, float(time), float(low), float(high))
+        comparisons[k] = RuptureComparison(
+            measured, history.unruptured, float(time), float(low), float(high), without_curves or bool(history.outputs)
+        )
     return comparisons

@@ -28,6 +28,9 @@ WEIGHTINGS = ("noise", "likelihood", "equal", "paper")
 SUSPECT_FRAMES = ("exclude", "keep")
 
 
+RUPTURE_TIMES = ("auto", "use", "ignore")
+
+
 OutputWeights = Literal["noise", "likelihood", "equal", "paper"] | Mapping[str, float]
 
 
@@ -51,6 +54,9 @@ class IdentificationSettings:
     further_laws : that select() tries at most where no candidate explains the tests: sums, and registered laws.
     suspect_frames : "exclude": frames that unload, fall or lie apart (see quality.exclude_suspect_frames) are left out
         when the public functions and commands are handed tests, and the notes of the result name them; or "keep".
+    rupture_times : whether ends of tests without curves, rupture times and run-outs, are compared with the law: "auto":
+        where its rate can rise at constant stress (see inverse.rupture_use), in a comparison of laws where that of any
+        can; "use" or "ignore": with every law or with none. Curves that were followed to rupture are compared to it.
     """
 
     starts: int = 8
@@ -63,6 +69,7 @@ class IdentificationSettings:
     test_loss: str = "gaussian"
     suspect_frames: Literal["exclude", "keep"] = "exclude"
     further_laws: int = 6
+    rupture_times: Literal["auto", "use", "ignore"] = "auto"
 
     def __post_init__(self) -> None:
         for name, allowed in (
@@ -81,6 +88,8 @@ class IdentificationSettings:
             raise FitError(
                 f"suspect_frames '{self.suspect_frames}' is not known; allowed are {' and '.join(SUSPECT_FRAMES)}"
             )
+        if self.rupture_times not in RUPTURE_TIMES:
+            raise FitError(f"rupture_times '{self.rupture_times}' is not known; allowed are {', '.join(RUPTURE_TIMES)}")
         _check_weights(self.weights)
         if self.weights == "likelihood" and self.loss != "linear":
             raise FitError(

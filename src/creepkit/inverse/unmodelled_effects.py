@@ -69,7 +69,9 @@ def unmodelled_effects(
     if "offset" not in kinds:
         changes += _offset(problem, linear)
     drifting_kinds = {DRIFT, "rate drift"}
-    if not kinds & drifting_kinds and not any(isinstance(h.temperature, Program) for h in full_histories):
+    without_curves = not any(h.outputs for h in full_histories)
+    recorded = any(isinstance(h.temperature, Program) for h in full_histories)
+    if not (kinds & drifting_kinds or recorded or without_curves):  # a drift changes curves, and no single value
         changes += _drift(problem, x, linear)
     factor = CovarianceFactor.of_residuals(linear.residuals, noise_model)
     energy, assumed = activation_energy(problem, x)

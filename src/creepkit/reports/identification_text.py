@@ -118,7 +118,7 @@ def _discrepancy_of_strain(fit: Identification) -> float:
 
 
 def _rms_label(fit: Identification) -> str:
-    whole = any(m.rupture is not None for m in fit.tests)
+    whole = bool(rupture_rows(fit))
     return "rms distance in ln strain and ln time" if whole else "rms of ln strain"
 
 
@@ -128,7 +128,7 @@ def _minimum_rates(fit: Identification) -> list[str]:
     if not rows:
         return []
     ratios = [r.ratio for _, _, r in rows if math.isfinite(r.ratio)]
-    text = f"{min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}" if ratios else "not predicted"
+    text = _spread(ratios) if ratios else "not predicted"
     within_interval = sum(r.low <= r.measured <= r.high for _, _, r in rows)
     lines = [
         f"  minimum rates of {_tests(len(rows))} without frames: predicted over measured {text}; {within_interval} "
@@ -148,21 +148,33 @@ def _minimum_rates(fit: Identification) -> list[str]:
 
 def _ruptures(fit: Identification) -> list[str]:
     """Rupture times, predicted over measured, and each test's where they are few."""
-    ruptures = rupture_rows(fit)
+    ruptures, lines = rupture_rows(fit), _unused_ends(fit)
     if not ruptures:
-        return []
+        return lines
     ratios, censored = [r.ratio for _, _, r in ruptures if not r.censored], [r for _, _, r in ruptures if r.censored]
     line = f"  rupture: {len(ratios)} of {_tests(len(fit.tests))} broke"
     if ratios:
         within_interval = sum(r.low <= r.measured <= r.high for _, _, r in ruptures if not r.censored)
         line += (
-            f"; time predicted over measured {min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}; "
+            f"; time predicted over measured {_spread(ratios)}; "
             f"{within_interval} within the 95 % interval of a single test{_if_the_law_holds(fit)}"
         )
     if censored:
         unexpected = sum(r.predicted < r.measured for r in censored)
         line += f"; {len(censored)} stopped before, of which {unexpected or 'none'} should have broken"
-    return [line, *(_rupture_table(ruptures) if len(ruptures) <= LISTED_TESTS else [])]
+    return [line, *(_rupture_table(ruptures) if len(ruptures) <= LISTED_TESTS else []), *lines]
+
+
+def _unused_ends(fit: Identification) -> list[str]:
+    """What the law would say of rupture times that it was not compared with."""
+    ends = [m.rupture for m in fit.tests if m.rupture is not None and not m.rupture.used]
+    ratios = [end.ratio for end in ends if not end.censored and math.isfinite(end.ratio)]
+    text = f": time predicted over measured {_spread(ratios)}" if ratios else ""
+    return [f"  ends of {_tests(len(ends))} were not used{text}"] if ends else []
+
+
+def _spread(ratios: Sequence[float]) -> str:
+    return f"{min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}"
 
 
 def _if_the_law_holds(fit: Identification) -> str:
@@ -307,8 +319,8 @@ MOST_TEMPERATURES_NAMED = 12
 
 
 def rupture_rows(fit: Identification) -> list[tuple[str, str, RuptureComparison]]:
-    """(test, condition, rupture) of the tests whose end is known."""
-    return [(m.name, m.condition, m.rupture) for m in fit.tests if m.rupture is not None]
+    """(test, condition, rupture) of the tests whose end is known and was compared with the law."""
+    return [(m.name, m.condition, m.rupture) for m in fit.tests if m.rupture is not None and m.rupture.used]
 
 
 def confirmation_text(confirmation: Confirmation) -> str:

@@ -95,7 +95,11 @@ def _drawn_temperatures(scale: ColourScale) -> list[float]:
 
 def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> None:
     """One point a test with its 95 % interval; tests that were stopped are open, and lie where they were stopped."""
-    ruptures = [(m.rupture, colour) for m, colour in zip(fit.tests, colours, strict=True) if m.rupture is not None]
+    ruptures = [
+        (m.rupture, colour)
+        for m, colour in zip(fit.tests, colours, strict=True)
+        if m.rupture is not None and m.rupture.used
+    ]
     for r, colour in ruptures:
         if not np.isfinite(r.predicted):
             continue

@@ -1,8 +1,9 @@
 """Rupture strength: the stress at which a test lasts a given time, with bounds, of one method or an average of several.
 
-The distribution of log10 of the rupture time at a stress and temperature is a mixture over methods by their weights. A
-bound of the strength is the stress at which a quantile of that distribution is the time asked for (Fieller's
-construction for a curve), so bounds exist only where that quantile falls with stress down to the time.
+The distribution of log10 of the rupture time at a stress and temperature is a mixture over methods by their weights.
+Between the bounds of a strength lie the stresses about the estimate at which the time asked for lies between quantiles
+of that distribution (Fieller's construction for a curve), so that those of a wider kind hold those of a narrower one. A
+bound exists where a quantile reaches the time.
 """
 
 from __future__ import annotations
@@ -121,13 +122,13 @@ def strength_estimates(
     tested = (stress >= 0.99 * tests.stress.min()) & (stress <= 1.01 * tests.stress.max())
     start = int(np.argmin(np.where(tested, np.abs(median - np.median(tests.log_time)), np.inf)))
     central = _falling_branch(stress, median, start)
-    branches = {key: _falling_branch(stress, curve, start) for key, curve in bound_curves(models, at, level).items()}
-    return [_estimate(central, branches, name, tests, time, temperature) for time in hours]
+    curves = bound_curves(models, at, level)
+    return [_estimate(central, (stress, curves), name, tests, time, temperature) for time in hours]
 
 
 def _estimate(
     central: _Branch,
-    branches: Mapping[tuple[str, float], _Branch],
+    bound_of_time: tuple[Floats, Mapping[tuple[str, float], Floats]],
     name: str,
     tests: RuptureTests,
     hours: float,
@@ -136,8 +137,9 @@ def _estimate(
     value, reason = central.stress_at(hours)
     reasons = [reason] if reason else []
     bounds: dict[str, list[float | None]] = {of: [] for of in BOUND_KINDS}
-    for k, ((of, _), branch) in enumerate(branches.items()):
-        bound, reason = branch.stress_at(hours) if value is not None else (None, "")
+    stress, curves = bound_of_time
+    for k, ((of, _), curve) in enumerate(curves.items()):
+        bound, reason = (None, "") if value is None else _bound(stress, curve, hours, value, upper=bool(k % 2))
         bounds[of].append(bound)
         if reason:
             reasons.append(f"no {'upper' if k % 2 else 'lower'} bound of the {of}: {reason}")
@@ -191,6 +193,26 @@ class _Branch:
             return None, f"it lies above {high:.4g} MPa, up to which strengths are looked for"
         inverse = PchipInterpolator(self.log_time[::-1], np.log(self.stress[::-1]))
         return float(np.exp(inverse(target))), ""
+
+
+def _bound(stress: Floats, log_time: Floats, hours: float, value: float, *, upper: bool) -> tuple[float | None, str]:
+    """The end of the stresses about a strength at which a quantile is above the time, or below it, and why none is.
+
+    stress, log_time : (points,) of the upper quantile, which is above the time at the strength, or of the lower one.
+    """
+    target, start = np.log10(hours), int(np.searchsorted(stress, value)) - upper
+    start = int(np.clip(start, 0, stress.size - 1))
+    crossings = np.flatnonzero((log_time[:-1] > target) & (log_time[1:] <= target))
+    inside = crossings[crossings >= start] if upper else crossings[crossings < start]
+    if inside.size:
+        return _falling_branch(stress, log_time, int(inside[0] if upper else inside[-1])).stress_at(hours)
+    if (log_time[start] < target) == upper:  # no wider than the distance of two points
+        return _falling_branch(stress, log_time, start).stress_at(hours)
+    beyond = log_time[start:] if upper else log_time[: start + 1]
+    extreme = start + int(beyond.argmin()) if upper else int(beyond.argmax())
+    ends = slice(start, extreme + 1) if upper else slice(extreme, start + 1)
+    turned = extreme < stress.size - 1 if upper else extreme > 0
+    return _Branch(stress[ends], log_time[ends], (turned, turned)).stress_at(hours)
 
 
 def _falling_branch(stress: Floats, log_time: Floats, start: int) -> _Branch:

@@ -8,10 +8,13 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import SurrogateError, nearest, quoted
+from creepkit.inverse.reference_conditions import with_arrhenius
+from creepkit.language import temperature
 from creepkit.readers.vocabulary import split_unit
 from creepkit.records import (
     SECONDS_PER_HOUR,
     ZERO_CELSIUS,
+    History,
     Nuisance,
     Predictor,
     Program,
@@ -22,7 +25,7 @@ from creepkit.records import (
     outputs_of,
 )
 from creepkit.records.quantities import LENGTH, QuantityKind
-from creepkit.studies.model import NuisancePart, Step
+from creepkit.studies.model import IdentificationPart, NuisancePart, Step
 from creepkit.studies.study_file import StudyFile
 
 if TYPE_CHECKING:
@@ -51,7 +54,10 @@ def value_of(file: StudyFile, key: tuple[str | int, ...], kinds: Mapping[str, Qu
 
 
 def laws_of(file: StudyFile) -> list[CreepLaw]:
-    """The candidate laws, with parameters bounded and fixed, each where it has them."""
+    """The candidate laws, with parameters bounded and fixed, each where it has them.
+
+    Those of a factor of temperature, such as Q, are known too; `law_as_fitted` bounds and fixes them.
+    """
     import creepkit as ck
 
     part = file.model.identification
@@ -61,17 +67,35 @@ def laws_of(file: StudyFile) -> list[CreepLaw]:
         with file.at("identification", "laws", k):
             laws.append(ck.law(name))
     known = {name for law in laws for name in law.names}
+    if part.temperature == "auto":
+        factor = ck.arrhenius(T_ref=ZERO_CELSIUS)
+        known |= {name for law in laws if not law.uses(temperature) for name in law.times(factor).names}
     for table, changes in (("bounds", part.bounds), ("fix", part.fix)):
         for name in changes:
             if name not in known:
                 raise file.error(
                     ("identification", table, name), f"no law has a parameter '{name}'; {nearest(name, known)}"
                 )
+    return [_changed(file, part, law) for law in laws]
+
+
+def law_as_fitted(file: StudyFile, law: CreepLaw, histories: Sequence[History]) -> CreepLaw:
+    """A candidate law as it is fitted to tests: with its factor of temperature, bounded and fixed as the study says."""
+    part = file.model.identification
+    assert part is not None
+    if part.temperature == "none":
+        return law
+    return _changed(file, part, with_arrhenius(law, histories))
+
+
+def _changed(file: StudyFile, part: IdentificationPart, law: CreepLaw) -> CreepLaw:
+    """The law with those of its parameters bounded and fixed that the study names."""
     with file.at("identification", "bounds"):
-        bounds: dict[str, Any] = {name: (low, high) for name, (low, high) in part.bounds.items()}
-        laws = [law.with_bounds(**{n: b for n, b in bounds.items() if n in law.names}) for law in laws]
+        bounds: dict[str, Any] = {n: (low, high) for n, (low, high) in part.bounds.items() if n in law.names}
+        law = law.with_bounds(**bounds) if bounds else law
     with file.at("identification", "fix"):
-        return [law.fix(**{n: v for n, v in part.fix.items() if n in law.names}) for law in laws]
+        fixed = {n: v for n, v in part.fix.items() if n in law.names}
+        return law.fix(**fixed) if fixed else law
 
 
 def predictor_of(file: StudyFile, root: Path | None) -> Predictor | None:
@@ -199,7 +223,7 @@ def settings_of(file: StudyFile) -> IdentificationSettings:
     base = ck.IdentificationSettings()
     if model.identification is not None:
         part = model.identification
-        for name in ("starts", "frames", "loss", "test_loss", "weights"):
+        for name in ("starts", "frames", "loss", "test_loss", "weights", "rupture_times"):
             value = getattr(part, name)
             if value is not None:
                 with file.at("identification", name):

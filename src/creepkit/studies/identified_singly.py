@@ -30,8 +30,10 @@ def identified_laws(
 ) -> Ranking:
     """Each law identified by itself, and all ranked. how : search and penalty."""
     import creepkit as ck
+    from creepkit.inverse.rupture_use import common_rupture_times
 
     fits, (search, penalty) = [], how
+    settings = common_rupture_times(laws, settings)
     for k, law in enumerate(laws, start=1):
 
         def of_law(

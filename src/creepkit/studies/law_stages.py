@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import creepkit as ck
@@ -18,6 +18,7 @@ from creepkit.studies.stage import Results, Stage, Tick, no_numbers, stage_name
 from creepkit.studies.stage_inputs import StageInputs
 
 if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.language import CreepLaw
 
@@ -95,7 +96,7 @@ def temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
     need = "" if law is not None else study.needed(place, "identification", group)
 
     def make(results: Results, tick: Tick) -> Any:
-        chosen = law if law is not None else _law_without_temperature(study, results[need], group)
+        chosen, fit = (law, None) if law is not None else _best_candidate(study, results[need], group)
         options: dict[str, Any] = {"forms": part.forms or None, "prior": part.prior_odds or None}
         options = {name: value for name, value in options.items() if value is not None}
         if part.parameters is not None:
@@ -107,13 +108,14 @@ def temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
             using,
             moduli=part.moduli,
             within=within,
-            settings=settings,
+            settings=settings if fit is None else fit.settings,
             progress=tick,
             **options,
         )
         if found.temperature_law is None:
             raise StudyError(found.notes[-1])
-        return found
+        # One law has one set of values: those of its identification, with what the study bounds and fixes.
+        return found if fit is None or part.moduli else replace(found, joint_fit=fit)
 
     described = [
         part.model_dump(),
@@ -129,12 +131,14 @@ def temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
     )
 
 
-def _law_without_temperature(study: StageInputs, ranking: Ranking, group: TestGroup) -> CreepLaw:
-    """The candidate that is best; where another law was found to be, the best of the candidates."""
+def _best_candidate(study: StageInputs, ranking: Ranking, group: TestGroup) -> tuple[CreepLaw, Identification | None]:
+    """The candidate that is best, without temperature, and its identification from all tests of the group.
+
+    Where another law was found to be the best, it is the best of the candidates; None where none was identified.
+    """
     named = {fitted.name: law for law, fitted in study.laws(group)}
-    return next(
-        (named[one.fit.law.name] for one in ranking.laws if one.fit.law.name in named), next(iter(named.values()))
-    )
+    fit = next((one.fit for one in ranking.laws if one.fit.law.name in named), None)
+    return (next(iter(named.values())) if fit is None else named[fit.law.name]), fit
 
 
 def _numbers_of_temperature(study: Any) -> dict[str, Any]:

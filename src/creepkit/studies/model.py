@@ -223,6 +223,7 @@ class IdentificationPart(Part):
     weights: Annotated[Any, BeforeValidator(_output_weights)] = None
     loss: Text | None = None
     test_loss: Text | None = None
+    rupture_times: Literal["auto", "use", "ignore"] | None = None
     search: SearchName = "multi-start"
     penalty: PenaltyName | None = None
 

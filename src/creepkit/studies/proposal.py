@@ -23,7 +23,9 @@ from creepkit.studies.toml_text import CITATION_LINE, comment, one_line, quoted,
 SECONDARY_LAWS = ("norton", "strain-hardening", "time-hardening")
 SEVERAL_STRESSES_LAW = "hyperbolic-sine"
 TERTIARY_LAWS = ("norton", "mpc-omega", "kachanov-rabotnov")
-"""Candidates, those of them that are installed."""
+DAMAGE_LAWS = ("norton", "kachanov-rabotnov")
+"""Candidates, those of them that are installed; of damage where rupture times stand beside minimum rates, for damage
+gives rates and times exponents of stress and temperature of their own."""
 
 
 TERTIARY_SHARE = 0.3
@@ -92,6 +94,13 @@ class DataSummary:
     def framed(self) -> int:
         """Tests with frames or a minimum rate, from which a law can be identified."""
         return sum(bool(h.outputs) or h.minimum_rate is not None for h in self.tests)
+
+    @property
+    def rupture_table(self) -> bool:
+        """Whether most tests have no curves, and enough of these ended by rupture to identify damage from."""
+        tables = [history for history in self.tests if not history.outputs]
+        ruptured = sum(history.rupture_time is not None for history in tables)
+        return 2 * len(tables) > len(self.tests) and ruptured >= FEWEST_RUPTURES
 
     @property
     def lines(self) -> list[str]:
@@ -209,7 +218,9 @@ def candidate_laws(summary: DataSummary) -> list[str]:
 
     installed = ck.available("laws")
     judged = all(map(duration_known, summary.tests))
-    names = TERTIARY_LAWS if summary.tertiary > TERTIARY_SHARE * summary.framed else SECONDARY_LAWS
+    names: tuple[str, ...] = TERTIARY_LAWS if summary.tertiary > TERTIARY_SHARE * summary.framed else SECONDARY_LAWS
+    if summary.rupture_table and not set(DAMAGE_LAWS) - set(installed):
+        names = DAMAGE_LAWS
     chosen = [name for name in names if name in installed and (judged or not needs_durations(ck.law(name)))]
     several = len(summary.loads) > 2 and summary.loads[-1] > STRESS_RATIO * summary.loads[0]
     if several and names is SECONDARY_LAWS and SEVERAL_STRESSES_LAW in installed:
@@ -286,8 +297,12 @@ def _identification_part(summary: DataSummary) -> list[str]:
         lines.append("# Minimum rates of tests of unknown duration cannot judge laws that depend on strain or time.")
     lines += ["[identification]", f"laws = {quoted_list(laws)}  # creepkit laws lists all"]
     with_alpha = [name for name in laws if "alpha" in ck.law(name).names]
-    if with_alpha and not set(with_alpha) - set(TERTIARY_LAWS):
+    if with_alpha and summary.rupture_table:
+        lines.append("fix = { alpha = 0, m = 0 }  # tables do not say how damage depends on principal stress and time")
+    elif with_alpha and not set(with_alpha) - set(TERTIARY_LAWS):
         lines.append("fix = { alpha = 0 }  # tests under tension do not say how damage depends on the principal stress")
+    if summary.rupture_table and not with_alpha:
+        lines.append("# No law of damage is installed: rupture times of tests without curves are not used to identify.")
     if len(summary.alloys) > 1:
         lines.append('group_by = "alloy"  # each is identified by itself')
     elif len(summary.heats) > 1:

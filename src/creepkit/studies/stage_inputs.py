@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.inverse.kept_fits import history_digest
-from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.records import History
 from creepkit.studies import arguments
 from creepkit.studies.inputs import StudyInputs, TestGroup
@@ -55,9 +54,5 @@ class StageInputs:
 
     def laws(self, group: TestGroup) -> list[tuple[CreepLaw, CreepLaw]]:
         """Pairs of a candidate as it is named, and as it is fitted to a group."""
-        part = self.file.model.identification
-        assert part is not None
         named = arguments.laws_of(self.file)
-        if part.temperature == "none":
-            return [(law, law) for law in named]
-        return [(law, with_arrhenius(law, group.histories)) for law in named]
+        return [(law, arguments.law_as_fitted(self.file, law, group.histories)) for law in named]

@@ -204,8 +204,8 @@ def rank(
         raise FitError(f"rank(by={criterion!r}) is not known: identifications are ranked by 'bic' or 'aicc'")
     if len({fit.provenance.get("data") for fit in fits}) > 1:
         raise FitError(
-            "the identifications were made from different histories, frames, losses or nuisances and cannot be ranked; "
-            "make them alike"
+            "the identifications were made from different histories, frames, losses, nuisances or rupture times and "
+            "cannot be ranked; make them alike (rupture_times='use' or 'ignore' for all laws)"
         )
     chi_square = np.full(len(fits), np.nan)
     if all(fit.linearised is not None for fit in fits):

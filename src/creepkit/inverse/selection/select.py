@@ -19,6 +19,7 @@ from creepkit.inverse.duration import duration_known, needs_durations
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify, identify_values
 from creepkit.inverse.reference_conditions import with_arrhenius
+from creepkit.inverse.rupture_use import common_rupture_times
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, challenged, rank, ranking_from_scores
@@ -95,6 +96,7 @@ def select(
         raise FitError(f"select(by={by!r}) is not known; allowed are {', '.join(CRITERIA)}")
     if not candidates:
         raise FitError("there are no candidate laws; give at least one, such as ck.law('norton')")
+    settings = common_rupture_times(candidates, settings)
     failed: dict[str, str] = {}
     fits = _identify_all(list(candidates), histories, using, settings, through, progress, failed)
     tried_further: tuple[str, ...] = ()

@@ -8,6 +8,7 @@ exponent there for what only it shows, small.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -128,9 +129,23 @@ def _undetermined_sentence(fit: Identification, group: list[int]) -> str:
         interval = f"[{estimate.low:.3g}, {estimate.high:.3g}]"
         fills = f"its interval {interval} fills {relative_width:.0%} of its bounds"
         return f"the parameter {names[0]} ({fit.law.table[names[0]].meaning}) is not determined: {fills}"
-    sentence = f"the parameters {', '.join(names[:-1])} and {names[-1]} are not determined singly"
+    loose = [name for k, name in zip(group, names, strict=True) if fit.estimates[k].verdict == "not determined"]
+    tied = [name for name in names if name not in loose]
+    several = len(loose) > 1
+    sentence = f"the parameter{'s' * several} {_listed(loose)} {'are' if several else 'is'} not determined singly"
+    if tied:
+        sentence += (
+            f"; {_listed(tied)} {'are' if len(tied) > 1 else 'is'} tied to {'them' if several else 'it'} by a "
+            f"correlation of {STRONG_CORRELATION:g} or more, which the interval{'s' * (len(tied) > 1)} stated "
+            f"allow{'s' * (len(tied) == 1)} for"
+        )
     combination = _best_determined_combination(fit, group)
-    return f"{sentence}; their combination {combination} is" if combination else sentence
+    whose = "the combination of all of these," if tied else "their combination"
+    return f"{sentence}; {whose} {combination}{',' * bool(tied)} is" if combination else sentence
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
 
 
 def _best_determined_combination(fit: Identification, group: list[int]) -> str:

@@ -21,6 +21,7 @@ from creepkit.inverse.observation_vector import (
     thinned_history,
 )
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
+from creepkit.inverse.rupture_use import compares_rupture_times
 from creepkit.records import output_unit
 from creepkit.reports.html.elements import number, plural
 
@@ -82,7 +83,8 @@ def compared_values(fit: Identification) -> ComparedValues | None:
     predictor = CompositePredictor(dict(predictor)) if isinstance(predictor, Mapping) else predictor
     try:
         tests = [thinned_history(h, fit.settings.frames) for h in fit.histories]
-        observations = ObservationVector.from_histories(tests, predictor, fit.histories)
+        used = compares_rupture_times(fit.law, fit.settings)
+        observations = ObservationVector.from_histories(tests, predictor, fit.histories, rupture_times=used)
     except CreepkitError:
         return None
     counts = np.asarray(observations.present).sum(axis=1)
