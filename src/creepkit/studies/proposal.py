@@ -261,15 +261,25 @@ def _data_part(files: Sequence[str], reader: str | None, summary: DataSummary, p
 
 
 def _exclude_part(quality: DataQuality) -> list[str]:
-    """Proposals for suspect tests, as comments; suspect frames are left out by [data] suspect_frames."""
+    """Copies of tests, left out; proposals for other suspect tests, as comments.
+
+    Suspect frames are left out by [data] suspect_frames.
+    """
+    copies = [one for one in quality if one.kind == "copy"]
     lines = []
-    flags = [one for one in quality if len(one.tests) == 1 and one.kind not in FRAME_FLAG_KINDS]
+    flags = [one for one in quality if len(one.tests) == 1 and one.kind not in ("copy", *FRAME_FLAG_KINDS)]
     for flag in flags[:MOST_REMARKS]:
         lines += [comment(str(flag)), "# [[exclude]]", f"# test = {quoted(one_line(flag.history))}"]
         if flag.frames:
             text = frame_ranges_text(flag.frames).partition(" ")[2]
             lines.append(f"# frames = {quoted(text)}")
         lines += [f"# reason = {quoted(flag.kind)}", "#"]
+    if copies:
+        tables = [
+            ["[[exclude]]", f"test = {quoted(one_line(one.history))}", f"reason = {quoted(one_line(one.reason))}"]
+            for one in copies
+        ]
+        return [*(line for table in tables for line in (*table, "")), *lines][:-1]
     if not lines:
         return ["# [[exclude]]", '# test = "name of a test"', '# frames = "97-191, 193"', '# reason = "why"']
     return lines[:-1]
