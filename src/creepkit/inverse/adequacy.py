@@ -72,8 +72,9 @@ class Adequacy:
         of a bend of these rates over stress, by which a law shows that it misses the dependence on stress.
     implausible : nuisances that lie far from their priors, without which the law would not explain the tests.
     expected_chi_square : what `chi_square` is in the mean if the law is right: above one where noise is estimated from
-        few frames. not_judged : the outputs, where nothing can be judged, and few_frames : the tests, each with how
-        many frames it has, where these are too few to show the noise.
+        few frames. outlying : tests whose rates lie outside of those of all others, with their factors on the law's
+        rate; `rate_scatter` is then that of the others. not_judged : the outputs, where nothing can be judged, and
+        few_frames : the tests, each with how many frames it has, where these are too few to show the noise.
     """
 
     verdict: AdequacyVerdict
@@ -90,6 +91,7 @@ class Adequacy:
     expected_chi_square: float = 1.0
     not_judged: tuple[str, ...] = ()
     few_frames: tuple[tuple[str, int], ...] = ()
+    outlying: tuple[tuple[str, float], ...] = ()
 
     @property
     def explains(self) -> bool:
@@ -169,6 +171,9 @@ class Adequacy:
             for o in sorted(self.outputs, key=lambda o: -o.discrepancy_in_noises)
             if o.discrepancy > 0
         ]
+        parts += [
+            f"test '{name}', which creeps {factor:.3g} times as fast as it says" for name, factor in self.outlying
+        ]
         if self.rate_scatter > LARGEST_SCATTER:
             parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
         elif self.rate_trend_p_value < TREND_SIGNIFICANCE:
@@ -177,4 +182,6 @@ class Adequacy:
         if self.remedies:
             where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
         rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained"
+        if self.outlying and self.rate_scatter > 0:
+            rest += f", where rates of the other tests scatter by {100 * self.rate_scatter:.2g} %"
         return f"{rest} ({self._chi_square_text}, {self._p_value_text}){where}"

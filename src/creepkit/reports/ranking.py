@@ -41,6 +41,8 @@ def explanation(fit: Identification) -> str:
     if fit.adequacy.explains:
         return "yes"
     noises = fit.adequacy.discrepancy_in_noises
+    if fit.adequacy.outlying and not noises > 0:
+        return f"no: not test {fit.adequacy.outlying[0][0]}"
     return f"no: leaves {noises:.2g} noises" if noises > 0 else "no: rates of tests are not followed"
 
 

@@ -366,10 +366,12 @@ def unstated_member_notes(histories: Sequence[History]) -> list[str]:
     for level in (*common, *members):
         without = [h.name for h in histories if not level_of(h, level)]
         if without:
-            tests = without[0] if len(without) == 1 else f"{without[0]} and {len(without) - 1} more tests"
-            own = f"a {level} of its own" if len(without) == 1 else f"one {level} each"
-            assumed = f"of {level} {common[level]}, as the others are" if level in common else own
-            notes.append(f"{tests} with no {level} stated: taken for {assumed}")
+            several = len(without) > 1
+            tests = f"{without[0]} and {len(without) - 1} more state" if several else f"{without[0]} states"
+            own = f"one {level} each" if several else f"a {level} of its own"
+            one = "tests" if several else "one"
+            assumed = f"{one} of {level} {common[level]}, as the others are" if level in common else own
+            notes.append(f"{tests} no {level}: taken for {assumed}")
     return notes
 
 
