@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from creepkit.cli.declared_options import OutputPath
-from creepkit.reports.terminal import print_json
+from creepkit.reports.terminal import print_json, printable
 
 if TYPE_CHECKING:
     from creepkit.errors import CreepkitError
@@ -41,7 +41,6 @@ def command(
     channels, units, gaps and clock.
     """
     import creepkit as ck
-    from creepkit.errors import HistoryError
     from creepkit.readers.table_summary import summarise_tables
     from creepkit.reports import histories as report
     from creepkit.reports.data_quality import data_quality_to_json
@@ -72,14 +71,16 @@ def command(
     if plot is not None:
         report.histories_figure(found, plot)
         typer.echo(f"wrote {plot}", err=as_json)
+    for error in unread:
+        typer.echo(printable(f"not read: {error}"), err=True)
     if unread:
-        raise HistoryError("\n".join(("not read:", *(f"  {error}" for error in unread))))
+        raise typer.Exit(1)
 
 
 def _readable_tests(
     files: list[Path], reader: str | None, ignored: list[str]
 ) -> tuple[list[History], list[CreepkitError]]:
-    """All tests; where some file cannot be read those of the others, and the error of each. Its error if it is alone."""
+    """All tests; where some file cannot be read those of the others, and the errors of these."""
     import creepkit as ck
 
     try:
@@ -89,7 +90,8 @@ def _readable_tests(
         single = [one for path in files for one in (_files_in(path, reader) if path in folders else [path])]
         if len(single) < 2:
             raise
-        read, unread = list[Path](), list[CreepkitError]()
+        read: list[Path] = []
+        unread: list[CreepkitError] = []
         for path in single:
             try:
                 ck.read_histories([path], reader=reader, ignore=ignored)

@@ -150,7 +150,14 @@ def _frame_flags(history: History, kinds: Collection[str]) -> list[QualityFlag]:
         if kind in kinds:
             kind_findings = [(kind, finding) for finding in search(remaining)]
             result += [
-                QualityFlag((history.name,), kind, finding.frames, finding.reason) for kind, finding in kind_findings
+                QualityFlag(
+                    (history.name,),
+                    kind,
+                    finding.frames,
+                    finding.reason,
+                    time=float(history.times[min(finding.frames)]),
+                )
+                for kind, finding in kind_findings
             ]
             remaining = _with_frames_unused(remaining, [k for _, finding in kind_findings for k in finding.frames])
     return result

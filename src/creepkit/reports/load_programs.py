@@ -76,6 +76,15 @@ def temperature_text(history: History) -> str:
     return _holds_text(steps, " °C", lambda v: f"{v - ZERO_CELSIUS:.0f}")
 
 
+def held_temperatures(history: History) -> list[float]:
+    """K at which a test is held, in their order; the mean temperature of one that is never held at any."""
+    program = history.temperature_program()
+    if float(np.ptp(program.values)) <= 2 * HELD_TEMPERATURE:
+        return [float(np.mean(program.values))]
+    held = [value for _, _, value in holds(program, _last_time(history), HELD_TEMPERATURE)]
+    return held or [history.mean_temperature]
+
+
 def holds(program: Program, last: float, tolerance: float) -> list[tuple[float, float, float]]:
     """(start, end, value) of the pieces, s, over which a program stays within a tolerance of their first value.
 
@@ -100,7 +109,7 @@ def _last_time(history: History) -> float:
 
 
 def _holds_text(pieces: list[tuple[float, float, float]], unit: str, number: Callable[[float], str]) -> str:
-    """The values of holds, and when each but the first begins to be approached."""
+    """The values of holds, and when each but the first begins, or between which times."""
     if not pieces:
         return f"ramps{unit}"
     first = number(pieces[0][2])
@@ -110,7 +119,8 @@ def _holds_text(pieces: list[tuple[float, float, float]], unit: str, number: Cal
         return f"{first} → … → {number(pieces[-1][2])}{unit}, {len(pieces)} steps"
     text = first
     for before, after in pairwise(pieces):
-        text += f" → {number(after[2])}{unit} at {hours_text(before[1])}"
+        begins, ends = hours_text(before[1]), hours_text(after[0])
+        text += f" → {number(after[2])}{unit} at {begins if begins == ends else f'{begins} to {ends}'}"
     return text
 
 

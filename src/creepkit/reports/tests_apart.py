@@ -57,7 +57,9 @@ def apart_sentence(fit: Identification) -> str:
     more = f" and {len(apart) - MOST_NAMED} more" if len(apart) > MOST_NAMED else ""
     others = [one.rate_factor for one in fit.tests if one not in apart and one.rate_factor > 0] or [1.0]
     usual = float(np.median(others))
-    errors = "".join(f". {_errors_text(fit, one, one.rate_factor / usual)}" for one in apart[:MOST_EXPLAINED])
+    ratios = {one.name: one.rate_factor / usual for one in apart}
+    outside = [one for one in apart if abs(np.log(ratios[one.name])) > np.log(OUTLYING_FACTOR)][:MOST_EXPLAINED]
+    errors = "".join(f". {_errors_text(fit, one, ratios[one.name])}" for one in outside)
     return (
         f"creep rates that lie far from the law's: {', '.join(named)}{more}{errors}. Check the units of strain, load, "
         "time and temperature of these tests, and their conditions, first: a unit that was misread is the usual cause, "

@@ -13,12 +13,14 @@ from creepkit.inverse.duration import duration_known, followed_duration, needs_d
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import ZERO_CELSIUS, History, dimensions_of, load_unit
+from creepkit.reports.load_programs import held_temperatures
+from creepkit.studies.arguments import HOUR
 from creepkit.studies.camera_proposal import CameraProposal, proposed_cameras, text_of_cameras
 from creepkit.studies.folders import folders_with_tests
 from creepkit.studies.study_file import parse_study
 from creepkit.studies.swapped_units import swapped_units
 from creepkit.studies.tertiary_creep import shows_tertiary_creep
-from creepkit.studies.toml_text import CITATION_LINE, comment, one_line, quoted, quoted_list, study_part
+from creepkit.studies.toml_text import CITATION_LINE, comment, comments, one_line, quoted, quoted_list, study_part
 
 SECONDARY_LAWS = ("norton", "strain-hardening", "time-hardening")
 SEVERAL_STRESSES_LAW = "hyperbolic-sine"
@@ -75,7 +77,7 @@ class DataSummary:
     def of(cls, tests: Sequence[History]) -> DataSummary:
         """The summary of tests."""
         levels: list[float] = []
-        for temperature in sorted(history.mean_temperature for history in tests):
+        for temperature in sorted(value for history in tests for value in held_temperatures(history)):
             if not levels or temperature > levels[-1] + SAME_TEMPERATURE:
                 levels.append(temperature)
         return cls(
@@ -269,10 +271,12 @@ def _exclude_part(quality: DataQuality) -> list[str]:
     lines = []
     flags = [one for one in quality if len(one.tests) == 1 and one.kind not in ("copy", *FRAME_FLAG_KINDS)]
     for flag in flags[:MOST_REMARKS]:
-        lines += [comment(str(flag)), "# [[exclude]]", f"# test = {quoted(one_line(flag.history))}"]
+        lines += [*comments(str(flag)), "# [[exclude]]", f"# test = {quoted(one_line(flag.history))}"]
         if flag.frames:
             text = frame_ranges_text(flag.frames).partition(" ")[2]
             lines.append(f"# frames = {quoted(text)}")
+        elif flag.time is not None:
+            lines.append(f"# from_h = {flag.time / HOUR:.6g}")
         lines += [f"# reason = {quoted(flag.kind)}", "#"]
     if copies:
         tables = [

@@ -52,7 +52,7 @@ def test_a_strain_ten_times_too_large_is_not_explained_and_its_cause_is_named():
     assert name == "t7"
     usual = np.median([one.rate_factor for one in fit.tests if one.name != name])
     assert factor / usual == pytest.approx(10**1.5, rel=0.3)
-    assert fit.adequacy.rate_scatter < 0.3, "that of the other tests, planted as 0.08"
+    assert fit.adequacy.rate_scatter < 0.5, "that of the other tests, planted as 0.08; the wrong one draws the exponent"
     assert "test 't7'" in str(fit.adequacy)
     said = apart_sentence(fit)
     assert "strain" in said
