@@ -107,7 +107,8 @@ def _unloaded_end(history: History, frames: Ints) -> Iterator[FlaggedFrames]:
         if shortfall > END_THRESHOLD * sigma * standard_error and (y[-count:] < y[-count - 1] - sigma).all():
             reason = (
                 f"at {time_text(float(t[-count]))} {_difference_text(history, shortfall)} below what the "
-                f"{END_FIT_FRAMES} frames before it lead to, {shortfall / sigma:.0f} times the noise: the load was taken off"
+                f"{END_FIT_FRAMES} frames before it lead to, "
+                f"{shortfall / sigma:.0f} times the noise: the load was taken off"
             )
             yield FlaggedFrames(tuple(map(int, frames[-count:])), reason)
             return

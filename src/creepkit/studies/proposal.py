@@ -10,10 +10,10 @@ from pathlib import Path
 
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.duration import duration_known, followed_duration, needs_durations
+from creepkit.inverse.held_levels import held_temperatures
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import ZERO_CELSIUS, History, dimensions_of, load_unit
-from creepkit.reports.load_programs import held_temperatures
 from creepkit.studies.arguments import HOUR
 from creepkit.studies.camera_proposal import CameraProposal, proposed_cameras, text_of_cameras
 from creepkit.studies.folders import folders_with_tests
