@@ -67,7 +67,7 @@ def identify(
         starts=4, nuisances=["offset", Nuisance("rate", sd=0.1)], weights="likelihood".
     """
     from creepkit.inverse.composite_predictor import through_for_law
-    from creepkit.inverse.history_checks import loading_notes, rig_notes, without_suspect_frames
+    from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
     from creepkit.inverse.identify import identify as run
     from creepkit.inverse.nuisance_parameters import check_nuisance_tests
     from creepkit.inverse.settings import IdentificationSettings
@@ -75,7 +75,7 @@ def identify(
 
     law, predictor = resolve_law(law), resolve_predictors(using, check_histories(histories))
     settings = change_settings(settings or IdentificationSettings(), changes, predictor)
-    histories = without_suspect_frames(check_histories(histories), settings)
+    histories, left_out = sound_tests(check_histories(histories), settings)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     surrogate = _resolve_through(through, predictor)
     if through == "auto":
@@ -93,7 +93,7 @@ def identify(
             settings=settings,
             progress=progress,
         )
-    return replace(fit, notes=(*fit.notes, *loading_notes(histories), *rig_notes(histories, settings)))
+    return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
 
 
 def select(
@@ -116,7 +116,7 @@ def select(
         asked for explains the tests, has 95 % of the weight, and nothing that the tests allow stands against it.
     using, through, settings, changes : as for identify(); weights are "likelihood".
     """
-    from creepkit.inverse.history_checks import loading_notes, rig_notes, without_suspect_frames
+    from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
     from creepkit.inverse.nuisance_parameters import check_nuisance_tests
     from creepkit.inverse.selection.select import select as run
     from creepkit.inverse.settings import IdentificationSettings
@@ -128,7 +128,7 @@ def select(
             f"select() compares laws by their likelihood, found weights={changes['weights']!r}; leave weights out, or "
             "identify each law with them and rank() the results"
         )
-    histories = without_suspect_frames(check_histories(histories), settings)
+    histories, left_out = sound_tests(check_histories(histories), settings)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     ranking = run(
         [resolve_law(law) for law in ((laws,) if isinstance(laws, str) else laws)],
@@ -140,7 +140,7 @@ def select(
         by=by,
         progress=progress,
     )
-    notes = (*loading_notes(histories), *rig_notes(histories, settings))
+    notes = (*left_out, *loading_notes(histories), *rig_notes(histories, settings))
     noted = (replace(one, fit=replace(one.fit, notes=(*one.fit.notes, *notes))) for one in ranking.laws)
     return replace(ranking, laws=tuple(noted))
 

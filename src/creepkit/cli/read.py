@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from creepkit.cli.declared_options import OutputPath
-from creepkit.reports.terminal import print_json
+from creepkit.reports.terminal import print_json, printable
 
 if TYPE_CHECKING:
+    from creepkit.errors import CreepkitError
     from creepkit.records import History, InstrumentRecord
 
 
@@ -49,14 +50,15 @@ def command(
         _show_records(records, to, plot, as_json)
         return
     ignored = [name.strip() for name in (ignore or "").split(",") if name.strip()]
-    found = ck.read_histories(files, reader=reader, ignore=ignored)
+    found, unread = _readable_tests(files, reader, ignored)
     general = {str(path) for path in files if path.is_file() and reader in (None, "csv", "xlsx")}
     sources = {history.source.partition(" (")[0] for history in found}
     tables = [table for path in sorted(general & sources) for table in summarise_tables(Path(path), ignored)]
     framed = [history for history in found if history.outputs]
     quality = ck.check_data_quality(framed)
     if as_json:
-        print_json({**report.histories_to_json(found, tables), "quality": data_quality_to_json(quality)})
+        document = {**report.histories_to_json(found, tables), "quality": data_quality_to_json(quality)}
+        print_json({**document, "not read": [str(error) for error in unread]} if unread else document)
     else:
         without = len(found) - len(framed)
         counted = f"{without} test{'' if without == 1 else 's'} without frames" if without else ""
@@ -69,6 +71,49 @@ def command(
     if plot is not None:
         report.histories_figure(found, plot)
         typer.echo(f"wrote {plot}", err=as_json)
+    for error in unread:
+        typer.echo(printable(f"not read: {error}"), err=True)
+    if unread:
+        raise typer.Exit(1)
+
+
+def _readable_tests(
+    files: list[Path], reader: str | None, ignored: list[str]
+) -> tuple[list[History], list[CreepkitError]]:
+    """All tests; where some file cannot be read those of the others, and the errors of these."""
+    import creepkit as ck
+
+    try:
+        return ck.read_histories(files, reader=reader, ignore=ignored), []
+    except ck.errors.CreepkitError:
+        folders = [path for path in files if path.is_dir()]
+        single = [one for path in files for one in (_files_in(path, reader) if path in folders else [path])]
+        if len(single) < 2:
+            raise
+        read: list[Path] = []
+        unread: list[CreepkitError] = []
+        for path in single:
+            try:
+                ck.read_histories([path], reader=reader, ignore=ignored)
+            except ck.errors.CreepkitError as error:
+                unread.append(error)
+            else:
+                read.append(path)
+        if not read or not unread:
+            raise
+    return ck.read_histories(read, reader=reader, ignore=ignored), unread
+
+
+def _files_in(folder: Path, reader: str | None) -> list[Path]:
+    """The visible files of a folder that a reader accepts, or the folder where one takes it as a whole."""
+    from creepkit.records.plugin_calls import accepts_path
+    from creepkit.registry import default_registry
+
+    readers = [entry.value for name, entry in default_registry().readers().items() if reader in (None, name)]
+    if any(accepts_path(one, folder) for one in readers):
+        return [folder]
+    visible = sorted(one for one in folder.iterdir() if one.is_file() and one.name[0] != ".")
+    return [one for one in visible if any(accepts_path(each, one) for each in readers)]
 
 
 def _write(histories: list[History], folder: Path) -> list[Path]:

@@ -78,7 +78,9 @@ def command(
 
 
 def print_result(result: StudyResult) -> None:
-    """How each stage ended, what was found, and where the report is."""
+    """How each stage ended, what was found, tests that lie apart, and where the report is."""
+    from creepkit.reports.tests_apart import apart_sentence
+
     typer.echo(printable(result.title))
     print_table("", ("stage", "state", ""), [(one.name, one.state, one.sentence) for one in result.stages])
     for exclusion in result.exclusions:
@@ -86,7 +88,8 @@ def print_result(result: StudyResult) -> None:
         frames = f", {count} frame{'s' if count > 1 else ''}" if count else ""
         typer.echo(printable(f"left out: {exclusion.test}{frames}: {exclusion.reason}"))
     for group, ranking in result.rankings.items():
-        typer.echo(printable(f"{group}: {ranking.verdict}" if group else ranking.verdict))
+        for sentence in filter(None, (ranking.verdict, apart_sentence(ranking.best))):
+            typer.echo(printable(f"{group}: {sentence}" if group else sentence))
     if result.report is not None:
         typer.echo(f"report: {result.report}")
 

@@ -14,7 +14,7 @@ from creepkit.discovery.regression import IsothermalEstimates, check_temperature
 from creepkit.discovery.temperature_law import TemperatureLaw, temperature_law_from_combinations
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.history_checks import suspect_frames_note, without_suspect_frames
+from creepkit.inverse.history_checks import sound_tests, suspect_frames_note
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_temperature, with_arrhenius
@@ -68,7 +68,7 @@ def discover(
     if predictor is None:
         raise FitError("the identifications were loaded from files: give using=, the specimen they were made with")
     settings = settings or fits[0].settings
-    tests = without_suspect_frames(check_histories(histories), settings)
+    tests, _ = sound_tests(check_histories(histories), settings)
     return refit(temperature_law, tests, predictor, settings=settings, progress=progress)
 
 
@@ -151,7 +151,8 @@ def temperature_study(
     if not tests:
         raise FitError("there are no histories to study")
     settings = settings or IdentificationSettings()
-    histories, notes = without_suspect_frames(tests, settings), []
+    histories, left_out = sound_tests(tests, settings)
+    notes = list(left_out)
     moduli_fit = None
     if moduli:
         moduli_fit = identify_moduli(with_arrhenius(law, histories), histories, predictor, frames=FIRST_FRAMES)

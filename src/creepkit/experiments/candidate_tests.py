@@ -13,6 +13,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError, quoted
 from creepkit.experiments.rig import HIGHER_LEVEL, LOWER_LEVEL, Rig
 from creepkit.records import (
+    ZERO_CELSIUS,
     History,
     Loading,
     PressureJump,
@@ -89,7 +90,7 @@ def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperatu
     candidates = []
     for duration, T in product(_durations(rig, longest), temperatures):
         for loading, text in _LOADINGS.get(quantity, _loads)(rig, base, duration):
-            at_temperature = f" at {T:.5g} K" if len(temperatures) > 1 else ""
+            at_temperature = f" at {T - ZERO_CELSIUS:.4g} °C" if len(temperatures) > 1 else ""
             whole = f"{text} for {hours_text(duration)}{at_temperature}"
             times = frame_times(duration, rig.frame_interval)
             for dimensions, pieces_text in pieces:

@@ -15,6 +15,7 @@ from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
 from creepkit.records import dimensions_of
+from creepkit.records.units import time_text
 
 
 def check_arguments(goal: object, budget: object, seed: object) -> None:
@@ -70,7 +71,7 @@ def edges_of(chosen: CandidateTest, considered: Sequence[CandidateTest], rigs: M
     if chosen.duration <= 1.001 * min(durations) and min(durations) < 0.999 * max(durations):
         notes.append(
             f"it is as short as any test that was considered ({hours_text(min(durations))}, for frames each "
-            f"{rig.frame_interval:.3g} s): more frequent frames may make a shorter one better"
+            f"{time_text(rig.frame_interval)}): more frequent frames may make a shorter one better"
         )
     levels = chosen.histories[0].loading.program().values
     levels = levels[levels > 0]

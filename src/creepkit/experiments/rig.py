@@ -11,6 +11,7 @@ import numpy as np
 
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.composite_predictor import predictor_for
+from creepkit.inverse.held_levels import held_temperatures
 from creepkit.records import History, Predictor, dimension_named, dimensions_of, load_unit, outputs_of_test
 
 LOWER_LEVEL, HIGHER_LEVEL, EXTENSION = 0.7, 1.4, 2.0
@@ -146,7 +147,7 @@ def _rig_of(tests: Sequence[History], predictor: Predictor) -> Rig:
     if not levels.size:
         raise FitError(f"tests of specimen '{tests[0].specimen}' hold no load above zero; say what the rig can do")
     temperatures: list[float] = []
-    for T in sorted(h.mean_temperature for h in tests):
+    for T in sorted(value for h in tests for value in held_temperatures(h)):
         if not temperatures or T - temperatures[-1] > ROUNDED_TEMPERATURE:
             temperatures.append(round(T, 2))
     largest = max(_largest_output(h, predictor) for h in tests)

@@ -356,10 +356,11 @@ def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputFo
             f"what is usual holds it, {100 * USUAL_SD['test']:.0f} % of the rate"
         )
     for level, names in scatter.members.items():
-        if len(set(names)) < FEW_TESTS:
+        stated = {name for name in names if not name.startswith("(of ")}
+        if len(stated) < FEW_TESTS:
             plural = {"heat": "heats", "laboratory": "laboratories"}[level]
             notes.append(
-                f"{len(set(names))} {plural} say little of the scatter between them: what is usual holds it, "
+                f"{len(stated)} {plural} say little of the scatter between them: what is usual holds it, "
                 f"{100 * USUAL_SD[level]:.0f} % of the rate"
             )
     for level in test.unseen:

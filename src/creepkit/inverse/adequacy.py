@@ -83,6 +83,8 @@ class Adequacy:
     not_judged : the outputs, where nothing can be judged, and few_frames : the tests, each with how
         many frames it has, where these are too few to show the noise.
     contradicting : minimum rates and rupture times that contradict one another by the law, beyond their own scatter.
+    outlying : tests whose rates lie outside of those of all others, with their factors on the law's rate;
+        `rate_scatter` is then that of the others.
     """
 
     verdict: AdequacyVerdict
@@ -102,6 +104,7 @@ class Adequacy:
     critical_chi_square: float = float("nan")
     smallest_p_value: float = float("nan")
     contradicting: ContradictingValues | None = None
+    outlying: tuple[tuple[str, float], ...] = ()
 
     @property
     def explains(self) -> bool:
@@ -176,6 +179,8 @@ class Adequacy:
         if self.contradicting is not None:
             return "contradicted: rates contradict rupture times"
         noises = self.discrepancy_in_noises
+        if self.outlying and not noises > 0:
+            return f"contradicted by test {self.outlying[0][0]}"
         left = f"leaves {noises_text(noises)} noises" if noises > 0 else "rates of tests are not followed"
         return f"contradicted: {left}"
 
@@ -206,6 +211,9 @@ class Adequacy:
             for o in sorted(self.outputs, key=lambda o: -o.discrepancy_in_noises)
             if o.discrepancy > 0
         ]
+        parts += [
+            f"test '{name}', which creeps {factor:.3g} times as fast as it says" for name, factor in self.outlying
+        ]
         if self.rate_scatter > LARGEST_SCATTER:
             parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
         elif self.rate_trend_p_value < TREND_SIGNIFICANCE:
@@ -216,6 +224,8 @@ class Adequacy:
         if self.remedies:
             where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
         rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained"
+        if self.outlying and self.rate_scatter > 0:
+            rest += f", where rates of the other tests scatter by {100 * self.rate_scatter:.2g} %"
         return f"{rest} ({self._chi_square_text}, {self._p_value_text}){where}"
 
 

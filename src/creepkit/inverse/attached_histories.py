@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from creepkit.errors import FitWarning
-from creepkit.inverse.history_checks import without_suspect_frames
+from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_notes import data_digest
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -16,14 +16,14 @@ from creepkit.records import History, Predictor
 
 
 def with_attached(fit: Identification, tests: Sequence[History], predictor: Predictor) -> Identification:
-    """The identification with its tests and what predicts them, suspect frames left out as they were.
+    """The identification with its tests and what predicts them, copies and suspect frames left out as they were.
 
     FitWarning where the tests are not those that it was made from: other frames, values, weights or nuisances.
     """
     tests = compared_tests(fit.law, tests, fit.settings).histories
     attached = replace(fit, histories=tuple(tests), predictor=predictor, problem=None)
     known = fit.provenance.get("data")
-    sound = tuple(without_suspect_frames(tests, fit.settings))
+    sound = tuple(sound_tests(tests, fit.settings)[0])
     if known is None or _digest(attached) == known:
         return attached
     without_suspect = replace(attached, histories=sound)

@@ -27,6 +27,7 @@ from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.largest_deviation import largest_deviation
 from creepkit.inverse.noise_covariance import predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, Residuals
+from creepkit.inverse.outlying_tests import outlying_tests
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.unmodelled_effect import UnmodelledEffect
@@ -89,8 +90,9 @@ def adequacy_of(
     alone = any(o.p_value < SIGNIFICANCE for o in outputs)
     left = [p_value < SIGNIFICANCE and (o.p_value < SIGNIFICANCE or not alone) for o in outputs]
     outputs = [o if kept else replace(o, discrepancy=0.0) for o, kept in zip(outputs, left, strict=True)]
-    scatter, trend = _scatter_of_rates(problem, judged.residuals, noise_model)
-    explained = p_value >= SIGNIFICANCE and scatter <= LARGEST_SCATTER and not trend < TREND_SIGNIFICANCE
+    scatter, trend, outlying = _scatter_of_rates(problem, judged.residuals, noise_model)
+    scattered = scatter > LARGEST_SCATTER or trend < TREND_SIGNIFICANCE or bool(outlying)
+    explained = p_value >= SIGNIFICANCE and not scattered
     return Adequacy(
         "explains" if explained else "leaves a discrepancy",
         tuple(outputs),
@@ -104,6 +106,7 @@ def adequacy_of(
         expected_chi_square=known.expected(share_of_freedom, known.judged),
         critical_chi_square=known.critical(SIGNIFICANCE / len(p_values), share_of_freedom, known.judged),
         smallest_p_value=min(p_values),
+        outlying=outlying,
     )
 
 
@@ -133,18 +136,23 @@ def adequacy_with_remedies(
 
 def _scatter_of_rates(
     problem: LeastSquaresProblem, residuals: Residuals, noise_model: NoiseModel
-) -> tuple[float, float]:
-    """Standard deviation of ln rate between tests, and the p-value of a bend of it over stress; 0 and 1 for none.
+) -> tuple[float, float, tuple[tuple[str, float], ...]]:
+    """Standard deviation of ln rate between tests, p-value of a bend of it over stress; 0 and 1 for none; and outliers.
 
     The scatter was estimated from the same tests: a law that misses the dependence on stress makes it, and it then
-    bends over the stress. The p-value is that of the square of ln stress in a regression (F test).
+    bends over the stress. The p-value is that of the square of ln stress in a regression (F test). Of tests that lie
+    outside of all others the names and factors are given; scatter and bend are then those of the others.
     """
-    rates = predicted_random_effects(residuals, noise_model)[1]
-    stresses = np.log([float(np.median(reference_stresses(h, problem.predictor))) for h in problem.histories])
     if not noise_model.rate > 0:
-        return 0.0, 1.0
+        return 0.0, 1.0, ()
+    rates = predicted_random_effects(residuals, noise_model)[1]
+    outside = outlying_tests(rates)
+    outlying = tuple((problem.histories[k].name, float(np.exp(rates[k]))) for k in np.flatnonzero(outside))
+    stresses = np.log([float(np.median(reference_stresses(h, problem.predictor))) for h in problem.histories])[~outside]
+    rates = rates[~outside]
+    scatter = float(rates.std(ddof=1)) if outlying else noise_model.rate
     if np.std(rates) < JUDGED_SCATTER or len(rates) < FEWEST_TREND_TESTS or np.unique(stresses.round(3)).size < 3:
-        return noise_model.rate, 1.0
+        return scatter, 1.0, outlying
     x = stresses - stresses.mean()
     squares = [
         float(((rates - design @ np.linalg.lstsq(design, rates, rcond=None)[0]) ** 2).sum())
@@ -152,7 +160,7 @@ def _scatter_of_rates(
     ]
     freedom = len(rates) - 3
     ratio = (squares[0] - squares[1]) / max(squares[1] / freedom, 1e-300)
-    return noise_model.rate, float(f.sf(ratio, 1.0, freedom))
+    return scatter, float(f.sf(ratio, 1.0, freedom)), outlying
 
 
 def _correlation(noise_model: NoiseModel) -> float:

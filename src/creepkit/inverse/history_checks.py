@@ -1,4 +1,4 @@
-"""Histories before an identification: suspect frames left out; enough finite outputs, creep beyond their noise."""
+"""Histories before an identification: copies and suspect frames left out, then what must hold of them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from creepkit.inverse.observation_vector import ObservationVector, frames_with_d
 from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
-from creepkit.quality import check_loading_strain, check_rig, exclude_suspect_frames
+from creepkit.quality import check_loading_strain, check_rig, exclude_suspect_frames, without_copies
 from creepkit.records import History, Predictor, is_logarithmic, output_named, outputs_of_test
 
 SUSPECT_LABEL = "suspect"
@@ -29,6 +29,19 @@ def without_suspect_frames(histories: Sequence[History], settings: Identificatio
     if settings.suspect_frames == "keep":
         return list(histories)
     return [h if SUSPECT_LABEL in h.labels else exclude_suspect_frames([h])[0] for h in histories]
+
+
+def sound_tests(
+    histories: Sequence[History], settings: IdentificationSettings
+) -> tuple[list[History], tuple[str, ...]]:
+    """The tests that count: copies of others left out and suspect frames unused, unless settings keep them; and notes.
+
+    The notes say which tests are copies, a sentence each.
+    """
+    if settings.suspect_frames == "keep":
+        return list(histories), ()
+    kept, reasons = without_copies(histories)
+    return without_suspect_frames(kept, settings), tuple(f"left out: {name}: {why}" for name, why in reasons.items())
 
 
 def truncated_at_strain(histories: Sequence[History], limit: float) -> list[History]:

@@ -20,6 +20,7 @@ from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.prediction_failures import tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_end_strain, reference_stresses
+from creepkit.inverse.uncertainty.rate_scatter import unstated_member_notes
 from creepkit.language import temperature
 from creepkit.records import History, Prediction, Status
 
@@ -122,6 +123,7 @@ def identification_notes(
         sentences.append(
             f"the minimum rate stated of {_named(with_both)} was not used: the readings of its test hold it already"
         )
+    sentences += unstated_member_notes(histories)
     sentences += nuisance_correlation_notes(problem, estimation.residuals)
     if (problem.bound_penalties.constraint_violations(estimation.minimum.x[: problem.parameter_count]) > 1e-3).any():
         sentences.append("a constraint of the law does not hold over the tests at these values")

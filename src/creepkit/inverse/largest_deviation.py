@@ -11,6 +11,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.records import History, output_unit
+from creepkit.records.units import time_text
 
 LOCAL_FRAMES = 5
 """Frames whose mean deviation says when a law misses a test."""
@@ -37,7 +38,7 @@ class LargestDeviation:
         side = "above" if self.deviation > 0 else "below"
         rms = f" (rms {_amount(self.rms, unit)})" if self.rms > 0 else ""
         return (
-            f"{self.output} of '{self.test}'{rms} about {self.time / 3600.0:.4g} h, where it lies "
+            f"{self.output} of '{self.test}'{rms} about {time_text(self.time)}, where it lies "
             f"{_amount(abs(self.deviation), unit)} {side} what was measured"
         )
 

@@ -1,8 +1,9 @@
 """Data quality: checks of measured histories, each flag stated with numbers; nothing is dropped unless asked for.
 
-Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one far from
-its replicates or from the trend of the others, a modulus off the trend, a first frame that is not elastic, strain of
-loading that nothing states, a strain above 100 %, a record of load or temperature that contradicts the stated program.
+Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one with the
+readings of another, one far from its replicates or from the trend of the others, a modulus off the trend, a first
+frame that is not elastic, strain of loading that nothing states, a strain above 100 %, a record of load or temperature
+that contradicts the stated program.
 Of the rig: a change of creep rate at one clock time in several tests, a jump of an output without a step of the load.
 """
 
@@ -21,6 +22,7 @@ from creepkit.quality.comparison import (
     replicate_deviations,
     temperature_trend_outliers,
 )
+from creepkit.quality.copies import copied_tests
 from creepkit.quality.flags import DataQuality, FlagKind, QualityFlag, frame_ranges_text
 from creepkit.quality.frames import FlaggedFrames, decreasing_frames, outlier_frames, unloading_frames
 from creepkit.quality.loading_strain import unstated_loading_strain
@@ -35,7 +37,9 @@ __all__ = [
     "check_data_quality",
     "check_loading_strain",
     "check_rig",
+    "copy_reason",
     "exclude_suspect_frames",
+    "without_copies",
 ]
 
 
@@ -55,7 +59,9 @@ def check_data_quality(
     if not (np.isfinite(activation_energy) and activation_energy > 0):
         raise HistoryError(f"an activation energy of {activation_energy:g} J/mol is not above zero; try 400e3")
     results = [[*_frame_flags(history, FRAME_FLAG_KINDS)] for history in histories]
+    copies = copied_tests(histories)
     test_checks: list[tuple[FlagKind, dict[int, str]]] = [
+        ("copy", {k: copy_reason(histories[original]) for k, original in copies.items()}),
         ("replicate", replicate_deviations(histories)),
         ("temperature", temperature_trend_outliers(histories)),
         ("modulus", modulus_trend_outliers(histories)),
@@ -75,6 +81,18 @@ def check_data_quality(
     flags += check_loading_strain(sound)
     flags += check_rig(sound, activation_energy=activation_energy)
     return DataQuality(tuple(flags), len(histories))
+
+
+def copy_reason(original: History) -> str:
+    """Why a test that is a copy counts not at all beside its original."""
+    return f"the same readings as {original.name}: one test, which counts once"
+
+
+def without_copies(histories: Sequence[History]) -> tuple[list[History], dict[str, str]]:
+    """The histories without those that are copies of others, and {name of a copy: why it is left out}."""
+    copies = copied_tests(histories)
+    kept = [history for k, history in enumerate(histories) if k not in copies]
+    return kept, {histories[k].name: copy_reason(histories[original]) for k, original in copies.items()}
 
 
 def check_loading_strain(histories: Sequence[History]) -> list[QualityFlag]:
@@ -132,7 +150,14 @@ def _frame_flags(history: History, kinds: Collection[str]) -> list[QualityFlag]:
         if kind in kinds:
             kind_findings = [(kind, finding) for finding in search(remaining)]
             result += [
-                QualityFlag((history.name,), kind, finding.frames, finding.reason) for kind, finding in kind_findings
+                QualityFlag(
+                    (history.name,),
+                    kind,
+                    finding.frames,
+                    finding.reason,
+                    time=float(history.times[min(finding.frames)]),
+                )
+                for kind, finding in kind_findings
             ]
             remaining = _with_frames_unused(remaining, [k for _, finding in kind_findings for k in finding.frames])
     return result

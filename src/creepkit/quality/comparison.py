@@ -11,6 +11,7 @@ from creepkit.arrays import Floats
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.quality.frames import load_segments, noise_standard_deviation
 from creepkit.records import ZERO_CELSIUS, History, Predictor, Program, growing_output, output_named, predict_with
+from creepkit.records.units import time_text
 
 
 def duplicate_tests(
@@ -125,7 +126,7 @@ def replicate_deviations(histories: Sequence[History]) -> dict[int, str]:
             creep_of_test, creep_of_replicate = (_creep_increment(histories[j], end) for j in (k, other))
             results[k] = (
                 f"grows {_creep_ratio(histories[k], histories[other], end):.2f} times as much as its replicate "
-                f"{histories[other].name} (to {end:g} s by {creep_of_test:.3g} and {creep_of_replicate:.3g}), "
+                f"{histories[other].name} (to {time_text(end)} by {creep_of_test:.3g} and {creep_of_replicate:.3g}), "
                 f"at {_celsius_text(histories[k])} and {_celsius_text(histories[other])}"
             )
     return results

@@ -13,6 +13,7 @@ FlagKind = Literal[
     "unloading",
     "falling",
     "outlier",
+    "copy",
     "replicate",
     "first frame",
     "loading",

@@ -10,6 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.records import History, growing_output, output_named
+from creepkit.records.units import time_text, times_text
 
 OUTLIER_THRESHOLD = 6.0
 """Robust standard deviations by which a single frame must differ from its neighbours: 2 in 1e9 of Gaussian noise do."""
@@ -87,7 +88,8 @@ def unloading_frames(history: History) -> Iterator[FlaggedFrames]:
     later_frames = later_frames[later_frames > usable[-1]] if usable.size else later_frames[:0]
     if later_frames.size and "frames_after_end" in history.labels:
         yield FlaggedFrames(
-            tuple(map(int, later_frames)), f"from {history.times[later_frames[0]]:g} s on, after the end of the test"
+            tuple(map(int, later_frames)),
+            f"from {time_text(float(history.times[later_frames[0]]))} on, after the end of the test",
         )
     segments = [part for part in load_segments(history) if part.frames.size > FEWEST_FRAMES]
     if segments and segments[-1].frames[-1] == usable[-1]:
@@ -104,8 +106,9 @@ def _unloaded_end(history: History, frames: Ints) -> Iterator[FlaggedFrames]:
         shortfall = expected - y[-count]
         if shortfall > END_THRESHOLD * sigma * standard_error and (y[-count:] < y[-count - 1] - sigma).all():
             reason = (
-                f"at {t[-count]:g} s {_difference_text(history, shortfall)} below what the {END_FIT_FRAMES} frames "
-                f"before it lead to, {shortfall / sigma:.0f} times the noise: the load was taken off"
+                f"at {time_text(float(t[-count]))} {_difference_text(history, shortfall)} below what the "
+                f"{END_FIT_FRAMES} frames before it lead to, "
+                f"{shortfall / sigma:.0f} times the noise: the load was taken off"
             )
             yield FlaggedFrames(tuple(map(int, frames[-count:])), reason)
             return
@@ -148,7 +151,8 @@ def decreasing_frames(history: History) -> Iterator[FlaggedFrames]:
             change = "is held at" if segment.is_first else "was raised to"
             load_text = f"{history.loading.quantity} {change} {segment.load:g} MPa"
             reason = (
-                f"falls by {_difference_text(history, decrease)} from {t[highest]:g} s to {t[lowest]:g} s, "
+                f"falls by {_difference_text(history, decrease)} from "
+                f"{times_text(float(t[highest]), float(t[lowest]))}, "
                 f"{decrease / noise_standard_deviation(t, y):.0f} times the noise, though the {load_text}"
             )
             yield FlaggedFrames(tuple(map(int, segment.frames[highest if segment.is_first else 0 :])), reason)
@@ -174,7 +178,7 @@ def outlier_frames(history: History) -> Iterator[FlaggedFrames]:
             deviation_text = _difference_text(history, float(residuals[worst] * residual_scale[worst]))
             frame = int(frames[worst + 2])
             reason = (
-                f"at {history.times[frame]:g} s off its neighbours by {deviation_text}, "
+                f"at {time_text(float(history.times[frame]))} off its neighbours by {deviation_text}, "
                 f"{standardised[worst]:.0f} times the noise"
             )
             yield FlaggedFrames((frame,), reason)

@@ -11,6 +11,7 @@ from creepkit.quality.common_changes import CommonRateChange, Jump
 from creepkit.quality.flags import QualityFlag
 from creepkit.quality.frames import LOAD_TOLERANCE, TEMPERATURE_TOLERANCE
 from creepkit.records import History, growing_output, output_named
+from creepkit.records.units import time_text, times_text
 
 ACTIVATION_ENERGY = 400e3
 """J/mol, with which a factor of the rate is put as a step of temperature unless another one is given."""
@@ -61,7 +62,7 @@ def rate_change_flag(histories: Sequence[History], change: CommonRateChange, act
         tuple(factors),
         "rate change",
         (),
-        f"at {change.time:g} s ({change.earliest:g} to {change.latest:g} s) the creep rate "
+        f"at {time_text(change.time)} ({times_text(change.earliest, change.latest)}) the creep rate "
         f"{'rises' if rises else 'falls'} at once by a factor (in brackets its nominal 95 % error, as a factor) of "
         f"{sizes}; "
         f"{_kelvin_text(kelvin)} {'warmer' if rises else 'colder'} would do it at {activation_energy / 1e3:g} kJ/mol; "
@@ -74,8 +75,8 @@ def rate_change_flag(histories: Sequence[History], change: CommonRateChange, act
         factor_errors=errors,
         temperature_steps=steps,
         jumps={histories[k].name: change.steps[k].jump for k in change.shown},
-        proposal=f"cut the frames after {change.time:g} s, model it by the nuisance {nuisances} from then on, {scope}, "
-        "or ignore it if the load or the alloy is known to have done it",
+        proposal=f"cut the frames after {time_text(change.time)}, model it by the nuisance {nuisances} from then on, "
+        f"{scope}, or ignore it if the load or the alloy is known to have done it",
     )
 
 
@@ -95,14 +96,14 @@ def jump_flags(histories: Sequence[History], jumps: Sequence[Jump]) -> Iterator[
             tuple(sizes),
             "jump",
             (),
-            f"{growing_output(histories[first.test])} steps by {', '.join(texts)} from {first.previous_time:g} s to "
-            f"{first.time:g} s, though the load does not",
+            f"{growing_output(histories[first.test])} steps by {', '.join(texts)} from "
+            f"{times_text(first.previous_time, first.time)}, though the load does not",
             time=first.time,
             earliest=max(j.previous_time for j in together),
             latest=first.time,
             jumps=sizes,
-            proposal=f"cut the frames from {first.time:g} s on, take the step off them if the observation moved (a "
-            "bumped camera or extensometer), or ignore it",
+            proposal=f"cut the frames from {time_text(first.time)} on, take the step off them if the observation "
+            "moved (a bumped camera or extensometer), or ignore it",
         )
 
 
@@ -122,7 +123,8 @@ def record_flags(history: History, activation_energy: float) -> Iterator[Quality
         unit, name, time = ("K" if is_temperature else "MPa"), history.name, float(times[off[0]])
         text = (
             f"the recorded {quantity} is off the stated one by more than {limit:g} {unit} in {off.size} of "
-            f"{times.size} frames, first at {time:g} s; most at {times[worst]:g} s, by {difference[worst]:+.3g} {unit}"
+            f"{times.size} frames, first at {time_text(time)}; most at {time_text(float(times[worst]))}, "
+            f"by {difference[worst]:+.3g} {unit}"
         )
         factors, steps = {}, {}
         if is_temperature:
@@ -139,7 +141,7 @@ def record_flags(history: History, activation_energy: float) -> Iterator[Quality
             rate_factors=factors,
             temperature_steps=steps,
             proposal="the record is what simulations use: ignore this if it is right; if the sensor is wrong, remove "
-            f"its column; if the control failed, cut the frames from {time:g} s on",
+            f"its column; if the control failed, cut the frames from {time_text(time)} on",
         )
 
 

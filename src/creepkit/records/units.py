@@ -115,3 +115,19 @@ def spellings(*symbols: str) -> dict[str, str]:
 def spelled_factors(*symbols: str) -> dict[str, float]:
     """{spelling: factor} of some units, for quantities whose units have no offset."""
     return {spelling: UNITS[symbol].conversion.factor for spelling, symbol in spellings(*symbols).items()}
+
+
+LONGEST_IN_SECONDS = 600.0
+"""s; longer times are said in hours."""
+
+
+def time_text(seconds: float) -> str:
+    """A time of a test for people: in hours, or in seconds up to LONGEST_IN_SECONDS."""
+    return f"{seconds:.4g} s" if abs(seconds) < LONGEST_IN_SECONDS else f"{seconds / 3600.0:.4g} h"
+
+
+def times_text(first: float, last: float) -> str:
+    """From one time to another, for people, in the unit of the later one; s."""
+    if abs(last) < LONGEST_IN_SECONDS:
+        return f"{first:.4g} to {last:.4g} s"
+    return f"{first / 3600.0:.4g} to {last / 3600.0:.4g} h"

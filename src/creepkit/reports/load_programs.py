@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from creepkit.inverse.observation_vector import frames_with_data
+from creepkit.inverse.held_levels import HELD_TEMPERATURE, holds, last_data_time
 from creepkit.inverse.reference_conditions import LOAD_TOLERANCE
 from creepkit.records import SECONDS_PER_HOUR as SECONDS_PER_HOUR
 from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program, load_unit
@@ -17,8 +17,8 @@ MOST_HOLDS = 3
 """Holds that are written one by one; of more, the first, the last and their number."""
 
 
-HELD_TEMPERATURE = 1.0
-"""K, within which a temperature is held."""
+SHORT_RAMP = 0.025
+"""Of the time at its end: a longer ramp has both its ends written, such as a step that lies between two readings."""
 
 
 def label_of(history: History) -> str:
@@ -34,7 +34,7 @@ def program_text(history: History) -> str:
 def load_text(history: History) -> str:
     """The load program over the frames of a test, such as "8 → 10 MPa at 4 h"."""
     loading = history.loading
-    last = _last_time(history)
+    last = last_data_time(history)
     if isinstance(loading, PointLoading):
         parts = [f"stress {name} {_level_text(p, last, ' MPa')}" for name, p in loading.stress.items()]
         return ", ".join(parts + [f"strain {name} {_level_text(p, last, '')}" for name, p in loading.strain.items()])
@@ -50,7 +50,7 @@ def kind_of_test(history: History) -> str:
     if isinstance(loading, PointLoading):
         prescribed = [name for name, one in (("stress", loading.stress), ("strain", loading.strain)) if one]
         return f"prescribed components of {' and '.join(prescribed)}"
-    program, last = loading.program(), _last_time(history)
+    program, last = loading.program(), last_data_time(history)
     pieces = holds(program, last, LOAD_TOLERANCE * float(np.abs(program.values).max()))
     levels = "constant" if len(pieces) == 1 else "stepwise" if pieces else "changing"
     if loading.quantity == "strain":
@@ -71,35 +71,12 @@ def temperature_text(history: History) -> str:
     program = history.temperature_program()
     if float(np.ptp(program.values)) <= 2 * HELD_TEMPERATURE:
         return f"{float(np.mean(program.values)) - ZERO_CELSIUS:.0f} °C"
-    steps = holds(program, _last_time(history), HELD_TEMPERATURE)
+    steps = holds(program, last_data_time(history), HELD_TEMPERATURE)
     return _holds_text(steps, " °C", lambda v: f"{v - ZERO_CELSIUS:.0f}")
 
 
-def holds(program: Program, last: float, tolerance: float) -> list[tuple[float, float, float]]:
-    """(start, end, value) of the pieces, s, over which a program stays within a tolerance of their first value.
-
-    last : s, the end of what is looked at. Ramps are no holds; a program of ramps alone has none.
-    """
-    times = np.append(program.times, max(last, float(program.times[-1])))
-    values = np.append(program.values, program.values[-1])
-    pieces: list[tuple[float, float, float]] = []
-    for start, end, value, following in zip(times[:-1], times[1:], values[:-1], values[1:], strict=True):
-        if start >= last or end <= start or abs(following - value) > tolerance:
-            continue
-        if pieces and start <= pieces[-1][1] * (1 + 1e-12) and abs(value - pieces[-1][2]) <= tolerance:
-            pieces[-1] = (pieces[-1][0], float(end), pieces[-1][2])
-        else:
-            pieces.append((float(start), float(end), float(value)))
-    return pieces
-
-
-def _last_time(history: History) -> float:
-    frames = np.flatnonzero(history.used & frames_with_data(history))
-    return float(history.times[frames[-1] if frames.size else -1])
-
-
 def _holds_text(pieces: list[tuple[float, float, float]], unit: str, number: Callable[[float], str]) -> str:
-    """The values of holds, and when each but the first begins to be approached."""
+    """The values of holds, and when each but the first begins, or between which times."""
     if not pieces:
         return f"ramps{unit}"
     first = number(pieces[0][2])
@@ -109,7 +86,9 @@ def _holds_text(pieces: list[tuple[float, float, float]], unit: str, number: Cal
         return f"{first} → … → {number(pieces[-1][2])}{unit}, {len(pieces)} steps"
     text = first
     for before, after in pairwise(pieces):
-        text += f" → {number(after[2])}{unit} at {hours_text(before[1])}"
+        known = after[0] - before[1] <= SHORT_RAMP * after[0]
+        when = hours_text(before[1]) if known else f"{hours_text(before[1])} to {hours_text(after[0])}"
+        text += f" → {number(after[2])}{unit} at {when}"
     return text
 
 

@@ -16,11 +16,11 @@ from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.inverse.defect_correction import with_correction_at_frames
 from creepkit.inverse.frame_noise import usable_frames
+from creepkit.inverse.held_levels import holds
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.reference_conditions import LOAD_TOLERANCE, reference_stresses
 from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
 from creepkit.records import History, Prediction
-from creepkit.reports.load_programs import holds
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 _CRITERION_NAMES = {"bic": "BIC", "aicc": "AICc", "hold-out": "hold-out"}
 
 
+CHI_SQUARE_NOTE = (
+    "chi-square: of all values under one estimated covariance, by which laws are compared; the reduced chi-square of a "
+    "verdict is that over the noise of the readings alone"
+)
+
+
 def ranking_text(ranking: Ranking) -> str:
     """The verdict, then a line for each law."""
     width = max(len(r.fit.law.name) for r in ranking.laws)
@@ -30,7 +36,7 @@ def ranking_text(ranking: Ranking) -> str:
     ]
     failed = [f"{name}: {reason}" for name, reason in ranking.failed.items()]
     equivalent = [] if ranking.decisive else [f"- {pair}" for pair in equivalents_among_remaining(ranking)]
-    return "\n".join([ranking.verdict, *equivalent, "", header, *rows, *failed])
+    return "\n".join([ranking.verdict, *equivalent, "", header, *rows, *failed, "", CHI_SQUARE_NOTE])
 
 
 def explanation(fit: Identification) -> str:

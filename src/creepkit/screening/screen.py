@@ -14,7 +14,7 @@ from typing import Literal
 
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.composite_predictor import CompositePredictor
-from creepkit.inverse.history_checks import without_suspect_frames
+from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets, check_penalty
 from creepkit.jobs.shard_progress import ProgressCallback, duration_text
@@ -103,7 +103,7 @@ def screen(
     """
     tests, composition_table = resolve_tests(histories, compositions), resolve_compositions(compositions)
     options, processes = options or ScreeningOptions(), process_count(workers, FitError)
-    tests = without_suspect_frames(tests, options.settings)
+    tests, _ = sound_tests(tests, options.settings)
     predictors = resolve_predictors(using, tests)
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()) if to is None else to)

@@ -16,6 +16,7 @@ import numpy as np
 from creepkit.errors import StudyError, nearest
 from creepkit.files.reading import FileKind, open_binary
 from creepkit.inverse.history_checks import SUSPECT_LABEL, truncated_at_strain
+from creepkit.quality import without_copies
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History
 from creepkit.records.history_selection import select_tests
 from creepkit.records.plugin_calls import accepts_path
@@ -205,6 +206,8 @@ def read_inputs(file: StudyFile, paths: Sequence[Path], watched: Sequence[Histor
             chosen = select_tests(measured, **_labels(file, data.only))
     histories, exclusions = _excluded(file, chosen, complete)
     if data.suspect_frames == "exclude":
+        histories, copies = without_copies(histories)
+        exclusions += [Exclusion(name, (), reason) for name, reason in copies.items()]
         sound = ck.exclude_suspect_frames(histories)
         exclusions += [
             Exclusion(after.name, _frames(before.used & ~after.used), f"suspect: {after.labels[SUSPECT_LABEL]}")

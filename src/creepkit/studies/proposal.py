@@ -10,6 +10,7 @@ from pathlib import Path
 
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.duration import duration_known, followed_duration, needs_durations
+from creepkit.inverse.held_levels import held_temperatures
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
@@ -18,7 +19,7 @@ from creepkit.studies.folders import folders_with_tests
 from creepkit.studies.study_file import parse_study
 from creepkit.studies.swapped_units import swapped_units
 from creepkit.studies.tertiary_creep import shows_tertiary_creep
-from creepkit.studies.toml_text import CITATION_LINE, comment, one_line, quoted, quoted_list, study_part
+from creepkit.studies.toml_text import CITATION_LINE, comment, comments, one_line, quoted, quoted_list, study_part
 
 SECONDARY_LAWS = ("norton", "strain-hardening", "time-hardening")
 SEVERAL_STRESSES_LAW = "hyperbolic-sine"
@@ -77,7 +78,7 @@ class DataSummary:
     def of(cls, tests: Sequence[History]) -> DataSummary:
         """The summary of tests."""
         levels: list[float] = []
-        for temperature in sorted(history.mean_temperature for history in tests):
+        for temperature in sorted(value for history in tests for value in held_temperatures(history)):
             if not levels or temperature > levels[-1] + SAME_TEMPERATURE:
                 levels.append(temperature)
         return cls(
@@ -272,15 +273,27 @@ def _data_part(files: Sequence[str], reader: str | None, summary: DataSummary, p
 
 
 def _exclude_part(quality: DataQuality) -> list[str]:
-    """Proposals for suspect tests, as comments; suspect frames are left out by [data] suspect_frames."""
+    """Copies of tests, left out; proposals for other suspect tests, as comments.
+
+    Suspect frames are left out by [data] suspect_frames.
+    """
+    copies = [one for one in quality if one.kind == "copy"]
     lines = []
-    flags = [one for one in quality if len(one.tests) == 1 and one.kind not in FRAME_FLAG_KINDS]
+    flags = [one for one in quality if len(one.tests) == 1 and one.kind not in ("copy", *FRAME_FLAG_KINDS)]
     for flag in flags[:MOST_REMARKS]:
-        lines += [comment(str(flag)), "# [[exclude]]", f"# test = {quoted(one_line(flag.history))}"]
+        lines += [*comments(str(flag)), "# [[exclude]]", f"# test = {quoted(one_line(flag.history))}"]
         if flag.frames:
             text = frame_ranges_text(flag.frames).partition(" ")[2]
             lines.append(f"# frames = {quoted(text)}")
+        elif flag.time is not None:
+            lines.append(f"# from_h = {flag.time / SECONDS_PER_HOUR:.6g}")
         lines += [f"# reason = {quoted(flag.kind)}", "#"]
+    if copies:
+        tables = [
+            ["[[exclude]]", f"test = {quoted(one_line(one.history))}", f"reason = {quoted(one_line(one.reason))}"]
+            for one in copies
+        ]
+        return [*(line for table in tables for line in (*table, "")), *lines][:-1]
     if not lines:
         return ["# [[exclude]]", '# test = "name of a test"', '# frames = "97-191, 193"', '# reason = "why"']
     return lines[:-1]

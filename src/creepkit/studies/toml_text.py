@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from pathlib import Path
+from textwrap import wrap
 
 CITATION_LINE = '# citation = "authors (year), title, doi"  # of published data: the methods text cites it'
 """In the table [data]."""
@@ -28,6 +29,12 @@ def one_line(text: str) -> str:
 def comment(text: str) -> str:
     """A text as a comment of one line."""
     return f"# {one_line(text)}"
+
+
+def comments(text: str) -> list[str]:
+    """A text as comments of several lines, each of at most 118 characters but for longer words."""
+    whole = "".join(character if character.isprintable() else "?" for character in text)[:2000]
+    return [f"# {line}" for line in wrap(whole, 116, break_long_words=False, break_on_hyphens=False)]
 
 
 def study_part(folder: Path) -> list[str]:

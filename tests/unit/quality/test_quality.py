@@ -160,7 +160,7 @@ def test_frames_after_the_end_are_told():
     test = bulge(np.random.default_rng(4))
     used = np.arange(96) < 94
     (found,) = check_data_quality([test.replace(used=used, labels={"frames_after_end": "2"})])
-    assert str(found) == "planted: unloading: frames 94-95: from 14250 s on, after the end of the test"
+    assert str(found) == "planted: unloading: frames 94-95: from 3.958 h on, after the end of the test"
 
 
 def test_an_amplitude_that_falls_under_a_held_pressure():

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from creepkit.inverse.held_levels import holds
 from creepkit.records import History, PointLoading, PressureJump, Program, RecordedLoading, StrainSteps, constant_stress
 from creepkit.records.loading import StressSteps
-from creepkit.reports.load_programs import holds, kind_of_test, label_of, program_text
+from creepkit.reports.load_programs import kind_of_test, label_of, program_text
 
 HOUR = 3600.0
 

@@ -341,22 +341,38 @@ def _evidence(
 
 
 def _members(histories: Sequence[History]) -> dict[str, tuple[str, ...]]:
-    """{level: names} of the levels that tell these tests apart: some member has two tests, and there are two members.
+    """{level: names} of the levels that these tests tell apart: some member has two tests, and two members are named.
 
-    A test that states none is a member of its own.
+    Beside two that are named a test that states none is a member of its own; beside one it is taken for one of that.
     """
     members = {}
     for level in LEVELS[:-1]:
-        names = tuple(level_of(h, level) or f"(of {h.name})" for h in histories)
-        if 1 < len(set(names)) < len(names):
+        stated = [level_of(h, level) for h in histories]
+        names = tuple(name or f"(of {h.name})" for name, h in zip(stated, histories, strict=True))
+        if len(set(stated) - {""}) > 1 and len(set(names)) < len(names):
             members[level] = names
     return members
 
 
 def _common_members(histories: Sequence[History]) -> dict[str, str]:
-    """{level: its one member} of the levels that all these tests state alike."""
-    names = {level: {level_of(h, level) for h in histories} for level in LEVELS[:-1]}
-    return {level: next(iter(found)) for level, found in names.items() if len(found) == 1 and "" not in found}
+    """{level: its one member} of the levels of which these tests name no other; those that state none count to it."""
+    named = {level: {level_of(h, level) for h in histories} - {""} for level in LEVELS[:-1]}
+    return {level: next(iter(found)) for level, found in named.items() if len(found) == 1}
+
+
+def unstated_member_notes(histories: Sequence[History]) -> list[str]:
+    """Tests that state no heat or laboratory where others do, and what was assumed of them, a sentence a level."""
+    common, members, notes = _common_members(histories), _members(histories), []
+    for level in (*common, *members):
+        without = [h.name for h in histories if not level_of(h, level)]
+        if without:
+            several = len(without) > 1
+            tests = f"{without[0]} and {len(without) - 1} more state" if several else f"{without[0]} states"
+            own = f"one {level} each" if several else f"a {level} of its own"
+            one = "tests" if several else "one"
+            assumed = f"{one} of {level} {common[level]}, as the others are" if level in common else own
+            notes.append(f"{tests} no {level}: taken for {assumed}")
+    return notes
 
 
 def _known_sd(nuisances: Sequence[Nuisance]) -> float | None:

@@ -23,7 +23,7 @@ from creepkit.inverse.observation_vector import (
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
 from creepkit.inverse.rupture_use import compares_rupture_times
 from creepkit.records import output_unit
-from creepkit.reports.html.elements import number, plural
+from creepkit.reports.html.elements import number, plural, printable
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -39,19 +39,44 @@ FLOOR = (
 
 @dataclass(frozen=True)
 class FrameCounts:
-    """Frames of tests: as measured, those of them that a fit may use, and those that were selected for it."""
+    """Frames of tests: as measured, those of them that a fit may use, and those that were selected for it.
+
+    excluded : left out by hand or as suspect, also by their file; at_zero : of the others those at time zero, without
+    creep yet; empty : of the rest those without a value. thinned : tests of which not all usable ones were selected.
+    """
 
     measured: int
     usable: int
     fitted: int
+    excluded: int = 0
+    at_zero: int = 0
+    empty: int = 0
+    thinned: tuple[str, ...] = ()
 
 
 def frame_counts(histories: Sequence[History], frames: int) -> FrameCounts:
     """The frames of tests with outputs; frames : at most so many were selected in each test."""
     tests = [h for h in histories if h.outputs]
-    usable = sum(int((h.used & (h.times > 0) & frames_with_data(h)).sum()) for h in tests)
-    fitted = sum(int(selected_frames(h, frames).size) for h in tests)
-    return FrameCounts(sum(h.times.size for h in tests), usable, fitted)
+    later = [h.used & (h.times > 0) for h in tests]
+    usable = [int((mask & frames_with_data(h)).sum()) for mask, h in zip(later, tests, strict=True)]
+    fitted = [int(selected_frames(h, frames).size) for h in tests]
+    measured, used, after_zero = (
+        sum(values)
+        for values in (
+            [h.times.size for h in tests],
+            [int(h.used.sum()) for h in tests],
+            [int(mask.sum()) for mask in later],
+        )
+    )
+    return FrameCounts(
+        measured,
+        sum(usable),
+        sum(fitted),
+        measured - used,
+        used - after_zero,
+        after_zero - sum(usable),
+        tuple(h.name for h, all_, kept in zip(tests, usable, fitted, strict=True) if kept < all_),
+    )
 
 
 @dataclass(frozen=True)
@@ -120,7 +145,20 @@ def selection_sentence(counts: FrameCounts, most: int) -> str:
     """How many frames were selected for a fit, and how."""
     if counts.fitted == counts.usable == counts.measured:
         return f"All {plural(counts.measured, 'reading')} were fitted."
-    text = f"{counts.fitted} of {plural(counts.measured, 'reading')} were selected for the fit"
-    if counts.fitted < counts.usable:
-        return f"{text}: at most {most} of a test, half of them spread evenly in time and half in its logarithm."
-    return f"{text}: readings at time zero, and those without values, are not compared."
+    reasons = [
+        (counts.excluded, "left out by the study, as suspect, or by their file"),
+        (counts.at_zero, "at time zero"),
+        (counts.empty, "without a value"),
+        (counts.usable - counts.fitted, _thinning_text(counts.thinned, most)),
+    ]
+    parts = ", ".join(f"{count} {reason}" for count, reason in reasons if count)
+    return f"{counts.fitted} of {plural(counts.measured, 'reading')} were selected for the fit; not selected: {parts}."
+
+
+def _thinning_text(tests: Sequence[str], most: int) -> str:
+    """Why readings of tests were thinned."""
+    named = ", ".join(f"'{printable(name, 80)}'" for name in tests[:3]) + (
+        f" and {len(tests) - 3} more" if len(tests) > 3 else ""
+    )
+    spread = "half of them spread evenly in time and half in its logarithm, some readings by both"
+    return f"of {named}, of which at most {most} are taken, {spread}"

@@ -1,0 +1,44 @@
+"""Levels of load and temperature at which tests are held."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from creepkit.inverse.observation_vector import frames_with_data
+from creepkit.records import History, Program
+
+HELD_TEMPERATURE = 1.0
+"""K, within which a temperature is held."""
+
+
+def held_temperatures(history: History) -> list[float]:
+    """K at which a test is held, in their order; the mean temperature of one that is never held at any."""
+    program = history.temperature_program()
+    if float(np.ptp(program.values)) <= 2 * HELD_TEMPERATURE:
+        return [float(np.mean(program.values))]
+    held = [value for _, _, value in holds(program, last_data_time(history), HELD_TEMPERATURE)]
+    return held or [history.mean_temperature]
+
+
+def holds(program: Program, last: float, tolerance: float) -> list[tuple[float, float, float]]:
+    """(start, end, value) of the pieces, s, over which a program stays within a tolerance of their first value.
+
+    last : s, the end of what is looked at. Ramps are no holds; a program of ramps alone has none.
+    """
+    times = np.append(program.times, max(last, float(program.times[-1])))
+    values = np.append(program.values, program.values[-1])
+    pieces: list[tuple[float, float, float]] = []
+    for start, end, value, following in zip(times[:-1], times[1:], values[:-1], values[1:], strict=True):
+        if start >= last or end <= start or abs(following - value) > tolerance:
+            continue
+        if pieces and start <= pieces[-1][1] * (1 + 1e-12) and abs(value - pieces[-1][2]) <= tolerance:
+            pieces[-1] = (pieces[-1][0], float(end), pieces[-1][2])
+        else:
+            pieces.append((float(start), float(end), float(value)))
+    return pieces
+
+
+def last_data_time(history: History) -> float:
+    """Time of the last used frame with data, s."""
+    frames = np.flatnonzero(history.used & frames_with_data(history))
+    return float(history.times[frames[-1] if frames.size else -1])

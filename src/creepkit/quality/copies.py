@@ -1,0 +1,222 @@
+"""Copies: tests with the readings of another test, which count once; repeated measurements differ in their noise.
+
+Two tests of one specimen under the same load and temperature are compared at the times that both have, each reading to
+half the last digit in which it is written (of the coarser of the two). That they agree everywhere is taken for a copy
+only where repeated measurements would hardly do so. Their chance is at most that of the rate of a second test to be so
+near that of the first, times those of the single readings to agree in spite of the noise; of a test without noise, such
+as a simulation, the first alone. Readings that are written so coarsely that repeats may agree are no copies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from math import erf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats, Ints
+from creepkit.quality.frames import FEWEST_FRAMES, noise_standard_deviation
+from creepkit.records import History, Program, growing_output
+
+REPEAT_CHANCE = 1e-3
+"""Largest chance of repeated measurements to agree so well, below which a test is a copy."""
+
+
+RATE_SCATTER = 0.02
+"""Of ln rate between repeats of one laboratory, at the least: well-made creep tests scatter by 5 % and more."""
+
+
+FEWEST_COMMON = 3
+COMMON_FRACTION = 0.5
+"""Readings at times that both tests have, and their least fraction of the shorter record."""
+
+
+LOAD_TOLERANCE, TEMPERATURE_TOLERANCE = 2e-3, 0.6
+"""Relative, and K, of one condition: what is written in other units is rounded."""
+
+
+VISIBLE_NOISE = 3.0
+"""Last digits of a reading, above which its noise can be told from its rounding."""
+
+
+ROUND_OFF = 1e-9
+"""Of the largest value: what conversions of units leave."""
+
+
+DIGITS = 12
+"""Decimal digits, relative to the largest value, beyond which a reading counts as exact."""
+
+
+TIME_UNITS = (86400.0, 3600.0, 60.0, 1.0)
+"""s, of units in which times are written with few digits."""
+
+
+def copied_tests(histories: Sequence[History]) -> dict[int, int]:
+    """{copy: original}, positions of tests whose readings another test has; the one with more readings is the original.
+
+    Of equal ones the first is. All frames are compared, also those that are not used. Time grows with the square of the
+    number of tests, for those under one condition alone.
+    """
+    copies: dict[int, int] = {}
+    conditions = [_Condition.of(history) for history in histories]
+    for a, b in combinations(range(len(histories)), 2):
+        if a in copies or b in copies or not conditions[a].is_that_of(conditions[b]):
+            continue
+        copy, original = (a, b) if histories[a].times.size < histories[b].times.size else (b, a)
+        if agreement_by_chance(histories[copy], histories[original]) < REPEAT_CHANCE:
+            copies[copy] = original
+    return {copy: _first(copies, original) for copy, original in copies.items()}
+
+
+def _first(copies: dict[int, int], position: int) -> int:
+    while position in copies:
+        position = copies[position]
+    return position
+
+
+def agreement_by_chance(one: History, two: History) -> float:
+    """Chance of a repeated measurement to agree with a test as `one` does with `two`; 1 where they do not agree."""
+    names = [name for name in one.outputs if name in two.outputs]
+    pairs = _common_frames(one, two)
+    if not names or pairs is None:
+        return 1.0
+    chance = 1.0
+    leading = growing_output(one)
+    for name in names:
+        a, b = one.outputs[name], two.outputs[name]
+        step_a, step_b = _last_digits(a), _last_digits(b)
+        first, second = pairs
+        known = np.isfinite(a[first]) & np.isfinite(b[second])
+        first, second = first[known], second[known]
+        if first.size < FEWEST_COMMON:
+            return 1.0
+        if not _agree(a[first], b[second], step_a[first], step_b[second]).all():
+            return 1.0
+        if name != leading and leading in names:
+            continue
+        width = 0.5 * np.maximum(step_a[first], step_b[second]) + ROUND_OFF * float(np.abs(a[first]).max())
+        size = float(np.ptp(a[first]))
+        if size <= 0:
+            return 1.0
+        noise = _noise(one if np.median(step_a) <= np.median(step_b) else two, name)
+        reading = np.array([_reading_chance(float(half), noise) for half in width])
+        rate = min(1.0, 2.0 * float(np.median(width)) / size / (RATE_SCATTER * 2.0 * sqrt(np.pi)))
+        chance *= rate * float(np.exp(np.log(np.maximum(reading, 1e-300)).sum()))
+    return chance
+
+
+def _reading_chance(half: float, noise: float) -> float:
+    """Of two measurements of one value to be the same digit of width 2 half, under a noise; 1 without noise."""
+    spread = sqrt(2.0) * noise
+    if spread <= 1e-3 * half:
+        return 1.0
+    ratio = sqrt(2.0) * half / spread
+    return float(erf(ratio) - (1.0 - np.exp(-(ratio**2))) / (ratio * sqrt(np.pi)))
+
+
+def _noise(history: History, name: str) -> float:
+    """Standard deviation of the readings; 0 where there are too few, or where it may be that of their last digit."""
+    values = history.outputs[name]
+    usable = np.isfinite(values) & (history.times > 0)
+    if int(usable.sum()) < FEWEST_FRAMES or (np.diff(history.times[usable]) <= 0).any():
+        return 0.0
+    noise = noise_standard_deviation(history.times[usable], values[usable])
+    return noise if noise > VISIBLE_NOISE * float(np.median(_last_digits(values)[usable])) else 0.0
+
+
+def _common_frames(one: History, two: History) -> tuple[Ints, Ints] | None:
+    """Positions of frames at the same times in both, to the digits written; None where they are too few."""
+    a, b = one.times, two.times
+    if a.size == b.size and _agree(a, b, _time_digits(a), _time_digits(b)).all():
+        return np.arange(a.size), np.arange(b.size)
+    nearest = np.clip(np.searchsorted(b, a), 1, b.size - 1)
+    nearest -= (a - b[nearest - 1]) <= np.abs(b[nearest] - a) if b.size > 1 else 0
+    same = _agree(a, b[nearest], _time_digits(a), _time_digits(b)[nearest])
+    if int(same.sum()) < max(FEWEST_COMMON, COMMON_FRACTION * min(a.size, b.size)):
+        return None
+    return np.flatnonzero(same), nearest[same]
+
+
+def _agree(a: Floats, b: Floats, step_a: Floats, step_b: Floats) -> Bools:
+    """Where values can be one number written to these last digits; NaN of both agrees with NaN."""
+    half = 0.5 * (step_a + step_b) * np.where(np.isclose(step_a, step_b, rtol=1e-6), 0.999, 1.0 + 1e-6)
+    largest = float(np.nanmax(np.abs(a), initial=0.0))
+    return np.asarray((np.abs(a - b) <= half + ROUND_OFF * largest) | (np.isnan(a) & np.isnan(b)))
+
+
+def _time_digits(times: Floats) -> Floats:
+    return np.asarray(np.max([unit * _last_digits(times / unit) for unit in TIME_UNITS], axis=0))
+
+
+def _last_digits(values: Floats) -> Floats:
+    """(values,) size of the last decimal digit in which each value is written, 0 where it is exact.
+
+    Values that are written with fixed decimals share it, also where a constant was added to all of them; those with a
+    fixed number of digits have it by their size.
+    """
+    finite = values[np.isfinite(values)]
+    if not finite.size or not np.abs(finite).max() > 0:
+        return np.zeros(values.size)
+    own = np.maximum(_fixed_decimals(finite), _fixed_decimals(finite - finite[0]))
+    magnitude = np.where(np.isfinite(values) & (values != 0), np.abs(values), 1.0)
+    exponent = np.floor(np.log10(magnitude))
+    digits = _significant_digits(finite)
+    by_size = np.zeros(values.size) if digits is None else 10.0 ** (exponent + 1 - digits)
+    return np.asarray(np.where(np.isfinite(values), np.maximum(own, by_size), 0.0))
+
+
+def _fixed_decimals(values: Floats) -> float:
+    """The largest power of ten of which all values are multiples; 0 where there is none above their round-off."""
+    largest = float(np.abs(values).max())
+    if largest <= 0:
+        return 0.0
+    top = int(np.floor(np.log10(largest)))
+    for power in range(top, top - DIGITS, -1):
+        scaled = values / 10.0**power
+        if (np.abs(scaled - np.round(scaled)) <= 1e-15 * np.abs(scaled).max() * 8 + 1e-12).all():
+            return float(10.0**power)
+    return 0.0
+
+
+def _significant_digits(values: Floats) -> int | None:
+    """The number of significant digits with which all values are written; None where they are exact."""
+    magnitude = np.abs(values[values != 0])
+    mantissa = magnitude / 10.0 ** np.floor(np.log10(magnitude))
+    for digits in range(1, DIGITS):
+        scaled = mantissa * 10.0 ** (digits - 1)
+        if (np.abs(scaled - np.round(scaled)) <= 1e-14 * scaled.max() * 8).all():
+            return digits
+    return None
+
+
+class _Condition(NamedTuple):
+    """What a test of one specimen was put under: load, MPa, and temperature, K, until its end, s."""
+
+    kind: tuple[str, str]
+    alloy: str
+    load: Program
+    temperature: Program
+    end: float
+
+    @classmethod
+    def of(cls, history: History) -> _Condition:
+        kind = (history.specimen, history.loading.quantity) if history.outputs else ("", history.name)
+        end = float(history.times[-1]) if history.times.size else 0.0
+        return cls(kind, history.alloy, history.loading.program(), history.temperature_program(), end)
+
+    def is_that_of(self, other: _Condition) -> bool:
+        """Whether both are the same, over the time that both tests last."""
+        if self.kind != other.kind or (self.alloy and other.alloy and self.alloy != other.alloy):
+            return False
+        largest = max(float(np.abs(program.values).max()) for program in (self.load, other.load))
+        return self._near(self.load, other.load, other.end, LOAD_TOLERANCE * largest) and self._near(
+            self.temperature, other.temperature, other.end, TEMPERATURE_TOLERANCE
+        )
+
+    def _near(self, own: Program, other: Program, other_end: float, tolerance: float) -> bool:
+        end = min(self.end, other_end)
+        times = np.concatenate([own.times, other.times, [end]])
+        times = times[times <= end]
+        return bool((np.abs(own.at(times) - other.at(times)) <= tolerance).all())
