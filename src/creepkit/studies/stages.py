@@ -60,6 +60,7 @@ class Stage:
         file is read; None where the result is made again from identifications that are kept.
     document : what of a result that no record can be read from is written down, as JSON-able data.
     predictor : of identifications that its file holds. file : that an export is written to, "" for other stages.
+    remark : what is known beforehand that the result leaves out of account, "" where nothing is.
     """
 
     name: str
@@ -72,6 +73,7 @@ class Stage:
     document: Callable[[Any], Any] | None = None
     predictor: Predictor | None = field(default=None, repr=False)
     file: str = ""
+    remark: str = ""
 
 
 def stage_name(kind: StageKind, group: str = "") -> str:
@@ -191,6 +193,7 @@ class Stages:
 
     def _temperature(self, group: TestGroup) -> Stage:
         import creepkit as ck
+        from creepkit.discovery.discover import isothermal_tests
 
         part, using, settings = (
             self.file.model.temperature,
@@ -206,6 +209,7 @@ class Stages:
         elif self.file.model.identification is None:
             raise self.file.error(place, "needs a law: give law, or the table [identification]")
         need = "" if law is not None else self._needed(place, "identification", group)
+        within = ISOTHERMAL_RANGE if part.within_K is None else part.within_K
 
         def make(results: Results, tick: Tick) -> Any:
             chosen = law if law is not None else self._law_without_temperature(results[need], group)
@@ -213,7 +217,6 @@ class Stages:
             options = {name: value for name, value in options.items() if value is not None}
             if part.parameters is not None:
                 options["parameters"] = part.parameters
-            within = ISOTHERMAL_RANGE if part.within_K is None else part.within_K
             study = ck.temperature_study(
                 chosen,
                 list(group.histories),
@@ -237,7 +240,10 @@ class Stages:
         ]
         needs = (need,) if need else ()
         name = stage_name("temperature", group.name)
-        return Stage(name, "temperature", group.name, described, make, needs, document=_temperature_document)
+        remark = isothermal_tests(group.histories, within)[1]
+        return Stage(
+            name, "temperature", group.name, described, make, needs, document=_temperature_document, remark=remark
+        )
 
     def _law_without_temperature(self, ranking: Ranking, group: TestGroup) -> CreepLaw:
         """The candidate that is best; where another law was found to be, the best of the candidates."""

@@ -248,6 +248,8 @@ def _temperature_blocks(name: str, result: Any, figures: PageFigures) -> list[Bl
                 "Parameters at each temperature with 95 % intervals, and the forms that remain with their weights.",
             )
         )
+    if result is not law:
+        blocks += [Paragraph(sentence(printable(note, 600))) for note in result.notes]
     text = temperature_law_text(result) if result is law else temperature_study_text(result)
     return [*blocks, Verbatim("The temperature law in full", printable_lines(text))]
 
