@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.duration import duration_known
 from creepkit.quality.flags import frame_ranges_text
-from creepkit.reports.design import cheapest_text, design_figure, direction_lines, order_text
+from creepkit.reports.design import MACHINE_TIME, cells_text, cheapest_text, design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
-from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows
+from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows, right_law
 from creepkit.reports.forecast_plot import forecast_figure
 from creepkit.reports.html.compared_values import frame_counts, selection_sentence
 from creepkit.reports.html.elements import (
@@ -163,7 +163,7 @@ def stage_sections(contents: ReportContents, figures: PageFigures, names: LawNam
         ("temperature", "Trends with temperature", contents.temperature, _temperature_blocks),
         ("rupture", "Rupture", contents.rupture, partial(_rupture_blocks, strengths=identified)),
         ("forecasts", "Forecasts", contents.forecasts, partial(_forecast_blocks, names=names)),
-        ("design", "Further tests proposed", contents.design, partial(_design_blocks, names=names)),
+        ("design", "Further tests", contents.design, partial(_design_blocks, names=names)),
     )
     for identifier, title, results, blocks_of in stages:
         if len(results) == 1:
@@ -289,7 +289,7 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures, *, nam
     laws = ", ".join(f"{names.in_text(law)} ({weight:.2g})" for law, weight in forecast.laws.items())
     blocks: list[Block] = [
         Paragraph(
-            f"By {laws}: if the law is right, bands and intervals hold a measured value of a single test with a "
+            f"By {laws}: if {right_law(forecast)}, bands and intervals hold a measured value of a single test with a "
             f"probability of {100 * forecast.level:g} %."
             + (
                 " The law does not explain the tests, so that this probability is not earned: treat the bands as a "
@@ -352,7 +352,7 @@ def _design_blocks(name: str, design: Design, figures: PageFigures, *, names: La
             for test in design.tests[:MOST_DESIGNS]
         ]
         probability = ("probability, decisive and right",) if to_decide else ()
-        columns = ("planned test", "machine time, h", *probability, "expected information, nats", "nats per hour")
+        columns = ("planned test", MACHINE_TIME, *probability, "expected information, nats", "nats per hour")
         caption = (
             f"The first of {plural(len(design.tests), 'planned test')} considered, {order_text(design)}; goal: "
             f"{design.goal}. A nat of information divides the volume of what is likely by 2.7"
@@ -365,7 +365,8 @@ def _design_blocks(name: str, design: Design, figures: PageFigures, *, names: La
                 f"What further tests tell{_of(name)}",
                 "Map of the expected information for an hour of machine time over first load and duration, left of "
                 f"constant loads, right of loads that change. {verdict}",
-                "Expected information for an hour of machine time over first load and duration; the plan is marked.",
+                "Expected information for an hour of machine time over first load and duration; the plan is marked. "
+                f"{cells_text(design)}.",
             )
         )
     lines = [line.strip() for line in direction_lines(design) if line.strip()]
