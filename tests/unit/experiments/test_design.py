@@ -1,6 +1,7 @@
 """Designs of experiments against closed forms of linear regression, and what a test tells once it is made."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -219,6 +220,26 @@ def test_a_design_is_told_as_text_json_and_a_map(hardening, tmp_path):
     assert (
         f"({min(able):.3g} h of machine time with setting up)" if able else "no test considered separates the laws"
     ) in said
+
+
+def test_a_number_in_the_map_is_one_of_the_table(hardening):
+    """In each cell the probability of the first test of the table with that first load and duration."""
+    found = design(hardening)
+    first: dict[tuple[bool, float, float], str] = {}
+    for test in found.tests:
+        levels = test.histories[0].loading.program().values
+        place = bool(np.ptp(levels[levels > 0]) == 0.0), round(test.first_level, 6), round(test.histories[0].times[-1])
+        first.setdefault(place, f"{test.expectation.probability:.2f}")
+    drawn = [text.get_text() for panel in found.plot().axes[:2] for text in panel.texts]
+    assert sorted(drawn) == sorted(first.values())
+
+
+def test_a_test_that_hardly_decides_is_not_advised(hardening):
+    found = design(hardening)
+    poor = tuple(replace(t, expectation=replace(t.expectation, probability=0.1)) for t in found.tests)
+    said = replace(found, tests=poor, plan=(), expected=None).sentence
+    assert said.startswith(f"none of the {len(poor)} tests considered is likely to tell")
+    assert "with probability 0.10" in said
 
 
 def test_work_that_is_stopped_gives_the_best_so_far(hardening):
