@@ -218,6 +218,19 @@ def test_demo_of_bars_prints_the_truth_beside_the_answer(tmp_path):
     assert "identification: " in result.stderr or sys.stderr.isatty()
 
 
+def test_demo_writes_its_data_alone_and_again(tmp_path):
+    """Twice into the same folder, but not over a file of somebody else."""
+    for _ in range(2):
+        result = creepkit("demo", "--data", "--to", tmp_path)
+        assert result.exit_code == 0, result.output
+    assert sorted(path.name for path in tmp_path.iterdir() if path.name[0] != ".") == ["bulge", "curves", "ruptures"]
+    assert len(ck.read_histories(tmp_path / "curves")) == len(ck.read_histories(PLANTED))
+    assert not (tmp_path / "curves" / "study.toml").exists()
+    (tmp_path / "curves" / "truth.json").write_text("mine")
+    assert creepkit("demo", "--data", "--to", tmp_path).exit_code == 1
+    assert (tmp_path / "curves" / "truth.json").read_text() == "mine"
+
+
 def test_a_cut_forgets_how_every_test_ended():
     """A stopped test that never came to the strain of the cut must not be the only one judged by its end."""
     from creepkit.cli.identify import _truncate_at_strain

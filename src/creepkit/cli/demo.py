@@ -34,15 +34,25 @@ PLANTED_BULGE = EXAMPLE_DATA / "planted_bulge_test"
 """A simulated bulge test of one dimple, and the truth behind it."""
 
 
+FOLDERS = {"curves": PLANTED, "bulge": PLANTED_BULGE, "ruptures": MEASURED}
+"""{folder that --data writes: where its files come from}."""
+
+
 def command(
     to: Annotated[Path, typer.Option(help="Folder for results; made if needed."), OutputPath("folder")] = Path("demo"),
     uniaxial: Annotated[bool, typer.Option("--uniaxial", help="Simulated creep curves instead of both.")] = False,
+    data: Annotated[
+        bool, typer.Option("--data", help="Write the data alone: the folders curves, bulge and ruptures.")
+    ] = False,
 ) -> None:
     """Run the studies that ship: creep curves, a bulge test.
 
     Rupture times are printed beside the measured ones, the true law of the simulated test beside the identified one.
     Each study leaves a report; 'creepkit run' carries out such a study of your own.
     """
+    if data:
+        _write_data(to)
+        return
     started = time.perf_counter()
     if uniaxial:
         results = [_planted_creep_curves(to)]
@@ -51,6 +61,21 @@ def command(
     typer.echo(f"\ntime: {time.perf_counter() - started:.0f} s")
     typer.echo(f"results, the best law of each as LaTeX and Python, and the study files' locks: {to}")
     typer.echo(f"reports: {' '.join(str(result.report) for result in results)}")
+
+
+def _write_data(to: Path) -> None:
+    """The example data without their study files, to try the commands on."""
+    from creepkit.errors import HistoryError
+    from creepkit.files.writing import check_folder_target, write_bytes
+
+    for name, source in FOLDERS.items():
+        folder = to / name
+        files = [path for path in sorted(source.iterdir()) if path.suffix in (".csv", ".json", ".md")]
+        check_folder_target(folder, HistoryError, tuple(path.name for path in files))
+        folder.mkdir(parents=True, exist_ok=True)
+        for path in files:
+            write_bytes(path.read_bytes(), folder / path.name, HistoryError)
+        typer.echo(f"wrote {folder}: {len(files)} files")
 
 
 def _measured_creep_curves(folder: Path) -> StudyResult:

@@ -27,6 +27,8 @@ def command(
     from creepkit.files.writing import check_target, write_text
     from creepkit.studies.proposal import propose_study
 
+    if not folder.is_dir():
+        raise StudyError(f"there is no folder {folder}; name the folder of your measured files")
     path = folder / "study.toml" if to is None else to
     check_target(path, StudyError)
     proposal = propose_study(folder, path, reader)

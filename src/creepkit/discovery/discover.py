@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypedDict, Unpack
 
+import numpy as np
+
 from creepkit.discovery.combinations import rank_combinations
 from creepkit.discovery.elastic_moduli import FIRST_FRAMES, ModulusEstimates, identify_moduli
 from creepkit.discovery.forms import CONSTANT, CandidateForm, candidate_forms
@@ -13,6 +15,7 @@ from creepkit.discovery.refitting import refit
 from creepkit.discovery.regression import IsothermalEstimates, check_temperatures, isothermal_groups
 from creepkit.discovery.temperature_law import TemperatureLaw, temperature_law_from_combinations
 from creepkit.errors import CreepkitError, FitError
+from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.history_checks import sound_tests, suspect_frames_note
 from creepkit.inverse.identification import Identification
@@ -22,7 +25,7 @@ from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, temperature
 from creepkit.presentation import Presentable
-from creepkit.records import History, Predictor
+from creepkit.records import ZERO_CELSIUS, History, Predictor
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictor, resolve_predictors
 
 Forms = Sequence[str] | Mapping[str, Sequence[str]]
@@ -136,23 +139,26 @@ def temperature_study(
 ) -> TemperatureStudy:
     """Identify moduli, then the law times Arrhenius, then each temperature alone, and discover forms of temperature.
 
-    law : without temperature. using : a predictor, or the name of a specimen; by default the one that the tests name.
+    law : without temperature. using : a predictor, or the name of a specimen; by default those that the tests name.
     moduli : whether to find each test's modulus from its first 15 frames before; every test states one to begin from.
     within : K, tests so near to the coldest of a group are at one temperature.
     form_options : forms, prior and parameters, as discover() takes them.
 
-    A temperature that cannot be identified alone is noted and left out of the forms.
+    Tests whose used frames are not at one temperature are left out, and a temperature that cannot be identified alone
+    is left out of the forms; both are noted.
     """
-    law, predictor = resolve_law(law), resolve_predictors(using, check_histories(tests))
-    if isinstance(predictor, dict):
-        raise FitError(f"the tests are of several specimens, {', '.join(predictor)}; a study takes those of one")
+    law, resolved = resolve_law(law), resolve_predictors(using, check_histories(tests))
+    predictor = CompositePredictor(resolved) if isinstance(resolved, dict) else resolved
     if law.uses(temperature):
         raise FitError(f"law '{law.name}' depends on temperature already; give it without: forms are what is sought")
     if not tests:
         raise FitError("there are no histories to study")
     settings = settings or IdentificationSettings()
     histories, left_out = sound_tests(tests, settings)
-    notes = list(left_out)
+    histories, not_isothermal = isothermal_tests(histories, within)
+    if not histories:
+        raise FitError(f"no test is at one temperature: {not_isothermal}; forms are found through single temperatures")
+    notes = [*left_out, *([not_isothermal] if not_isothermal else [])]
     moduli_fit = None
     if moduli:
         moduli_fit = identify_moduli(with_arrhenius(law, histories), histories, predictor, frames=FIRST_FRAMES)
@@ -173,6 +179,24 @@ def temperature_study(
     return TemperatureStudy(
         tuple(histories), moduli_fit, joint_fit, tuple(isothermal_fits), temperature_law, tuple(notes)
     )
+
+
+def isothermal_tests(
+    tests: Sequence[History], temperature_tolerance: float = ISOTHERMAL_RANGE
+) -> tuple[list[History], str]:
+    """The tests at one temperature each, and a sentence that names the others; "" where there are none.
+
+    temperature_tolerance : K, within which the temperatures up to the last used frame of a test are one, but
+    ISOTHERMAL_RANGE at most, which identifications at single temperatures are held to.
+    """
+    most = min(temperature_tolerance, ISOTHERMAL_RANGE)
+    others = {test.name: test.followed_temperatures for test in tests if np.ptp(test.followed_temperatures) > most}
+    remaining = [test for test in tests if test.name not in others]
+    if not others:
+        return remaining, ""
+    spans = [f"{name} ({T.min() - ZERO_CELSIUS:.0f} to {T.max() - ZERO_CELSIUS:.0f} C)" for name, T in others.items()]
+    what = "is left out, for it is" if len(others) == 1 else "are left out, for they are"
+    return remaining, f"{', '.join(spans)} {what} not at one temperature"
 
 
 def group_by_temperature(

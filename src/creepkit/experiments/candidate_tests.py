@@ -91,7 +91,7 @@ def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperatu
     for duration, T in product(_durations(rig, longest), temperatures):
         for loading, text in _LOADINGS.get(quantity, _loads)(rig, base, duration):
             at_temperature = f" at {T - ZERO_CELSIUS:.4g} °C" if len(temperatures) > 1 else ""
-            whole = f"{text} for {hours_text(duration)}{at_temperature}"
+            whole = f"{text} {hours_text(duration)}{at_temperature}"
             times = frame_times(duration, rig.frame_interval)
             for dimensions, pieces_text in pieces:
                 description = f"{pieces_text} at {whole}" if pieces_text else whole
@@ -155,36 +155,38 @@ def _pairs(rig: Rig) -> Iterator[tuple[float, float]]:
             yield first, second
 
 
+def _change_text(first: str, change: float, second: str) -> str:
+    """A load that changes after a time, s, up to the end, which the description of the test goes on with."""
+    return f"{first} to {hours_text(change)}, then {second} to"
+
+
 def _pressures(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
     ramp = min(float(getattr(base.loading, "ramp", 5.0)), 0.1 * duration)
     for level in _levels(rig):
-        yield PressureJump(level, level, 0.5 * duration, ramp), f"{level:.3g} MPa"
+        yield PressureJump(level, level, 0.5 * duration, ramp), f"{level:.3g} MPa for"
     for first, second in _pairs(rig):
         change = CHANGE_AT * duration
-        yield (
-            PressureJump(first, second, change, ramp),
-            f"{first:.3g} MPa, from {hours_text(change)} on {second:.3g} MPa,",
-        )
+        yield (PressureJump(first, second, change, ramp), _change_text(f"{first:.3g} MPa", change, f"{second:.3g} MPa"))
 
 
 def _stresses(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
     control: ControlledQuantity = getattr(base.loading, "control", "stress")
     for level in _levels(rig):
-        yield constant_stress(level, control), f"{level:.3g} MPa"
+        yield constant_stress(level, control), f"{level:.3g} MPa for"
     for first, second in _pairs(rig):
         change = CHANGE_AT * duration
         steps = StressSteps(((0.0, first), (change, second)), control)
-        yield steps, f"{first:.3g} MPa, from {hours_text(change)} on {second:.3g} MPa,"
+        yield steps, _change_text(f"{first:.3g} MPa", change, f"{second:.3g} MPa")
 
 
 def _strains(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
     ramp = min(float(getattr(base.loading, "ramp", 0.0)), 0.1 * duration)
     for level in _levels(rig):
-        yield constant_strain(level, ramp), f"a strain of {level:.3g}"
+        yield constant_strain(level, ramp), f"a strain of {level:.3g} for"
     for first, second in _pairs(rig):
         change = CHANGE_AT * duration
         steps = StrainSteps(((0.0, first), (change, second)), ramp)
-        yield steps, f"a strain of {first:.3g}, from {hours_text(change)} on {second:.3g},"
+        yield steps, _change_text(f"a strain of {first:.3g}", change, f"{second:.3g}")
 
 
 def _loads(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
@@ -193,11 +195,11 @@ def _loads(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, 
     ramp = float(program.times[1]) if program.values[0] == 0.0 and program.times.size > 1 else 0.0
     ramp = min(ramp, 0.1 * duration)
     for level in _levels(rig):
-        yield load_steps(quantity, [(0.0, level)], ramp), f"{level:.3g} {unit}".rstrip()
+        yield load_steps(quantity, [(0.0, level)], ramp), f"{level:.3g} {unit}".rstrip() + " for"
     for first, second in _pairs(rig):
         change = CHANGE_AT * duration
         steps = load_steps(quantity, [(0.0, first), (change, second)], ramp)
-        yield steps, f"{first:.3g} {unit}, from {hours_text(change)} on {second:.3g} {unit},"
+        yield steps, _change_text(f"{first:.3g} {unit}".rstrip(), change, f"{second:.3g} {unit}".rstrip())
 
 
 _LOADINGS: dict[Quantity, Callable[[Rig, History, float], Iterator[tuple[Loading, str]]]] = {
@@ -258,13 +260,13 @@ def _variations(rig: Rig, base: History, made_levels: Floats, exponent: float) -
             if abs(begin - first) < 0.01 * first and abs(end_level - second) < 0.01 * second:
                 yield candidate
     if longest > end:
-        yield _like(base, "the same loading", longest, rig)
+        yield _like(base, "the same loading for", longest, rig)
     for name, values in rig.dimensions.items():
         for value in values:
             changed = replace(base, geometry={**base.geometry, name: value})
             if abs(value / base.geometry.get(name, rig.dimensions[name][len(values) // 2]) - 1.0) > 1e-3:
                 text = f"a test piece of {name.replace('_', ' ')} {value:.3g} mm"
-                yield _like(changed, f"{text} under the same loading", end, rig)
+                yield _like(changed, f"{text} under the same loading for", end, rig)
 
 
 def _made(
@@ -275,7 +277,7 @@ def _made(
 
 
 def _like(base: History, text: str, duration: float, rig: Rig) -> CandidateTest:
-    description = f"{text} for {hours_text(duration)}"
+    description = f"{text} {hours_text(duration)}"
     history = base.replace(
         times=frame_times(duration, rig.frame_interval), outputs={}, standard_deviation={}, name=f"plan: {description}"
     )

@@ -20,7 +20,7 @@ from creepkit.experiments.design_task import DesignTask, Goal, task_of
 from creepkit.experiments.expectations import Criterion, Expectation, PrecisionCriterion
 from creepkit.experiments.known_laws import KnownLaw
 from creepkit.experiments.law_discrimination import Alteration, LawCriterion
-from creepkit.experiments.planned_design import Design, PlannedTest
+from creepkit.experiments.planned_design import ALIKE, Design, PlannedTest
 from creepkit.experiments.planned_outcomes import PlannedOutcomes
 from creepkit.experiments.remaining_laws import RemainingLaws
 from creepkit.experiments.rig import Rig
@@ -49,10 +49,6 @@ MOST_REFITS = 10
 
 LARGEST_RUPTURE_PROBABILITY = 0.1
 """Of a planned test, from which on it is left out."""
-
-
-ALIKE = 0.05
-"""Probabilities of a decisive verdict that differ by less are taken as equal: the more informative test is better."""
 
 
 SMALLEST_GROWTH = 5.0

@@ -51,14 +51,14 @@ class DesignTask:
         if best.adequacy is not None and best.adequacy.rejects:
             return (
                 f"no test is proposed: {best.law.name}, the best law, does not explain the tests that were made; find "
-                "a law that does, or ask for goal='parameters'"
+                "a law that does, or take the goal 'parameters'"
             )
         if len(self.laws) > 1 or self.altered:
             return ""
         doubt = "".join(f"; but {effect}" for effect in self.remaining.unmodelled_effects())
         return (
-            f"one law remains, {best.law.name}, and nothing is to be told apart from it{doubt}; ask for "
-            "goal='parameters' or for a quantity"
+            f"one law remains, {best.law.name}, and nothing is to be told apart from it{doubt}; tests are proposed for "
+            "the goal 'parameters', or for a quantity such as the rate at a stress"
         )
 
     @property
@@ -75,7 +75,7 @@ def task_of(remaining: RemainingLaws, goal: Goal | None, budget: float | None) -
     if goal == "law" and remaining.ranking is None:
         raise FitError(
             f"there is one law, {remaining.fits[0].law.name}, and nothing to tell it apart from: give the ranking of "
-            "several laws, or goal='parameters'"
+            "several laws, or take the goal 'parameters'"
         )
     altered = remaining.altered() if goal == "law" or (goal is None and remaining.ranking is not None) else []
     if isinstance(goal, DerivedQuantity):

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-USEFUL_INFORMATION = 0.05
-"""Nats below which a test tells next to nothing."""
-
-
-USEFUL_PROBABILITY = 0.05
+USEFUL_PROBABILITY = 0.2
 """Of a decisive verdict, below which a test is not advised for it."""
+
+
+ALIKE = 0.05
+"""Steps of the probability of a decisive verdict, within which the more informative test is better."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,11 @@ class PlannedTest:
     def hours(self) -> float:
         """h of machine time."""
         return self.candidate.hours
+
+    @property
+    def machine_time(self) -> str:
+        """Its machine time in words: the longest test of a rig does not hold the time to set it up."""
+        return machine_time_text(self.hours)
 
     @property
     def first_level(self) -> float:
@@ -118,6 +123,11 @@ class Design(Presentable):
         return present(self, "plot", path)
 
 
+def machine_time_text(hours: float) -> str:
+    """Machine time in words; hours : h, those to set up each run included."""
+    return f"{hours:.3g} h of machine time with setting up"
+
+
 def design_sentence(design: Design) -> str:
     """The advice: what to make, what it is expected to tell, and the next best."""
     if design.obstacle:
@@ -134,18 +144,17 @@ def design_sentence(design: Design) -> str:
     if design.budget is not None and len(design.plan) > 1 and design.expected is not None:
         runs = "; then ".join(_repeated(design.plan))
         total = sum(test.hours for test in design.plan)
-        return f"{runs} ({total:.3g} h of machine time): together {_told(design, design.expected)}"
+        return f"{runs} ({machine_time_text(total)}): together {_told(design, design.expected)}"
     first = design.plan[0] if design.plan else best
     others = [test for test in design.tests if test is not first]
     further = f"; next best {others[0].description} ({_short(design, others[0].expectation)})" if others else ""
-    return f"{first.description} ({first.hours:.3g} h of machine time): {_told(design, first.expectation)}{further}"
+    return f"{first.description} ({first.machine_time}): {_told(design, first.expectation)}{further}"
 
 
 def _is_hopeless(design: Design) -> bool:
-    """Whether no test, nor the plan, is likely to decide, and none says anything to speak of."""
+    """Whether neither a test nor the plan is likely to decide."""
     expected = [test.expectation for test in design.tests] + ([design.expected] if design.expected is not None else [])
-    decides = max(e.probability for e in expected) >= USEFUL_PROBABILITY
-    return not decides and (max(e.information for e in expected) < USEFUL_INFORMATION or bool(design.altered))
+    return max(e.probability for e in expected) < USEFUL_PROBABILITY
 
 
 def _and(names: tuple[str, ...]) -> str:

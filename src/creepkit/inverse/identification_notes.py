@@ -37,7 +37,7 @@ def fitted_ranges(problem: LeastSquaresProblem) -> dict[str, tuple[float, float]
     tests = problem.histories
     values_by_name = {
         "stress": [v for h in tests for v in reference_stresses(h, problem.predictor)],
-        "temperature": [v for h in tests for v in h.temperature_program().values],
+        "temperature": [v for h in tests for v in h.followed_temperatures],
         "strain": [0.0, *(reference_end_strain(h, problem.predictor) for h in tests)],
         "time": [v for h in tests for v in _time_range(h)],
     }
@@ -45,10 +45,10 @@ def fitted_ranges(problem: LeastSquaresProblem) -> dict[str, tuple[float, float]
 
 
 def _time_range(history: History) -> tuple[float, float]:
-    """First and last time, s; of a test without frames from loading to its end."""
+    """First time and that of the last used frame, s; of a test without frames from loading to its end."""
     if not history.outputs:
         return 0.0, followed_duration(history)
-    return float(history.times[0]), float(history.times[-1])
+    return float(history.times[0]), float(history.used_times[-1])
 
 
 def provenance_of(problem: LeastSquaresProblem, search_evaluations: int, search: str = "") -> dict[str, str | int]:

@@ -171,13 +171,13 @@ ISOTHERMAL_RANGE = 5.0
 
 def reference_temperature(histories: Sequence[History]) -> float:
     """The median temperature of the tests, rounded to 10 C, in K."""
-    temperatures = [float(np.mean(h.temperature_program().values)) for h in histories]
+    temperatures = [float(np.mean(h.followed_temperatures)) for h in histories]
     return float(round((np.median(temperatures) - ZERO_CELSIUS) / 10.0) * 10.0 + ZERO_CELSIUS)
 
 
 def spans_temperatures(histories: Sequence[History]) -> bool:
     """Whether the tests span more than 5 K."""
-    temperatures = [float(v) for h in histories for v in h.temperature_program().values]
+    temperatures = [float(v) for h in histories for v in h.followed_temperatures]
     return max(temperatures) - min(temperatures) > ISOTHERMAL_RANGE
 
 

@@ -24,7 +24,7 @@ def tested_points(fit: Identification) -> Floats:
         for history in fit.histories
         for stress in reference_stresses(history, fit.predictor)
         if stress > 0
-        for T in np.unique(np.round(history.temperature_program().at(history.times), 1))
+        for T in np.unique(np.round(history.temperature_program().at(history.used_times), 1))
     ]
     return np.array(points, float).reshape(-1, 2)
 

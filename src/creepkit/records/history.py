@@ -229,9 +229,21 @@ class History:
         return self.temperature if isinstance(self.temperature, Program) else Program.constant(self.temperature)
 
     @property
+    def used_times(self) -> Floats:
+        """(used frames,) s; of all frames where none is used."""
+        return self.times[self.used] if self.used.any() else self.times
+
+    @property
     def mean_temperature(self) -> float:
-        """Mean temperature over the frames, K."""
-        return float(self.temperature_program().at(self.times).mean())
+        """Mean temperature over the used frames, K."""
+        return float(self.temperature_program().at(self.used_times).mean())
+
+    @property
+    def followed_temperatures(self) -> Floats:
+        """(levels,) K, those of the program up to the last used frame: later ones decide nothing that is compared."""
+        program, end = self.temperature_program(), self.used_times[-1]
+        just_before = np.nextafter(end, 0.0)  # a step at the last frame did nothing to it
+        return np.append(program.values[program.times <= just_before], program.at(just_before))
 
     @property
     def condition(self) -> str:

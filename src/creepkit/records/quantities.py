@@ -28,10 +28,13 @@ class QuantityKind:
     open_interval: bool = False
 
     def unit(self, suffix: str, location: str, name: str) -> UnitConversion:
-        """Return the unit that a suffix means; `name` and `location` say in the error what was read and where."""
+        """Return the unit that a suffix means; an error says by `name` and `location` what was read and where.
+
+        location : "" where whoever catches the error says it.
+        """
         if suffix not in self.units:
             raise HistoryError(
-                f"{location}: {self._unit_error(name, suffix)}; allowed: {self._spellings(name, suffix)}"
+                f"{_before(location)}{self._unit_error(name, suffix)}; allowed: {self._spellings(name, suffix)}"
             )
         return self.units[suffix]
 
@@ -41,7 +44,7 @@ class QuantityKind:
         value = unit.factor * number + unit.offset
         is_inside = self.low < value < self.high if self.open_interval else self.low <= value <= self.high
         if not (math.isfinite(value) and is_inside):
-            raise HistoryError(f"{location}: '{name}' is {number:g}; a {self.name} must lie {self.range_text}")
+            raise HistoryError(f"{_before(location)}'{name}' is {number:g}; a {self.name} must lie {self.range_text}")
         return value
 
     @property
@@ -88,9 +91,13 @@ class QuantityKind:
 
     def _spellings(self, name: str, suffix: str) -> str:
         if not name.endswith(suffix):  # the unit stood apart from the name
-            return ", ".join(self.units)
+            return ", ".join(unit or "no unit" for unit in self.units)
         stem = name.removesuffix(suffix).rstrip("_")[:60]
         return ", ".join(f"{stem}_{unit}" if unit else stem for unit in self.units)
+
+
+def _before(location: str) -> str:
+    return f"{location}: " if location else ""
 
 
 TIME = QuantityKind("time", conversions("s", "min", "h", "d"), low=0.0)
@@ -106,7 +113,7 @@ _PERCENT = conversions("pct")["pct"]
 
 
 STRAIN = QuantityKind(
-    "strain", {**_NO_UNIT, **conversions("1", "pct"), "percent": _PERCENT, **conversions("microstrain")}
+    "strain", {**_NO_UNIT, **conversions("1", "pct"), "percent": _PERCENT, **conversions("permille", "microstrain")}
 )
 
 

@@ -80,6 +80,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
         ),
         "1": _unit("strain", 1.0, "-", "mm/mm", "m/m", "in/in", "fraction"),
         "pct": _unit("strain", 1e-2, "%", "percent", "per cent"),
+        "permille": _unit("strain", 1e-3, "‰", "per mille", "promille"),
         "microstrain": _unit("strain", 1e-6, "µstrain", "μstrain", "ustrain", "µm/m", "μm/m", "um/m"),
         "N": _unit("force", 1.0),
         "kN": _unit("force", 1e3),

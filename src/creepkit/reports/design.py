@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.experiments.planned_design import kind_of_reason, precision_text
+from creepkit.experiments.planned_design import ALIKE, kind_of_reason, precision_text
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.records import load_unit
 from creepkit.reports.figures import empty_figure, save_figure, wrapped
@@ -27,11 +27,15 @@ ROWS = 8
 """Tests in a table."""
 
 
+MACHINE_TIME = "machine time with setting up, h"
+"""The heading of a column."""
+
+
 def _columns(design: Design) -> tuple[str, ...]:
     last = {"law": "probability, decisive and right", "parameters": "standard deviations, before > after"}.get(
         design.goal, "sd after"
     )
-    return ("planned test", "machine time, h", "nats", "nats / h", last)
+    return ("planned test", MACHINE_TIME, "nats", "nats / h", last)
 
 
 def _cells(design: Design, test: PlannedTest) -> tuple[str, ...]:
@@ -67,7 +71,9 @@ def order_text(design: Design) -> str:
         return "in the order of the expected information for each hour of machine time"
     return (
         f"in the order: tests with a probability of {DECISIVE_WEIGHT:g} or more of a decisive and right verdict, the "
-        "shortest first; then the others by that probability, and where it is alike by the expected information"
+        f"shortest first; then the others by that probability in steps of {ALIKE:g}, and within a step by the expected "
+        "information; tests that were judged over the uncertainty of the parameters stand before all that were judged "
+        "at their estimates alone, which flatters them"
     )
 
 
@@ -76,20 +82,21 @@ def cheapest_text(design: Design) -> str:
     if not design.tests:
         return ""
     if design.goal == "law":
-        able = [test for test in design.tests if test.expectation.probability >= DECISIVE_WEIGHT]
+        judged = [test for test in design.tests if test.at_draws] or design.tests
+        able = [test for test in judged if test.expectation.probability >= DECISIVE_WEIGHT]
         does = f"separates the laws with a probability of {DECISIVE_WEIGHT:g} or more"
         if not able:
-            best = max(design.tests, key=lambda test: test.expectation.probability)
+            best = design.tests[0]
             return (
                 f"no test considered {does}; nearest comes {best.description} ({best.expectation.probability:.2g}, "
-                f"{best.hours:.3g} h of machine time)"
+                f"{best.machine_time})"
             )
     else:
         most = max(test.expectation.information for test in design.tests)
         able = [test for test in design.tests if test.expectation.information >= LARGE_SHARE * most]
         does = f"gives at least {100 * LARGE_SHARE:.0f} % of the highest expected information of a test"
     cheapest = min(able, key=lambda test: test.hours)
-    return f"the cheapest test that {does}: {cheapest.description} ({cheapest.hours:.3g} h of machine time)"
+    return f"the cheapest test that {does}: {cheapest.description} ({cheapest.machine_time})"
 
 
 def direction_lines(design: Design) -> list[str]:
@@ -203,9 +210,11 @@ def _expectation_to_json(e: Expectation) -> dict[str, object]:
 def design_figure(design: Design, path: str | Path | None = None) -> Figure:
     """What candidates tell for each hour of machine time, over the first load and the duration; the best of each place.
 
-    To first order about the estimates, which is what is known of all candidates alike. Left: constant loads; right: the
-    load changes during the test. The number in a cell is the probability of a decisive and right verdict, to first
-    order too. The runs of the plan are marked. Of several specimens that of the best test is drawn.
+    Each cell stands for one test: of those of its first load and duration the first in the order of the design,
+    whatever its second load, temperature and dimensions. Left: constant loads; right: the load changes during the test.
+    The colour is to first order about the estimates, which is what is known of all candidates alike; the number is
+    the probability of a decisive and right verdict that tables give. The runs of the plan are marked. Of several
+    specimens that of the best test is drawn.
     """
     figure = empty_figure(10.5, 5.0)
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -228,22 +237,28 @@ def design_figure(design: Design, path: str | Path | None = None) -> Figure:
     axes[0].set_ylabel("duration, h")
     if drawn is not None:
         figure.colorbar(drawn, ax=list(axes), label="information to first order, nats per hour of machine time")
-    numbers = np.isfinite([test.first_order.probability for test in drawn_tests]).any()
-    cells = "; in cells: probability of a decisive and right verdict, to first order" if numbers else ""
-    figure.suptitle(wrapped(design.sentence + cells, 10.0, 9.0), fontsize=9)
+    figure.suptitle(wrapped(f"{design.sentence}. {cells_text(design)}", 10.0, 9.0), fontsize=9)
     return save_figure(figure, path)
 
 
+def cells_text(design: Design) -> str:
+    """What a cell of the map stands for and what its number says, in sentences."""
+    told = "A cell: of the tests of that first load and duration the first in the order of the table, whatever its "
+    told += "second load and temperature"
+    if design.goal != "law":
+        return told
+    return f"{told}; its number: the probability of a decisive and right verdict, as in the table"
+
+
 def _draw_map(panel: Axes, tests: list[PlannedTest], largest: float) -> QuadMesh | None:
-    """One cell for each load and duration, coloured by the best candidate there; its largest probability beside."""
+    """One cell for each load and duration, of the first of the tests there (ordered); its probability as a number."""
     if not tests:
         panel.text(0.5, 0.5, "none considered", transform=panel.transAxes, ha="center")
         return None
     best: dict[tuple[float, float], PlannedTest] = {}
     for test in tests:
         place = round(test.first_level, 6), round(test.candidate.duration / 3600.0, 6)
-        if place not in best or test.first_order_per_hour > best[place].first_order_per_hour:
-            best[place] = test
+        best.setdefault(place, test)
     loads, durations = (sorted({place[k] for place in best}) for k in (0, 1))
     values = np.full((len(durations), len(loads)), np.nan)
     for (load, duration), test in best.items():
@@ -258,9 +273,9 @@ def _draw_map(panel: Axes, tests: list[PlannedTest], largest: float) -> QuadMesh
         axis.set_ticks(shown, labels=[f"{tick:.3g}" for tick in shown])
         axis.set_ticks([], minor=True)
     for (load, duration), test in best.items():
-        if np.isfinite(test.first_order.probability):
+        if np.isfinite(test.expectation.probability):
             light = test.first_order_per_hour > 0.6 * largest
-            panel.text(load, duration, f"{test.first_order.probability:.2f}", ha="center", va="center", fontsize=7,
+            panel.text(load, duration, f"{test.expectation.probability:.2f}", ha="center", va="center", fontsize=7,
                        color="k" if light else "w")  # fmt: skip
     return mesh
 

@@ -24,12 +24,17 @@ def forecast_text(forecast: Forecast) -> str:
     """What is forecast by which laws, then a paragraph for each test."""
     names = ", ".join(name if len(forecast.laws) == 1 else f"{name} ({w:.2g})" for name, w in forecast.laws.items())
     names += f" ({forecast.left_out} more of too little weight)" if forecast.left_out else ""
-    lines = [f"by {names}: {100 * forecast.level:g} % bands and intervals of single tests, if the law is right"]
+    lines = [f"by {names}: {100 * forecast.level:g} % bands and intervals of single tests, if {right_law(forecast)}"]
     if forecast.rejected:
         lines.append("the law does not explain the tests: this probability is not earned")
     for test in forecast.tests:
         lines += ["", *_test_lines(test)]
     return "\n".join(lines)
+
+
+def right_law(forecast: Forecast) -> str:
+    """The condition under which bands hold what they say, behind "if"."""
+    return "the law is right" if len(forecast.laws) == 1 else "one of these laws is right, with these weights"
 
 
 def _test_lines(test: TestForecast) -> list[str]:

@@ -50,7 +50,7 @@ def value_of(file: StudyFile, key: tuple[str | int, ...], kinds: Mapping[str, Qu
     """A number in creepkit's unit, from the unit of its key."""
     name, unit = quantity(file, key, kinds)
     with file.at(*key):
-        return kinds[name].convert(number, unit, "it", name)
+        return kinds[name].convert(number, unit, "", name)
 
 
 def laws_of(file: StudyFile) -> list[CreepLaw]:

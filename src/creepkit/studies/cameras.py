@@ -211,7 +211,7 @@ class StudyCameras:
         name, unit = arguments.quantity(self.file, (*place, "load", key), kinds)
         assert part.temperature_C is not None
         with self.file.at(*place, "load", key):
-            levels = [(start, kinds[name].convert(v, unit, "it", name)) for start, v in arguments.steps_of(steps)]
+            levels = [(start, kinds[name].convert(v, unit, "", name)) for start, v in arguments.steps_of(steps)]
             load = next(one for one in loads_of(specimen) if one.name == name)
             end = max(2.0 * levels[-1][0], 1e9)
             loading = stepped_load(name, load, levels, control=None, ramp=part.ramp_s, end=end)

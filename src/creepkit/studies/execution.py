@@ -188,6 +188,8 @@ class Execution:
         self, stage: Stage, state: Any, key: str, sentence: str = "", numbers: Mapping[str, Any] | None = None
     ) -> None:
         sha256 = self.digests.get(stage.name, "")
+        if state in ("made", "kept"):
+            sentence = "; ".join(filter(None, (stage.remark, sentence)))
         self.records.append(
             StageRecord(stage.name, stage.kind, stage.group, state, key, sentence, numbers or {}, sha256, stage.needs)
         )

@@ -80,6 +80,8 @@ def numbers_of_ranking(ranking: Ranking) -> dict[str, Any]:
 
 def temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
     """The forms of temperature of the law of a group."""
+    from creepkit.discovery.discover import isothermal_tests
+
     part, using, settings = (
         study.file.model.temperature,
         arguments.predictor_of(study.file, study.root),
@@ -87,6 +89,7 @@ def temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
     )
     assert part is not None
     place = ("temperature",)
+    within = ISOTHERMAL_RANGE if part.within_K is None else part.within_K
     law = None
     if part.law is not None:
         with study.file.at("temperature", "law"):
@@ -101,7 +104,6 @@ def temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
         options = {name: value for name, value in options.items() if value is not None}
         if part.parameters is not None:
             options["parameters"] = part.parameters
-        within = ISOTHERMAL_RANGE if part.within_K is None else part.within_K
         found = ck.temperature_study(
             chosen,
             list(group.histories),
@@ -127,7 +129,15 @@ def temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
     needs = (need,) if need else ()
     name = stage_name("temperature", group.name)
     return Stage(
-        name, "temperature", group.name, described, make, _numbers_of_temperature, needs, document=_temperature_document
+        name,
+        "temperature",
+        group.name,
+        described,
+        make,
+        _numbers_of_temperature,
+        needs,
+        document=_temperature_document,
+        remark=isothermal_tests(group.histories, within)[1],
     )
 
 

@@ -148,7 +148,27 @@ def _changes(old: Any, new: Any, place: str) -> list[tuple[str, str, str]]:
     if isinstance(old, dict) and isinstance(new, dict):
         inner = (_changes(old.get(key), new.get(key), f"{place}.{key}".lstrip(".")) for key in sorted({*old, *new}))
         return [change for changes in inner for change in changes]
+    if _are_tables(old) and _are_tables(new):
+        pairs = _paired(old, new)
+        return [change for number, a, b in pairs for change in _changes(a, b, f"{place} {number}")]
     return [] if old == new else [(place, _short(old), _short(new))]
+
+
+def _paired(old: Sequence[Any], new: Sequence[Any]) -> list[tuple[int, Any, Any]]:
+    """(number, before, now) of tables of a list, None where there is none: paired by their names, else by order."""
+    named = [{one.get("name", k): (k, one) for k, one in enumerate(tables, 1)} for tables in (old, new)]
+    if [len(each) for each in named] != [len(old), len(new)]:  # names that are not of one table each
+        named = [{k: (k, one) for k, one in enumerate(tables, 1)} for tables in (old, new)]
+    before, now = named
+    nothing = (0, None)
+    return [
+        ((now.get(key) or before[key])[0], before.get(key, nothing)[1], now.get(key, nothing)[1])
+        for key in dict.fromkeys([*before, *now])
+    ]
+
+
+def _are_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(one, dict) for one in value)
 
 
 def _short(value: Any) -> str:

@@ -79,7 +79,7 @@ def _levels(
     """The load of a key, and (start in s, level in creepkit's unit) of its steps."""
     name, unit = quantity(file, key, kinds)
     with file.at(*key):
-        return name, [(start, kinds[name].convert(level, unit, "it", name)) for start, level in steps_of(steps)]
+        return name, [(start, kinds[name].convert(level, unit, "", name)) for start, level in steps_of(steps)]
 
 
 def _component_loading(file: StudyFile, number: int, part: ForecastPart) -> Loading:

@@ -44,6 +44,7 @@ class Stage:
         file is read; None where the result is made again from identifications that are kept.
     document : what of a result that no record can be read from is written down, as JSON-able data.
     predictor : of identifications that its file holds. file : that an export is written to, "" for other stages.
+    remark : what is known beforehand that the result leaves out of account, "" where nothing is.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Stage:
     document: Callable[[Any], Any] | None = None
     predictor: Predictor | None = field(default=None, repr=False)
     file: str = ""
+    remark: str = ""
 
 
 def stage_name(kind: StageKind, group: str = "") -> str:

@@ -146,6 +146,13 @@ def _syntax_error(message: str, text: str) -> str:
     """Line and reason of an error of tomllib, which names the line at the end."""
     found = re.search(r" \(at line (\d+), column (\d+)\)$", message)
     line, column = (found[1], f", column {found[2]}") if found else (str(text.count("\n") + 1), "")
+    twice = re.match(r"Cannot (?:declare|overwrite|mutate).*?\('([^']*)',\)", message)
+    if twice and twice[1] in StudyModel.model_fields:
+        several = _takes_several(twice[1])
+        remedy = f"write [[{twice[1]}]] above each of them" if several else "put its keys under one heading"
+        return f"{line}: [{twice[1]}] stands there twice; {remedy}"
+    if not re.search(r"^\s*(?:\[|[\w\"'.-]+\s*=)", text, re.MULTILINE):
+        return f"{line}: this is no study file, but looks like data; {STUDY_FILE.advice}"
     reason = re.sub(r" \(at .*\)$", "", message)
     reason = reason[:1].lower() + reason[1:]
     return f"{line}: this is not TOML: {quoted(reason, 120)}{column}; texts stand in quotes, and each key on a line"
@@ -162,6 +169,11 @@ def _sentence(path: Path, error: ValidationError, lines: Mapping[KeyPath, int]) 
     more = len(found) - 1
     others = f" ({more} more mistake{'s' if more > 1 else ''} in the file)" if more else ""
     return f"{path}:{line_of(key, lines)}: {_problem(first, key)}{others}"
+
+
+def _takes_several(table: str) -> bool:
+    """Whether a study may have several tables of a name."""
+    return get_origin(StudyModel.model_fields[table].annotation) is list
 
 
 def _key(error: Any) -> KeyPath:
@@ -181,6 +193,10 @@ def _problem(error: Any, key: KeyPath) -> str:
         table = key[:-1]
         example = f"; {EXAMPLES[str(key[-1])]}" if str(key[-1]) in EXAMPLES else ""
         return f"{place_text(table) if table else 'the study'} has no '{key[-1]}', which it needs{example}"
+    if len(key) == 1 and kind == "list_type" and isinstance(given, dict):
+        return f"[{key[0]}] may stand there several times; write it in two brackets, [[{key[0]}]]"
+    if len(key) == 1 and kind in ("model_type", "model_attributes_type") and isinstance(given, list):
+        return f"[[{key[0]}]] stands there once at most; write it in one bracket, [{key[0]}]"
     return f"{place_text(key)} is {_shown(given)}, and {_needed(kind, given, context, error)}"
 
 
@@ -217,7 +233,7 @@ def _needed(kind: str, given: Any, context: Mapping[str, Any], error: Any) -> st
         return simple[kind]
     if kind == "literal_error":
         words = re.findall(r"'([^']*)'", str(context.get("expected", "")))
-        return f"must be one of these: {nearest(str(given)[:SHOWN], words)}"
+        return f"must be one of these: {', '.join(words)}"
     limits = {"greater_than": "above", "greater_than_equal": "at least", "less_than": "below"}
     limits["less_than_equal"] = "at most"
     if kind in limits:

@@ -89,7 +89,7 @@ def test_variations_of_bulge_tests_change_pressure_and_thickness():
     base = dimple(geometry={"apex_thickness": 0.5})
     told = {c.description: c for c in variations_of_tests([base], rigs_of([base], Bulge()))}
     assert any(text.startswith("14 MPa for") for text in told)
-    assert any(text.startswith("8 MPa, from") and "on 14 MPa" in text for text in told)
+    assert any(text.startswith("8 MPa to ") and " h, then 14 MPa to " in text for text in told)
     thicknesses = {h.geometry["apex_thickness"] for c in told.values() for h in c.histories}
     assert thicknesses == {0.45, 0.5, 0.55}
 
@@ -130,7 +130,7 @@ def test_any_load_is_varied_in_its_unit_after_the_ramp_that_was_made():
     )  # fmt: skip
     found = grid_of_rig(Rig("three-point-bend", (100.0, 400.0), 20.0, (1000.0,)), base)
     assert any(c.description.startswith("400 N for ") for c in found)
-    assert any("100 N, from " in c.description and " on 141 N" in c.description for c in found)
+    assert any("100 N to " in c.description and " h, then 141 N to " in c.description for c in found)
     for candidate in found:
         loading = candidate.histories[0].loading
         assert loading.quantity == "force"

@@ -1,6 +1,7 @@
 """Designs of experiments against closed forms of linear regression, and what a test tells once it is made."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -141,14 +142,14 @@ def hardening():
 def test_a_change_of_stress_separates_hardening_by_strain_from_hardening_by_time(hardening):
     """At constant stress both are one law (n' = n/(1-m), m' = m/(1-m)); after a change they part, both ways."""
     found = hardening.further_tests()
-    assert ", from " in found.best.description
+    assert ", then " in found.best.description
     assert found.best.expectation.probability > 0.99
     directions = {(c.reference_law, c.alternative_law): c.expected for c in found.best.expectation.chi_squares}
     names = "strain-hardening", "time-hardening"
     assert min(directions[names], directions[names[::-1]]) > 100
     shares = "+".join(names), "+".join(reversed(names))
     assert set(directions) == {names, names[::-1], (names[0], shares[0]), (names[1], shares[1])}
-    steady = [t for t in found.tests if ", from " not in t.description]
+    steady = [t for t in found.tests if ", then " not in t.description]
     assert max(t.expectation.probability for t in steady) < 0.5
     assert "separates" in str(found)
     assert "if strain-hardening holds, the chi-square of time-hardening is expected" in str(found)
@@ -213,10 +214,32 @@ def test_a_design_is_told_as_text_json_and_a_map(hardening, tmp_path):
     found.plot(tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 1000
     assert str(found).startswith(found.sentence)
-    able = [test.hours for test in found.tests if test.expectation.probability >= 0.95]
+    able = [test.hours for test in found.tests if test.at_draws and test.expectation.probability >= 0.95]
     said = cheapest_text(found)
     assert said in str(found)
-    assert (f"({min(able):.3g} h of machine time)" if able else "no test considered separates the laws") in said
+    assert (
+        f"({min(able):.3g} h of machine time with setting up)" if able else "no test considered separates the laws"
+    ) in said
+
+
+def test_a_number_in_the_map_is_one_of_the_table(hardening):
+    """In each cell the probability of the first test of the table with that first load and duration."""
+    found = design(hardening)
+    first: dict[tuple[bool, float, float], str] = {}
+    for test in found.tests:
+        levels = test.histories[0].loading.program().values
+        place = bool(np.ptp(levels[levels > 0]) == 0.0), round(test.first_level, 6), round(test.histories[0].times[-1])
+        first.setdefault(place, f"{test.expectation.probability:.2f}")
+    drawn = [text.get_text() for panel in found.plot().axes[:2] for text in panel.texts]
+    assert sorted(drawn) == sorted(first.values())
+
+
+def test_a_test_that_hardly_decides_is_not_advised(hardening):
+    found = design(hardening)
+    poor = tuple(replace(t, expectation=replace(t.expectation, probability=0.1)) for t in found.tests)
+    said = replace(found, tests=poor, plan=(), expected=None).sentence
+    assert said.startswith(f"none of the {len(poor)} tests considered is likely to tell")
+    assert "with probability 0.10" in said
 
 
 def test_work_that_is_stopped_gives_the_best_so_far(hardening):

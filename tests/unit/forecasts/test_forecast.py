@@ -295,7 +295,10 @@ def test_over_laws_the_doubt_about_the_law_is_part_of_the_band(tests):
     )
     average = ModelAverage(fits, (0.6, 0.4))
     far = bar("plan", 220.0, noise=0.0)
-    single, both = fits[0].forecast(far).tests[0], average.forecast(far).tests[0]
+    of_one, of_both = fits[0].forecast(far), average.forecast(far)
+    assert "single tests, if the law is right" in str(of_one)
+    assert "single tests, if one of these laws is right, with these weights" in str(of_both)
+    single, both = of_one.tests[0], of_both.tests[0]
     assert both.outputs["strain"].shares["choice of the law"][-1] > 0.05
     width = [np.log(t.times[0].high / t.times[0].low) for t in (single, both)]
     assert width[1] > width[0]

@@ -17,6 +17,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import StudyError
 from creepkit.files.writing import write_text
+from creepkit.studies.lock import differences
 from helpers.study_runs import ONE_FIT, STUDY, made, numbers, study_in
 
 
@@ -231,6 +232,26 @@ def test_two_processes_do_not_run_one_study_at_once(study: Path) -> None:
     with running_alone(study.parent / "study.results"), pytest.raises(StudyError, match="another process"):
         ck.Study.load(study).run()
     assert ck.Study.load(study).run(only="quality").failures == ()
+
+
+def test_a_changed_forecast_is_named_by_its_key_and_both_values() -> None:
+    """Forecasts are paired by their names, so that one more in front of others changes none of them."""
+
+    def lock(*forecasts: dict[str, Any]) -> dict[str, Any]:
+        settings = {"declared": {"forecast": list(forecasts)}, "settings": {}, "seed": 0}
+        return {**settings, "versions": {}, "inputs": {}, "laws": {}}
+
+    def pipe(stress: float) -> dict[str, Any]:
+        return {"name": "pipe", "load": {"stress_MPa": [{"from_h": 0.0, "level": stress}]}, "end_h": 5.0}
+
+    bolt = {"name": "bolt", "load": {"strain": [{"from_h": 0.0, "level": 0.0015}]}, "end_h": 9.0}
+    assert differences(lock(bolt, pipe(80.0)), lock(bolt, pipe(90.0))) == [
+        "setting forecast 2.load.stress_MPa 1.level: changed from 80.0 to 90.0"
+    ]
+    assert differences(lock(pipe(80.0)), lock(bolt, pipe(80.0))) == [
+        "setting forecast 1: changed from nothing to {'name': 'bolt', 'load': {'strain': [{'from_h': 0.0, 'lev..."
+    ]
+    assert differences(lock(bolt), lock(bolt)) == []
 
 
 def test_the_lock_says_what_a_run_depends_on_and_refuses_another(study: Path) -> None:

@@ -91,10 +91,21 @@ class Challenge:
 
 def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
     """The challenges of the first of some identifications, best first; the first law that is found ends the search."""
-    best, others = FittedLaw.at_least_chi_square(fits[0]), [FittedLaw.of(fit) for fit in fits[1:]]
+    best, others = FittedLaw.at_least_chi_square(fits[0]), _addable(fits)
     laws = itertools.chain((_sum_challenge(best, other) for other in others), (_threshold_challenge(best) for _ in "1"))
     first_law = next((challenge for challenge in laws if challenge is not None), None)
     return (*([first_law] if first_law is not None else []), *decisive_effects(fits))
+
+
+def _addable(fits: Sequence[Identification]) -> list[FittedLaw]:
+    """Those behind the first that have no summand of it: a sum that holds a law twice is never excluded."""
+    own = _summands(fits[0].law)
+    return [FittedLaw.of(fit) for fit in fits[1:] if own.isdisjoint(_summands(fit.law))]
+
+
+def _summands(law: CreepLaw) -> set[str]:
+    """Names of the laws that a law is the sum of."""
+    return set(law.name.split("+"))
 
 
 # ---- shares of other laws --------------------------------------------------------------------------------------------
@@ -272,7 +283,7 @@ def altered_laws(fits: Sequence[Identification], limit: float = NOT_EXCLUDED) ->
 
     What cannot be fitted is left out.
     """
-    best, others = FittedLaw.at_least_chi_square(fits[0]), [FittedLaw.of(fit) for fit in fits[1:]]
+    best, others = FittedLaw.at_least_chi_square(fits[0]), _addable(fits)
     results = []
     for other in (*others, None):
         try:

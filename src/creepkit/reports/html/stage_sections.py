@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, TypeVar
 
 from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
-from creepkit.reports.design import cheapest_text, design_figure, direction_lines, order_text
+from creepkit.reports.design import MACHINE_TIME, cells_text, cheapest_text, design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
-from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows
+from creepkit.reports.forecast import FORECAST_COLUMNS, forecast_rows, right_law
 from creepkit.reports.forecast_plot import forecast_figure
 from creepkit.reports.html.elements import (
     Block,
@@ -82,9 +82,7 @@ def stage_sections(contents: ReportContents, figures: PageFigures, names: LawNam
         lambda name, one: _forecast_blocks(name, one, figures, names=names),
     )
     yield from _sections(
-        ("design", "Further tests proposed"),
-        contents.design,
-        lambda name, one: _design_blocks(name, one, figures, names=names),
+        ("design", "Further tests"), contents.design, lambda name, one: _design_blocks(name, one, figures, names=names)
     )
 
 
@@ -180,6 +178,8 @@ def _temperature_blocks(name: str, result: TemperatureStudy | TemperatureLaw, fi
                 "Parameters at each temperature with 95 % intervals, and the forms that remain with their weights.",
             )
         )
+    if isinstance(result, TemperatureStudy):
+        blocks += [Paragraph(sentence(printable(note, 600))) for note in result.notes]
     text = temperature_study_text(result) if isinstance(result, TemperatureStudy) else temperature_law_text(result)
     return [*blocks, Verbatim("The temperature law in full", printable_lines(text))]
 
@@ -222,7 +222,7 @@ def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures, *, nam
     laws = ", ".join(f"{names.in_text(law)} ({weight:.2g})" for law, weight in forecast.laws.items())
     blocks: list[Block] = [
         Paragraph(
-            f"By {laws}: if the law is right, bands and intervals hold a measured value of a single test with a "
+            f"By {laws}: if {right_law(forecast)}, bands and intervals hold a measured value of a single test with a "
             f"probability of {100 * forecast.level:g} %."
             + (
                 " The law does not explain the tests, so that this probability is not earned: that the form of the law "
@@ -286,7 +286,7 @@ def _design_blocks(name: str, design: Design, figures: PageFigures, *, names: La
             for test in design.tests[:MOST_DESIGNS]
         ]
         probability = ("probability, decisive and right",) if to_decide else ()
-        columns = ("planned test", "machine time, h", *probability, "expected information, nats", "nats per hour")
+        columns = ("planned test", MACHINE_TIME, *probability, "expected information, nats", "nats per hour")
         caption = (
             f"The first of {plural(len(design.tests), 'planned test')} considered, {order_text(design)}; goal: "
             f"{design.goal}. A nat of information divides the volume of what is likely by 2.7"
@@ -299,7 +299,8 @@ def _design_blocks(name: str, design: Design, figures: PageFigures, *, names: La
                 f"What further tests tell{_of(name)}",
                 "Map of the expected information for an hour of machine time over first load and duration, left of "
                 "constant loads, right of loads that change.",
-                "Expected information for an hour of machine time over first load and duration; the plan is marked.",
+                "Expected information for an hour of machine time over first load and duration; the plan is marked. "
+                f"{cells_text(design)}.",
                 shows_values=True,
             )
         )

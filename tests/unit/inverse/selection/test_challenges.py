@@ -18,6 +18,7 @@ from creepkit.inverse.selection.challenges import (
     _chi_square,
     _comparison_text,
     _least_chi_square,
+    altered_laws,
     challenges_of,
     compatible_sum,
     compatible_threshold,
@@ -89,6 +90,14 @@ def test_a_planted_sum_of_two_fifths_is_not_decided_against():
         found = rank(fits_of(steady(law, values, conditions, noise=2e-4, seed=seed)))
         assert not found.decisive
         assert found.verdict.startswith("not decisive")
+
+
+def test_no_law_is_added_to_a_sum_that_holds_it(power_law_narrow):
+    """Norton's law and a sum with it: the sum of both has Norton's law as a case, and no test could exclude it."""
+    norton, sinh = power_law_narrow
+    both = replace(norton, law=replace(norton.law, name="norton+hyperbolic-sine"))
+    assert [one.other for one in altered_laws([norton, both, sinh]) if one.kind == "sum"] == ["hyperbolic-sine"]
+    assert [one.other for one in altered_laws([both, norton, sinh]) if one.kind == "sum"] == []
 
 
 def test_the_share_is_held_in_the_fit(power_law_narrow):
