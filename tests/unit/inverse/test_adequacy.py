@@ -250,7 +250,7 @@ def test_the_sentence_of_a_discrepancy_says_how_much_where_and_what_would_help()
     assert str(found) == (
         "leaves 0.0037 mm of amplitude (2.5 times its stated noise) unexplained (reduced chi-square 4.1 with "
         "77 degrees of freedom, p = 3e-09 (Bonferroni, 3 comparisons)); "
-        "most in amplitude of 'D3' about 5400 s, where it lies 0.0041 mm below what was measured; it would "
+        "most in amplitude of 'D3' about 1.5 h, where it lies 0.0041 mm below what was measured; it would "
         "explain them with thickness, which nobody modelled"
     )
     assert "p < 1e-12" in str(replace(found, p_value=0.0))

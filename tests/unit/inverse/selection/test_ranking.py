@@ -89,7 +89,7 @@ def test_where_no_law_explains_the_best_is_named_with_what_it_leaves():
         f"{LEAVES}"
     )
     assert "leaves 4e-05 of strain (2 times its stated noise) unexplained" in found
-    assert "most in strain of 'bar 1' about 5400 s, where it lies 4e-05 above what was measured" in found
+    assert "most in strain of 'bar 1' about 1.5 h, where it lies 4e-05 above what was measured" in found
     two = verdict_of(ranking([0.6, 0.35, 0.05], [LEAVES] * 3))
     assert "norton (weight 0.60 of the laws tried, not told apart from sinh), leaves" in two
 
