@@ -54,6 +54,10 @@ NAMED_SHARE, UNNAMED = 0.02, "#000000"
 """Share of the variance from which a part stands in the legend, and the colour of others."""
 
 
+BELOW_EDGE = 0.04
+"""Of the height of a panel: how far below its upper edge the interval of the rupture time is drawn."""
+
+
 LONGEST_AXIS = 5.0
 """Of the time of a test: beyond, an interval goes on to the right of the axis, as an arrow says."""
 
@@ -172,7 +176,8 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, bottom: flo
         is_rupture = not time.output
         if not is_rupture and time.output != one.output:
             continue
-        level = top * 0.97 if is_rupture else _scaled(one) * time.target
+        below = top * (bottom / top) ** BELOW_EDGE if is_logarithmic(one.output) else top - BELOW_EDGE * (top - bottom)
+        level = below if is_rupture else _scaled(one) * time.target
         if not bottom <= level <= top or not np.isfinite(time.low):
             continue
         low, high = time.low / SECONDS_PER_HOUR, min(time.high / SECONDS_PER_HOUR, right)

@@ -112,4 +112,4 @@ def _column(rates: Sequence[MinimumRate], name: str) -> Floats:
 
 def _positive(values: Sequence[float]) -> Floats:
     array = np.array(values, float)
-    return array[np.isfinite(array) & (array > 0)]
+    return np.asarray(array[np.isfinite(array) & (array > 0)])

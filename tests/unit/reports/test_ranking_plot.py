@@ -8,7 +8,7 @@ from creepkit.inverse.identify import identify
 from creepkit.inverse.selection.ranking import ranking_from_scores
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
-from creepkit.reports.ranking_plot import MOST_TESTS_DRAWN, misfits
+from creepkit.reports.ranking_plot import MOST_TESTS_DRAWN, misfit_name, misfits
 from helpers.steady_rate_predictor import Steady, planted
 
 QUICK = IdentificationSettings(starts=2, sobol_points=16, frames=20)
@@ -48,18 +48,23 @@ def test_of_a_decisive_ranking_the_one_law_is_drawn(fits):
     assert all(len(axes.lines) == 2 for axes in figure.subfigs[1].axes if axes.get_visible())
 
 
-def test_misfits_are_the_reduced_chi_squares_of_the_tests(fits):
+def test_misfits_are_those_of_which_the_verdict_is_the_mean(fits):
+    """All tests have as many readings, so that the reduced chi-square of all is the mean of theirs."""
     ranking = ranked(fits, 0.0, 1.0)
-    expected = [[m["strain"].errors.chi_square for m in r.fit.tests] for r in ranking.laws]
-    np.testing.assert_allclose(misfits(ranking), expected)
+    shown = misfits(ranking)
+    np.testing.assert_allclose(shown.mean(axis=1), [r.fit.adequacy.chi_square for r in ranking.laws], rtol=1e-9)
     (image,) = ranking.plot().subfigs[0].axes[0].images
-    np.testing.assert_allclose(image.get_array(), expected)
+    np.testing.assert_allclose(image.get_array(), shown)
+    assert "own rate" in misfit_name(ranking)
 
 
 def test_a_ranking_that_was_loaded_without_histories_shows_its_misfits(fits, tmp_path):
     import creepkit as ck
 
     loaded = [ck.load(fit.save(tmp_path / f"{k}.json")) for k, fit in enumerate(fits)]
+    expected = [[m["strain"].errors.chi_square for m in fit.tests] for fit in loaded]
+    np.testing.assert_allclose(misfits(ranked(loaded, 0.0, 1.0)), expected)
+    assert "the law's rate" in misfit_name(ranked(loaded, 0.0, 1.0))
     figure = ranked(loaded, 0.0, 1.0).plot()
     assert len(figure.subfigs) == 1
     assert figure.get_suptitle().startswith("not decisive")
