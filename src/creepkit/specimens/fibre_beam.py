@@ -96,9 +96,11 @@ class FibreBeam(TestPiece, ABC):
             if not least <= value <= most:
                 raise SolveError(f"specimen '{self.name}': {name} is {value!r}; allowed are {least:g} to {most:g}")
 
-    model_text = fibre_beam_text
-
-    # ---- of each kind of beam -------------------------------------------------------------------------------------
+    def model_text(self, histories: Sequence[History]) -> str:
+        """How the beam is simulated, in sentences for a paper."""
+        return fibre_beam_text(
+            len(self.beam_stations().moments), len(self.section()[0]), self.tolerance, self.strain_limit
+        )
 
     @abstractmethod
     def section(self) -> tuple[Floats, Floats]:
@@ -107,8 +109,6 @@ class FibreBeam(TestPiece, ABC):
     @abstractmethod
     def beam_stations(self) -> BeamStations:
         """The sections along the beam."""
-
-    # ---- of every beam --------------------------------------------------------------------------------------------
 
     @property
     def compliance(self) -> float:
