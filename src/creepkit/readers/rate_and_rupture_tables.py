@@ -22,6 +22,7 @@ from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.readers.assembly import assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
 from creepkit.readers.column_names import NameTable, split_written_name, unit_suffix, words_of
+from creepkit.readers.silent_rows import without_silent_rows
 from creepkit.readers.table_rows import TableRow
 from creepkit.readers.text_grids import peek_columns, read_text_grid
 from creepkit.readers.text_tables import SourceText, TextTable, unknown_text
@@ -125,12 +126,6 @@ _NAMES = NameTable(
 )
 
 
-RESULTS = ("minimum_rate", "rupture", "end_time", "ended")
-"""Quantities of which a test without frames states one or more."""
-
-MOST_NAMED = 6
-"""Rows left out that the label of assumptions names."""
-
 RUN_OUT = re.compile(r">=?|\N{GREATER-THAN OR EQUAL TO}")
 
 
@@ -162,7 +157,7 @@ class RowPerTestReader:
         for table in _tables(path, self.vocabulary.ignored):
             keys = _keys(table)
             if self.vocabulary.ignored:
-                table = _without_silent_rows(table, keys)
+                table = without_silent_rows(table, [_quantity(key) for key in keys])
             for row in table.rows:
                 history, place = self._history(table, row, keys), table.location(row.line)
                 if history.name in places:
@@ -187,26 +182,6 @@ class RowPerTestReader:
         where = f"sheet {table.sheet}, " if table.sheet else ""
         source = f"{table.path} ({where}{cells['name'].text if 'name' in cells else f'line {row.line}'})"
         return assemble_without_frames(name, entries, self.vocabulary, location=location, source=source)
-
-
-def _without_silent_rows(table: TextTable, keys: Sequence[str]) -> TextTable:
-    """The table without rows that say nothing of creep once columns are left out, which its assumptions name."""
-    says = [name for name, key in zip(table.columns, keys, strict=True) if _quantity(key) in RESULTS]
-    silent = [row for row in table.rows if not any(name in table.entries(row) for name in says)]
-    if not silent:
-        return table
-    if len(silent) == len(table.rows):
-        raise HistoryError(
-            f"{table.location(table.columns_line)}: no row states a minimum creep rate or an end of its test once the "
-            "ignored columns are left out; keep one of these columns"
-        )
-    names = [name for name, key in zip(table.columns, keys, strict=True) if key == "name"]
-    called = [table.entries(row)[names[0]].text if names and names[0] in table.entries(row) else f"line {row.line}"
-              for row in silent]  # fmt: skip
-    more = f" and {len(called) - MOST_NAMED} more" if len(called) > MOST_NAMED else ""
-    kept = tuple(row for row in table.rows if row not in silent)
-    what = f"without {' '.join(called[:MOST_NAMED])}{more} (nothing but ignored columns)"
-    return replace(table, rows=kept, assumptions=(*table.assumptions, what))
 
 
 def _with_point(entry: SourceText) -> SourceText:
