@@ -34,7 +34,7 @@ def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) 
     if histories:
         more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
         blocks += [_table_of_histories(histories, more), table_of_details(histories[:MOST_LISTED], more)]
-        blocks += minimum_rate_table(histories[:MOST_LISTED], found)
+        blocks += minimum_rate_table(histories[:MOST_LISTED])
     blocks += [Paragraph(sentence(f"Source of the data: {text}")) for text in contents.data_citations]
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)
