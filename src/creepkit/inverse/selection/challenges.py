@@ -99,13 +99,8 @@ def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
 
 def _addable(fits: Sequence[Identification]) -> list[FittedLaw]:
     """Those behind the first that have no summand of it: a sum that holds a law twice is never excluded."""
-    own = _summands(fits[0].law)
-    return [FittedLaw.of(fit) for fit in fits[1:] if own.isdisjoint(_summands(fit.law))]
-
-
-def _summands(law: CreepLaw) -> set[str]:
-    """Names of the laws that a law is the sum of."""
-    return set(law.name.split("+"))
+    own = set(fits[0].law.name.split("+"))
+    return [FittedLaw.of(fit) for fit in fits[1:] if own.isdisjoint(fit.law.name.split("+"))]
 
 
 # ---- shares of other laws --------------------------------------------------------------------------------------------
@@ -379,21 +374,16 @@ def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
     """The unmodelled effects, one by one, with which the first law no longer has nearly all the weight."""
     if any(fit.linearised is None for fit in fits):  # they were not made by likelihood
         return ()
-    kinds = dict.fromkeys(effect.kind for fit in fits for effect in fit.unmodelled if not effect.common)
+    independent = [{e.kind: e for e in fit.unmodelled if not e.common and e.residual_change.size} for fit in fits]
     challenges = []
-    for kind in kinds:
-        effects = [next((e for e in fit.unmodelled if e.kind == kind and not e.common), None) for fit in fits]
-        if any(effect is None or not effect.residual_change.size for effect in effects):
-            continue
-        weights = _weights_with(fits, [e for e in effects if e is not None])
+    for kind, example in independent[0].items():
+        effects = [one[kind] for one in independent if kind in one]
+        weights = _weights_with(fits, effects) if len(effects) == len(fits) else np.ones(1)
         if weights[0] > DECISIVE_WEIGHT:
             continue
-        example = next(e for e in effects if e is not None)
         rival = fits[int(np.argmax(np.where(np.arange(len(fits)) == 0, -1.0, weights)))].law.name
-        sentence = (
-            f"{example.description}, which was not modelled, would leave it a weight of {weights[0]:.2f} "
-            f"({rival}: {max(w for k, w in enumerate(weights) if k):.2f})"
-        )
+        left = f"would leave it a weight of {weights[0]:.2f} ({rival}: {weights[1:].max():.2f})"
+        sentence = f"{example.description}, which was not modelled, {left}"
         challenges.append(Challenge("unmodelled effect", kind, sentence))
     return tuple(challenges)
 
