@@ -27,7 +27,7 @@ LARGEST_SCATTER = 1.0
 
 
 TREND_SIGNIFICANCE = 0.01
-"""p-value below which rates of tests bend over the stress."""
+"""p-value below which rates of tests depend on stress in another way than the law's."""
 
 
 NOTEWORTHY_EXPECTATION = 1.05
@@ -217,7 +217,7 @@ class Adequacy:
         if self.rate_scatter > LARGEST_SCATTER:
             parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
         elif self.rate_trend_p_value < TREND_SIGNIFICANCE:
-            parts.append(f"rates of tests that bend over the stress (p = {self.rate_trend_p_value:.1g})")
+            parts.append(f"rates of tests that depend on stress in another way (p = {self.rate_trend_p_value:.1g})")
         if self.contradicting is not None:
             parts.append(str(self.contradicting))
         where = f"; most in {self.largest}" if self.largest is not None else ""

@@ -26,7 +26,7 @@ def forecast_text(forecast: Forecast) -> str:
     names += f" ({forecast.left_out} more of too little weight)" if forecast.left_out else ""
     lines = [f"by {names}: {100 * forecast.level:g} % bands and intervals of single tests, if {right_law(forecast)}"]
     if forecast.rejected:
-        lines.append("the law does not explain the tests: this probability is not earned")
+        lines.append("the tests contradict the law: bands and intervals do not have this probability")
     for test in forecast.tests:
         lines += ["", *_test_lines(test)]
     return "\n".join(lines)

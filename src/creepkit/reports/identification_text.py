@@ -180,7 +180,7 @@ def _spread(ratios: Sequence[float]) -> str:
 def _if_the_law_holds(fit: Identification) -> str:
     """The condition of intervals of single tests."""
     rejected = fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy"
-    return ", which is not earned: the law does not explain the tests" if rejected else ", if the law holds"
+    return ", which they do not have: the tests contradict the law" if rejected else ", if the law holds"
 
 
 def _rupture_table(ruptures: Sequence[tuple[str, str, RuptureComparison]]) -> list[str]:

@@ -175,10 +175,8 @@ def _table_of_ruptures(fit: Identification) -> Table:
         "95 % interval of a single test if the law is right, h",
     )
     rejected = fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy"
-    earned = (
-        ". The law does not explain the tests: the probability of these intervals is not earned" if rejected else ""
-    )
-    caption = f"Rupture times; > marks tests that were stopped before{earned}"
+    doubt = ". The tests contradict the law: the intervals do not have this probability" if rejected else ""
+    caption = f"Rupture times; > marks tests that were stopped before{doubt}"
     return Table(caption, columns, rows, numeric=(2, 3, 4))
 
 

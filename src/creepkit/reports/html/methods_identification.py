@@ -133,8 +133,8 @@ def _weights(fit: Identification, references: References) -> list[str]:
         return [
             f"The {parts} were estimated by restricted maximum likelihood{references.cite('reml')}; 95 % intervals "
             "follow from the whole covariance with Satterthwaite's degrees of freedom"
-            f"{references.cite('satterthwaite')}. Beforehand parameters have weak Gaussian priors, with the variance "
-            "of a uniform distribution between their bounds."
+            f"{references.cite('satterthwaite')}. Parameters have weak Gaussian priors, with the variance of a uniform "
+            "distribution between their bounds."
         ]
     if settings.weights == "noise":
         parts = listed(["noise", *estimated, "what the law cannot follow"])

@@ -39,7 +39,7 @@ def slider_sections(found: Sequence[GroupFindings]) -> list[PageSection]:
     if len(fragment.encode()) > LARGEST_FRAGMENT:
         return []
     text = "What the law does when its parameters are changed, over the tests; curves are computed in the browser."
-    return [PageSection("sliders", "The law under sliders", [Paragraph(text), Fragment(Markup(fragment))])]
+    return [PageSection("sliders", "The law with sliders", [Paragraph(text), Fragment(Markup(fragment))])]
 
 
 def fragment_style(sections: Sequence[PageSection]) -> str:
