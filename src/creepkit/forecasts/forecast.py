@@ -47,8 +47,8 @@ class Forecast(Presentable):
     laws : {law: weight}; left_out : how many laws of a ranking have too little weight to count.
     level : probability that a pointwise band holds a measured value, a simultaneous band a whole curve, and an interval
     a time, of a single test, if the law is right. tests : one forecast each.
-    rejected : whether the tests contradict the law of most weight, so that bands and intervals do not have this probability.
-    draws : of the law, of each test's own rate and of its dimensions, in each test; the largest number.
+    rejected : whether the tests contradict the law of most weight, so that bands and intervals do not have this
+    probability. draws : of the law, of each test's own rate and of its dimensions, in each test; the largest number.
     """
 
     laws: Mapping[str, float]
