@@ -6,9 +6,10 @@ before a line of creepkit runs (`sitecustomize` of such an entry, `creepkit.py` 
 this module; the script `creepkit`, and `python -P -m creepkit`, look into no working folder at all.
 """
 
-# no `from __future__ import`: that imports a module too, before the working folder is left out
+# no `from __future__ import`: that imports a module too, before the working folder is left out; _signal is part of the
+# interpreter, while signal imports enum and others, during which Ctrl-C would end in a traceback
+import _signal
 import os
-import signal
 import sys
 
 _OPTIONS_WITH_VALUES = "WX"
@@ -33,8 +34,8 @@ def leave_working_folder_out() -> None:
 
 def end_without_traceback_at_ctrl_c() -> None:
     """Until the command line is imported, Ctrl-C ends the process as it does programs that are not Python's."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
+        _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
 
 
 def leave_settings_of_working_folder_out() -> None:
