@@ -140,6 +140,18 @@ def test_a_signal_while_an_object_is_tidied_away_is_not_lost():
     assert stderr.count("\n") == 1
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="signals are those of POSIX")
+def test_a_library_that_aborts_while_the_interpreter_ends_changes_no_exit_code():
+    """As torch does where a signal cut its training off; what is registered to be tidied up still is."""
+    program = (
+        "import atexit, sys\nclass Library:\n    def __del__(self): os.abort()\nkept = Library()\n"
+        "atexit.register(lambda: print('tidied up', file=sys.stderr))\n"
+        f"app.app = lambda: os.kill(os.getpid(), signal.SIGTERM)\n{CALLED}"
+    )
+    code, stderr = ended(program)
+    assert (code, stderr.splitlines()[-1]) == (143, "tidied up")
+
+
 def test_nohup_is_heeded():
     program = (
         f"signal.signal(signal.SIGINT, signal.SIG_IGN)\napp.app = lambda: os.kill(os.getpid(), signal.SIGINT)\n{CALLED}"

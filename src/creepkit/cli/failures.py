@@ -5,6 +5,7 @@ A fault of creepkit is one line, exit code 70, and a file with all that a report
 
 from __future__ import annotations
 
+import atexit
 import io
 import os
 import platform
@@ -145,6 +146,9 @@ def run_to_the_end(run: Callable[[], None]) -> None:
         ignore_signals()  # all is done; Python would print a traceback while it tidies up
     for stream in (sys.stdout, sys.stderr):
         _drop_what_cannot_be_written(stream)
+    if was_interrupted() and isinstance(code, int):
+        atexit._run_exitfuncs()
+        os._exit(code)  # libraries that were cut off amid a call, as torch, may abort while the interpreter tidies up
     exec("")  # Python ends by SIGINT where a text that exec ran was ever interrupted, unless another ran afterwards
     sys.exit(code)  # type: ignore[arg-type]
 
