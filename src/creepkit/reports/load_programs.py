@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from creepkit.inverse.held_levels import HELD_TEMPERATURE, holds, last_data_time
+from creepkit.inverse.held_levels import holds, is_isothermal, last_data_time, temperature_holds
 from creepkit.inverse.reference_conditions import LOAD_TOLERANCE
 from creepkit.records import SECONDS_PER_HOUR as SECONDS_PER_HOUR
 from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program, load_unit
@@ -69,10 +69,9 @@ def _level_text(program: Program, last: float, unit: str) -> str:
 def temperature_text(history: History) -> str:
     """The temperature over the frames of a test, such as "793 → 800 °C at 4 h"."""
     program = history.temperature_program()
-    if float(np.ptp(program.values)) <= 2 * HELD_TEMPERATURE:
+    if is_isothermal(history):
         return f"{float(np.mean(program.values)) - ZERO_CELSIUS:.0f} °C"
-    steps = holds(program, last_data_time(history), HELD_TEMPERATURE)
-    return _holds_text(steps, " °C", lambda v: f"{v - ZERO_CELSIUS:.0f}")
+    return _holds_text(temperature_holds(history), " °C", lambda v: f"{v - ZERO_CELSIUS:.0f}")
 
 
 def _holds_text(pieces: list[tuple[float, float, float]], unit: str, number: Callable[[float], str]) -> str:
