@@ -7,7 +7,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.reference_conditions import reference_stresses
-from creepkit.records import ZERO_CELSIUS
+from creepkit.records.units import celsius_text
 
 SAME_TEMPERATURE = 2.0
 """K between tests of one temperature."""
@@ -63,7 +63,7 @@ def outside_combinations(fit: Identification, stresses: Floats, temperatures: Fl
             continue  # a temperature beyond all tests is said of the temperature
         low, high = np.exp(spans[0])
         return (
-            f"stress {stress:.4g} MPa at {T - ZERO_CELSIUS:.0f} °C (the tests' region in 1/T and ln stress holds "
+            f"stress {stress:.4g} MPa at {celsius_text(T, digits=0)} (the tests' region in 1/T and ln stress holds "
             f"{low:.4g} to {high:.4g} MPa there)"
         )
     return ""

@@ -12,7 +12,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError, quoted
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
-from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History
+from creepkit.records import SECONDS_PER_HOUR, History
 
 TensileStrength = Callable[[Floats], Floats]
 """MPa at temperatures in K, arrays of one shape; NaN where it is not known."""
@@ -225,8 +225,3 @@ def tensile_strengths(tests: RuptureTests, stated: Mapping[float, float] | None)
         ]
     temperatures, strengths = zip(*pairs, strict=True) if pairs else ((), ())
     return frozen(temperatures), frozen(strengths)
-
-
-def celsius(temperature: float) -> str:
-    """A temperature in K as text in degrees Celsius."""
-    return f"{temperature - ZERO_CELSIUS:.5g} °C"
