@@ -12,6 +12,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError, quoted
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
+from creepkit.quality import repeated_row_notes
 from creepkit.records import SECONDS_PER_HOUR, History
 
 TensileStrength = Callable[[Floats], Floats]
@@ -129,6 +130,7 @@ def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTe
             f"{len(repeated)} tests have the stress, temperature and time of another one, such as '{repeated[0]}'; "
             "leave them out if a table was read twice, for each counts"
         )
+    notes += repeated_row_notes([h for h in with_rate if not h.end_known])
     return _as_arrays(known), _as_arrays(with_rate), tuple(notes)
 
 

@@ -286,10 +286,12 @@ def _band_notes(mixture: ModelAverage, temperature: float, temperature_uncertain
     low, high = fit.ranges["temperature"]
     if len(laws_without_temperature) < len(mixture.fits) and high - low < SAME_TEMPERATURE:
         notes.append(
-            f"all tests were made at {celsius_text(0.5 * (low + high), digits=0)}: how the rate depends on temperature is "
-            "not determined by them, and the band shows it"
+            f"all tests were made at {celsius_text(0.5 * (low + high), digits=0)}: how the rate depends on temperature "
+            "is not determined by them, and the band shows it"
         )
     extrapolation = max(low - SAME_TEMPERATURE - temperature, temperature - high - SAME_TEMPERATURE)
     if extrapolation > 0:
-        notes.append(f"{celsius_text(temperature, digits=0)} lies {extrapolation + SAME_TEMPERATURE:.0f} K outside the tests")
+        notes.append(
+            f"{celsius_text(temperature, digits=0)} lies {extrapolation + SAME_TEMPERATURE:.0f} K outside the tests"
+        )
     return tuple(notes)
