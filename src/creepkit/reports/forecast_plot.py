@@ -178,7 +178,7 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, bottom: flo
             continue
         below = top * (bottom / top) ** BELOW_EDGE if is_logarithmic(one.output) else top - BELOW_EDGE * (top - bottom)
         level = below if is_rupture else _scaled(one) * time.target
-        if not bottom <= level <= top or not np.isfinite(time.low):
+        if not bottom <= level <= top or not time.low / SECONDS_PER_HOUR <= right:
             continue
         low, high = time.low / SECONDS_PER_HOUR, min(time.high / SECONDS_PER_HOUR, right)
         colour = RUPTURE_COLOUR if is_rupture else TIME_COLOUR

@@ -315,7 +315,7 @@ def _range_lines(fit: Identification) -> list[str]:
     part = [(T, s) for T, s in at_temperatures if s[0] > low * tolerance or s[1] * tolerance < high]
     if part:
         named = "; ".join(
-            f"{celsius_text(T)} {s[0]:.4g}{f' to {s[1]:.4g}' if s[1] > s[0] * tolerance else ''} MPa"
+            f"{celsius_text(T, digits=0)} {s[0]:.4g}{f' to {s[1]:.4g}' if s[1] > s[0] * tolerance else ''} MPa"
             for T, s in at_temperatures[:MOST_TEMPERATURES_NAMED]
         )
         more = len(at_temperatures) - MOST_TEMPERATURES_NAMED
