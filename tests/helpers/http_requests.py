@@ -74,3 +74,11 @@ def question(**changes: Any) -> dict[str, Any]:
 def ask(server: PageServer, **changes: Any) -> Answer:
     """The answer to such a question."""
     return request(server, "POST", f"/{server.token}/predict", json.dumps(question(**changes)).encode())
+
+
+def sentence(answer: Answer) -> str:
+    """The one thing that a refusal says."""
+    assert answer.data.keys() == {"error"}
+    assert "\n" not in answer.data["error"]
+    assert "Traceback" not in answer.data["error"]
+    return str(answer.data["error"])

@@ -181,7 +181,7 @@ def test_demo_identifies_measured_curves_then_the_law_of_a_virtual_bulge_test(tm
     result = creepkit("demo", "--to", tmp_path / "demo")
     assert result.exit_code == 0, result.output
     measured, simulated = result.stdout.split("SIMULATED")
-    rupture = re.findall(r"980 C, (\d+) MPa +(\S.*?)  +(\d+) +(\d+) to (\d+)", measured)
+    rupture = re.findall(r"980 °C, (\d+) MPa +(\S.*?)  +(\d+) +(\d+) to (\d+)", measured)
     assert [int(row[0]) for row in rupture] == [230, 200, 170, 140]
     for _, times, predicted, low, high in rupture:
         for time in times.split(", "):

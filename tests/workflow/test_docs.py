@@ -131,11 +131,11 @@ def test_the_tables_of_the_guide_are_read(tmp_path):
         (tmp_path / f"{k}.csv").write_text(block, encoding="utf-8")
         found.append(ck.read_histories(tmp_path / f"{k}.csv"))
     ((bar,), beside, pairs, rows) = found
-    assert (bar.condition, bar.times[-1]) == ("850 C, 60.5 MPa", 4500.0)
+    assert (bar.condition, bar.times[-1]) == ("850 °C, 60.5 MPa", 4500.0)
     assert bar.outputs["strain"].tolist() == [0.0, 0.00021, 0.00034]
     for tests in (beside, pairs, rows):
         assert [test.name for test in tests] == ["A1", "A2"]
-        assert [test.condition for test in tests] == ["850 C, 60 MPa", "860 C, 80 MPa"]
+        assert [test.condition for test in tests] == ["850 °C, 60 MPa", "860 °C, 80 MPa"]
         assert [test.outputs["strain"][1] for test in tests] == pytest.approx([0.005, 0.007])
     assert [test.labels["heat"] for test in rows] == ["X7", "X8"]
 

@@ -49,7 +49,7 @@ def test_loads_and_lengths_are_keys_and_options_in_their_units(tmp_path):
     assert (test.specimen, dict(test.geometry)) == ("test-cantilever", {"height": 2.02, "breadth": 10.1})
     assert test.loading == ck.constant_load("end_force", 11.0)
     assert test.outputs["end_deflection"].tolist() == pytest.approx([1e-3, 0.02, 0.2])
-    assert test.condition == "700 C, 11 N"
+    assert test.condition == "700 °C, 11 N"
     (again,) = ck.read_histories(ck.write_history(test, tmp_path / "again.csv"))
     assert again.loading.program() == test.loading.program()
     assert (again.geometry, again.specimen) == (test.geometry, test.specimen)

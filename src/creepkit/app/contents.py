@@ -17,16 +17,8 @@ from creepkit.errors import CreepkitError, FitError, quoted
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.language import temperature
-from creepkit.records import (
-    ZERO_CELSIUS,
-    History,
-    LawWithValues,
-    Predictor,
-    Specimen,
-    dimensions_of,
-    known_specimens,
-    predict_with,
-)
+from creepkit.records import History, LawWithValues, Predictor, Specimen, dimensions_of, known_specimens, predict_with
+from creepkit.records.units import celsius_text
 from creepkit.registry.arguments import check_histories, resolve_law
 
 if TYPE_CHECKING:
@@ -233,10 +225,10 @@ def temperature_warning(law: CreepLaw, histories: Sequence[History]) -> str:
     temperatures = [history.mean_temperature for history in histories]
     if law.uses(temperature) or not temperatures or max(temperatures) - min(temperatures) <= SAME_TEMPERATURE:
         return ""
-    low, high = min(temperatures) - ZERO_CELSIUS, max(temperatures) - ZERO_CELSIUS
+    span = celsius_text(min(temperatures), max(temperatures), digits=0)
     return (
-        f"The law does not depend on temperature, and these tests are at {low:.0f} to {high:.0f} C: its curves are the "
-        "same at every temperature, so that they cannot follow all of them."
+        f"The law does not depend on temperature, and these tests are at {span}: its curves are the same at every "
+        "temperature, so that they cannot follow all of them."
     )
 
 

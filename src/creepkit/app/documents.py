@@ -24,6 +24,7 @@ from creepkit.app.model_data import law_data
 from creepkit.app.page_models import model_of, network_of
 from creepkit.errors import CreepkitError
 from creepkit.exporters.latex import latex_unit
+from creepkit.inverse.measured_minimum_rates import measured_minimum_rate
 from creepkit.language.printing import LatexLawPrinter, latex_equations
 from creepkit.records import (
     History,
@@ -118,6 +119,21 @@ def law_document(page_law: PageLaw, end: float) -> dict[str, Any]:
 
 def judged_text(fit: Identification) -> str:
     """What the identification found of the misfit, which it takes otherwise than the page does; "" for nothing."""
+    return " ".join(filter(None, (_misfit_at_optimum(fit), _numerical_error(fit))))
+
+
+def _numerical_error(fit: Identification) -> str:
+    """That curves of the page have an error of which the identification took account; "" where it found none."""
+    error = fit.numerical_error
+    if error is None:
+        return ""
+    return (
+        f"The identification was corrected for the numerical error of its predictor, up to {error.noises:.2g} times "
+        "the noise; the curves and misfits here are not."
+    )
+
+
+def _misfit_at_optimum(fit: Identification) -> str:
     scatter = f"; these scatter by {100.0 * fit.noise_model.rate:.2g} %" if fit.noise_model.rate > 0.0 else ""
     if fit.adequacy is None or not fit.adequacy.outputs:
         return ""
@@ -264,11 +280,26 @@ def test_document(history: History, contents: PageContents) -> dict[str, Any]:
         "modulus": None if history.elastic is None else finite(history.elastic.at(history.mean_temperature).E),
         "lengths": {name: float(value) for name, value in history.geometry.items()},
         "nuisances": _has_nuisances(history, contents),
-        "minimum_rate": history.minimum_rate,
+        "minimum_rate": _minimum_rate(history),
+        "note": "; ".join(_test_notes(history, contents)),
         "rupture_time": history.rupture_time,
         "includes_elastic": history.includes_elastic,
         "measure": history.strain_measure,
     }
+
+
+def _minimum_rate(history: History) -> float | None:
+    """1/s, that a test states or its strain shows; None where neither does."""
+    if history.minimum_rate is not None:
+        return history.minimum_rate
+    return finite(measured_minimum_rate(history)) if history.used.any() else None
+
+
+def _test_notes(history: History, contents: PageContents) -> list[str]:
+    """Why a test has no misfit, and that the first law was identified without it."""
+    without = contents.laws[0].fit is not None and not _test_fits(history, contents)
+    notes = ["no misfit: all of its frames are excluded"] if history.outputs and not history.used.any() else []
+    return [*notes, *(["the law was identified without this test"] if without else [])]
 
 
 def _thinned(program: Program) -> list[list[float | None]]:

@@ -81,7 +81,7 @@ def _write_data(to: Path) -> None:
 def _measured_creep_curves(folder: Path) -> StudyResult:
     """Laws of the CMSX-6 curves, and rupture as the best one has it."""
     typer.echo(
-        "MEASURED: nine creep curves of CMSX-6 at 980 C, thinned; six tests ruptured, three were stopped\n"
+        "MEASURED: nine creep curves of CMSX-6 at 980 °C, thinned; six tests ruptured, three were stopped\n"
         "(Federal Institute for Materials Research and Testing, doi 10.5281/zenodo.13937986, CC BY 4.0)"
     )
     result = _run(MEASURED, folder)
@@ -95,7 +95,7 @@ def _measured_creep_curves(folder: Path) -> StudyResult:
 
 
 def _planted_creep_curves(folder: Path) -> StudyResult:
-    typer.echo("SIMULATED: nine creep curves with noise, 750 to 850 C")
+    typer.echo("SIMULATED: nine creep curves with noise, 750 to 850 °C")
     result = _run(PLANTED, folder)
     _print_ranking(result.rankings[""])
     _print_truth(PLANTED, result.rankings[""].best)

@@ -6,6 +6,7 @@ A fault of creepkit is one line, exit code 70, and a file with all that a report
 from __future__ import annotations
 
 import atexit
+import codecs
 import io
 import os
 import platform
@@ -73,6 +74,20 @@ def _address() -> str:
     return "to its authors"
 
 
+AS_TERMINALS_CAN = "creepkit.terminal"
+"""Name of how characters that an encoding lacks are written: 850 °C as 850 C, others as their codes."""
+
+
+def _replaced(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    lacking = error.object[error.start : error.end]
+    return lacking.replace("\N{DEGREE SIGN}", "").encode("ascii", "backslashreplace").decode("ascii"), error.end
+
+
+codecs.register_error(AS_TERMINALS_CAN, _replaced)
+
+
 def prepare_streams() -> None:
     """Have all three standard streams open, write all of a text or fail, and write what an encoding lacks as its code.
 
@@ -96,7 +111,7 @@ def prepare_streams() -> None:
             whole = io.BufferedWriter(stream.buffer)
             setattr(sys, name, stream := io.TextIOWrapper(whole, stream.encoding, line_buffering=True))
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
+            stream.reconfigure(errors=AS_TERMINALS_CAN)
 
 
 def print_warnings_plainly() -> None:

@@ -23,6 +23,7 @@ from creepkit.cli.planned_test import (
     parse_temperature,
     planned_test,
 )
+from creepkit.records.units import celsius_text
 from creepkit.reports.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ def _temperature(source: Identification | ModelAverage, texts: list[str] | None)
         return parse_temperature(texts)
     low, high = (source if isinstance(source, Identification) else source.fits[0]).ranges["temperature"]
     if high - low > ISOTHERMAL_RANGE:
-        raise FitError(f"the fitted tests were made at {low:.4g} to {high:.4g} K: give --temperature-c")
+        raise FitError(f"the fitted tests were made at {celsius_text(low, high)}: give --temperature-c")
     return float(0.5 * (low + high))
 
 

@@ -25,7 +25,8 @@ from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, temperature
 from creepkit.presentation import Presentable
-from creepkit.records import ZERO_CELSIUS, History, Predictor
+from creepkit.records import History, Predictor
+from creepkit.records.units import celsius_text
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictor, resolve_predictors
 
 Forms = Sequence[str] | Mapping[str, Sequence[str]]
@@ -194,7 +195,7 @@ def isothermal_tests(
     remaining = [test for test in tests if test.name not in others]
     if not others:
         return remaining, ""
-    spans = [f"{name} ({T.min() - ZERO_CELSIUS:.0f} to {T.max() - ZERO_CELSIUS:.0f} C)" for name, T in others.items()]
+    spans = [f"{name} ({celsius_text(T.min(), T.max(), digits=0)})" for name, T in others.items()]
     what = "is left out, for it is" if len(others) == 1 else "are left out, for they are"
     return remaining, f"{', '.join(spans)} {what} not at one temperature"
 
@@ -221,7 +222,7 @@ def _isothermal_fits(
         try:
             fits.append(identify(law, group, predictor, settings=settings))
         except CreepkitError as error:
-            failures.append(f"at {group[0].mean_temperature:.0f} K alone: {error}")
+            failures.append(f"at {celsius_text(group[0].mean_temperature, digits=0)} alone: {error}")
         if progress is not None:
             progress("temperature", k + 1, len(groups))
     return fits, failures

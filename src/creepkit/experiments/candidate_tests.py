@@ -13,7 +13,6 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError, quoted
 from creepkit.experiments.rig import HIGHER_LEVEL, LOWER_LEVEL, Rig
 from creepkit.records import (
-    ZERO_CELSIUS,
     History,
     Loading,
     PressureJump,
@@ -25,6 +24,7 @@ from creepkit.records import (
     load_unit,
 )
 from creepkit.records.loading import Quantity
+from creepkit.records.units import celsius_text, time_text
 
 ControlledQuantity = Literal["load", "stress"]
 
@@ -90,8 +90,8 @@ def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperatu
     candidates = []
     for duration, T in product(_durations(rig, longest), temperatures):
         for loading, text in _LOADINGS.get(quantity, _loads)(rig, base, duration):
-            at_temperature = f" at {T - ZERO_CELSIUS:.4g} °C" if len(temperatures) > 1 else ""
-            whole = f"{text} {hours_text(duration)}{at_temperature}"
+            at_temperature = f" at {celsius_text(T)}" if len(temperatures) > 1 else ""
+            whole = f"{text} {time_text(duration)}{at_temperature}"
             times = frame_times(duration, rig.frame_interval)
             for dimensions, pieces_text in pieces:
                 description = f"{pieces_text} at {whole}" if pieces_text else whole
@@ -157,7 +157,7 @@ def _pairs(rig: Rig) -> Iterator[tuple[float, float]]:
 
 def _change_text(first: str, change: float, second: str) -> str:
     """A load that changes after a time, s, up to the end, which the description of the test goes on with."""
-    return f"{first} to {hours_text(change)}, then {second} to"
+    return f"{first} to {time_text(change)}, then {second} to"
 
 
 def _pressures(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
@@ -211,11 +211,6 @@ _LOADINGS: dict[Quantity, Callable[[Rig, History, float], Iterator[tuple[Loading
 
 NOT_PLANNED = "components"
 """The load of a material point: there are too many of it to plan."""
-
-
-def hours_text(seconds: float) -> str:
-    """A duration as people say it."""
-    return f"{seconds / 3600.0:.3g} h"
 
 
 # ---- variations of tests that were made ------------------------------------------------------------------------------
@@ -277,7 +272,7 @@ def _made(
 
 
 def _like(base: History, text: str, duration: float, rig: Rig) -> CandidateTest:
-    description = f"{text} {hours_text(duration)}"
+    description = f"{text} {time_text(duration)}"
     history = base.replace(
         times=frame_times(duration, rig.frame_interval), outputs={}, standard_deviation={}, name=f"plan: {description}"
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from creepkit.errors import FitError, quoted
-from creepkit.experiments.candidate_tests import CandidateTest, hours_text
+from creepkit.experiments.candidate_tests import CandidateTest
 from creepkit.experiments.rig import Rig, rigs_of
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.identification import Identification
@@ -70,7 +70,7 @@ def edges_of(chosen: CandidateTest, considered: Sequence[CandidateTest], rigs: M
     notes = []
     if chosen.duration <= 1.001 * min(durations) and min(durations) < 0.999 * max(durations):
         notes.append(
-            f"it is as short as any test that was considered ({hours_text(min(durations))}, for frames each "
+            f"it is as short as any test that was considered ({time_text(min(durations))}, for frames each "
             f"{time_text(rig.frame_interval)}): more frequent frames may make a shorter one better"
         )
     levels = chosen.histories[0].loading.program().values

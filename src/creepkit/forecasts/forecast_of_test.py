@@ -311,7 +311,7 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked
     low, high = fit.ranges["temperature"]
     celsius = float(temperatures.max())
     meant = celsius < low - FAR and low - FAR < celsius + ZERO_CELSIUS < high + FAR
-    return f"{text}; temperatures are in K: is {celsius:g} C meant, {celsius + ZERO_CELSIUS:g} K?" if meant else text
+    return f"{text}; temperatures are in K: is {celsius:g} °C meant, {celsius + ZERO_CELSIUS:g} K?" if meant else text
 
 
 def extrapolated_names(text: str) -> list[str]:

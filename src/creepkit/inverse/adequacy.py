@@ -204,7 +204,7 @@ class Adequacy:
             found = f"{self._chi_square_text}, {self._p_value_text}{correlated}"
             return f"is not contradicted by the tests at their {source} noise{self.qualification}{scatter}: {found}"
         if self.contradicting is not None and not self.outputs:
-            return f"does not explain the tests: {self.contradicting}"
+            return f"is contradicted by the tests: {self.contradicting}"
         parts = [
             f"{o.discrepancy:.2g}{' ' + output_unit(o.output) if output_unit(o.output) else ''} of {o.output} "
             f"({noises_text(o.discrepancy_in_noises)} times its {o.noise_source} noise)"

@@ -77,7 +77,7 @@ def check_kelvin(ranges: Mapping[str, tuple[float, float]], temperature: ArrayLi
         if value < low - WRONG_UNIT_MARGIN and low - WRONG_UNIT_MARGIN <= kelvin <= high + WRONG_UNIT_MARGIN:
             raise FitError(
                 f"temperature {value:g} K lies {low - value:.0f} K below the fitted tests ({low:.4g} to {high:.4g} K); "
-                f"temperatures are in K: if {value:g} C is meant, give {kelvin:g}; if not, pass warn=False"
+                f"temperatures are in K: if {value:g} °C is meant, give {kelvin:g}; if not, pass warn=False"
             )
 
 

@@ -13,11 +13,28 @@ HELD_TEMPERATURE = 1.0
 
 def held_temperatures(history: History) -> list[float]:
     """K at which a test is held, in their order; the mean temperature of one that is never held at any."""
-    program = history.temperature_program()
-    if float(np.ptp(program.values)) <= 2 * HELD_TEMPERATURE:
-        return [float(np.mean(program.values))]
-    held = [value for _, _, value in holds(program, last_data_time(history), HELD_TEMPERATURE)]
+    if is_isothermal(history):
+        return [float(np.mean(history.temperature_program().values))]
+    held = [value for _, _, value in temperature_holds(history)]
     return held or [history.mean_temperature]
+
+
+def temperature_range(history: History) -> tuple[float, float]:
+    """K, the coldest and the hottest at which a test is held; of one that only ramps, the ends of its program."""
+    if is_isothermal(history) or temperature_holds(history):
+        held = held_temperatures(history)
+        return min(held), max(held)
+    return float(history.followed_temperatures.min()), float(history.followed_temperatures.max())
+
+
+def is_isothermal(history: History) -> bool:
+    """Whether one temperature is held all the time."""
+    return float(np.ptp(history.temperature_program().values)) <= 2 * HELD_TEMPERATURE
+
+
+def temperature_holds(history: History) -> list[tuple[float, float, float]]:
+    """(start, end, K) of the pieces, s, over which the temperature of a test is held, up to its last used frame."""
+    return holds(history.temperature_program(), last_data_time(history), HELD_TEMPERATURE)
 
 
 def holds(program: Program, last: float, tolerance: float) -> list[tuple[float, float, float]]:

@@ -13,7 +13,7 @@ from creepkit.inverse.observation_vector import ObservationVector, frames_with_d
 from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
-from creepkit.quality import check_loading_strain, check_rig, exclude_suspect_frames, without_copies
+from creepkit.quality import check_loading_strain, check_rig, exclude_suspect_frames, repeated_row_notes, without_copies
 from creepkit.records import History, Predictor, is_logarithmic, output_named, outputs_of_test
 
 SUSPECT_LABEL = "suspect"
@@ -36,12 +36,13 @@ def sound_tests(
 ) -> tuple[list[History], tuple[str, ...]]:
     """The tests that count: copies of others left out and suspect frames unused, unless settings keep them; and notes.
 
-    The notes say which tests are copies, a sentence each.
+    The notes say which tests are copies, a sentence each, and that rows of tables repeat others, which count.
     """
     if settings.suspect_frames == "keep":
         return list(histories), ()
     kept, reasons = without_copies(histories)
-    return without_suspect_frames(kept, settings), tuple(f"left out: {name}: {why}" for name, why in reasons.items())
+    left_out = (f"left out: {name}: {why}" for name, why in reasons.items())
+    return without_suspect_frames(kept, settings), (*left_out, *repeated_row_notes(kept))
 
 
 def truncated_at_strain(histories: Sequence[History], limit: float) -> list[History]:

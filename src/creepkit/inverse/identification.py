@@ -255,6 +255,9 @@ class Identification(Presentable):
 
         own_nuisances : fitted tests, known by name, with their own nuisances and offsets; else, and all other
             histories, with what is known of their alloy or of all tests, or the prior means, and without offset.
+
+        A prediction is the predictor's own: where the identification was corrected for its numerical error
+        (`numerical_error`), that error is in it.
         """
         predictor = self._predictor_or(using)
         tests = list(histories or self.histories)

@@ -23,6 +23,7 @@ from creepkit.inverse.reference_conditions import reference_end_strain, referenc
 from creepkit.inverse.uncertainty.rate_scatter import unstated_member_notes
 from creepkit.language import temperature
 from creepkit.records import History, Prediction, Status
+from creepkit.records.units import celsius_text
 
 LOW_TEST_WEIGHT = 0.5
 """Weight below which a test is named."""
@@ -103,7 +104,7 @@ def identification_notes(
     temperatures = {round(float(v), 1) for h in histories for v in h.temperature_program().values}
     if max(temperatures) - min(temperatures) > 5 and not law.uses(temperature):
         sentences.append(
-            f"the tests span {min(temperatures):.0f} to {max(temperatures):.0f} K and this law knows no temperature"
+            f"the tests span {celsius_text(min(temperatures), max(temperatures))} and this law knows no temperature"
         )
     elif max(temperatures) - min(temperatures) > 5:
         isothermal = [str(s) for s, state in law.states.items() if state.rate != 0 and not state.rate.has(temperature)]

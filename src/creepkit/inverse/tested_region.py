@@ -7,7 +7,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.reference_conditions import reference_stresses
-from creepkit.records import ZERO_CELSIUS
+from creepkit.records.units import ZERO_CELSIUS, celsius_text
 
 SAME_TEMPERATURE = 2.0
 """K between tests of one temperature."""
@@ -20,11 +20,11 @@ SAME_STRESS = 0.01
 def tested_points(fit: Identification) -> Floats:
     """(points, 2) stress, MPa, and temperature, K, of the holds of the fitted tests; none without their histories."""
     points = [
-        (float(stress), float(T))
+        (float(stress), float(celsius) + ZERO_CELSIUS)
         for history in fit.histories
         for stress in reference_stresses(history, fit.predictor)
         if stress > 0
-        for T in np.unique(np.round(history.temperature_program().at(history.used_times), 1))
+        for celsius in np.unique(np.round(history.temperature_program().at(history.used_times) - ZERO_CELSIUS, 1))
     ]
     return np.array(points, float).reshape(-1, 2)
 
@@ -63,7 +63,7 @@ def outside_combinations(fit: Identification, stresses: Floats, temperatures: Fl
             continue  # a temperature beyond all tests is said of the temperature
         low, high = np.exp(spans[0])
         return (
-            f"stress {stress:.4g} MPa at {T - ZERO_CELSIUS:.0f} °C (the tests' region in 1/T and ln stress holds "
+            f"stress {stress:.4g} MPa at {celsius_text(T, digits=0)} (the tests' region in 1/T and ln stress holds "
             f"{low:.4g} to {high:.4g} MPa there)"
         )
     return ""

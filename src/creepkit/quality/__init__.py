@@ -22,7 +22,7 @@ from creepkit.quality.comparison import (
     replicate_deviations,
     temperature_trend_outliers,
 )
-from creepkit.quality.copies import copied_tests
+from creepkit.quality.copies import copied_tests, repeated_rows
 from creepkit.quality.flags import DataQuality, FlagKind, QualityFlag, frame_ranges_text
 from creepkit.quality.frames import FlaggedFrames, decreasing_frames, outlier_frames, unloading_frames
 from creepkit.quality.loading_strain import unstated_loading_strain
@@ -39,6 +39,7 @@ __all__ = [
     "check_rig",
     "copy_reason",
     "exclude_suspect_frames",
+    "repeated_row_notes",
     "without_copies",
 ]
 
@@ -62,7 +63,7 @@ def check_data_quality(
     copies = copied_tests(histories)
     test_checks: list[tuple[FlagKind, dict[int, str]]] = [
         ("copy", {k: copy_reason(histories[original]) for k, original in copies.items()}),
-        ("replicate", replicate_deviations(histories)),
+        ("replicate", _row_reasons(histories) | replicate_deviations(histories)),
         ("temperature", temperature_trend_outliers(histories)),
         ("modulus", modulus_trend_outliers(histories)),
         ("unit", _large_strains(histories)),
@@ -93,6 +94,25 @@ def without_copies(histories: Sequence[History]) -> tuple[list[History], dict[st
     copies = copied_tests(histories)
     kept = [history for k, history in enumerate(histories) if k not in copies]
     return kept, {histories[k].name: copy_reason(histories[original]) for k, original in copies.items()}
+
+
+def repeated_row_notes(histories: Sequence[History]) -> tuple[str, ...]:
+    """Rows of tables that state the numbers of other rows: how many and an example, in one sentence; () for none."""
+    reasons = _row_reasons(histories)
+    if not reasons:
+        return ()
+    example, reason = next(iter(reasons.items()))
+    count = len(reasons) - 1
+    others = f" (and {count} more such test{'s' * (count > 1)})" if count else ""
+    return (f"{histories[example].name}{others}: {reason}",)
+
+
+def _row_reasons(histories: Sequence[History]) -> dict[int, str]:
+    return {
+        k: f"the same numbers as {histories[earlier].name}, to all digits: each counts; leave one of them out if a "
+        "table was read twice"
+        for k, earlier in repeated_rows(histories).items()
+    }
 
 
 def check_loading_strain(histories: Sequence[History]) -> list[QualityFlag]:

@@ -10,8 +10,8 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.quality.frames import load_segments, noise_standard_deviation
-from creepkit.records import ZERO_CELSIUS, History, Predictor, Program, growing_output, output_named, predict_with
-from creepkit.records.units import time_text
+from creepkit.records import History, Predictor, Program, growing_output, output_named, predict_with
+from creepkit.records.units import celsius_text, time_text
 
 
 def duplicate_tests(
@@ -326,7 +326,7 @@ def _arrhenius_point(history: History, end: float) -> tuple[float, float]:
 
 
 def _celsius_text(history: History) -> str:
-    return f"{history.mean_temperature - ZERO_CELSIUS:.1f} C"
+    return celsius_text(history.mean_temperature)
 
 
 def _youngs_modulus(history: History) -> float:

@@ -70,6 +70,29 @@ def copied_tests(histories: Sequence[History]) -> dict[int, int]:
     return {copy: _first(copies, original) for copy, original in copies.items()}
 
 
+def repeated_rows(histories: Sequence[History]) -> dict[int, int]:
+    """{row: an earlier one}, positions of tests without frames that state the same numbers as another one.
+
+    Load, temperature, how they ended and minimum rate are equal to all digits, as in a table that was read twice. Of
+    rows that have one measured value, a rate or a time, a single pair may agree by chance, and is none.
+    """
+    first: dict[tuple[object, ...], int] = {}
+    repeated: dict[int, int] = {}
+    for k, history in enumerate(histories):
+        if history.outputs or (history.rupture_time is None and history.minimum_rate is None):
+            continue
+        load, temperature = history.loading.program(), history.temperature_program()
+        programs = (*(tuple(v.tolist()) for p in (load, temperature) for v in (p.times, p.values)),)
+        ended = (history.rupture_time, history.unruptured and float(history.times[-1]))
+        labels = tuple(history.labels.get(name, "") for name in ("heat", "laboratory"))
+        key = (history.alloy, history.specimen, history.loading.quantity, programs, ended, history.minimum_rate, labels)
+        if key in first:
+            repeated[k] = first[key]
+        first.setdefault(key, k)
+    single = [k for k in repeated if histories[k].rupture_time is None or histories[k].minimum_rate is None]
+    return {k: earlier for k, earlier in repeated.items() if k not in single or len(single) > 1}
+
+
 def _first(copies: dict[int, int], position: int) -> int:
     while position in copies:
         position = copies[position]

@@ -14,7 +14,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.records.known_specimens import load_unit
 from creepkit.records.loading import Loading, Program, loading_text
 from creepkit.records.noise_correlations import can_hold_together
-from creepkit.records.units import ZERO_CELSIUS
+from creepkit.records.units import celsius_text
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -247,10 +247,12 @@ class History:
 
     @property
     def condition(self) -> str:
-        """The nominal condition in words, '850 C, 43 MPa': what leave-one-condition-out holds out."""
-        celsius = self.temperature_program().values - ZERO_CELSIUS
-        temperature_text = f"{celsius[0]:.0f}" if np.ptp(celsius) < 0.5 else f"{celsius[0]:.0f} to {celsius[-1]:.0f}"
-        return f"{temperature_text} C, {loading_text(self.loading, load_unit(self))}"
+        """The nominal condition in words, '850 °C, 43 MPa': what leave-one-condition-out holds out."""
+        kelvin = self.temperature_program().values
+        ends = (kelvin[0], kelvin[-1]) if abs(kelvin[-1] - kelvin[0]) >= 0.5 else (kelvin.min(), kelvin.max())
+        if np.ptp(kelvin) < 0.5:
+            ends = (kelvin[0], kelvin[0])
+        return f"{celsius_text(*ends, digits=0)}, {loading_text(self.loading, load_unit(self))}"
 
 
 def _rebuild(kind: type[History], state: dict[str, Any]) -> History:

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 ZERO_CELSIUS = 273.15
+"""K."""
 
 
 SECONDS_PER_HOUR = 3600.0
-"""K."""
+"""s."""
 
 
 PSI = 6.894757293168361e-3
@@ -124,11 +125,27 @@ LONGEST_IN_SECONDS = 600.0
 
 def time_text(seconds: float) -> str:
     """A time of a test for people: in hours, or in seconds up to LONGEST_IN_SECONDS."""
-    return f"{seconds:.4g} s" if abs(seconds) < LONGEST_IN_SECONDS else f"{seconds / 3600.0:.4g} h"
+    return f"{seconds:.4g} s" if abs(seconds) < LONGEST_IN_SECONDS else f"{hours_number(seconds)} h"
+
+
+def celsius_text(low: float, high: float | None = None, *, digits: int = 1) -> str:
+    """A temperature, or from one to another, K, for people: "550 °C", "600 to 620 °C".
+
+    digits : after the decimal point at most.
+    """
+    ends = [f"{round(T - ZERO_CELSIUS, digits) + 0.0:g}" for T in (low, low if high is None else high)]
+    return f"{ends[0]} °C" if ends[0] == ends[1] else f"{ends[0]} to {ends[1]} °C"
+
+
+def hours_number(seconds: float) -> str:
+    """A time in h as a number for people: "later" than anything where infinite, "?" where not known."""
+    if math.isnan(seconds):
+        return "?"
+    return f"{seconds / SECONDS_PER_HOUR:.4g}" if math.isfinite(seconds) else "later"
 
 
 def times_text(first: float, last: float) -> str:
     """From one time to another, for people, in the unit of the later one; s."""
     if abs(last) < LONGEST_IN_SECONDS:
         return f"{first:.4g} to {last:.4g} s"
-    return f"{first / 3600.0:.4g} to {last / 3600.0:.4g} h"
+    return f"{hours_number(first)} to {hours_number(last)} h"

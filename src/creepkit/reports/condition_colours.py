@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.inverse.held_levels import held_temperatures, is_isothermal, temperature_holds, temperature_range
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_stresses
 from creepkit.records import ZERO_CELSIUS, History, Predictor
 from creepkit.reports.figures import logarithmic_labels
@@ -39,19 +40,27 @@ class ColourScale:
     """A colour scale by a condition.
 
     label : the condition and its unit; values : (tests,) the condition of each test; logarithmic : of the scale.
+    levels : (levels,) of the tests where single ones have several, which the scale spans too.
     """
 
     label: str
     values: Floats
     logarithmic: bool = False
     colour_map: str = "viridis"
+    levels: Floats = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The least and the largest value that the scale spans."""
+        spanned = np.append(self.values, self.levels)
+        return float(spanned.min()), float(spanned.max())
 
     def __call__(self, value: float) -> Any:
         """The colour of a value of the condition."""
         from matplotlib import colormaps
 
         transform: Callable[[Any], Any] = np.log if self.logarithmic else np.asarray
-        low, high = float(transform(self.values.min())), float(transform(self.values.max()))
+        low, high = (float(transform(end)) for end in self.ends)
         share = (float(transform(value)) - low) / (high - low) if high > low else 0.0
         return colormaps[self.colour_map](USED_SHARE * share)
 
@@ -67,7 +76,7 @@ class ColourScale:
         from matplotlib.colors import ListedColormap, LogNorm, Normalize
         from matplotlib.ticker import NullFormatter, NullLocator
 
-        low, high = float(self.values.min()), float(self.values.max())
+        low, high = self.ends
         norm = (LogNorm if self.logarithmic else Normalize)(low, high)
         colours = ListedColormap(colormaps[self.colour_map](np.linspace(0.0, USED_SHARE, 256)))
         bar = figure.colorbar(ScalarMappable(norm, colours), ax=list(panels), label=self.label, pad=0.01, aspect=30)
@@ -111,8 +120,21 @@ def mean_stresses(histories: Sequence[History], predictor: Predictor | None) -> 
 
 
 def temperature_scale(histories: Sequence[History]) -> ColourScale:
-    """Colours by temperature."""
-    return ColourScale("temperature, °C", temperatures_celsius(histories), colour_map="inferno")
+    """Colours by temperature: a test with steps has that of its mean, which is no level of the scale."""
+    levels = np.array([T for h in histories for T in held_temperatures(h)]) - ZERO_CELSIUS
+    return ColourScale("temperature, °C", temperatures_celsius(histories), colour_map="inferno", levels=levels)
+
+
+def tested_temperatures(histories: Sequence[History]) -> list[float]:
+    """°C at which tests are held, those within ISOTHERMAL_RANGE as their mean; of ramps alone, the means of tests."""
+    held = sorted(T for h in histories if is_isothermal(h) or temperature_holds(h) for T in held_temperatures(h))
+    found: list[list[float]] = []
+    for kelvin in held or sorted(h.mean_temperature for h in histories):
+        if found and kelvin - found[-1][0] <= ISOTHERMAL_RANGE:
+            found[-1].append(kelvin)
+        else:
+            found.append([kelvin])
+    return [float(np.mean(one)) - ZERO_CELSIUS for one in found]
 
 
 def stress_scale(histories: Sequence[History], predictor: Predictor | None) -> ColourScale:
@@ -130,15 +152,19 @@ def distinct_colours(count: int) -> list[Any]:
 def condition_groups(histories: Sequence[History], predictor: Predictor | None) -> list[tuple[str, list[int]]]:
     """Title and positions of the tests of each group: of one temperature, and of neighbouring stresses where many.
 
-    Temperatures that differ little are one; of more than MOST_GROUPS groups, neighbours are joined.
+    Tests with steps of temperature are grouped by their coldest and hottest level. Temperatures that differ little are
+    one; of more than MOST_GROUPS groups, neighbours are joined.
     """
-    temperatures, stresses = temperatures_celsius(histories), mean_stresses(histories, predictor)
+    temperatures = np.array([temperature_range(h) for h in histories]) - ZERO_CELSIUS
+    stresses = mean_stresses(histories, predictor)
     groups: list[list[int]] = []
-    for k in np.argsort(temperatures, kind="stable"):
-        if groups and temperatures[k] - temperatures[groups[-1][0]] <= ISOTHERMAL_RANGE:
-            groups[-1].append(int(k))
-        else:
+    for k in np.lexsort((temperatures[:, 1], temperatures[:, 0])):
+        alike = (g for g in groups if np.abs(temperatures[k] - temperatures[g[0]]).max() <= ISOTHERMAL_RANGE)
+        group = next(alike, None)
+        if group is None:
             groups.append([int(k)])
+        else:
+            group.append(int(k))
     if len(groups) > MOST_GROUPS:
         sizes = np.cumsum([len(g) for g in groups])
         panel = (sizes - 1) * MOST_GROUPS // sizes[-1]
@@ -159,7 +185,8 @@ def _split(stresses: Floats) -> int:
 
 
 def _group_title(temperatures: Floats, stresses: Floats) -> str:
-    tests = f"{temperatures.size} test{'s' if temperatures.size > 1 else ''}"
+    """temperatures : (tests, 2) the coldest and the hottest of each, °C; stresses : (tests,) MPa."""
+    tests = f"{stresses.size} test{'s' if stresses.size > 1 else ''}"
     return f"{_range_text(temperatures, '.0f')} °C, {_range_text(stresses, '.3g')} MPa, {tests}"
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.records import output_unit
-from creepkit.reports.load_programs import SECONDS_PER_HOUR, kind_of_test
+from creepkit.records.units import hours_number
+from creepkit.reports.load_programs import kind_of_test
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
@@ -58,36 +59,29 @@ def _end_text(one: OutputForecast) -> str:
     if not alive.size:
         return f"{one.output}: nothing is predicted"
     k = int(alive[-1])
-    hours = one.times[k] / SECONDS_PER_HOUR
     return (
-        f"{one.output.replace('_', ' ')} at {hours:.4g} h: {one.value[k]:.3g}{unit} "
+        f"{one.output.replace('_', ' ')} at {hours_number(float(one.times[k]))} h: {one.value[k]:.3g}{unit} "
         f"[{one.band.low[k]:.3g}, {_number(one.band.high[k])}]"
     )
 
 
 def _time_text(one: TimeForecast, end: float) -> str:
     if not math.isfinite(one.low) and not math.isfinite(one.measured):
-        return f"{one.event}: not within the test of {_hours(end)} h (probability of it {one.chance:.2g})"
+        return f"{one.event}: not within the test of {hours_number(end)} h (probability of it {one.chance:.2g})"
     text = f"{one.event}: {_median_and_interval(one)} h"
     if math.isfinite(one.measured):
         where = {True: "inside", False: "outside", None: ""}[one.inside]
-        return f"{text}, measured {'> ' if one.censored else ''}{_hours(one.measured)} h, {where}"
+        return f"{text}, measured {'> ' if one.censored else ''}{hours_number(one.measured)} h, {where}"
     return f"{text}; {_chance(one, end)}"
 
 
 def _median_and_interval(one: TimeForecast) -> str:
-    return f"median {_hours(one.median)} [{_hours(one.low)}, {_hours(one.high)}]"
+    return f"median {hours_number(one.median)} [{hours_number(one.low)}, {hours_number(one.high)}]"
 
 
 def _chance(one: TimeForecast, end: float) -> str:
     """The probability of what was asked: that it comes before the last time of the test, s."""
-    return f"before the end of the test at {_hours(end)} h with probability {one.chance:.2g}"
-
-
-def _hours(seconds: float) -> str:
-    if math.isnan(seconds):
-        return "?"
-    return f"{seconds / SECONDS_PER_HOUR:.3g}" if math.isfinite(seconds) else "later"
+    return f"before the end of the test at {hours_number(end)} h with probability {one.chance:.2g}"
 
 
 def _number(value: float) -> str:
@@ -147,7 +141,7 @@ def forecast_rows(forecast: Forecast) -> list[tuple[str, ...]]:
         measured = explained = ""
         if test.score is not None:
             inside = [f"{name} {100 * share:.0f} % inside" for name, share in test.score.inside.items()]
-            inside += [f"{t.event}: {_hours(t.measured)}" for t in test.times if math.isfinite(t.measured)]
+            inside += [f"{t.event}: {hours_number(t.measured)}" for t in test.times if math.isfinite(t.measured)]
             measured, explained = "\n".join(inside), f"{100 * test.score.explained:.0f} %"
         end = "" if leading is None else _end_text(leading).replace(" at ", "\nat ", 1)
         end += f"\n{test.caution}" if test.caution else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import is_logarithmic
 from creepkit.reports.curve_of_test import axis_label
 from creepkit.reports.figures import empty_figure, save_figure, set_range, wrapped
-from creepkit.reports.load_programs import SECONDS_PER_HOUR, with_degrees
+from creepkit.reports.load_programs import SECONDS_PER_HOUR
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -144,7 +144,7 @@ def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, *, first: b
     axes.tick_params(labelsize=7, labelbottom=False)
     axes.grid(alpha=0.25)
     if first:
-        axes.set_title(wrapped(f"{test.name}: {with_degrees(history.condition)}", 4.4, 11.0), fontsize=8)
+        axes.set_title(wrapped(f"{test.name}: {history.condition}", 4.4, 11.0), fontsize=8)
 
 
 def _last(test: TestForecast) -> float:
@@ -170,7 +170,7 @@ def _measured(test: TestForecast, output: str, factor: float) -> tuple[Floats, F
 
 
 def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, bottom: float, top: float) -> None:
-    """Intervals of times as bars: at the value that is reached, and of rupture at the upper edge."""
+    """Intervals of times, the median marked: at the value that is reached, and of rupture at the upper edge."""
     right = axes.get_xlim()[1]
     for time in test.times:
         is_rupture = not time.output
@@ -178,15 +178,15 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, bottom: flo
             continue
         below = top * (bottom / top) ** BELOW_EDGE if is_logarithmic(one.output) else top - BELOW_EDGE * (top - bottom)
         level = below if is_rupture else _scaled(one) * time.target
-        if not bottom <= level <= top or not np.isfinite(time.low):
+        if not bottom <= level <= top or not time.low / SECONDS_PER_HOUR <= right:
             continue
         low, high = time.low / SECONDS_PER_HOUR, min(time.high / SECONDS_PER_HOUR, right)
         colour = RUPTURE_COLOUR if is_rupture else TIME_COLOUR
         axes.plot([low, high], [level, level], color=colour, lw=2.2, solid_capstyle="butt", zorder=4)
         if time.high / SECONDS_PER_HOUR > right:
             axes.plot([right], [level], ">", color=colour, ms=5, clip_on=False, zorder=5)
-        if np.isfinite(time.value):
-            axes.plot([time.value / SECONDS_PER_HOUR], [level], "|", color=colour, ms=9, mew=2, zorder=5)
+        if np.isfinite(time.median) and time.median / SECONDS_PER_HOUR <= right:
+            axes.plot([time.median / SECONDS_PER_HOUR], [level], "|", color=colour, ms=9, mew=2, zorder=5)
         if np.isfinite(time.measured) and not time.censored:
             axes.plot([time.measured / SECONDS_PER_HOUR], [level], "x", color="black", ms=5, zorder=6)
 
@@ -212,6 +212,11 @@ def _draw_shares(axes: Axes, above: Axes, one: OutputForecast, parts: dict[str, 
     axes.tick_params(labelsize=7)
 
 
+def _time_style(*, rupture: bool) -> dict[str, Any]:
+    """Of the interval of a time in the legend."""
+    return {"color": RUPTURE_COLOUR if rupture else TIME_COLOUR, "lw": 2.2, "marker": "|", "ms": 9, "mew": 2}
+
+
 def _legend(figure: Figure, parts: dict[str, str], level: float, ruptures: set[bool], *, measured: bool) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -223,7 +228,7 @@ def _legend(figure: Figure, parts: dict[str, str], level: float, ruptures: set[b
         Patch(color="#3b6fb6", alpha=0.15, label=f"{per_cent} of whole curves"),
         *([Line2D([], [], color="black", marker=".", ls="", label="measured")] if measured else []),
         *(
-            Line2D([], [], color=RUPTURE_COLOUR if r else TIME_COLOUR, lw=2.2, label=f"{per_cent} of times to {word}")
+            Line2D([], [], **_time_style(rupture=r), label=f"time to {word}: median, {per_cent}")
             for r, word in ((False, "a value"), (True, "rupture"))
             if r in ruptures
         ),

@@ -15,6 +15,8 @@ from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import is_logarithmic, kind_and_start, output_unit
+from creepkit.records.units import celsius_text
+from creepkit.reports.judged_readings import judged_readings
 from creepkit.reports.stress_exponents import reference_sentences
 from creepkit.reports.tests_apart import apart_sentence
 
@@ -217,21 +219,26 @@ def _linear_outputs(fit: Identification) -> list[str]:
 
 
 def _table(fit: Identification) -> list[str]:
-    """One line a test: its error, its offset and weight, and what was found of its nuisances."""
+    """One line a test: its error, its offset and weight, and what was found of its nuisances.
+
+    chi2 : as the law is judged, with the test's own rate and offset taken out, where its noise is known.
+    """
     linear_output_tests = [m for m in fit.tests if m.outputs and not is_logarithmic(m.outputs[0].output)]
     estimates_by_owner = {(n.key, n.owner): n for n in fit.nuisances if n.scope == "test"}
     kinds = list(dict.fromkeys(n.key for n in fit.nuisances if n.scope == "test"))
     if not (linear_output_tests or kinds):
         return _shared_nuisances(fit)
     width = max(len(m.name) for m in fit.tests)
+    readings = judged_readings(fit)
     head = f"  {'test':{width}}  {'condition':22} {'error':>9} {'chi2':>8} {'offset':>9} {'rate':>6} {'weight':>6}"
     lines = ["", head + "".join(f" {kind + _unit(kind):>18}" for kind in kinds)]
-    for m in fit.tests:
+    for k, m in enumerate(fit.tests):
         first_output = m.outputs[0]
         test_estimates = [estimates_by_owner.get((kind, m.name)) for kind in kinds]
         errors = first_output.errors
+        chi_square = errors.chi_square if readings is None else readings.chi_square(k)
         lines.append(
-            f"  {m.name:{width}}  {m.condition:22} {errors.relative_squared_error:9.2g} {errors.chi_square:8.3g} "
+            f"  {m.name:{width}}  {m.condition:22} {errors.relative_squared_error:9.2g} {chi_square:8.3g} "
             f"{first_output.offset:9.2g} {m.rate_factor:6.2f} {m.weight:6.2f}"
             + "".join(f" {'-' if n is None else _plus_minus(n):>18}" for n in test_estimates)
         )
@@ -294,9 +301,12 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
 
 def _range_lines(fit: Identification) -> list[str]:
     """The range of the tests, and at which temperatures not all of its stresses were tested."""
-    units = {"stress": "MPa", "temperature": "K", "strain": "", "time": "s"}
+    units = {"stress": "MPa", "strain": "", "time": "s"}
     covered = (
-        f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip() for name, (low, high) in fit.ranges.items()
+        f"{name} {celsius_text(low, high)}"
+        if name == "temperature"
+        else f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip()
+        for name, (low, high) in fit.ranges.items()
     )
     lines = [f"range of the tests: {', '.join(covered)}"]
     at_temperatures = stresses_at_temperatures(fit)
@@ -305,7 +315,7 @@ def _range_lines(fit: Identification) -> list[str]:
     part = [(T, s) for T, s in at_temperatures if s[0] > low * tolerance or s[1] * tolerance < high]
     if part:
         named = "; ".join(
-            f"{T:.4g} K {s[0]:.4g}{f' to {s[1]:.4g}' if s[1] > s[0] * tolerance else ''} MPa"
+            f"{celsius_text(T, digits=0)} {s[0]:.4g}{f' to {s[1]:.4g}' if s[1] > s[0] * tolerance else ''} MPa"
             for T, s in at_temperatures[:MOST_TEMPERATURES_NAMED]
         )
         more = len(at_temperatures) - MOST_TEMPERATURES_NAMED

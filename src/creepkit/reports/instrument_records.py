@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.instruments.clock_alignment import UNIX_TIME
-from creepkit.records.units import ZERO_CELSIUS
+from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.figures import empty_figure, save_figure
 
 if TYPE_CHECKING:
@@ -139,10 +139,9 @@ def _camera_time_text(time: float) -> str:
 def imposed_text(imposed: Imposed) -> str:
     """What was imposed, and how well the programs follow the record."""
     load, warm = imposed.load, imposed.temperature
-    celsius = warm.values - ZERO_CELSIUS
     lines = [
         f"imposed on {imposed.specimen or 'the specimen'}: '{imposed.channels[0]}' up to {load.values.max():.4g} MPa, "
-        f"'{imposed.channels[1]}' {celsius.min():.4g} to {celsius.max():.4g} C; the first ramp starts at "
+        f"'{imposed.channels[1]}' {celsius_text(warm.values.min(), warm.values.max())}; the first ramp starts at "
         f"{_camera_time_text(imposed.time_zero)}",
         f"  load: {load.times.size} points, off its record by {imposed.load_error:.2g} MPa at most, noise "
         f"{imposed.load_noise:.2g} MPa",

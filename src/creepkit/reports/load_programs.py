@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 
-from creepkit.inverse.held_levels import HELD_TEMPERATURE, holds, last_data_time
+from creepkit.inverse.held_levels import holds, is_isothermal, last_data_time, temperature_holds
 from creepkit.inverse.reference_conditions import LOAD_TOLERANCE
 from creepkit.records import SECONDS_PER_HOUR as SECONDS_PER_HOUR
 from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program, load_unit
+from creepkit.records.units import time_text
 
 MOST_HOLDS = 3
 """Holds that are written one by one; of more, the first, the last and their number."""
@@ -69,10 +69,9 @@ def _level_text(program: Program, last: float, unit: str) -> str:
 def temperature_text(history: History) -> str:
     """The temperature over the frames of a test, such as "793 → 800 °C at 4 h"."""
     program = history.temperature_program()
-    if float(np.ptp(program.values)) <= 2 * HELD_TEMPERATURE:
+    if is_isothermal(history):
         return f"{float(np.mean(program.values)) - ZERO_CELSIUS:.0f} °C"
-    steps = holds(program, last_data_time(history), HELD_TEMPERATURE)
-    return _holds_text(steps, " °C", lambda v: f"{v - ZERO_CELSIUS:.0f}")
+    return _holds_text(temperature_holds(history), " °C", lambda v: f"{v - ZERO_CELSIUS:.0f}")
 
 
 def _holds_text(pieces: list[tuple[float, float, float]], unit: str, number: Callable[[float], str]) -> str:
@@ -87,19 +86,6 @@ def _holds_text(pieces: list[tuple[float, float, float]], unit: str, number: Cal
     text = first
     for before, after in pairwise(pieces):
         known = after[0] - before[1] <= SHORT_RAMP * after[0]
-        when = hours_text(before[1]) if known else f"{hours_text(before[1])} to {hours_text(after[0])}"
+        when = time_text(before[1]) if known else f"{time_text(before[1])} to {time_text(after[0])}"
         text += f" → {number(after[2])}{unit} at {when}"
     return text
-
-
-def hours_text(time: float) -> str:
-    """A time in s, in hours."""
-    return f"{time / SECONDS_PER_HOUR:.3g} h"
-
-
-def with_degrees(text: str) -> str:
-    """A condition as it is printed: '850 C, 43 MPa' as '850 °C, 43 MPa'."""
-    return _CELSIUS.sub(" °C", text)
-
-
-_CELSIUS = re.compile(r"(?<=\d) C(?=[,)]|$)")

@@ -13,6 +13,7 @@ from creepkit.inverse.measured_minimum_rates import MinimumRate, apparent_expone
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import strain, time
 from creepkit.records import ZERO_CELSIUS
+from creepkit.records.units import celsius_text
 from creepkit.reports.condition_colours import ColourScale, temperature_scale
 from creepkit.reports.figures import place_legend_right, set_range
 
@@ -84,7 +85,7 @@ def _draw_level(axes: Axes, rates: Sequence[MinimumRate], scale: ColourScale, *,
     colour = scale(float(np.mean(_column(rates, "temperature"))) - ZERO_CELSIUS)
     known = sorted((r for r in rates if np.isfinite([r.predicted, r.low, r.high]).all()), key=lambda r: r.stress)
     if known:
-        label = f"{_column(known, 'temperature').mean() - ZERO_CELSIUS:.0f} °C" if named else None
+        label = celsius_text(float(_column(known, "temperature").mean()), digits=0) if named else None
         stresses, predicted = _column(known, "stress"), _column(known, "predicted")
         low, high = _column(known, "low"), _column(known, "high")
         if np.ptp(stresses) > 0:

@@ -16,7 +16,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.inverse.defect_correction import with_correction_at_frames
 from creepkit.inverse.frame_noise import usable_frames
-from creepkit.inverse.held_levels import holds
+from creepkit.inverse.held_levels import holds, is_isothermal, temperature_holds
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.reference_conditions import LOAD_TOLERANCE, reference_stresses
 from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
@@ -138,14 +138,15 @@ def rates_of_tests(fit: Identification, prediction: Prediction) -> list[HoldRate
             continue
         output = test.outputs[0].output
         predicted = prediction.of(k)[:, prediction.outputs.index(output)]
-        for stress, frames in _levels(fit, history, output):
-            frames = frames & np.isfinite(predicted)
-            if frames.sum() < FEWEST_FRAMES:
-                continue
-            ratio = _growth_ratio(history.outputs[output][frames], predicted[frames])
-            if ratio > 0:
-                rate = ratio * float(fit.rate(stress, history.mean_temperature, warn=False)[0])
-                rates.append(HoldRate(k, stress, history.mean_temperature, rate))
+        for stress, under_load in _levels(fit, history, output):
+            for temperature, at_temperature in _temperatures(history):
+                frames = under_load & at_temperature & np.isfinite(predicted)
+                if frames.sum() < FEWEST_FRAMES:
+                    continue
+                ratio = _growth_ratio(history.outputs[output][frames], predicted[frames])
+                if ratio > 0:
+                    rate = ratio * float(fit.rate(stress, temperature, warn=False)[0])
+                    rates.append(HoldRate(k, stress, temperature, rate))
     return rates
 
 
@@ -170,6 +171,15 @@ def _levels(fit: Identification, history: History, output: str) -> list[tuple[fl
         return [(float(np.exp(np.mean(np.log(stresses)))), used)] if stresses.size else []
     by_load = dict(zip(levels, stresses, strict=True))
     return [(by_load[v], used & (history.times > start) & (history.times <= end)) for start, end, v in pieces]
+
+
+def _temperatures(history: History) -> list[tuple[float, Bools]]:
+    """The temperature, K, of each hold of a test, and (frames,) which frames were taken at it; of ramps, their mean."""
+    pieces = temperature_holds(history)
+    if is_isothermal(history) or not pieces:
+        return [(history.mean_temperature, np.ones(history.times.size, bool))]
+    last = max(end for _, end, _ in pieces)
+    return [(value, (history.times > start) & ((history.times <= end) | (end == last))) for start, end, value in pieces]
 
 
 GROWTH_INTERVALS = 8

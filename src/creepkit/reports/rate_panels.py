@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.records import ZERO_CELSIUS, Prediction
-from creepkit.reports.condition_colours import ColourScale, temperature_scale
+from creepkit.reports.condition_colours import temperature_scale, tested_temperatures
 from creepkit.reports.figures import place_legend_right, set_range
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.minimum_rate_panel import compared_minimum_rates, draw_minimum_rates
@@ -50,7 +50,7 @@ def _draw_reference_rates(axes: Axes, fit: Identification, rates: Sequence[HoldR
     grid = np.geomspace(0.8 * min(stresses), 1.25 * max(stresses), 60)
     scale = temperature_scale(fit.histories)
     bounds: list[float] = []
-    for celsius in _drawn_temperatures(scale):
+    for celsius in _drawn_temperatures(tested_temperatures(fit.histories)):
         rate, low, high = fit.rate(grid, np.full_like(grid, celsius + ZERO_CELSIUS), warn=False)
         axes.fill_between(grid, low, high, color=scale(celsius), alpha=0.25, lw=0)
         axes.plot(grid, rate, color=scale(celsius), lw=1.4, label=f"{celsius:.0f} °C")
@@ -86,9 +86,9 @@ def _draw_reference_rates(axes: Axes, fit: Identification, rates: Sequence[HoldR
     )
 
 
-def _drawn_temperatures(scale: ColourScale) -> list[float]:
+def _drawn_temperatures(tested: Sequence[float]) -> list[float]:
     """Temperatures of tests, °C: all where they are few, else some of them from the lowest to the highest."""
-    values = np.unique(np.round(scale.values, 0))
+    values = np.unique(np.round(tested, 0))
     wanted = np.linspace(values[0], values[-1], MOST_TEMPERATURES)
     return [float(v) for v in np.unique(values[np.abs(values[:, None] - wanted).argmin(axis=0)])]
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.log_time_distributions import power_of_ten
-from creepkit.rupture_assessment.observed_tests import celsius
 
 if TYPE_CHECKING:
     from creepkit.rupture_assessment.assessment import RuptureAssessment
@@ -143,7 +143,7 @@ def strength_rows(assessment: RuptureAssessment) -> tuple[list[str], list[tuple[
         rows.append(
             (
                 one.method,
-                celsius(one.temperature),
+                celsius_text(one.temperature),
                 f"{one.hours:g}",
                 "none" if one.value is None else f"{one.value:.1f}",
                 *map(_pair, bounds),

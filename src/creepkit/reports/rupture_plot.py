@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.records import ZERO_CELSIUS
+from creepkit.records.units import celsius_text
 from creepkit.reports.figures import empty_figure, save_figure, set_range, wrapped
 from creepkit.rupture_assessment.checks import BAND_FACTOR
 from creepkit.rupture_assessment.fitting import conditions_of
@@ -138,7 +138,7 @@ def _draw_isotherm(
     shown = np.flatnonzero(tested & (times > hours[0]) & (times < 0.8 * hours[1]))
     if shown.size:  # above the isotherm at the highest stress tested, where bands are narrow
         axes.annotate(
-            f"{temperature - ZERO_CELSIUS:.0f} °C",
+            celsius_text(temperature, digits=0),
             (times[shown[-1]], stress[shown[-1]]),
             xytext=(7, 3),
             textcoords="offset points",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.uncertainty.state_at_strain import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.language import strain, time
-from creepkit.records import ZERO_CELSIUS
+from creepkit.records.units import celsius_text
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def held_quantities(fit: Identification) -> str:
 def reference_sentences(fit: Identification, text: NumberText = plain_number) -> list[str]:
     """Rate and exponent amid the tests, one sentence each, without full stops."""
     r, state = fit.reference, _state(fit)
-    at = f"{text(r.stress, 4)} MPa and {r.temperature - ZERO_CELSIUS:.0f} °C"
+    at = f"{text(r.stress, 4)} MPa and {celsius_text(r.temperature, digits=0)}"
     formula = _interval(tuple(map(float, fit.local_exponent(r.stress, warn=False))), text)
     held = held_quantities(fit)
     if state is not None:

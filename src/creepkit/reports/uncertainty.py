@@ -11,6 +11,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.records import ZERO_CELSIUS
+from creepkit.records.units import celsius_text
 from creepkit.reports.figures import empty_figure, place_legend_right, save_figure, set_range, wrapped
 
 if TYPE_CHECKING:
@@ -187,14 +188,14 @@ def model_average_text(average: ModelAverage) -> str:
     exponent, exponent_low, exponent_high = (float(v) for v in average.local_exponent(reference.stress))
     names = ", ".join(f"{fit.law.name} ({w:.2g})" for fit, w in zip(average.fits, average.weights, strict=True))
     return (
-        f"over the laws {names}: rate at {reference.stress:.4g} MPa, {reference.temperature:.0f} K {rate:.3g} "
+        f"over the laws {names}: rate at {reference.stress:.4g} MPa, {celsius_text(reference.temperature)} {rate:.3g} "
         f"[{low:.3g}, {high:.3g}] 1/s, local stress exponent {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]"
     )
 
 
 def rate_band_text(band: RateBand) -> str:
     """Median rate and 95 % band, one line a stress."""
-    temperature = f"{band.temperature - ZERO_CELSIUS:.0f} +- {band.temperature_uncertainty:g} C"
+    temperature = f"{band.temperature - ZERO_CELSIUS:.0f} +- {band.temperature_uncertainty:g} °C"
     lines = [f"creep rate at {temperature}, 95 % band"]
     for stress, rate, low, high in zip(band.stress, band.rate, band.low, band.high, strict=True):
         lines.append(f"  {stress:8.4g} MPa  {rate:9.3g}  [{low:.3g}, {high:.3g}] 1/s")

@@ -15,6 +15,7 @@ from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import FitError, nearest, quoted
 from creepkit.inverse.information_criteria import aicc_penalty, bic_penalty, criterion_weights
 from creepkit.records import History
+from creepkit.records.units import celsius_text
 from creepkit.registry.arguments import check_histories
 from creepkit.rupture_assessment.assessment import (
     AVERAGE,
@@ -38,7 +39,6 @@ from creepkit.rupture_assessment.observed_tests import (
     NOT_STATED,
     RuptureTests,
     TensileStrength,
-    celsius,
     rupture_tests,
     tensile_strengths,
 )
@@ -149,14 +149,14 @@ def _methods(
     for name in asked:
         constants = settings.fixed.get(name, {})
         if tests.isothermal and METHODS[name].thermal and not constants:
-            place = celsius(float(tests.temperature.mean()))
+            place = celsius_text(float(tests.temperature.mean()))
             advice = f", or give its {METHODS[name].fixable[0]} by fixed=" if METHODS[name].fixable else ""
             raise FitError(
                 f"all tests are at {place}, which does not determine {name}; use the method isothermal{advice}"
             )
         if name == "wilshire" and not has_tensile:
             missing = [T for T in tests.isotherms if not np.isfinite(tensile(np.array([T]))[0])]
-            where = f" at {', '.join(celsius(T) for T in missing)}" if missing else ""
+            where = f" at {', '.join(celsius_text(T) for T in missing)}" if missing else ""
             raise FitError(
                 f"wilshire needs the tensile strength{where}: give tensile_strength={{temperature in K: MPa}} "
                 "(--tensile), or a label tensile_strength_MPa of each test"

@@ -15,12 +15,13 @@ from creepkit.errors import FitError, nearest, quoted
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.presentation import Presentable, present
 from creepkit.records import SECONDS_PER_HOUR
+from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.checks import AssessmentCheck
 from creepkit.rupture_assessment.likelihood import DISTRIBUTIONS, Distribution
 from creepkit.rupture_assessment.log_time_distributions import power_of_ten
 from creepkit.rupture_assessment.methods import METHODS, Conditions
 from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
-from creepkit.rupture_assessment.observed_tests import RuptureTests, celsius
+from creepkit.rupture_assessment.observed_tests import RuptureTests
 from creepkit.rupture_assessment.rupture_fit import RuptureFit
 from creepkit.rupture_assessment.strength import (
     BOUND_KINDS,
@@ -230,9 +231,9 @@ class RuptureAssessment(Presentable):
         if any(_needs(model, "tensile_strength") for model, _ in models) and not np.isfinite(
             self.tensile(np.array([temperature]))[0]
         ):
-            return f"no tensile strength is known at {celsius(temperature)}"
+            return f"no tensile strength is known at {celsius_text(temperature)}"
         if self.tests.isothermal and abs(temperature - self.tests.temperature.mean()) > ISOTHERMAL_TOLERANCE:
-            return f"all tests are at {celsius(float(self.tests.temperature.mean()))}"
+            return f"all tests are at {celsius_text(float(self.tests.temperature.mean()))}"
         return ""
 
     def rupture_time(

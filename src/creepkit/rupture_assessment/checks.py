@@ -30,9 +30,10 @@ import numpy as np
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
+from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.log_time_distributions import power_of_ten
 from creepkit.rupture_assessment.methods import METHODS, Conditions
-from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength, celsius
+from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
 from creepkit.rupture_assessment.rupture_fit import RuptureFit
 
 LEAST_SLOPE = 1.5
@@ -81,7 +82,7 @@ def turning(fit: RuptureFit, tests: RuptureTests, tensile: TensileStrength) -> s
         times = fit.location(_isotherm(stress, T, tensile))
         rising = np.flatnonzero(~(np.diff(times) < 0))
         if rising.size:
-            return f"the time rises with stress at {celsius(T)}, {stress[rising[0]]:.3g} MPa, within the tests"
+            return f"the time rises with stress at {celsius_text(T)}, {stress[rising[0]]:.3g} MPa, within the tests"
     return ""
 
 
@@ -111,7 +112,7 @@ def physical_realism(
     both = inside[:, 1:] & inside[:, :-1]
     slopes = np.where(both, slopes, np.inf)
     row, column = np.unravel_index(int(np.argmin(slopes)), slopes.shape)
-    least, where = float(slopes[row, column]), f"{celsius(float(T[row]))}, {stress[column]:.3g} MPa"
+    least, where = float(slopes[row, column]), f"{celsius_text(float(T[row]))}, {stress[column]:.3g} MPa"
     checks = [
         AssessmentCheck(
             "isotherms do not turn back",
@@ -135,7 +136,7 @@ def physical_realism(
             AssessmentCheck(
                 "isotherms do not cross",
                 bool(gaps[row, column] > 0),
-                f"{text}, at {celsius(float(T[row]))}, {stress[column]:.3g} MPa",
+                f"{text}, at {celsius_text(float(T[row]))}, {stress[column]:.3g} MPa",
                 "isotherms cross",
             )
         )
@@ -149,7 +150,7 @@ def effectiveness(fit: RuptureFit, tests: RuptureTests, at: Conditions) -> list[
     for T, near in main_isotherms(tests):
         chosen = near & broken
         if len(tests.isotherms) > 1 and chosen.sum() >= LEAST_ISOTHERM and np.ptp(tests.log_time[chosen]) > 0.3:
-            checks.append(_predicted_against_measured(celsius(T), predicted[chosen], tests.log_time[chosen]))
+            checks.append(_predicted_against_measured(celsius_text(T), predicted[chosen], tests.log_time[chosen]))
     return checks
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError, quoted
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
-from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History
+from creepkit.quality import repeated_row_notes
+from creepkit.records import SECONDS_PER_HOUR, History
 
 TensileStrength = Callable[[Floats], Floats]
 """MPa at temperatures in K, arrays of one shape; NaN where it is not known."""
@@ -129,6 +130,7 @@ def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTe
             f"{len(repeated)} tests have the stress, temperature and time of another one, such as '{repeated[0]}'; "
             "leave them out if a table was read twice, for each counts"
         )
+    notes += repeated_row_notes([h for h in with_rate if not h.end_known])
     return _as_arrays(known), _as_arrays(with_rate), tuple(notes)
 
 
@@ -225,8 +227,3 @@ def tensile_strengths(tests: RuptureTests, stated: Mapping[float, float] | None)
         ]
     temperatures, strengths = zip(*pairs, strict=True) if pairs else ((), ())
     return frozen(temperatures), frozen(strengths)
-
-
-def celsius(temperature: float) -> str:
-    """A temperature in K as text in degrees Celsius."""
-    return f"{temperature - ZERO_CELSIUS:.5g} °C"

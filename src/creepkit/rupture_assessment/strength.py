@@ -16,9 +16,10 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from creepkit.arrays import Floats
+from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.log_time_distributions import LogTimeDistribution, MixedLogTime, power_of_ten
 from creepkit.rupture_assessment.methods import Conditions
-from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength, celsius
+from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
 
 BOUND_KINDS = ("mean", "heat", "test")
 """Of the median time of the average heat; of the median time of a new heat; of one test of a new heat."""
@@ -156,7 +157,7 @@ def extrapolation(tests: RuptureTests, hours: float, temperature: float, stress:
         parts.append(f"{hours / longest:.3g} times the longest test ({longest:.4g} h)")
     low, high = float(tests.temperature.min()), float(tests.temperature.max())
     if not low - 1.0 <= temperature <= high + 1.0:
-        span = celsius(low) if high - low < 1.0 else f"{celsius(low)} to {celsius(high)}"
+        span = celsius_text(low) if high - low < 1.0 else celsius_text(low, high)
         parts.append(f"temperature outside the tested {span}")
     if stress is not None and not 0.999 * tests.stress.min() <= stress <= 1.001 * tests.stress.max():
         parts.append(f"stress outside the tested {tests.stress.min():.4g} to {tests.stress.max():.4g} MPa")

@@ -103,7 +103,7 @@ def screen(
     """
     tests, composition_table = resolve_tests(histories, compositions), resolve_compositions(compositions)
     options, processes = options or ScreeningOptions(), process_count(workers, FitError)
-    tests, _ = sound_tests(tests, options.settings)
+    tests, notes = sound_tests(tests, options.settings)
     predictors = resolve_predictors(using, tests)
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()) if to is None else to)
@@ -120,9 +120,10 @@ def screen(
         )
         _make_folder(folder / FITS_FOLDER)
         results = _screen_all(job, processes, progress)
-    return ScreeningResult.from_results(
+    plate = ScreeningResult.from_results(
         job.alloys, results, job.predictor, composition_table, None if to is None else folder
     )
+    return replace(plate, notes=(*notes, *plate.notes))
 
 
 def resolve_tests(histories: Sequence[History] | str | Path, compositions: object) -> list[History]:

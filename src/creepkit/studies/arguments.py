@@ -245,7 +245,7 @@ def temperature_of(file: StudyFile, key: tuple[str | int, ...], steps: Sequence[
     """K, a number or a program."""
     levels = [(start, level + ZERO_CELSIUS) for start, level in steps_of(steps)]
     if any(not 0.0 < level < 1e4 for _, level in levels):
-        raise file.error(key, f"{min(steps, key=lambda s: s.level).level:g} C is no temperature of a test")
+        raise file.error(key, f"{min(steps, key=lambda s: s.level).level:g} °C is no temperature of a test")
     if levels[0][0] != 0.0:
         raise file.error(key, "nothing is said of the time before; give the first level from_h = 0")
     with file.at(*key):

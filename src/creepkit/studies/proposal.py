@@ -14,6 +14,7 @@ from creepkit.inverse.held_levels import held_temperatures
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
+from creepkit.records.units import celsius_text
 from creepkit.studies.camera_proposal import CameraProposal, proposed_cameras, text_of_cameras
 from creepkit.studies.folders import folders_with_tests
 from creepkit.studies.study_file import parse_study
@@ -106,9 +107,10 @@ class DataSummary:
     @property
     def lines(self) -> list[str]:
         """It in sentences."""
-        low, high = self.temperatures[0] - ZERO_CELSIUS, self.temperatures[-1] - ZERO_CELSIUS
+        low, high = self.temperatures[0], self.temperatures[-1]
         kinds = ", ".join(dict.fromkeys(history.specimen for history in self.tests))
-        at = f"{low:.0f} C" if high - low < 1 else f"{low:.0f} to {high:.0f} C ({len(self.temperatures)} levels)"
+        at = celsius_text(low, high, digits=0)
+        at += f" ({len(self.temperatures)} levels)" if high - low >= 1 else ""
         unit = load_unit(self.tests[0])
         loads = f"{len(self.loads)} level{'s' if len(self.loads) > 1 else ''} of load"
         if len({load_unit(history) for history in self.tests}) == 1:

@@ -1,6 +1,7 @@
 """What a page gets to show: laws of every kind of source, specimens by their records, tests with noise and offsets."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from creepkit.app.contents import MOST_TESTS, page_contents
 from creepkit.app.documents import MOST_FRAMES, contents_document
 from creepkit.app.page import page_fragment, page_html, shared_scripts
 from creepkit.errors import ExportError, FitError
+from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from helpers.planted_bars import SPL, bars
 
@@ -138,3 +140,32 @@ def test_a_network_that_is_too_large_for_a_page_is_named(monkeypatch, tmp_path):
     monkeypatch.setattr(creepkit.app.page_models, "network_of", lambda contents: {"network-1": "x" * 1_400_000})
     with pytest.raises(ExportError, match=r"the weights of the network alone are 1\.4 MB: train one with fewer"):
         ck.interactive_page("norton", tmp_path / "page.html")
+
+
+def test_a_test_without_stated_minimum_rate_shows_that_of_its_readings():
+    """Strain in proportion to time has one slope."""
+    times = np.linspace(3600.0, 360000.0, 50)
+    steady = ck.History("steady", times, {"strain": 3e-8 * times}, ck.constant_stress(80.0), 873.15)
+    stated = steady.replace(name="stated", minimum_rate=5e-8)
+    assert [test["minimum_rate"] for test in document("norton", [steady, stated])["tests"]] == [
+        pytest.approx(3e-8, rel=1e-6),
+        5e-8,
+    ]
+
+
+def test_it_is_said_why_a_test_has_no_misfit_and_which_the_law_does_not_know(fit, histories):
+    unused = histories[0].replace(used=np.zeros(histories[0].times.size, bool))
+    other = histories[1].replace(name="another")
+    shown = document(fit, [unused, other, histories[2]])["tests"]
+    assert [test["note"] for test in shown] == [
+        "no misfit: all of its frames are excluded",
+        "the law was identified without this test",
+        "",
+    ]
+
+
+def test_it_is_said_where_the_identification_was_corrected_and_the_curves_are_not(fit):
+    assert "numerical error" not in document(fit)["laws"][0]["judged"]
+    error = NumericalError("coarse", "fine", {"strain": 4e-5}, noises=2.0, shift=0.3)
+    (law,) = document(replace(fit, numerical_error=error))["laws"]
+    assert "up to 2 times the noise; the curves and misfits here are not" in law["judged"]

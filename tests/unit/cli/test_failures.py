@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import creepkit as ck
+from creepkit.cli.failures import AS_TERMINALS_CAN
 from helpers.command_line import creepkit, one_line
 
 CREEPKIT = (sys.executable, "-m", "creepkit")
@@ -88,6 +89,11 @@ def test_a_narrow_encoding_shows_codes(encoding, tmp_path):
         assert b"Traceback" not in run.stderr
         assert run.returncode == (1 if words[0] == "read" else 0)
         (run.stdout + run.stderr).decode(encoding)
+
+
+def test_a_degree_is_left_out_where_the_encoding_lacks_it():
+    assert "850 °C, ü".encode("ascii", AS_TERMINALS_CAN) == b"850 C, \\xfc"
+    assert "850 °C".encode("cp1252", AS_TERMINALS_CAN).decode("cp1252") == "850 °C"
 
 
 @LINUX

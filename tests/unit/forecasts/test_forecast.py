@@ -341,8 +341,8 @@ def test_nonsense_is_refused(fit, options, sentence):
 
 def test_celsius_is_refused_and_may_be_insisted_on(fit):
     plan = bar("plan", 100.0, noise=0.0).replace(temperature=800.0)
-    assert fit.forecast(plan).tests[0].extrapolation.endswith("temperatures are in K: is 800 C meant, 1073.15 K?")
-    with pytest.raises(FitError, match=r"temperature 800 K lies 273 K below .* if 800 C is meant, give 1073.15"):
+    assert fit.forecast(plan).tests[0].extrapolation.endswith("temperatures are in K: is 800 °C meant, 1073.15 K?")
+    with pytest.raises(FitError, match=r"temperature 800 K lies 273 K below .* if 800 °C is meant, give 1073.15"):
         fit.rate(100.0, 800.0)
     with pytest.raises(FitError, match="temperatures are in K"):
         fit.rupture_time(100.0, 800.0)

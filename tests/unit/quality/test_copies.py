@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.quality import check_data_quality, without_copies
-from creepkit.quality.copies import copied_tests
+from creepkit.quality import check_data_quality, repeated_row_notes, without_copies
+from creepkit.quality.copies import copied_tests, repeated_rows
 from creepkit.records import History, StressSteps
 
 HOUR = 3600.0
@@ -96,3 +96,41 @@ def test_copies_change_no_value_and_no_interval_of_an_identification():
     assert sum("the same readings as t3" in note for note in beside.notes) == 3
     kept = ck.identify(law, [*tests, *copies], starts=1, suspect_frames="keep")
     assert len(kept.tests) == 7
+
+
+def row(name, stress, *, hours=None, rate=None, heat="A"):
+    """A test of which a table states a time to rupture, h, or a minimum rate, 1/s."""
+    time = None if hours is None else hours * HOUR
+    return History(
+        name, [time or HOUR], {}, StressSteps([(0.0, stress)]), 873.15,
+        rupture_time=time, minimum_rate=rate, labels={"heat": heat},
+    )  # fmt: skip
+
+
+def test_a_row_that_repeats_a_rate_and_a_time_is_told_and_kept():
+    rows = [row("a", 150.0, hours=812.4, rate=3.21e-9), row("b", 150.0, hours=812.4, rate=3.21e-9)]
+    assert repeated_rows(rows) == {1: 0}
+    assert without_copies(rows)[0] == rows
+    (flag,) = [flag for flag in check_data_quality(rows).flags if flag.kind == "replicate"]
+    assert flag.tests == ("b",)
+    assert "same numbers as a" in flag.reason
+    assert repeated_row_notes(rows) == (f"b: {flag.reason}",)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        row("b", 150.0, hours=812.4, rate=3.22e-9),
+        row("b", 150.0, hours=812.5, rate=3.21e-9),
+        row("b", 151.0, hours=812.4, rate=3.21e-9),
+        row("b", 150.0, hours=812.4, rate=3.21e-9, heat="B"),
+    ],
+)
+def test_rows_that_differ_in_a_digit_or_in_the_heat_are_two(other):
+    assert repeated_rows([row("a", 150.0, hours=812.4, rate=3.21e-9), other]) == {}
+
+
+def test_one_rate_may_agree_by_chance_and_two_hardly():
+    once = [row("a", 150.0, rate=3.2e-9), row("b", 170.0, rate=6.1e-9), row("c", 150.0, rate=3.2e-9)]
+    assert repeated_rows(once) == {}
+    assert repeated_rows([*once, row("d", 170.0, rate=6.1e-9)]) == {2: 0, 3: 1}

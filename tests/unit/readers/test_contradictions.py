@@ -38,7 +38,7 @@ def test_a_strain_above_one_is_flagged(tmp_path: Path):
 def test_a_unit_behind_a_value_that_is_not_that_of_its_name(tmp_path: Path):
     body = "Stress (MPa);100;{}\nTemperature (C);800;{}\nTime (h);Strain (%)\n0;0\n1;0,5\n2;0,9\n"
     (history,) = read(tmp_path / "bar.csv", body.format("MPa", "°C"))
-    assert history.condition == "800 C, 100 MPa"
+    assert history.condition == "800 °C, 100 MPa"
     for units in (("ksi", "C"), ("MPa", "K")):
         with pytest.raises(HistoryError, match=r"bar.csv:[12]: '(Stress|Temp).* behind its value; keep one"):
             read(tmp_path / "bar.csv", body.format(*units))

@@ -23,7 +23,7 @@ def write(folder: Path, content: Any, series: str | None = LIS, encoding: str = 
 
 def test_document_with_its_series(tmp_path: Path):
     (test,) = ck.read_histories(write(tmp_path, document()))
-    assert (test.name, test.alloy, test.condition) == ("Q7", "ALLOY-X", "950 C, 152.5 MPa")
+    assert (test.name, test.alloy, test.condition) == ("Q7", "ALLOY-X", "950 °C, 152.5 MPa")
     np.testing.assert_allclose(test.times, [0.0, 900.0, 37800.0, 218700.0])
     np.testing.assert_allclose(test.outputs["strain"], [0.0, 1.25e-4, 2.125e-3, 0.025125])
     assert test.rupture_time == 61.5 * 3600
@@ -63,7 +63,7 @@ def test_versions_differ_in_capitals(tmp_path: Path):
     text = json.dumps(document()).replace("AdditionalMetadata", "additionalMetadata").replace("TestInfo", "testInfo")
     path = write(tmp_path, {})
     path.write_text(text)
-    assert ck.read_histories(path)[0].condition == "950 C, 152.5 MPa"
+    assert ck.read_histories(path)[0].condition == "950 °C, 152.5 MPa"
 
 
 def test_a_stopped_test(tmp_path: Path):
@@ -75,7 +75,7 @@ def test_a_stopped_test(tmp_path: Path):
 def test_a_rupture_time_without_a_series(tmp_path: Path):
     (test,) = ck.read_histories(write(tmp_path, document(link="Not applicable"), series=None))
     assert (test.times.tolist(), dict(test.outputs)) == ([61.5 * 3600], {})
-    assert (test.rupture_time, test.condition) == (61.5 * 3600, "950 C, 152.5 MPa")
+    assert (test.rupture_time, test.condition) == (61.5 * 3600, "950 °C, 152.5 MPa")
 
 
 def test_entries_are_known_by_their_whole_name(tmp_path: Path):
@@ -86,7 +86,7 @@ def test_entries_are_known_by_their_whole_name(tmp_path: Path):
     )
     (tmp_path / SERIES_NAME).write_text(LIS.replace("Date of test start", f"{others}Date of test start"))
     (test,) = ck.read_histories(tmp_path)
-    assert (test.name, test.condition, test.rupture_time) == ("Q7", "950 C, 152.5 MPa", 61.5 * 3600)
+    assert (test.name, test.condition, test.rupture_time) == ("Q7", "950 °C, 152.5 MPa", 61.5 * 3600)
 
 
 def test_a_rupture_time_without_load_control_says_what_was_assumed(tmp_path: Path):

@@ -38,7 +38,7 @@ def test_uniaxial_test_in_laboratory_units(read):
     assert history.elastic == Elastic(E=153e3, nu=0.3)
     assert (history.strain_measure, history.includes_elastic) == ("logarithmic", True)
     assert (history.alloy, history.specimen, dict(history.labels)) == ("Alloy 617", "uniaxial", {"heat": "X7"})
-    assert history.condition == "850 C, 60 MPa"
+    assert history.condition == "850 °C, 60 MPa"
 
 
 def test_what_was_not_said_is_assumed_and_recorded(read):

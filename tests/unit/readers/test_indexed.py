@@ -87,7 +87,7 @@ def test_another_laboratory_is_a_declaration(tmp_path):
     )
     assert layout.accepts(made)
     (history,) = layout.read(made)
-    assert (history.name, history.condition) == ("x", "600 C, 90 MPa")
+    assert (history.name, history.condition) == ("x", "600 °C, 90 MPa")
     np.testing.assert_allclose(history.outputs["strain"], [0, 0.02])
 
 

@@ -42,7 +42,7 @@ def read(path: Path) -> list[History]:
 
 def test_one_test_in_one_sheet_keeps_every_digit(tmp_path: Path):
     (history,) = read(written(tmp_path / "bar.xlsx", {"Sheet1": CONDITIONS + FRAMES}))
-    assert (history.name, history.condition) == ("bar", "850 C, 60 MPa")
+    assert (history.name, history.condition) == ("bar", "850 °C, 60 MPa")
     np.testing.assert_array_equal(history.times, 3600.0 * np.array([0, 0.1, 1 / 3]))
     np.testing.assert_array_equal(history.outputs["strain"], 0.01 * np.array([0, 0.012, 0.025]))
 
@@ -50,7 +50,7 @@ def test_one_test_in_one_sheet_keeps_every_digit(tmp_path: Path):
 def test_head_lines_of_canonical_files(tmp_path: Path):
     head = [["# stress_MPa: 60"], ["# temperature_C:", 850], ["# a remark"]]
     (history,) = read(written(tmp_path / "bar.xlsx", {"Sheet1": head + FRAMES}))
-    assert history.condition == "850 C, 60 MPa"
+    assert history.condition == "850 °C, 60 MPa"
 
 
 def test_a_test_a_sheet_with_a_sheet_of_conditions(tmp_path: Path):
@@ -62,7 +62,7 @@ def test_a_test_a_sheet_with_a_sheet_of_conditions(tmp_path: Path):
     }
     first, second = read(written(tmp_path / "bars.xlsx", sheets))
     assert (first.name, second.name) == ("A1", "A2")
-    assert (first.condition, second.condition) == ("850 C, 60 MPa", "860 C, 80 MPa")
+    assert (first.condition, second.condition) == ("850 °C, 60 MPa", "860 °C, 80 MPa")
     assert second.labels["heat"] == "X8"
     assert "sheet 'Notes' not read as it has no column of time" in first.labels["assumed"]
     sheets["Conditions"].append(["A3", 80, 860, "X8"])
@@ -95,7 +95,7 @@ def test_pairs_below_merged_names(tmp_path: Path):
     ]
     first, second = read(written(tmp_path / "x.xlsx", {"Sheet1": rows}, merged=("A1:B1", "C1:D1")))
     assert (first.name, second.name, first.times.size, second.times.size) == ("A1", "A2", 3, 2)
-    assert second.condition == "860 C, 80 MPa"
+    assert second.condition == "860 °C, 80 MPa"
 
 
 def test_one_column_a_test_below_merged_quantity(tmp_path: Path):
@@ -109,7 +109,7 @@ def test_one_column_a_test_below_merged_quantity(tmp_path: Path):
     ]
     first, second = read(written(tmp_path / "x.xlsx", {"Sheet1": rows}, merged=("B2:C2", "B3:C3", "A3:A4")))
     assert (first.name, second.name) == ("A1", "A2")
-    assert second.condition == "860 C, 80 MPa".replace("860", "850")
+    assert second.condition == "860 °C, 80 MPa".replace("860", "850")
     assert "holds for all" not in second.labels["assumed"]
 
 

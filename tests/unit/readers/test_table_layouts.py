@@ -52,7 +52,7 @@ def test_one_test_reads_the_same_in_every_dialect(read, delimiter: str, decimal:
     (history,) = read(head + body, encoding)
     np.testing.assert_array_equal(history.times, 3600.0 * np.array(TIMES))
     np.testing.assert_array_equal(history.outputs["strain"], 0.01 * np.array(STRAINS))
-    assert history.condition == "850 C, 60 MPa"
+    assert history.condition == "850 °C, 60 MPa"
 
 
 @pytest.mark.parametrize(
@@ -135,7 +135,7 @@ WIDE = {
 def test_two_tests_side_by_side(read, layout: str):
     first, second = read(WIDE[layout])
     assert (first.name, second.name) == ("A1", "A2")
-    assert (first.condition, second.condition) == ("850 C, 60 MPa", "860 C, 80 MPa")
+    assert (first.condition, second.condition) == ("850 °C, 60 MPa", "860 °C, 80 MPa")
     np.testing.assert_array_equal(first.times, [0.0, 3600.0, 7200.0])
     np.testing.assert_array_equal(second.times, [0.0, 3600.0, 10800.0])
     np.testing.assert_allclose(first.outputs["strain"], [0, 0.005, 0.009], rtol=1e-15)

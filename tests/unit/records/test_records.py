@@ -131,10 +131,10 @@ def test_standard_deviation_may_be_one_number():
 @pytest.mark.parametrize(
     ("loading", "temperature", "words"),
     [
-        (constant_stress(43.0), 1123.15, "850 C, 43 MPa"),
-        (StressSteps(((0, 100), (3600, 120))), 1123.15, "850 C, 100 to 120 MPa"),
-        (PressureJump(8, 10, 14580), 1075.6, "802 C, 8 to 10 MPa"),
-        (constant_stress(43.0), Program([0, 10], [1123.15, 1173.15]), "850 to 900 C, 43 MPa"),
+        (constant_stress(43.0), 1123.15, "850 °C, 43 MPa"),
+        (StressSteps(((0, 100), (3600, 120))), 1123.15, "850 °C, 100 to 120 MPa"),
+        (PressureJump(8, 10, 14580), 1075.6, "802 °C, 8 to 10 MPa"),
+        (constant_stress(43.0), Program([0, 10], [1123.15, 1173.15]), "850 to 900 °C, 43 MPa"),
     ],
 )
 def test_condition_in_words(loading, temperature, words):

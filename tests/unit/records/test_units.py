@@ -11,7 +11,7 @@ from creepkit.instruments.column_heads import channel_unit
 from creepkit.readers.column_names import unit_suffix
 from creepkit.records.camera_format import LENGTH_UNITS
 from creepkit.records.quantities import LENGTH, STRESS, TEMPERATURE, TIME
-from creepkit.records.units import UNITS
+from creepkit.records.units import UNITS, celsius_text, hours_number, time_text
 
 POUND_FORCE, INCH = 0.45359237 * 9.80665, 25.4
 """N and mm, by their definitions."""
@@ -65,3 +65,17 @@ def test_instruments_and_tables_take_the_same_spellings(text: str):
     assert suffix is not None
     conversion = (STRESS if suffix in STRESS.units else TEMPERATURE).units[suffix]
     assert (channel.factor, channel.offset) == (conversion.factor, conversion.offset)
+
+
+def test_temperatures_are_written_in_degrees_of_celsius():
+    """The ice point is 273.15 K; one temperature has one text, and 550 °C does not round to two numbers of kelvin."""
+    assert celsius_text(823.15) == "550 °C"
+    assert celsius_text(273.15) == celsius_text(273.1499) == "0 °C"
+    assert celsius_text(872.92, 893.15) == "599.8 to 620 °C"
+    assert celsius_text(872.92, 893.15, digits=0) == "600 to 620 °C"
+    assert celsius_text(872.92, 873.15, digits=0) == "600 °C"
+
+
+def test_times_are_written_in_hours():
+    assert (time_text(599.0), time_text(3600.0)) == ("599 s", "1 h")
+    assert [hours_number(s) for s in (5.4e6, float("inf"), float("nan"))] == ["1500", "later", "?"]

@@ -15,9 +15,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.reports.curve_of_test import TestCurve
 from creepkit.reports.figures import empty_figure
 from creepkit.reports.forecast_plot import LONGEST_AXIS, _time_end
-from creepkit.reports.html.elements import sentence
 from creepkit.reports.judged_readings import judged_readings
-from creepkit.reports.load_programs import with_degrees
 from creepkit.reports.prediction_bands import fitted_curves
 from creepkit.reports.residual_panels import _limit, draw_residuals
 from creepkit.reports.test_figure import _end_text, fitted_test_text
@@ -114,9 +112,3 @@ def test_the_axis_of_a_forecast_holds_the_interval_of_the_rupture_time(high: flo
     """The interval of a strain carries the axis to 513 h, within which that of the rupture time begins."""
     times = [SimpleNamespace(low=3600.0 * a, high=3600.0 * b) for a, b in ((341.0, high), (115.0, 513.0))]
     assert _time_end(SimpleNamespace(times=times), 300.0) == pytest.approx(end)
-
-
-def test_degrees_are_printed_as_such() -> None:
-    assert with_degrees("980 C, 230 MPa") == "980 °C, 230 MPa"
-    assert with_degrees("bar 3 Chrome") == "bar 3 Chrome"
-    assert sentence("a test (980 C, 230 MPa)") == "A test (980 °C, 230 MPa)."

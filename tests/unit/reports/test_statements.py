@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,9 +22,12 @@ from creepkit.inverse.unmodelled_effect import UnmodelledEffect, combined_change
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.reports import stress_exponents
+from creepkit.reports.figures import empty_figure
 from creepkit.reports.forecast import _time_text
+from creepkit.reports.forecast_plot import _draw_times
 from creepkit.reports.html.elements import number, with_interval
 from creepkit.reports.html.groups import _separation
+from creepkit.reports.judged_readings import judged_readings
 from creepkit.reports.stress_exponents import interval_digits, reference_sentences
 from helpers.steady_rate_predictor import Steady, planted
 
@@ -123,3 +128,43 @@ def test_a_time_is_stated_by_its_median_and_with_the_probability_of_what_was_ask
     assert _time_text(one, 300.0 * 3600) == (
         "strain 0.01: median 310 [115, 513] h; before the end of the test at 300 h with probability 0.47"
     )
+
+
+def test_a_forecast_marks_the_median_that_its_table_states() -> None:
+    """Not the time at the identified values, 376 h, which may lie far from it."""
+    one = TimeForecast("strain 0.01", 376.0 * 3600, 310.0 * 3600, 115.0 * 3600, 513.0 * 3600, 0.47)
+    rupture = SimpleNamespace(
+        output="", target=0.0, value=one.value, median=one.median, low=one.low, high=one.high,
+        measured=math.nan, censored=False,
+    )  # fmt: skip
+    axes = empty_figure(4.0, 3.0).add_subplot()
+    axes.set_xlim(0.0, 600.0)
+    _draw_times(axes, SimpleNamespace(times=[rupture]), SimpleNamespace(output="strain"), 1e-3, 1.0)
+    (mark,) = [line for line in axes.lines if line.get_marker() == "|"]
+    assert list(mark.get_xdata()) == [310.0]
+
+
+def test_the_terminal_and_the_report_state_one_chi_square_of_a_test() -> None:
+    """Norton bars at a held strain: 1/s^(n-1) grows by (n-1) E A t; one relaxes faster than the law says."""
+    times = np.geomspace(36.0, 3.6e5, 30)
+    tests = []
+    for k, (strain, factor) in enumerate(((0.001, 1.0), (0.0012, 1.0), (0.0014, 1.4), (0.0016, 0.8))):
+        noise = 0.3 * np.random.default_rng(k).normal(size=times.size)
+        stress = ((1.5e5 * strain) ** -4.0 + 4.0 * 1.5e5 * factor * 1e-18 * times) ** -0.25 + noise
+        held = ck.constant_strain(strain)
+        elastic = ck.Elastic(1.5e5, 0.3)
+        tests.append(
+            ck.History(
+                f"bar {k}", times, {"stress": stress}, held, 1000.0, "relaxation", elastic=elastic,
+                standard_deviation={"stress": np.full(times.size, 0.3)},
+            )
+        )  # fmt: skip
+    fit = ck.identify("norton", tests, starts=1)
+    readings = judged_readings(fit)
+    assert readings is not None
+    rows = [line.split() for line in str(fit).splitlines() if line.startswith("  bar ")]
+    # name in two words, condition in four ("727 °C, strain 0.001"), error, chi2
+    assert [float(row[7]) for row in rows] == [
+        pytest.approx(readings.chi_square(k), rel=6e-3) for k in range(len(tests))
+    ]
+    assert fit.tests[2].outputs[0].errors.chi_square > 2.0 * readings.chi_square(2)

@@ -252,3 +252,10 @@ def test_what_is_given_is_checked_before_any_work(how, message):
 def test_an_alloy_that_is_not_there_is_asked_for(plate):
     with pytest.raises(FitError, match="the plate has no alloy 'Z'"):
         plate["Z"]
+
+
+def test_a_copy_of_a_test_is_left_out_with_a_note():
+    tests = bars("X")
+    plate = screened([*tests, tests[0].replace(name="again")])
+    assert plate.notes == (f"left out: again: the same readings as {tests[0].name}: one test, which counts once",)
+    assert [h.name for h in plate.histories["X"]] == [h.name for h in tests]

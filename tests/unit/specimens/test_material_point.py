@@ -205,7 +205,7 @@ def test_a_history_of_a_point_survives_its_file(tmp_path):
     (again,) = ck.read_histories(write_history(run, tmp_path / "point.csv"))
     assert (again.specimen, again.loading, again.elastic) == ("point", loading, STEEL)
     assert {name: v.tolist() for name, v in again.outputs.items()} == {n: v.tolist() for n, v in run.outputs.items()}
-    assert again.condition == "20 C, 11 60 MPa, 12 0 to -40 MPa, strain 33 0"
+    assert again.condition == "20 °C, 11 60 MPa, 12 0 to -40 MPa, strain 33 0"
 
 
 @pytest.mark.parametrize(

@@ -152,7 +152,7 @@
     function symbols(one, places) {
       // every symbol in one path: hundreds of frames cost as much as one
       const r = one.large ? 5 : 2.6;
-      const path = places.filter((place) => place !== null).map(([u, v]) => `M${u - r} ${v}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`).join("");
+      const path = places.filter((place) => place !== null).map(([u, v]) => page.symbol(one.name, u, v, r)).join("");
       const drawn = svg("path", { class: `points ${one.style ?? ""}`, d: path });
       drawn.style.stroke = drawn.style.fill = one.colour;
       return drawn;

@@ -32,5 +32,16 @@
   page.identifier = (stem) => `creepkit-${stem}-${++count}`;
 
   // The colour of a curve: the plan's own, or that of a test by its number.
-  page.colour = (k) => (k === null ? "var(--plan)" : `var(--curve-${k % 8})`);
+  const COLOURS = 12; // of tests, in the style
+  page.colour = (k) => (k === null ? "var(--plan)" : `var(--curve-${k % COLOURS})`);
+
+  // The path of the symbol of a test with its middle at (u, v): the tests beyond the colours have other shapes.
+  const SHAPES = [
+    (u, v, r) => `M${u - r} ${v}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`,
+    (u, v, r) => `M${u - r} ${v - r}h${2 * r}v${2 * r}h${-2 * r}Z`,
+    (u, v, r) => `M${u} ${v - 1.3 * r}l${1.3 * r} ${2.3 * r}h${-2.6 * r}Z`,
+    (u, v, r) => `M${u} ${v - 1.4 * r}l${1.4 * r} ${1.4 * r}l${-1.4 * r} ${1.4 * r}l${-1.4 * r} ${-1.4 * r}Z`,
+    (u, v, r) => `M${u} ${v + 1.3 * r}l${1.3 * r} ${-2.3 * r}h${-2.6 * r}Z`,
+  ];
+  page.symbol = (k, u, v, r) => SHAPES[Math.floor(k / COLOURS) % SHAPES.length](Number(u), Number(v), r);
 })((globalThis.creepkitPage ??= {}));

@@ -116,7 +116,7 @@
       charts.get("strain")?.heading.append(element("span", { class: "help" }, ` ${strainKind()}`));
       const point = data.laws[state.law].rate_point;
       rates = page.chart({ title: "Creep rate against stress", whole: true, x: { label: "stress, MPa", logarithmic: true }, y: { label: "creep rate, 1/s", short: "1/s", logarithmic: true } });
-      rates.heading.append(element("span", { class: "help" }, ` at strain ${page.format(point.strain, 2)}, ${page.duration(point.time)}`));
+      rates.heading.append(element("span", { class: "help" }, ` at strain ${page.format(point.strain, 2)}, ${page.duration(point.time)}${data.tests.some((test) => test.minimum_rate !== null) ? "; points: measured minimum rates, each at the temperature of its test" : ""}`));
       section = page.section();
       section.panel.hidden = true;
       panels.replaceChildren(element("span", { class: "chooser" }, chosen), ...[...charts.values()].map((chart) => chart.panel), section.panel, rates.panel);

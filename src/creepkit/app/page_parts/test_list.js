@@ -1,7 +1,7 @@
 "use strict";
 // Measured tests: which are shown, their colours, and how far the curves lie from them.
 (function (page) {
-  const { element } = page;
+  const { element, svg } = page;
 
   // handlers: onInput(), onRelease(), onRepeat(k)
   page.testList = function (data, state, handlers) {
@@ -13,11 +13,11 @@
     const rows = data.tests.map((test, k) => {
       const shown = element("input", { type: "checkbox", "aria-label": `show ${test.name}`, onchange: () => { state.tests[k] = shown.checked; handlers.onInput(); handlers.onRelease(); } });
       shown.checked = state.tests[k];
-      const swatch = element("span", { class: "swatch", "aria-hidden": "true" });
-      swatch.style.background = page.colour(k);
+      const swatch = svg("svg", { class: "swatch", "aria-hidden": "true", viewBox: "-6 -6 12 12" }, svg("path", { d: page.symbol(k, 0, 0, 4) }));
+      swatch.style.fill = page.colour(k);
       const repeat = page.programOf(test) === null ? null : element("button", { type: "button", class: "small", title: "plan this test: its load, temperature and end", onclick: () => handlers.onRepeat(k) }, "plan");
       const rms = element("td", { class: "number" }), ratio = element("td", { class: "number" });
-      body.append(element("tr", {}, element("td", {}, shown, swatch), element("th", { scope: "row" }, test.name, element("span", { class: "help" }, test.condition), repeat), rms, ratio));
+      body.append(element("tr", {}, element("td", {}, shown, swatch), element("th", { scope: "row" }, test.name, element("span", { class: "help" }, test.condition), test.note ? element("span", { class: "help" }, test.note) : null, repeat), rms, ratio));
       return { shown, rms, ratio };
     });
     const all = element("button", { type: "button", class: "small", onclick: () => set(true) }, "show all");

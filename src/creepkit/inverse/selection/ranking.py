@@ -146,7 +146,7 @@ def verdict_of(ranking: Ranking) -> str:
     """One sentence: what is known of the law, of how many tried, and what keeps it from being decisive."""
     names, count, adequacy = [r.fit.law.name for r in ranking.credible], len(ranking.laws), ranking.adequacy
     best = ranking.best.law.name
-    adequacy_text = "whether it explains the tests is not known" if adequacy is None else f"it {adequacy}"
+    adequacy_text = "whether the tests contradict it is not known" if adequacy is None else f"it {adequacy}"
     if count == 1:
         return f"only {best} was fitted; {adequacy_text}"
     if ranking.decisive:

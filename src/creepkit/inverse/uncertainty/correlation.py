@@ -19,6 +19,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.presentation import Presentable, present
+from creepkit.records.units import celsius_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -179,7 +180,7 @@ def _determined_sentence(fit: Identification) -> str:
     rate, rate_low, rate_high = (float(v) for v in fit.rate(reference.stress, warn=False))
     exponent, exponent_low, exponent_high = (float(v) for v in fit.local_exponent(reference.stress, warn=False))
     return (
-        f"what the tests see at {reference.stress:.4g} MPa, {reference.temperature:.0f} K: the local exponent is "
-        f"{exponent:.3g} "
-        f"[{exponent_low:.3g}, {exponent_high:.3g}], the rate {rate:.3g} [{rate_low:.3g}, {rate_high:.3g}] 1/s"
+        f"what the tests see at {reference.stress:.4g} MPa, {celsius_text(reference.temperature)}: the local "
+        f"exponent is {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}], "
+        f"the rate {rate:.3g} [{rate_low:.3g}, {rate_high:.3g}] 1/s"
     )

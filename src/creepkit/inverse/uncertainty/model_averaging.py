@@ -29,7 +29,8 @@ from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, Mi
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, local_exponent, log_rate
 from creepkit.language import temperature as TEMPERATURE
 from creepkit.presentation import Presentable, present
-from creepkit.records import ZERO_CELSIUS, History
+from creepkit.records import History
+from creepkit.records.units import celsius_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -285,12 +286,12 @@ def _band_notes(mixture: ModelAverage, temperature: float, temperature_uncertain
     low, high = fit.ranges["temperature"]
     if len(laws_without_temperature) < len(mixture.fits) and high - low < SAME_TEMPERATURE:
         notes.append(
-            f"all tests were made at {0.5 * (low + high) - ZERO_CELSIUS:.0f} C: how the rate depends on temperature is "
-            "not determined by them, and the band shows it"
+            f"all tests were made at {celsius_text(0.5 * (low + high), digits=0)}: how the rate depends on temperature "
+            "is not determined by them, and the band shows it"
         )
     extrapolation = max(low - SAME_TEMPERATURE - temperature, temperature - high - SAME_TEMPERATURE)
     if extrapolation > 0:
         notes.append(
-            f"{temperature - ZERO_CELSIUS:.0f} C lies {extrapolation + SAME_TEMPERATURE:.0f} K outside the tests"
+            f"{celsius_text(temperature, digits=0)} lies {extrapolation + SAME_TEMPERATURE:.0f} K outside the tests"
         )
     return tuple(notes)

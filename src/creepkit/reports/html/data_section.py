@@ -14,7 +14,6 @@ from creepkit.reports.html.elements import Block, PageSection, Paragraph, Table,
 from creepkit.reports.html.findings import findings_of
 from creepkit.reports.html.minimum_rates import minimum_rate_table
 from creepkit.reports.html.test_details import NOT_STATED, table_of_details
-from creepkit.reports.load_programs import with_degrees
 from creepkit.reports.tests_apart import apart_sentence
 
 if TYPE_CHECKING:
@@ -49,7 +48,7 @@ def _table_of_histories(histories: Sequence[History], more: str) -> Table:
         (
             printable(h.name, 120),
             printable(h.alloy or NOT_STATED, 80),
-            printable(with_degrees(h.condition), 200),
+            printable(h.condition, 200),
             str(h.times.size) if h.outputs else "–",
             number(float(h.times[-1]) / SECONDS_PER_HOUR) if duration_known(h) else "–",
             _ending(h),

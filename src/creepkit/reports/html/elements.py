@@ -13,8 +13,6 @@ from typing import ClassVar, TypeAlias
 
 from markupsafe import Markup
 
-from creepkit.reports.load_programs import with_degrees
-
 LONGEST_TEXT = 4000
 """Characters of a cell or paragraph; an error message may hold a name of any length."""
 
@@ -130,7 +128,6 @@ def printable_lines(text: str) -> str:
 def sentence(text: str) -> str:
     """A text with a capital and a full stop, powers of ten and signs as they are printed; names stay as they are."""
     text = _POWER.sub(lambda found: _with_power(found[1], found[2]), printable(text).strip()).replace(" +- ", " ± ")
-    text = with_degrees(text)
     first = text[:1] if _NAME.match(text) else text[:1].upper()
     return f"{first}{text[1:]}{'' if text.endswith(('.', '!', '?', ':', '…')) else '.'}"
 

@@ -96,7 +96,7 @@ def _found(group: ReportGroup) -> GroupFindings | None:
         equivalents = () if result.decisive else tuple(map(str, equivalents_among_remaining(result)))
         return GroupFindings(group.name, result.best, result, result.verdict, equivalents, (), result.decisive)
     if isinstance(result, Identification):
-        adequacy = "was identified; whether it explains the tests is not known"
+        adequacy = "was identified; whether the tests contradict it is not known"
         adequacy = adequacy if result.adequacy is None else str(result.adequacy)
         law = f"the {title_in_sentence(result.law)}" if result.law.title else f"the law '{result.law.name}'"
         return GroupFindings(group.name, result, None, f"{law} {adequacy}")

@@ -32,7 +32,7 @@ from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.identification_plot import identification_figure
 from creepkit.reports.identification_text import rupture_rows
 from creepkit.reports.judged_readings import judged_readings
-from creepkit.reports.load_programs import SECONDS_PER_HOUR, with_degrees
+from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.minimum_rate_panel import compared_minimum_rates, exponent_sentence
 from creepkit.reports.prediction_bands import fitted_curves
 from creepkit.reports.ranking import explanation, misfit_cells, misfit_columns
@@ -114,7 +114,7 @@ def _table_of_tests(fit: Identification) -> Table:
         rows.append(
             (
                 printable(test.name, 120),
-                printable(with_degrees(test.condition), 200),
+                printable(test.condition, 200),
                 "not known" if compared is None else str(compared.by_test.get(test.name, 0)),
                 "–" if readings is None else number(readings.chi_square(k), 3),
                 "–" if readings is None else number(readings.misfit_of_common_rate(k), 3),
@@ -160,7 +160,7 @@ def _table_of_ruptures(fit: Identification) -> Table:
     rows = [
         (
             printable(name, 120),
-            printable(with_degrees(condition), 200),
+            printable(condition, 200),
             f"{'> ' if r.censored else ''}{number(r.measured / SECONDS_PER_HOUR)}",
             number(r.predicted / SECONDS_PER_HOUR),
             f"{number(r.low / SECONDS_PER_HOUR)} to {number(r.high / SECONDS_PER_HOUR)}",
@@ -255,7 +255,7 @@ def _separation(ranking: Ranking) -> list[str]:
     k, name = int(np.argmax(differences)), second.fit.law.name
     against = float(np.maximum(differences, 0.0).sum())
     share = f"{100 * float(differences[k]) / against:.0f} % of the chi-square that speaks against {name} is its own; "
-    test = f"test {printable(fits[0].tests[k].name, 120)} ({printable(with_degrees(fits[0].tests[k].condition), 200)})"
+    test = f"test {printable(fits[0].tests[k].name, 120)} ({printable(fits[0].tests[k].condition, 200)})"
     criterion = criterion_name(ranking)
     return [
         f"What separates {name} from {fits[0].law.name} most is {test}: {share}"

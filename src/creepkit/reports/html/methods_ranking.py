@@ -1,4 +1,4 @@
-"""How laws were compared, and how it was judged whether a law explains the tests, in sentences for a paper."""
+"""How laws were compared, and how it was judged whether the tests contradict a law, in sentences for a paper."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def ranking_sentences(found: GroupFindings, references: References, *, numbers: 
         name, penalty = CRITERIA[ranking.criterion]
         n = f" (n = {number(ranking.independent_frames, 4)})" if numbers and _known(ranking.independent_frames) else ""
         deviance = (
-            "chi-square, under the covariance of the law that explains the tests best, plus the logarithm of the "
+            "chi-square, under the covariance of the law that fits the tests best, plus the logarithm of the "
             "determinant that integrates nuisance parameters out"
             if by_likelihood
             else "-2 ln L, multiplied by the number of independent readings over that of all"
@@ -48,8 +48,8 @@ def ranking_sentences(found: GroupFindings, references: References, *, numbers: 
         f"The laws were compared by the {criterion}.",
         "The weight of a law is exp(-difference / 2) over the sum of all laws tried, and a law is credible with a "
         f"weight above {CREDIBLE_WEIGHT:g}. A law is called decisive where its weight is above {DECISIVE_WEIGHT:g}, it "
-        "was among the laws asked for, it explains the tests, and neither a share of another law nor an effect that "
-        "was not modelled changes that.",
+        "was among the laws asked for, it is not contradicted by the tests, and neither a share of another law nor an "
+        "effect that was not modelled changes that.",
     ]
 
 
@@ -58,7 +58,7 @@ def _known(value: float) -> bool:
 
 
 def adequacy_sentences(found: Sequence[GroupFindings], references: References) -> list[str]:
-    """How it was judged whether a law explains the tests; none where it was not."""
+    """How it was judged whether the tests contradict a law; none where it was not."""
     judged = [one.fit.adequacy for one in found if one.fit.adequacy is not None]
     if not judged:
         return []
@@ -79,8 +79,8 @@ def adequacy_sentences(found: Sequence[GroupFindings], references: References) -
     several = " (the least of those of all outputs and of each one, times their number)"
     scatter = number(math.exp(LARGEST_SCATTER), 2)
     return [
-        "A law explains the tests where its chi-square, against noise that was stated or estimated without the law, "
-        f"has a probability of at least {100 * SIGNIFICANCE:g} %"
+        "A law is not contradicted by the tests where its chi-square, against noise that was stated or estimated "
+        f"without the law, has a probability of at least {100 * SIGNIFICANCE:g} %"
         f"{several if any(len(one.outputs) > 1 for one in judged) else ''}, the rates of tests scatter by less than a "
         f"factor of {scatter}, and they do not bend over stress (p at least {TREND_SIGNIFICANCE:g}). Degrees of "
         f"freedom are the readings less the unknowns that they determine.{freedom}{estimated}"

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from creepkit.reports.html.elements import Block, Table, number, printable
-from creepkit.reports.load_programs import with_degrees
 
 if TYPE_CHECKING:
     from creepkit.records import History
@@ -17,7 +16,7 @@ def minimum_rate_table(histories: Sequence[History]) -> list[Block]:
     rows = [
         (
             printable(one.name, 120),
-            printable(with_degrees(one.condition), 200),
+            printable(one.condition, 200),
             number(one.minimum_rate, 4),
             "–" if one.minimum_rate_sd is None else number(one.minimum_rate_sd, 2),
         )

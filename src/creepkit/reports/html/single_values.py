@@ -8,7 +8,6 @@ import numpy as np
 
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.reports.html.elements import Block, Paragraph, Table, number, printable
-from creepkit.reports.load_programs import with_degrees
 
 if TYPE_CHECKING:
     from creepkit.inverse.goodness_of_fit import RateComparison, RuptureComparison, TestFit
@@ -37,7 +36,7 @@ def _table(tests: list[TestFit], count: int) -> Table:
     rows = [
         (
             printable(test.name, 120),
-            printable(with_degrees(test.condition), 200),
+            printable(test.condition, 200),
             *(_rate_cells(test.minimum_rate) if rates else ()),
             *(_end_cells(test.rupture) if ends else ()),
         )

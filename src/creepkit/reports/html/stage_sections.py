@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, TypeVar
 
 from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
+from creepkit.records.units import celsius_text
 from creepkit.reports.design import MACHINE_TIME, cells_text, cheapest_text, design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
@@ -30,7 +31,6 @@ from creepkit.reports.html.law_names import LawNames
 from creepkit.reports.html.law_tables import LAW_REJECTED
 from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.instrument_records import alignment_text, imposed_text
-from creepkit.reports.load_programs import with_degrees
 from creepkit.reports.rupture import rupture_text, strength_rows
 from creepkit.reports.rupture_plot import rupture_figure
 from creepkit.reports.temperature_law import plot_temperature_law, temperature_law_text, temperature_study_text
@@ -153,8 +153,8 @@ def _temperature_blocks(name: str, result: TemperatureStudy | TemperatureLaw, fi
         forms = ", ".join(f"{parameter} {form}" for parameter, form in law.forms.items())
         blocks.append(
             Paragraph(
-                f"Between {low:.0f} and {high:.0f} K the parameters follow these forms best: {forms}. The values are "
-                f"those at {law.T_ref:.1f} K."
+                f"From {celsius_text(low, high)} the parameters follow these forms best: {forms}. The values are "
+                f"those at {celsius_text(law.T_ref)}."
             )
         )
         rows = [
@@ -173,7 +173,7 @@ def _temperature_blocks(name: str, result: TemperatureStudy | TemperatureLaw, fi
                 lambda: plot_temperature_law(law),
                 f"Parameters over temperature{_of(name)}",
                 f"Isothermal estimates with 95 % intervals at {law.isothermal_estimates.temperatures.size} "
-                f"temperatures from {low:.0f} to {high:.0f} K, and the curves of the forms that remain. "
+                f"temperatures from {celsius_text(low, high)}, and the curves of the forms that remain. "
                 f"Best forms: {forms}.",
                 "Parameters at each temperature with 95 % intervals, and the forms that remain with their weights.",
             )
@@ -266,7 +266,7 @@ def _forecast_cells(forecast: Forecast) -> list[tuple[str, ...]]:
     rows = []
     for test, condition, end, *cells in forecast_rows(forecast):
         parted = ["; ".join(cell.splitlines()) for cell in cells]
-        rows.append(tuple(map(printable, (test, with_degrees(condition), end, *parted))))
+        rows.append(tuple(map(printable, (test, condition, end, *parted))))
     return rows
 
 

@@ -79,7 +79,7 @@ def test_singled_out_needs_adequacy_and_weight_but_no_challenge():
 
 def test_one_law_is_not_a_choice():
     assert verdict_of(ranking([1.0])) == f"only norton was fitted; it {EXPLAINS}"
-    assert verdict_of(ranking([1.0], [None])) == "only norton was fitted; whether it explains the tests is not known"
+    assert verdict_of(ranking([1.0], [None])) == "only norton was fitted; whether the tests contradict it is not known"
 
 
 def test_where_no_law_explains_the_best_is_named_with_what_it_leaves():

@@ -126,7 +126,7 @@ def test_a_law_without_temperature_cannot_know(fit):
 
 def test_temperatures_beyond_the_tests_are_said(warm):
     (told,) = rate_band(warm, [40.0], 1100.0).notes
-    assert told == "827 C lies 50 K outside the tests"
+    assert told == "827 °C lies 50 K outside the tests"
     one = replace(warm, ranges={**warm.ranges, "temperature": (1000.0, 1000.0)})
     assert "not determined by them" in rate_band(one, [40.0], 1000.0).notes[0]
 
