@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
@@ -17,6 +18,7 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.records import History, Prediction, is_logarithmic
 
 
+@checked
 def relative_squared_error(
     measured: Sequence[ArrayLike], predicted: Sequence[ArrayLike], about: Literal["all", "test", "frame"] = "all"
 ) -> float:

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from creepkit.arrays import Floats, frozen
+from creepkit.checked_arguments import checked
 from creepkit.errors import DatasetError
 from creepkit.language import Elastic
 from creepkit.records import ZERO_CELSIUS, History, Predictor
@@ -34,6 +35,7 @@ MOST_FRAMES = 100_000
 """Largest number of frames of a sample: a typing error should not ask for all the memory."""
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class TimeGrid:
     """The times of all samples of a design.

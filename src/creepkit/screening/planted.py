@@ -20,6 +20,7 @@ import numpy as np
 
 from creepkit import kernels, registry
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError
 from creepkit.files.writing import write_text
 from creepkit.language import Elastic
@@ -114,6 +115,7 @@ class PlantedPlate:
         return tests, composition_file
 
 
+@checked
 def planted_plate(alloys: int = 47, seed: int = 7, *, thickness_known: bool = True) -> PlantedPlate:
     """Simulate the tests of so many alloys, one dimple each; the first alloys are the same however many there are.
 

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.stats import norm
 
 from creepkit.arrays import ArrayLike, Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.extrapolation import check_kelvin, warn_of_extrapolation
 from creepkit.inverse.identification import Identification
@@ -81,6 +82,7 @@ class ModelAverage(Presentable):
         weighted = [r for r in source.laws if r.weight > 0]
         return cls(tuple(r.fit for r in weighted), tuple(r.weight for r in weighted))
 
+    @checked
     def rate(
         self,
         stress: ArrayLike,
@@ -101,6 +103,7 @@ class ModelAverage(Presentable):
         median, low, high = (np.exp(v) for v in distribution.interval())
         return median, low, high
 
+    @checked
     def local_exponent(
         self,
         stress: ArrayLike,
@@ -199,6 +202,7 @@ class RateBand(Presentable):
         return present(self, "plot", path)
 
 
+@checked
 def rate_band(
     source: Identification | WeightedLaws | ModelAverage,
     stresses: ArrayLike,
