@@ -61,9 +61,9 @@ def is_finite_number(value: object) -> bool:
 def _is_number(value: Any) -> bool:
     if type(value) is float:
         return True
-    if isinstance(value, bool):
-        return False
     if isinstance(value, numbers.Real):
+        if isinstance(value, bool):
+            return False
         return not isinstance(value, numbers.Integral) or abs(int(value)) < 10**300
     return getattr(value, "shape", None) == () and getattr(getattr(value, "dtype", None), "kind", "") in "fiu"
 
@@ -73,7 +73,7 @@ def _is_finite(value: Any) -> bool:
 
 
 def _is_integer(value: Any) -> bool:
-    return isinstance(value, numbers.Integral) and not isinstance(value, bool) and abs(int(value)) <= LARGEST_INTEGER
+    return type(value) is not bool and isinstance(value, numbers.Integral) and abs(int(value)) <= LARGEST_INTEGER
 
 
 def _is_truth(value: Any) -> bool:
@@ -136,7 +136,15 @@ class _Checks:
     def of(self, annotation: Any) -> Check:
         if isinstance(annotation, str | typing.ForwardRef):
             return check_of(getattr(annotation, "__forward_arg__", annotation), self.names, finite=self.finite)
-        simple = {None: NOTHING, type(None): NOTHING, str: TEXT, int: INTEGER, bool: TRUTH, Path: PATH, Any: ANYTHING}
+        simple: dict[Any, Check] = {
+            None: NOTHING,
+            type(None): NOTHING,
+            str: TEXT,
+            int: INTEGER,
+            bool: TRUTH,
+            Path: PATH,
+            Any: ANYTHING,
+        }
         simple |= {float: FINITE if self.finite else NUMBER, object: ANYTHING, _ArrayLike: ARRAY}
         if isinstance(annotation, collections.abc.Hashable) and annotation in simple:
             return simple[annotation]
@@ -234,9 +242,21 @@ class _Checks:
         if not isinstance(kind, type):
             return ANYTHING
         if getattr(kind, "_is_protocol", False) and not getattr(kind, "_is_runtime_protocol", False):
-            return ANYTHING
+            return _protocol(kind)
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
         return Check(lambda value: isinstance(value, kind), f"{article} {kind.__name__}")
+
+
+def _protocol(kind: type) -> Check:
+    """What has the methods and properties of a protocol; a function where it is called."""
+    members = {name for one in kind.__mro__ if getattr(one, "_is_protocol", False) for name in vars(one)}
+    if "__call__" in members:
+        return CALLABLE
+    names = sorted(name for name in members if not name.startswith("_"))
+    return Check(
+        lambda value: not isinstance(value, type) and all(hasattr(value, name) for name in names),
+        f"an object with {' and '.join(names)}",
+    )
 
 
 def _is_series(value: Any) -> bool:
@@ -313,7 +333,7 @@ def _imported_for_checking(path: str) -> dict[str, str]:
         tree = ast.parse(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, SyntaxError):
         return {}
-    found = {}
+    found: dict[str, str] = {}
     for node in tree.body:
         if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
             for one in node.body:

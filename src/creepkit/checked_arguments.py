@@ -32,7 +32,8 @@ def checked(public: Anything) -> Anything:
     itself says of a wrong value comes first.
     """
     if not inspect.isclass(public):
-        return _checked_function(public, public.__qualname__, lambda: _function_annotations(public))
+        function: Anything = _checked_function(public, public.__qualname__, lambda: _function_annotations(public))
+        return function
     name = "__init__" if "__init__" in public.__dict__ else "__new__"
     constructor = inspect.unwrap(getattr(public, name))
     generated = is_dataclass(public) and not constructor.__code__.co_filename.endswith(".py")
@@ -46,7 +47,10 @@ def checked_with_own_words(*own: str) -> Callable[[Anything], Anything]:
     """As checked, of a function that itself says what is wrong with the arguments of these names."""
 
     def decorate(function: Anything) -> Anything:
-        return _checked_function(function, function.__qualname__, lambda: _function_annotations(function), own)
+        made: Anything = _checked_function(
+            function, function.__qualname__, lambda: _function_annotations(function), own
+        )
+        return made
 
     return decorate
 

@@ -188,6 +188,8 @@ def with_arrhenius(law: CreepLaw, histories: Sequence[History]) -> CreepLaw:
 
     Internal variables with rates of their own have activation energies of their own, as CreepLaw.times says.
     """
+    if not histories:
+        raise FitError("there are no histories whose temperatures say whether the law needs a factor")
     if law.uses(temperature) or not spans_temperatures(histories):
         return law
     return law.times(arrhenius(T_ref=reference_temperature(histories)))

@@ -14,7 +14,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, frozen
 from creepkit.checked_arguments import checked
-from creepkit.errors import DatasetError
+from creepkit.errors import DatasetError, quoted
 from creepkit.language import Elastic
 from creepkit.records import ZERO_CELSIUS, History, Predictor
 from creepkit.sampling.specimen_conditions import (
@@ -49,7 +49,7 @@ class TimeGrid:
     def __post_init__(self) -> None:
         values = frozen(self.values)
         if values.ndim != 1 or values.size < 2 or not np.isfinite(values).all():
-            raise DatasetError(f"a time grid needs two or more finite times, found {values.tolist()[:3]}")
+            raise DatasetError(f"a time grid needs two or more finite times, found {quoted(values.tolist())}")
         if values[0] < 0 or (np.diff(values) <= 0).any():
             raise DatasetError("the times of a grid must start at or after 0 and increase")
         if self.relative and values[-1] > 1:

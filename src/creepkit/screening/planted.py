@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from creepkit import kernels, registry
+from creepkit import kernels, limits, registry
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
-from creepkit.errors import SolveError
+from creepkit.errors import FitError, SolveError
 from creepkit.files.writing import write_text
 from creepkit.language import Elastic
 from creepkit.readers.history_csv import write_history
@@ -121,6 +121,8 @@ def planted_plate(alloys: int = 47, seed: int = 7, *, thickness_known: bool = Tr
 
     thickness_known : whether each test states the apex thickness of its dimple, to a micrometre.
     """
+    limits.check_number("alloys", alloys, limits.TESTS_IN_A_RUN, FitError)
+    limits.check_number("seed", seed, limits.SEED, FitError)
     histories, atomic, truth = [], {}, {}
     for number in range(1, alloys + 1):
         name, rng = f"A{number:02d}", np.random.default_rng([seed, number])

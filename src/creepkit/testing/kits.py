@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, quoted
 from creepkit.kernels.lowering import lower
@@ -78,6 +79,8 @@ def check_law(law: CreepLaw, samples: int = 64, seed: int = 0) -> ConformanceRep
     """
     if not isinstance(law, CreepLaw):
         raise LawError(f"check_law() takes a creep law, found {law!r}; ck.law(name) returns a registered one")
+    limits.check_number("samples", samples, limits.SOBOL_POINTS, LawError)
+    limits.check_number("seed", seed, limits.SEED, LawError)
     try:
         lower(law, "numpy")
     except CreepkitError as error:

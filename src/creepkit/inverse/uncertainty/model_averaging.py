@@ -234,8 +234,8 @@ def rate_band(
         )
     if temperature_distribution not in ("uniform", "normal"):
         raise FitError(f"shape is '{temperature_distribution}'; allowed are 'uniform' and 'normal'")
-    if not (levels > 0).all():
-        raise FitError("a rate band was asked for at a stress that is not above zero; give von Mises stresses, in MPa")
+    if levels.ndim != 1 or not levels.size or not (levels > 0).all():
+        raise FitError("a rate band needs von Mises stresses (points,), in MPa, each above zero")
     _, inner_low, inner_high = mixture.distribution(log_rate, levels, temperature, strain, time).interval()
     temperatures = (
         temperature + temperature_uncertainty * _standard_temperatures(temperature_distribution)
