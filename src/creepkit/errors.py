@@ -31,6 +31,19 @@ def quoted(text: object, longest: int = LONGEST_QUOTE) -> str:
     return shown if len(shown) <= longest else f"{shown[: longest - 3]}..."
 
 
+def quoted_value(value: object, longest: int = LONGEST_QUOTE) -> str:
+    """A value as messages quote it: numbers, texts and short lists as Python writes them, others by their type."""
+    if isinstance(value, str | bytes):
+        value = value[: longest + 1]
+    elif hasattr(value, "__len__") and not isinstance(value, list | tuple | dict) and not hasattr(value, "dtype"):
+        return f"of type {type(value).__name__}"
+    try:
+        whole = repr(value)
+    except Exception:  # of an integer of thousands of digits, or by a class of the caller's
+        return f"of type {type(value).__name__}"
+    return f"of type {type(value).__name__}" if " object at 0x" in whole else quoted(whole, longest)
+
+
 class CreepkitError(Exception):
     """Base of every error that creepkit raises on purpose; its message is one sentence for the user.
 
@@ -45,6 +58,10 @@ def _message(text: str) -> str:
     if len(text) > LONGEST_MESSAGE:  # the beginning names the file, the end says what to do
         text = f"{text[: LONGEST_MESSAGE - 503]}...{text[-500:]}"
     return printable(text)
+
+
+class ArgumentError(CreepkitError, TypeError, ValueError):
+    """An argument of a public function or record is not what the annotation says."""
 
 
 class LawError(CreepkitError):

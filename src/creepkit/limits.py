@@ -52,6 +52,17 @@ def check_number(name: str, value: Any, limits: Limits, error: type[CreepkitErro
         raise error(f"{name} is {quoted(text, 40)}; allowed are {limits}")
 
 
+def check_numbers(name: str, values: Any, limits: Limits, error: type[CreepkitError]) -> None:
+    """The same for a number or an array of numbers (...,)."""
+    import numpy as np
+
+    array = np.asarray(values, dtype=float)
+    lowest = array > limits.low if limits.above else array >= limits.low
+    within = np.isfinite(array) & lowest & (array <= limits.high)
+    if not within.all():
+        check_number(name, float(array[~within].flat[0]), limits, error)
+
+
 STARTS = Limits(1, 10_000)
 SOBOL_POINTS = Limits(1, 2**20)
 FURTHER_LAWS = Limits(0, 1000)
@@ -89,6 +100,11 @@ HOURS = numbers(0, 1e9, above=True)
 SECONDS = numbers(0, 1e12, above=True)
 RAMP = numbers(0, 1e12)
 PROBABILITY = numbers(0.5, 0.999999)
+KELVIN = numbers(0, 1e4, above=True)
+"""Of a state of a material."""
+
+
+MEGAPASCAL_OF_STATE = numbers(0, 1e5, above=True)
 CELSIUS = numbers(-273.15, 1e5, above=True)
 KELVIN_DIFFERENCE = numbers(0, 1e5)
 GIGAPASCAL = numbers(0, 1e6, above=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.records import Loading, Program, RecordedLoading, SupportsSurfaceObservation
 from creepkit.registry.arguments import resolve_predictor
@@ -21,6 +22,7 @@ WATCHED = "bulge"
 """The specimen that cameras are taken to watch where none is named."""
 
 
+@checked
 def extract(
     frames: Frames,
     specimen: Specimen | str = WATCHED,

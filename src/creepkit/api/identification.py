@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 from creepkit import registry
+from creepkit.checked_arguments import checked
 from creepkit.errors import ExportError, FitError, nearest
 from creepkit.records import History, LawWithValues, Nuisance, Predictor, Units, dimension_named, exported_text
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictors
@@ -40,6 +41,7 @@ class SettingChanges(TypedDict, total=False):
     rupture_times: Literal["auto", "use", "ignore"]
 
 
+@checked
 def identify(
     law: CreepLaw | str,
     histories: Sequence[History],
@@ -96,6 +98,7 @@ def identify(
     return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
 
 
+@checked
 def select(
     laws: Sequence[CreepLaw | str],
     histories: Sequence[History],
@@ -145,6 +148,7 @@ def select(
     return replace(ranking, laws=tuple(noted))
 
 
+@checked
 def rank(fits: Sequence[Identification]) -> Ranking:
     """Rank identifications of the same histories by BIC, with weights and a verdict."""
     from creepkit.inverse.identification import Identification
@@ -155,6 +159,7 @@ def rank(fits: Sequence[Identification]) -> Ranking:
     return run(list(fits))
 
 
+@checked
 def moduli(
     law: CreepLaw | str, histories: Sequence[History], using: Predictor | str | None = None, *, frames: int = 15
 ) -> ModulusEstimates:
@@ -172,6 +177,7 @@ def moduli(
     return identify_moduli(resolve_law(law), histories, predictor, frames=frames)
 
 
+@checked
 def confirm(
     fit: Identification, tests: Sequence[History] | None = None, using: Predictor | str | None = None
 ) -> Confirmation:
@@ -238,6 +244,7 @@ def _resolve_through(
     return reduced if reduced is not None and prediction_errors_of(reduced) else None
 
 
+@checked
 def export(
     source: CreepLaw | Identification | Ranking | TemperatureLaw | LawWithValues | str,
     target: str,
@@ -274,6 +281,7 @@ def export(
     return exported_text(exporter, record)
 
 
+@checked
 def law_with_values(
     source: CreepLaw | Identification | Ranking | TemperatureLaw | LawWithValues | str,
     values: Mapping[str, float] | None = None,

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit import registry
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, PluginError, nearest
 from creepkit.registry.arguments import resolve_law
 
@@ -21,16 +22,19 @@ if TYPE_CHECKING:
 EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
 
 
+@checked
 def law(name: str) -> CreepLaw:
     """Return the law called `name`: one of `available("laws")`, or a sum of them as in "norton+strain-hardening"."""
     return resolve_law(name)
 
 
+@checked
 def specimen(name: str) -> Specimen:
     """Return the specimen called `name`: one of `available("specimens")`."""
     return registry.default_registry().specimen(name)
 
 
+@checked
 def available(kind: str) -> dict[str, Any]:
     """Return all that is registered of a kind, {name: value}.
 
@@ -42,6 +46,7 @@ def available(kind: str) -> dict[str, Any]:
     return {name: entry.value for name, entry in getattr(registry.default_registry(), kind)().items()}
 
 
+@checked
 def load_plugin(path: str | Path) -> Plugin:
     """Load a plugin from a `.py` file; what it offers is available by name from then on.
 
@@ -50,6 +55,7 @@ def load_plugin(path: str | Path) -> Plugin:
     return registry.default_registry().load_file(path)
 
 
+@checked
 def surrogate(name_or_path: str | Path) -> Predictor:
     """Return a cheap model that stands for a specimen, by its name or from its file.
 
@@ -61,6 +67,7 @@ def surrogate(name_or_path: str | Path) -> Predictor:
     return surrogate_by_name(name_or_path)
 
 
+@checked
 def load(path: str | Path) -> Identification:
     """Return the identification saved in a JSON file.
 
@@ -71,6 +78,7 @@ def load(path: str | Path) -> Identification:
     return run(path)
 
 
+@checked
 def load_ranking(path: str | Path) -> ModelAverage:
     """Return the laws of a ranking.json with their weights, as forecasts take them; the files of laws lie beside it."""
     from creepkit.inverse.ranking_document import read_ranking as run
@@ -78,6 +86,7 @@ def load_ranking(path: str | Path) -> ModelAverage:
     return run(path)
 
 
+@checked
 def load_rupture_assessment(path: str | Path) -> RuptureAssessment:
     """Return the rupture assessment saved in a JSON file: its fits predict, plot and state strengths as before."""
     from creepkit.rupture_assessment.assessment_document import read_assessment as run
@@ -85,6 +94,7 @@ def load_rupture_assessment(path: str | Path) -> RuptureAssessment:
     return run(path)
 
 
+@checked
 def example_data(name: str) -> Path:
     """Return the folder of example data that come with creepkit, such as "planted creep curves".
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import ExportError
 from creepkit.files.writing import check_target, write_text
 
@@ -18,6 +19,7 @@ LARGE_NETWORK = 300_000
 """Bytes of weights from which a network is named as what makes a page too large."""
 
 
+@checked
 def interactive_page(
     source: PageSource,
     to: str | Path = "page.html",

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from creepkit.api.identification import export, law_with_values, rank
+from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, ReportError
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ PACKAGES = ("creepkit", "numpy", "scipy", "sympy", "torch", "matplotlib")
 """Whose versions are stated."""
 
 
+@checked
 def report(
     source: Reported | ReportSource | ReportContents | Iterable[Reported],
     to: str | Path = "report.html",

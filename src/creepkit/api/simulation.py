@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import DatasetError, SolveError, SurrogateError
 from creepkit.language import symbols
 from creepkit.records import History, Loading, Predictor, Program, Specimen, Status, call_of_plugin, predict_with
@@ -30,6 +31,7 @@ ROOM_TEMPERATURE = 293.15
 """K; stands where a law does not ask for a temperature."""
 
 
+@checked
 def simulate(
     law: CreepLaw | str,
     using: Predictor | str,
@@ -91,6 +93,7 @@ def _simulated(law: CreepLaw, using: Predictor, values: Mapping[str, float], pla
     return run_from_outputs(Run, planned_test, prediction.outputs, prediction.of(0), status, end, prediction.reason)
 
 
+@checked
 def check_data_quality(
     histories: Sequence[History], specimen: Predictor | str | None = None, *, activation_energy: float | None = None
 ) -> DataQuality:
@@ -107,6 +110,7 @@ def check_data_quality(
     return run(check_histories(histories), predictor, activation_energy=energy)
 
 
+@checked
 def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] | None = None) -> list[History]:
     """Return the histories with suspect frames unused and a label that says which; whole tests stay.
 
@@ -118,6 +122,7 @@ def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] 
     return run(check_histories(histories), FRAME_FLAG_KINDS if kinds is None else kinds)
 
 
+@checked
 def generate(
     source: SamplingDesign | CreepLaw | str,
     using: Specimen | str,
@@ -164,6 +169,7 @@ def resolve_design(source: SamplingDesign | CreepLaw | str, specimen: Specimen, 
     return source
 
 
+@checked
 def train(
     data: Dataset | str | Path,
     recipe: Recipe,

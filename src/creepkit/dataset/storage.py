@@ -38,6 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from creepkit.arrays import Bools
+from creepkit.checked_arguments import checked
 from creepkit.dataset.dataset import COLUMNS, HOLD_TIMES, Dataset, empty_columns
 from creepkit.errors import DatasetError, LawError, steering
 from creepkit.files.hdf5_files import open_hdf5, write_hdf5, write_names
@@ -151,6 +152,7 @@ COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 # ---- writing -------------------------------------------------------------------------------------------------------
 
 
+@checked
 def write_dataset(data: Dataset, path: str | Path) -> Path:
     """Write a data set, whole or not at all; DatasetError for a file that creepkit did not write."""
     path = Path(path)
@@ -205,6 +207,7 @@ def _extend(dataset: h5py.Dataset, values: Any) -> None:
 # ---- reading -------------------------------------------------------------------------------------------------------
 
 
+@checked
 def read_dataset(path: str | Path, *, accepted_only: bool = False) -> Dataset:
     """Read a data set that write_dataset or generate wrote; DatasetError, in one sentence, when the file is another.
 

@@ -8,6 +8,7 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
+from creepkit.checked_arguments import checked
 from creepkit.discovery.combinations import rank_combinations
 from creepkit.discovery.elastic_moduli import FIRST_FRAMES, ModulusEstimates, identify_moduli
 from creepkit.discovery.forms import CONSTANT, CandidateForm, candidate_forms
@@ -37,6 +38,7 @@ PriorOdds = Mapping[str, Mapping[str, float]]
 """{parameter: {form: odds}}."""
 
 
+@checked
 def discover(
     fits: Sequence[Identification],
     *,
@@ -127,6 +129,7 @@ class TemperatureStudy(Presentable):
     notes: tuple[str, ...]
 
 
+@checked
 def temperature_study(
     law: CreepLaw | str,
     tests: Sequence[History],
@@ -200,6 +203,7 @@ def isothermal_tests(
     return remaining, f"{', '.join(spans)} {what} not at one temperature"
 
 
+@checked
 def group_by_temperature(
     tests: Sequence[History], temperature_tolerance: float = ISOTHERMAL_RANGE
 ) -> list[list[History]]:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from creepkit.arrays import single_threaded_blas
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig, variations_of_tests
 from creepkit.experiments.design_checks import check_arguments, edges_of, notes_of, rigs_for
@@ -59,6 +60,7 @@ GREEDY_POOL, MOST_RUNS, LEAST_GAIN = 30, 6, 0.02
 """Candidates from which runs are chosen one after the other for a budget, how many, and the gain that ends it, nats."""
 
 
+@checked
 def design(
     source: Ranking | ModelAverage | Identification | Sequence[Identification],
     *,

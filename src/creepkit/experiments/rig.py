@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.held_levels import held_temperatures
@@ -35,6 +36,7 @@ ROUNDED_TEMPERATURE = 5.0
 """K, within which two tests are at one temperature."""
 
 
+@checked
 @dataclass(frozen=True)
 class Rig:
     """What the equipment can do with one kind of specimen.

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import LONGEST_QUOTE, SolveError, nearest, quoted
 from creepkit.fem.mesh import Mesh
 from creepkit.fem.mesh_builder import ElementNodes, MeshBuilder
@@ -20,6 +21,7 @@ from creepkit.files.json_documents import read_json
 from creepkit.files.reading import FileKind, read_text
 
 
+@checked
 def read_mesh(
     nodes: str | Path,
     elements: str | Path,

@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen
+from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import AxialConstraints, FiniteElementModel, RigidContact, finite_element_model
 from creepkit.fem.mesh import (
@@ -30,6 +31,7 @@ SAME_PLACE = 1e-9
 """mm; nodes that are nearer to one another are one node where two sections are joined."""
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Section:
     """The half section of a body of revolution in eight-node quadrilaterals, with named sides and points.

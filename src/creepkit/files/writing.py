@@ -22,6 +22,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import Literal
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError
 from creepkit.files.reading import FileKind, read_bytes
 
@@ -51,6 +52,7 @@ WAITS = (0.02, 0.1, 0.4)
 ADVICE = "choose a file in a folder that exists and has space"
 
 
+@checked
 @contextmanager
 def overwriting(rule: ForeignRule = "replace") -> Iterator[None]:
     """Allow files that creepkit did not write to be replaced by what is written in this block.

@@ -12,6 +12,7 @@ import numpy as np
 
 from creepkit import limits
 from creepkit.arrays import single_threaded_blas
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest, quoted
 from creepkit.forecasts.draws import check_tolerances, law_draws
 from creepkit.forecasts.forecast_of_test import forecast_test
@@ -40,6 +41,7 @@ DEFAULT_TARGETS: Mapping[str, Sequence[float]] = {"strain": (0.01,)}
 """Outputs, and values of them, the times to which are forecast where none are asked for."""
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Forecast(Presentable):
     """What tests will show: the result of forecast().
@@ -72,6 +74,7 @@ class Forecast(Presentable):
         return present(self, "plot", path)
 
 
+@checked
 def forecast(
     source: Identification | WeightedLaws | ModelAverage,
     tests: History | Sequence[History],

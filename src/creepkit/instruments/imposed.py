@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.presentation import Presentable
 from creepkit.records import Channel, ClockAlignment, InstrumentRecord, Program
@@ -53,6 +54,7 @@ class Imposed(Presentable):
     notes: tuple[str, ...] = ()
 
 
+@checked
 def imposed(
     record: InstrumentRecord,
     specimen: str | tuple[str, str],

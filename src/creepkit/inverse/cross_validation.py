@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs, predict_to_rupture
 from creepkit.inverse.frame_noise import usable_frames
@@ -159,6 +160,7 @@ class CrossValidation(Presentable):
         return self.fit.predictor
 
 
+@checked
 def cross_validate(
     fit: Identification,
     histories: Sequence[History] | None = None,

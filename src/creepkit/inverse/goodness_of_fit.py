@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.errors import FitError
+from creepkit.checked_arguments import checked
+from creepkit.errors import FitError, quoted
 from creepkit.inverse.composite_predictor import compared_outputs
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.noise_model import Residuals
@@ -17,6 +18,7 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.records import History, Prediction, is_logarithmic
 
 
+@checked
 def relative_squared_error(
     measured: Sequence[ArrayLike], predicted: Sequence[ArrayLike], about: Literal["all", "test", "frame"] = "all"
 ) -> float:
@@ -24,10 +26,16 @@ def relative_squared_error(
 
     measured, predicted : (frames,) of each test, in one unit.
     """
-    measured_arrays = [np.asarray(m, float) for m in measured]
-    squares = sum(
-        float(((np.asarray(p, float) - m) ** 2).sum()) for m, p in zip(measured_arrays, predicted, strict=True)
-    )
+    measured_arrays, predicted_arrays = ([np.asarray(v, float) for v in values] for values in (measured, predicted))
+    shapes, predicted_shapes = ([v.shape for v in values] for values in (measured_arrays, predicted_arrays))
+    if shapes != predicted_shapes or any(len(shape) != 1 for shape in shapes):
+        raise FitError(
+            "measured and predicted must have the values (frames,) of the same tests, found shapes "
+            f"{quoted(shapes)} and {quoted(predicted_shapes)}"
+        )
+    if about not in ("all", "test", "frame"):
+        raise FitError(f"about is {quoted(about)}; allowed are all, test and frame")
+    squares = sum(float(((p - m) ** 2).sum()) for m, p in zip(measured_arrays, predicted_arrays, strict=True))
     return (
         squares / total_sum_of_squares(measured_arrays, about)
         if total_sum_of_squares(measured_arrays, about) > 0

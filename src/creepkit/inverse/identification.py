@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.composite_predictor import CompositePredictor, predict
@@ -152,6 +153,7 @@ class Identification(Presentable):
         """Residuals of a problem of these tests at the optimum, with the weights of tests."""
         return problem.residuals(self.x).with_test_weights(np.array([m.weight for m in self.tests]))
 
+    @checked
     def rate(
         self,
         stress: ArrayLike,
@@ -177,6 +179,7 @@ class Identification(Presentable):
         log_rate_value, low, high = self.interval_of(function)
         return np.exp(log_rate_value), np.exp(low), np.exp(high)
 
+    @checked
     def local_exponent(
         self,
         stress: ArrayLike,
@@ -211,6 +214,7 @@ class Identification(Presentable):
         value, sd = delta_method(function, self.u, self.covariance)
         return value, value - self._quantile * sd, value + self._quantile * sd
 
+    @checked
     def rupture_time(
         self,
         stress: ArrayLike,
@@ -238,6 +242,7 @@ class Identification(Presentable):
         time, low, high = self.rupture_times(tests, test_scatter=test_scatter, using=using)
         return time.reshape(shape), low.reshape(shape), high.reshape(shape)
 
+    @checked
     def rupture_times(
         self, histories: Sequence[History] | None = None, *, test_scatter: bool = True, using: Predictor | None = None
     ) -> tuple[Floats, Floats, Floats]:
@@ -248,6 +253,7 @@ class Identification(Presentable):
         tests, noise_model = list(histories or self.histories), self.noise_model if test_scatter else None
         return predict_rupture_times(self.coordinates, self.u, self.scatter_of_rates, noise_model, tests, predictor)
 
+    @checked
     def predict(
         self, histories: Sequence[History] | None = None, using: Predictor | None = None, *, own_nuisances: bool = True
     ) -> Prediction:

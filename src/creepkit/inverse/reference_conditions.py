@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.duration import followed_duration
@@ -181,11 +182,14 @@ def spans_temperatures(histories: Sequence[History]) -> bool:
     return max(temperatures) - min(temperatures) > ISOTHERMAL_RANGE
 
 
+@checked
 def with_arrhenius(law: CreepLaw, histories: Sequence[History]) -> CreepLaw:
     """The law times an Arrhenius factor about the median temperature, if the tests call for one and it has none.
 
     Internal variables with rates of their own have activation energies of their own, as CreepLaw.times says.
     """
+    if not histories:
+        raise FitError("there are no histories whose temperatures say whether the law needs a factor")
     if law.uses(temperature) or not spans_temperatures(histories):
         return law
     return law.times(arrhenius(T_ref=reference_temperature(histories)))

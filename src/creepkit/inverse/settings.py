@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from creepkit import limits
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest, quoted
 from creepkit.records import Nuisance
 
@@ -34,6 +35,7 @@ RUPTURE_TIMES = ("auto", "use", "ignore")
 OutputWeights = Literal["noise", "likelihood", "equal", "paper"] | Mapping[str, float]
 
 
+@checked
 @dataclass(frozen=True)
 class IdentificationSettings:
     """What a run can be repeated from.
@@ -108,6 +110,7 @@ class IdentificationSettings:
                 )
 
 
+@checked
 def default_nuisances(*further: Nuisance, without: Sequence[str] = ()) -> tuple[Nuisance, ...]:
     """The default nuisances of an identification and `further` ones: what the command line makes of --nuisance.
 

@@ -22,6 +22,7 @@ from typing import IO, Any, Protocol
 
 from creepkit import limits
 from creepkit.arrays import usable_cores
+from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, DatasetError
 from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task
 from creepkit.jobs.worker_start import setup_message, start_worker
@@ -186,6 +187,7 @@ class Workers(Protocol):
         ...
 
 
+@checked
 @dataclass(frozen=True)
 class ParallelExecution:
     """How the shards of a data set are divided among processes and machines.

@@ -11,6 +11,7 @@ from itertools import islice
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, overload
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import LawError, nearest
 from creepkit.kernels.kernel_functions import law_comments
 from creepkit.kernels.symbolic_kernel import SymbolicKernel, symbolic_kernel
@@ -24,14 +25,17 @@ if TYPE_CHECKING:
 KernelTarget = Literal["numpy", "torch", "compiled"]
 
 
+@checked
 @overload
 def lower(law: CreepLaw, target: Literal["numpy", "torch"]) -> ArrayKernel: ...
 
 
+@checked
 @overload
 def lower(law: CreepLaw, target: Literal["compiled"]) -> CompiledLaw: ...
 
 
+@checked
 def lower(law: CreepLaw, target: KernelTarget = "numpy") -> ArrayKernel | CompiledLaw:
     """Return the law as a numeric kernel for "numpy", "torch" or "compiled" (C functions, for solvers)."""
     if target == "compiled":

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import sympy
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import LawError
 from creepkit.language.symbols import temperature
 
 
+@checked
 @dataclass(frozen=True)
 class Elastic:
     """Isotropic linear elasticity; E in MPa, a number or an expression of `temperature` such as wachtman(...)."""
@@ -33,12 +35,14 @@ class Elastic:
         if isinstance(self.nu, float) and not -1 < self.nu < 0.5:
             raise LawError(f"Elastic: nu = {self.nu:g} is outside (-1, 0.5)")
 
+    @checked
     def at(self, T: float) -> Elastic:
         """The same record with numbers, at temperature `T` in K."""
         E, nu = (float(v.subs(temperature, T)) if isinstance(v, sympy.Expr) else float(v) for v in (self.E, self.nu))
         return Elastic(E, nu)
 
 
+@checked
 def wachtman(E0: float, b: float, T0: float) -> sympy.Expr:
     """Young's modulus E0 - b T exp(-T0/T) as an expression of temperature; E0 in MPa, b in MPa/K, T0 and T in K.
 

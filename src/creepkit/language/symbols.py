@@ -16,6 +16,7 @@ from typing import Literal
 
 import sympy
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import LawError
 
 stress = sympy.Symbol("stress", real=True)
@@ -54,6 +55,7 @@ LATEX_SYMBOLS = {
 }
 
 
+@checked
 def parameters(names: str) -> tuple[sympy.Symbol, ...]:
     """Return one plain real symbol for each name in `names`, always as a tuple.
 
@@ -62,6 +64,7 @@ def parameters(names: str) -> tuple[sympy.Symbol, ...]:
     return tuple(sympy.Symbol(name, real=True) for name in names.replace(",", " ").split())
 
 
+@checked
 def states(names: str) -> tuple[sympy.Symbol, ...]:
     """Return the symbols of internal variables, named in `names`, as a tuple."""
     return parameters(names)
@@ -70,6 +73,7 @@ def states(names: str) -> tuple[sympy.Symbol, ...]:
 ParameterScale = Literal["linear", "log"]
 
 
+@checked
 @dataclass(frozen=True)
 class Param:
     """One parameter of a law: its meaning, unit, bounds and how it is to be searched.
@@ -160,6 +164,7 @@ class Param:
         return low - tolerance <= value <= high + tolerance
 
 
+@checked
 @dataclass(frozen=True)
 class State:
     """One internal variable of a law: how it starts, how it grows, and where the material ends.

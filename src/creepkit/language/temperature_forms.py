@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 import sympy
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import LawError
 from creepkit.language.symbols import GAS_CONSTANT, Param, temperature
 
@@ -47,6 +48,7 @@ class TemperatureForm:
     T_ref: float
 
 
+@checked
 def arrhenius(T_ref: float = 1073.15, Q: float | None = None) -> TemperatureFactor:
     """The Arrhenius factor exp[-(Q/R)(1/T - 1/T_ref)] of Eq. (5); T_ref in K, Q in J/mol (a parameter unless given)."""
     check_reference_temperature(T_ref)
@@ -59,6 +61,7 @@ def arrhenius(T_ref: float = 1073.15, Q: float | None = None) -> TemperatureFact
     return TemperatureFactor("arrhenius", expression, params, "Arrhenius (1889), Z. Phys. Chem. 4, 226", float(T_ref))
 
 
+@checked
 def linear(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) -> TemperatureForm:
     """p(T) = p + p_T (T - T_ref); the slope p_T, per K, lies by default within half the range of p in 100 K."""
     check_reference_temperature(T_ref)
@@ -76,6 +79,7 @@ def linear(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) -> 
     return TemperatureForm("linear", build, "straight line about T_ref", float(T_ref))
 
 
+@checked
 def inverse_temperature(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) -> TemperatureForm:
     """p(T) = p + p_I (1000/T - 1000/T_ref); default bounds of p_I: the range of p over 0.5."""
     check_reference_temperature(T_ref)
@@ -93,6 +97,7 @@ def inverse_temperature(T_ref: float = 1073.15, slope: tuple[float, float] | Non
     return TemperatureForm("inverse", build, "straight line in 1/T about T_ref", float(T_ref))
 
 
+@checked
 def activated(T_ref: float = 1073.15, Q: tuple[float, float] = (-9e5, 9e5)) -> TemperatureForm:
     """p(T) = p exp[-(Q_p/R)(1/T - 1/T_ref)] for a positive parameter; Q_p in J/mol, of either sign."""
     check_reference_temperature(T_ref)
@@ -105,6 +110,7 @@ def activated(T_ref: float = 1073.15, Q: tuple[float, float] = (-9e5, 9e5)) -> T
     return TemperatureForm("activated", build, "Arrhenius (1889), Z. Phys. Chem. 4, 226", float(T_ref))
 
 
+@checked
 def exponential(T_ref: float = 1073.15, slope: tuple[float, float] = (-0.1, 0.1)) -> TemperatureForm:
     """p(T) = p exp[p_T (T - T_ref)] for a positive parameter; p_T in 1/K."""
     check_reference_temperature(T_ref)

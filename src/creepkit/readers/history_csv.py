@@ -28,6 +28,7 @@ from pathlib import Path
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
@@ -124,6 +125,7 @@ def histories_of_tests(
     return histories
 
 
+@checked
 def write_history(history: History, path: str | Path) -> Path:
     """Write a history as CSV, in s, MPa, mm, K, and return the path; nothing is half-written.
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.records.units import spelled_factors
 
@@ -83,6 +84,7 @@ class LostRule:
     value: float
 
 
+@checked
 @dataclass(frozen=True)
 class CameraFormat:
     """How one camera system writes its frames.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Bools, Floats, frozen
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 
 
@@ -53,6 +54,7 @@ class CameraFrame:
             object.__setattr__(self, name, value)
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Frames(Sequence[CameraFrame]):
     """A sequence of frames; each is read when it is asked for and not kept, so that memory holds one at a time.
@@ -77,6 +79,7 @@ class Frames(Sequence[CameraFrame]):
         object.__setattr__(self, "times", times)
 
     @classmethod
+    @checked
     def of(
         cls,
         points: ArrayLike,

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, frozen
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.presentation import Presentable
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class ClockAlignment(Presentable):
     """Times of a camera as times of an instrument's record: t - zero + lag + drift (t - middle).
@@ -49,6 +51,7 @@ class ClockAlignment(Presentable):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     @classmethod
+    @checked
     def stated(cls, lag: float, drift: float = 0.0, zero: float = 0.0) -> ClockAlignment:
         """An alignment that is known: the record's time is t - zero + lag + drift (t - zero)."""
         return cls(zero, lag, drift, zero, (lag, lag), (drift, drift))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, frozen
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, quoted
 from creepkit.records.known_specimens import load_unit
 from creepkit.records.loading import Loading, Program, loading_text
@@ -32,6 +33,7 @@ EVERY_FRAME: Bools = frozen([], dtype=bool)
 """The value of History.used that marks every frame."""
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class History:
     """One measured (or planned) test: outputs over time, and everything known about how it was made.

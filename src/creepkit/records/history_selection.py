@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest
 from creepkit.records.history import History
 
@@ -25,6 +26,7 @@ MOST_NAMED = 12
 """Values of a label that an error names."""
 
 
+@checked
 def select_tests(histories: Sequence[History], **labels: LabelValues) -> list[History]:
     """Return the tests that have these labels: select_tests(tests, temperature=[1073, 1123], alloy="X", name="a*").
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, quoted
 
 PRESSURE_REFERENCES = ("gauge", "absolute")
@@ -19,6 +20,7 @@ _REPEATED_TWICE = re.compile(r"\([^()]*[+*][^()]*\)[+*{]")
 """A repeated group with a repetition in it: the time of a search may grow as 2 to the power of the name's length."""
 
 
+@checked
 @dataclass(frozen=True)
 class InstrumentFormat:
     """How one data logger writes its records: a table of text with a line of names and a row for each moment.

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Floats, frozen
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest
 from creepkit.presentation import Presentable, present
 from creepkit.records.loading import Program
@@ -23,6 +24,7 @@ GAP_FACTOR = 5.0
 """A gap is an interval between two rows that is longer than so many median intervals."""
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Channel:
     """One column of an instrument's record.
@@ -51,6 +53,7 @@ class Channel:
         return int(np.isnan(self.values).sum())
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class InstrumentRecord(Presentable):
     """Channels that one instrument recorded over one clock.

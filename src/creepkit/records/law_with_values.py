@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import ExportError, LawError, nearest
 from creepkit.records.units import factors
 
@@ -23,6 +24,7 @@ TIME_UNITS = {**factors("s", "min", "h"), "day": factors("d")["d"], **factors("y
 """Seconds in one unit of time; a year is a Julian year."""
 
 
+@checked
 @dataclass(frozen=True)
 class Units:
     """The units of a text that leaves: of stress (and moduli) and of time; temperatures are in K.
@@ -54,6 +56,7 @@ class Units:
         return self == Units()
 
 
+@checked
 @dataclass(frozen=True)
 class LawWithValues:
     """A law with its values, and what belongs to them.
@@ -87,6 +90,7 @@ class LawWithValues:
         """The same with some fields changed."""
         return replace(self, **changes)
 
+    @checked
     def at(self, temperature: float) -> LawWithValues:
         """The same with a number, in K, in the place of the temperature."""
         law = self.law.at(temperature)

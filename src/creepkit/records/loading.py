@@ -12,12 +12,14 @@ from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, frozen
-from creepkit.errors import SolveError
+from creepkit.checked_arguments import checked, checked_with_own_words
+from creepkit.errors import SolveError, quoted
 
 Quantity: TypeAlias = str
 """What a loading prescribes: the name of a load that a specimen takes, such as "stress", "pressure" or "force"."""
 
 
+@checked
 @dataclass(frozen=True)
 class Program:
     """A piecewise linear function of time; a repeated time is a jump (the value after it holds from then on).
@@ -49,13 +51,18 @@ class Program:
         return hash((self.times.tobytes(), self.values.tobytes()))
 
     @classmethod
+    @checked
     def constant(cls, value: float) -> Program:
         """The program that holds one value for ever."""
         return cls(np.zeros(1), np.full(1, float(value)))
 
     @classmethod
+    @checked
     def steps(cls, steps: Sequence[tuple[float, float]]) -> Program:
-        """Constant pieces from (start time, value) pairs: [(0, 100), (3600, 120)]."""
+        """Constant pieces from (start time, value) pairs: [(0, 100), (3600, 120)]; SolveError for any other order."""
+        starts = [start for start, _ in steps]
+        if not starts or starts[0] != 0.0 or any(b <= a for a, b in pairwise(starts)):
+            raise SolveError(f"steps of a program must start at 0 and follow one another, found {quoted(starts)}")
         times, values = [0.0], [float(steps[0][1])]
         for start, value in steps[1:]:
             times += [float(start)] * 2
@@ -86,6 +93,7 @@ class Loading(Protocol):
         ...
 
 
+@checked
 @dataclass(frozen=True)
 class StressSteps:
     """Uniaxial loading by steps of stress: [(0, 100), (3600, 120)] is 100 MPa, then 120 MPa from one hour on.
@@ -117,11 +125,13 @@ class StressSteps:
         return Program.steps(self.steps)
 
 
+@checked_with_own_words("stress")
 def constant_stress(stress: float, control: Literal["load", "stress"] = "load") -> StressSteps:
     """One stress, MPa, held from time zero."""
     return StressSteps(((0.0, stress),), control)
 
 
+@checked
 @dataclass(frozen=True)
 class StrainSteps:
     """Total strain of a bar by steps: [(0, 0.002), (3600, 0.003)] holds 0.2 %, then 0.3 % from one hour on.
@@ -155,11 +165,13 @@ class StrainSteps:
         return Program(np.array(times), np.array([e for pair in pairwise(strains) for e in pair]))
 
 
+@checked
 def constant_strain(strain: float, ramp: float = 0.0) -> StrainSteps:
     """One total strain, held from time zero, or from the end of a ramp (s) on."""
     return StrainSteps(((0.0, strain),), ramp)
 
 
+@checked
 @dataclass(frozen=True)
 class PressureJump:
     """Gas pressure P1, then P2 from Tj on, each reached by a linear ramp; MPa and s."""
@@ -180,6 +192,7 @@ class PressureJump:
         return Program(times, np.array([0.0, self.P1, self.P1, self.P2]))
 
 
+@checked
 @dataclass(frozen=True)
 class RecordedLoading:
     """A loading known as a program over time: a recorded column, or ramps that no simpler record describes.
@@ -201,6 +214,7 @@ class RecordedLoading:
         return self.record
 
 
+@checked
 def constant_load(quantity: Quantity, value: float, ramp: float = 0.0) -> RecordedLoading:
     """A load, in its unit, held from time zero, or from the end of a ramp (s) on: constant_load("force", 250.0)."""
     return load_steps(quantity, [(0.0, value)], ramp)
@@ -246,6 +260,7 @@ def loading_of(
     return load_steps(quantity, steps, ramp or 0.0)
 
 
+@checked
 def load_steps(quantity: Quantity, steps: Sequence[tuple[float, float]], ramp: float = 0.0) -> RecordedLoading:
     """A load by steps: load_steps("force", [(0, 100), (3600, 120)]) is 100 N, then 120 N from one hour on.
 
@@ -273,6 +288,7 @@ ComponentHistory: TypeAlias = float | Program | Sequence[tuple[float, float]]
 """A constant, a program, or steps as (start time, value) pairs."""
 
 
+@checked
 @dataclass(frozen=True)
 class PointLoading:
     """Stresses (MPa) and total strains (of the tensor) prescribed at a material point, by component "11" to "13".

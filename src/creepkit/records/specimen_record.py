@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, nearest
 from creepkit.records.quantities import QUANTITIES, QuantityKind, unit_of
 
@@ -18,6 +19,7 @@ VISIBLE_IN_NOISE = 10.0
 """An output that moved by so many standard deviations of its noise plainly shows creep."""
 
 
+@checked
 class Output(str):
     """The name of something that is observed of a test piece, with what is known about it.
 
@@ -87,6 +89,7 @@ class Output(str):
         return (str(self), self.quantity, self.long_name), known
 
 
+@checked
 @dataclass(frozen=True)
 class Load:
     """What can be imposed on a test piece: `Load("force", "force")`, `Load("pressure", "pressure")`.
@@ -118,6 +121,7 @@ class Load:
         return QUANTITIES[self.quantity]
 
 
+@checked
 @dataclass(frozen=True)
 class Dimension:
     """A length of a test piece, mm: a key of history files, an option of the command line, a nuisance parameter.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from creepkit.arrays import ArrayLike
 from creepkit.cameras import reading as camera_reading
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, LawError, SolveError, quoted
 from creepkit.instruments import reading as instrument_files
 from creepkit.instruments.reading_options import RecordOptions
@@ -77,6 +78,7 @@ def check_histories(values: Sequence[History]) -> list[History]:
     return histories
 
 
+@checked
 def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: Collection[str] = ()) -> list[History]:
     """Read measured histories from a file, a folder, a pattern such as "in625/*.csv", or several of these.
 
@@ -87,6 +89,7 @@ def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: 
     return reading.read_histories(paths, readers, reader, ignore)
 
 
+@checked
 def read_frames(
     path: camera_reading.FramePath,
     format: camera_reading.FormatLike = None,
@@ -112,6 +115,7 @@ def frame_files(path: camera_reading.FramePath, format: camera_reading.FormatLik
     return camera_reading.frame_files(path, formats, format)
 
 
+@checked
 def read_record(path: str | Path, format: str | None = None, **options: Unpack[RecordOptions]) -> InstrumentRecord:
     """Read the record of an instrument: channels of pressure, temperature and others over one clock.
 

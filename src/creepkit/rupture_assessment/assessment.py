@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest, quoted
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.presentation import Presentable, present
@@ -46,6 +47,7 @@ LARGEST_CONSTANT = 1e7
 """Of those that may be given: an activation energy in J/mol is some 1e5."""
 
 
+@checked
 @dataclass(frozen=True)
 class RuptureSettings:
     """How rupture tests are assessed.

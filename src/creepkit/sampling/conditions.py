@@ -13,7 +13,8 @@ from typing import Any, Literal
 import numpy as np
 
 from creepkit.arrays import Floats, frozen
-from creepkit.errors import DatasetError
+from creepkit.checked_arguments import checked
+from creepkit.errors import DatasetError, quoted
 from creepkit.language import Elastic
 from creepkit.records import ZERO_CELSIUS, History, Predictor
 from creepkit.sampling.specimen_conditions import (
@@ -34,6 +35,7 @@ MOST_FRAMES = 100_000
 """Largest number of frames of a sample: a typing error should not ask for all the memory."""
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class TimeGrid:
     """The times of all samples of a design.
@@ -47,7 +49,7 @@ class TimeGrid:
     def __post_init__(self) -> None:
         values = frozen(self.values)
         if values.ndim != 1 or values.size < 2 or not np.isfinite(values).all():
-            raise DatasetError(f"a time grid needs two or more finite times, found {values.tolist()[:3]}")
+            raise DatasetError(f"a time grid needs two or more finite times, found {quoted(values.tolist())}")
         if values[0] < 0 or (np.diff(values) <= 0).any():
             raise DatasetError("the times of a grid must start at or after 0 and increase")
         if self.relative and values[-1] > 1:

@@ -18,9 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from creepkit import kernels, registry
+from creepkit import kernels, limits, registry
 from creepkit.arrays import Floats
-from creepkit.errors import SolveError
+from creepkit.checked_arguments import checked
+from creepkit.errors import FitError, SolveError
 from creepkit.files.writing import write_text
 from creepkit.language import Elastic
 from creepkit.readers.history_csv import write_history
@@ -114,11 +115,14 @@ class PlantedPlate:
         return tests, composition_file
 
 
+@checked
 def planted_plate(alloys: int = 47, seed: int = 7, *, thickness_known: bool = True) -> PlantedPlate:
     """Simulate the tests of so many alloys, one dimple each; the first alloys are the same however many there are.
 
     thickness_known : whether each test states the apex thickness of its dimple, to a micrometre.
     """
+    limits.check_number("alloys", alloys, limits.TESTS_IN_A_RUN, FitError)
+    limits.check_number("seed", seed, limits.SEED, FitError)
     histories, atomic, truth = [], {}, {}
     for number in range(1, alloys + 1):
         name, rng = f"A{number:02d}", np.random.default_rng([seed, number])

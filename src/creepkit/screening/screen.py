@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.history_checks import sound_tests
@@ -47,6 +48,7 @@ POLL_INTERVAL = 1.0
 _log = logging.getLogger("creepkit.screening")
 
 
+@checked
 @dataclass(frozen=True)
 class ScreeningOptions:
     """How the alloys of a plate are identified.
@@ -75,6 +77,7 @@ class ScreeningOptions:
             raise FitError(f'confirm is {self.confirm!r}; allowed are True, False and "when in doubt"')
 
 
+@checked
 def screen(
     histories: Sequence[History] | str | Path,
     laws: Sequence[CreepLaw | str] | None = None,

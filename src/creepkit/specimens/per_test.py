@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, SolveError, quoted
 from creepkit.records import History, Load, Prediction, Status
 from creepkit.records.prediction_assembly import (
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from creepkit.records import NuisanceValues
 
 
+@checked
 @dataclass(frozen=True)
 class OneTest:
     """What one candidate does in one test, where it does not reach the end.

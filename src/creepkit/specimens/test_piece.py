@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import Field, field, replace
 from typing import Any, Self
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, nearest
 from creepkit.records import Dimension, History, Program, check_geometry, check_load, dimension_named
 
@@ -13,6 +14,7 @@ BASIC_NUISANCES = ("temperature", "modulus")
 """Kinds that every test piece follows: they change the history itself."""
 
 
+@checked
 def dimension(
     default: float,
     bounds: tuple[float, float] = (1e-3, 1e4),

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from creepkit.checked_arguments import checked
 from creepkit.files.reading import read_bytes
 from creepkit.reports.attachments import problem_of_names
 from creepkit.reports.contents import (
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
     from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 
+@checked
 @dataclass(frozen=True, repr=False)
 class StudyResult:
     """What a run of a study gave: ordinary records, by group of tests or by name.

@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import StudyError, nearest
 from creepkit.files.writing import check_target, is_foreign
 from creepkit.reports.attachments import problem_of_name, same_name
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from creepkit.reports.contents import ReportContents
 
 
+@checked
 @dataclass(frozen=True, repr=False)
 class Study:
     """A study file that was read and checked.

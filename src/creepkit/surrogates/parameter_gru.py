@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from creepkit import limits
+from creepkit.checked_arguments import checked
 from creepkit.errors import SurrogateError, nearest
 from creepkit.records import Specimen, outputs_of
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors
 
 
+@checked
 @dataclass(frozen=True)
 class ParameterGru:
     """A recurrent network whose inputs are a law's parameters and the load: the paper's, at its defaults.

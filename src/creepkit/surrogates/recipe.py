@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from numpy.typing import NDArray
 
 from creepkit import limits
+from creepkit.checked_arguments import checked
 from creepkit.errors import SurrogateError
 from creepkit.jobs.shard_progress import ProgressCallback as ProgressCallback
 
@@ -29,6 +30,7 @@ Weights: TypeAlias = Mapping[str, NDArray[Any]]
 """{name: (...,)} weights and scales of a network, as they stand in its file."""
 
 
+@checked
 @dataclass(frozen=True)
 class Training:
     """How a network is trained: with Adam, on batches of whole histories.

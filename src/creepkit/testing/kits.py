@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from creepkit import limits
+from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, quoted
 from creepkit.kernels.lowering import lower
 from creepkit.language import arrhenius
@@ -69,6 +71,7 @@ _LAW_CHECKS: dict[str, Callable[[CreepLaw, LawSamples], Iterator[ConformanceChec
 }
 
 
+@checked
 def check_law(law: CreepLaw, samples: int = 64, seed: int = 0) -> ConformanceReport:
     """Run every check on a law; never raises for a law that fails one.
 
@@ -76,6 +79,8 @@ def check_law(law: CreepLaw, samples: int = 64, seed: int = 0) -> ConformanceRep
     """
     if not isinstance(law, CreepLaw):
         raise LawError(f"check_law() takes a creep law, found {law!r}; ck.law(name) returns a registered one")
+    limits.check_number("samples", samples, limits.SOBOL_POINTS, LawError)
+    limits.check_number("seed", seed, limits.SEED, LawError)
     try:
         lower(law, "numpy")
     except CreepkitError as error:
@@ -103,6 +108,7 @@ def _checks_of_property(
         return [ConformanceCheck(name, False, f"{type(error).__name__}: {error}")]
 
 
+@checked
 def check_specimen(
     specimen: Specimen,
     histories: Sequence[History] | None = None,
@@ -141,6 +147,7 @@ _PREDICTOR_CHECKS: dict[str, Callable[[PredictorCase], Iterator[ConformanceCheck
 }
 
 
+@checked
 def check_predictor(
     predictor: Predictor,
     histories: Sequence[History] | None = None,
@@ -161,6 +168,7 @@ def check_predictor(
     return ConformanceReport(predictor, tuple(_all_findings(checks, case)), "predictor")
 
 
+@checked
 def check_reader(reader: Reader, path: str | Path | None = None) -> ConformanceReport:
     """Run every check on a reader.
 
@@ -177,6 +185,7 @@ def check_reader(reader: Reader, path: str | Path | None = None) -> ConformanceR
     return _report(reader, "reader", checks, case)
 
 
+@checked
 def check_camera_format(format: CameraFormat, path: str | Path | None = None) -> ConformanceReport:
     """Run every check on a camera format: tables in its own words are read as they were meant, and taken by it alone.
 
@@ -193,6 +202,7 @@ def check_camera_format(format: CameraFormat, path: str | Path | None = None) ->
     return _report(format, "camera format", checks, case)
 
 
+@checked
 def check_exporter(exporter: Exporter) -> ConformanceReport:
     """Run every check on an exporter, with every registered law."""
     if isinstance(exporter, type) or not hasattr(exporter, "text"):
@@ -207,6 +217,7 @@ def check_exporter(exporter: Exporter) -> ConformanceReport:
     return _report(exporter, "exporter", checks, case)
 
 
+@checked
 def check_instrument_format(format: InstrumentFormat) -> ConformanceReport:
     """Run every check on an instrument format: its name, the units of its channels, the order of its dates."""
     if not isinstance(format, InstrumentFormat):

@@ -22,6 +22,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from creepkit.arrays import Bools, Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.global_search import SearchResult, SearchTrace
@@ -42,6 +43,7 @@ STALL_GENERATIONS = 10
 """Generations without a lower cost after which a run has converged: least squares does the rest."""
 
 
+@checked
 @dataclass(frozen=True)
 class CmaEs:
     """CMA-ES in the unit cube of the bounds, with restarts.
@@ -137,6 +139,7 @@ class _CmaEsRuns:
         return CMA(mean, self.rules.initial_step_size, bounds, seed=seed, population_size=population)
 
 
+@checked
 @dataclass(frozen=True)
 class ParticleSwarm:
     """A particle swarm; numbers of particles and iterations are the paper's.

@@ -14,6 +14,7 @@ from scipy.stats import qmc
 
 from creepkit import limits
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.bounds import LOG_RATE_BOUNDS, Bounds
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -26,6 +27,7 @@ INTERNAL_RATE_RANGE = (-4.0, 0.0)
 """Range of draws for an internal variable: ln of its rate times the duration of a test."""
 
 
+@checked
 @dataclass(frozen=True)
 class MultiStart:
     """Least squares from the centre of the bounds and the best of screened Sobol draws.

@@ -14,6 +14,7 @@ from scipy.stats import beta
 
 from creepkit import limits
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.search.local_refinement import IterationCallback
@@ -131,6 +132,7 @@ def _terms_kept(
     return terms_above(problem.contributions_at(x))
 
 
+@checked
 def bootstrap_terms(
     law: CreepLaw,
     histories: Sequence[History],

@@ -17,6 +17,7 @@ from typing import ClassVar, Literal, Protocol, TypeAlias
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.sparsity.contributions import TermContributions
@@ -59,6 +60,7 @@ class ContributionPenalty(Protocol):
         ...
 
 
+@checked
 @dataclass(frozen=True)
 class L2:
     """strength x sum c_i^2: the word of the paper, "L2 sparsity", read as the squared norm of contributions.
@@ -83,6 +85,7 @@ class L2:
         return np.ones_like(c)
 
 
+@checked
 @dataclass(frozen=True)
 class GroupL2:
     """strength x sum c_i: each c_i is itself the L2 norm of a group, the rates of term i at the points visited.
@@ -107,6 +110,7 @@ class GroupL2:
         return np.asarray(0.5 / np.maximum(c, MIN_CONTRIBUTION))
 
 
+@checked
 @dataclass(frozen=True)
 class Sqrt:
     """strength x [ sum (c_i + d)^(1/2) + exponents x sum (|m_j| + 0.02)^(1/2) ], d = 0.003.
@@ -136,6 +140,7 @@ class Sqrt:
         return np.asarray(0.25 / (np.maximum(c, MIN_CONTRIBUTION) * np.sqrt(c + self.OFFSET)))
 
 
+@checked
 @dataclass(frozen=True)
 class Subsets:
     """{0} or its bounds for every coefficient, as Table 1 has it: each set of terms is fitted, the lowest BIC kept.

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.identification import Identification
@@ -209,6 +210,7 @@ def identify_reduced(
     return replace(fit, search_trace=choice.trace or full.search_trace, sparsity=record)
 
 
+@checked
 def penalty_path(
     law: CreepLaw,
     histories: Sequence[History],

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.stats import norm
 
 from creepkit.arrays import ArrayLike, Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.extrapolation import check_kelvin, warn_of_extrapolation
 from creepkit.inverse.identification import Identification
@@ -82,6 +83,7 @@ class ModelAverage(Presentable):
         weighted = [r for r in source.laws if r.weight > 0]
         return cls(tuple(r.fit for r in weighted), tuple(r.weight for r in weighted))
 
+    @checked
     def rate(
         self,
         stress: ArrayLike,
@@ -102,6 +104,7 @@ class ModelAverage(Presentable):
         median, low, high = (np.exp(v) for v in distribution.interval())
         return median, low, high
 
+    @checked
     def local_exponent(
         self,
         stress: ArrayLike,
@@ -200,6 +203,7 @@ class RateBand(Presentable):
         return present(self, "plot", path)
 
 
+@checked
 def rate_band(
     source: Identification | WeightedLaws | ModelAverage,
     stresses: ArrayLike,
@@ -231,8 +235,8 @@ def rate_band(
         )
     if temperature_distribution not in ("uniform", "normal"):
         raise FitError(f"shape is '{temperature_distribution}'; allowed are 'uniform' and 'normal'")
-    if not (levels > 0).all():
-        raise FitError("a rate band was asked for at a stress that is not above zero; give von Mises stresses, in MPa")
+    if levels.ndim != 1 or not levels.size or not (levels > 0).all():
+        raise FitError("a rate band needs von Mises stresses (points,), in MPa, each above zero")
     _, inner_low, inner_high = mixture.distribution(log_rate, levels, temperature, strain, time).interval()
     temperatures = (
         temperature + temperature_uncertainty * _standard_temperatures(temperature_distribution)

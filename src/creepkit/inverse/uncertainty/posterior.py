@@ -25,6 +25,7 @@ import numpy as np
 
 from creepkit import limits
 from creepkit.arrays import ArrayLike, Bools, Floats, single_threaded_blas
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predictor_for_law
 from creepkit.inverse.coordinates import Coordinates
@@ -249,6 +250,7 @@ class PosteriorSamples(Presentable):
         quantiles = quantity.to_unit(np.quantile(quantity.function(self.coordinates)(self.u), INTERVAL_PROBABILITIES))
         return float(quantiles[0]), float(quantiles[1]), float(quantiles[2])
 
+    @checked
     def rate(
         self,
         stress: ArrayLike,
@@ -265,6 +267,7 @@ class PosteriorSamples(Presentable):
         median, low, high = np.exp(np.quantile(draws, INTERVAL_PROBABILITIES, axis=0))
         return median, low, high
 
+    @checked
     def local_exponent(
         self,
         stress: ArrayLike,

@@ -11,7 +11,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from creepkit import limits
 from creepkit.arrays import ArrayLike, Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.coordinates import Coordinates
 
@@ -50,6 +52,7 @@ def parameter(coordinates: Coordinates, name: str) -> DerivedQuantity:
     return DerivedQuantity(name, param.unit, param.scale, lambda c: lambda u: c.theta(u)[..., position])
 
 
+@checked
 def rate_at(
     stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
 ) -> DerivedQuantity:
@@ -59,6 +62,7 @@ def rate_at(
     return DerivedQuantity(name, "1/s", "log", lambda c: log_rate(c, stress, temperature, strain, time), point)
 
 
+@checked
 def exponent_at(
     stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
 ) -> DerivedQuantity:
@@ -68,8 +72,20 @@ def exponent_at(
     return DerivedQuantity(name, "1", "linear", lambda c: local_exponent(c, stress, temperature, strain, time), point)
 
 
-LARGEST_STRESS = 1e5
-"""MPa, at which a quantity can be asked for."""
+STATE_LIMITS = {
+    "stress": limits.MEGAPASCAL_OF_STATE,
+    "temperature": limits.KELVIN,
+    "strain": limits.numbers(0, 1e3),
+    "time": limits.numbers(0, 1e300),
+}
+"""Of a state at which a quantity can be asked for, in MPa, K, - and s."""
+
+
+def check_state(stress: Any, temperature: Any = None, strain: Any = None, time: Any = None) -> None:
+    """FitError for what is no state of a material; numbers or arrays in MPa, K, - and s, or None."""
+    for name, value in {"stress": stress, "temperature": temperature, "strain": strain, "time": time}.items():
+        if value is not None or name == "stress":
+            limits.check_numbers(f"{name} of a creep rate", value, STATE_LIMITS[name], FitError)
 
 
 def _checked_point(stress: Any, temperature: Any, strain: Any, time: Any) -> dict[str, float | None]:
@@ -79,8 +95,7 @@ def _checked_point(stress: Any, temperature: Any, strain: Any, time: Any) -> dic
         if value is None and name != "stress":
             continue
         is_number = isinstance(value, int | float | np.number) and bool(np.isfinite(value))
-        lowest_excluded, largest = name in ("stress", "temperature"), LARGEST_STRESS if name == "stress" else np.inf
-        if not is_number or not 0 <= value <= largest or (lowest_excluded and value == 0):
+        if not is_number or value not in STATE_LIMITS[name]:
             raise FitError(
                 f"a quantity was asked for at {name} {quoted(repr(value))}; give a number: a stress in MPa above "
                 "zero, a "
@@ -108,8 +123,7 @@ def log_rate(
     from creepkit.kernels import lower
 
     law, reference, kernel = coordinates.law, coordinates.reference, lower(coordinates.law, "numpy")
-    if (np.asarray(stress, float) < 0).any():
-        raise FitError("a creep rate was asked for at a negative stress; give the von Mises stress, in MPa")
+    check_state(stress, temperature, strain, time)
     given = (
         (stress, reference.stress),
         (strain, reference.strain),

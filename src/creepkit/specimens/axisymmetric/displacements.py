@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.section import Section
 
 
+@checked
 class Displacements:
     """What `observe` is given: displacements of named points of the section in each step, mm, and a force, N."""
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.records import History, NuisanceValues, Prediction
 from creepkit.specimens.axisymmetric.settings import AxisymmetricSettings
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from creepkit.specimens.axisymmetric.run import AxisymmetricRun
 
 
+@checked
 @dataclass(frozen=True, kw_only=True)
 class Axisymmetric(AxisymmetricSettings):
     """A body of revolution in creep at finite strain, simulated by finite elements.

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Bools, Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 
 SHAPES = (0.25, 40.0)
@@ -93,6 +94,7 @@ class FrameFits(NamedTuple):
     cost: Floats
 
 
+@checked
 def paper_parameters(
     amplitude: float, sigma_x: float, sigma_y: float, shape: float, theta: float = 0.0, offset: float = 0.0
 ) -> PaperParameters:
@@ -115,6 +117,7 @@ def paper_parameters(
     return PaperParameters(amplitude + offset, float(np.sqrt(sigma_x * sigma_y) * 2.0 ** (1.0 / shape)), shape)
 
 
+@checked
 def fit_field(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> FieldFit:
     """Fit Eq. (7) by unweighted least squares to points; x, y, heights : (points,) mm, in any order or shape.
 

@@ -1,0 +1,257 @@
+"""Whatever is given to a public function or record: one sentence of creepkit's own, or a result; nothing from inside.
+
+Each argument in turn is a bad value, beside good values of those that must be given.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import signal
+import time
+import timeit
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import ArgumentError, CreepkitError
+
+BAD: dict[str, Callable[[], Any]] = {
+    "None": lambda: None,
+    "empty text": lambda: "",
+    "text": lambda: "x",
+    "bytes": lambda: b"x",
+    "nan": lambda: float("nan"),
+    "inf": lambda: float("inf"),
+    "-1": lambda: -1,
+    "huge": lambda: 10**400,
+    "[]": list,
+    "[None]": lambda: [None],
+    "{}": dict,
+    "{'a': 1}": lambda: {"a": 1},
+    "object": object,
+    "array of nan": lambda: np.array([np.nan]),
+    "generator": lambda: (one for one in ["x"]),
+    "long text": lambda: "x" * 100_000,
+    "no path": lambda: "\0",
+}
+
+LONGEST = 5.0
+"""s, of one call."""
+
+NOT_CALLED = {
+    "hookimpl": "pluggy's decorator",
+    "Predictor": "a protocol",
+    "Specimen": "a protocol",
+    "Status": "an enumeration of Python's",
+    "Axisymmetric": "a base class with abstract methods; Python says which are missing",
+    "PerTest": "a base class without constructor",
+    "TestPiece": "a base class without constructor",
+    "Prediction": "made in each step of an identification, and checked by check_prediction where it is used",
+}
+
+
+@contextmanager
+def _time_limit() -> Iterator[None]:
+    def stop(*_: Any) -> None:
+        raise TimeoutError(f"longer than {LONGEST} s")
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, LONGEST)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def _callables() -> list[str]:
+    return [n for n in ck.__all__ if n not in NOT_CALLED and callable(getattr(ck, n))]
+
+
+@cache
+def _histories() -> list[ck.History]:
+    times = np.array([1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
+    return [
+        ck.History(f"{s:g}", times, {"strain": 1e-15 * s**5 * times}, ck.constant_stress(s), 1000.0)
+        for s in (60.0, 80.0, 100.0)
+    ]
+
+
+@cache
+def _fit() -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return ck.identify("norton", _histories(), starts=1, sobol_points=8)
+
+
+def good_values(name: str) -> dict[str, Any]:
+    """Values of arguments by their name, of a function or record."""
+    fit, histories, grid = _fit(), _histories(), np.linspace(1.0, 2.0, 4)
+    by_name: dict[str, Any] = {
+        "histories": histories,
+        "tests": histories,
+        "history": histories[0],
+        "fit": fit,
+        "fits": [fit],
+        "source": fit,
+        "target": "python",
+        "law": ck.law("norton"),
+        "laws": ["norton"],
+        "using": "uniaxial",
+        "values": {"A": 1e-15, "n": 5.0},
+        "penalty": ck.L2(),
+        "specimen": "uniaxial",
+        "predictor": ck.specimen("uniaxial"),
+        "loading": ck.constant_stress(80.0),
+        "times": grid,
+        "frame_times": grid,
+        "temperature": 1000.0,
+        "temperatures": (1000.0,),
+        "stress": 80.0,
+        "stresses": grid,
+        "strain": 0.01,
+        "outputs": {"strain": grid},
+        "bounds": (1.0, 2.0),
+        "meaning": "exponent",
+        "name": "a",
+        "title": "a",
+        "columns": {"x": "x", "y": "y", "z": "z"},
+        "names": "a b",
+        "steps": ((0.0, 1.0),),
+        "record": ck.Program.constant(1.0),
+        "quantity": "stress",
+        "value": 1.0,
+        "default": 1.0,
+        "kind": "laws",
+        "to": "written",
+        "path": "nowhere",
+        "paths": "nowhere",
+        "seed": 0,
+        "measured": [grid],
+        "predicted": [grid],
+    }
+    numbers = dict.fromkeys(("E", "E0", "b", "T0", "P1", "P2", "amplitude", "sigma_x", "sigma_y", "shape"), 1.0)
+    numbers |= dict.fromkeys(("initial", "level", "longest_hours"), 0.9) | {"Tj": 10.0}
+    own_values: dict[str, dict[str, Any]] = {
+        "Channel": {"quantity": "temperature", "values": grid},
+        "InstrumentRecord": {"channels": {}},
+        "Nuisance": {"kind": "offset"},
+        "Program": {"times": grid - 1.0, "values": grid},
+        "State": {"rate": ck.stress},
+        "TimeGrid": {"values": grid},
+        "check_specimen": {"specimen": ck.specimen("uniaxial")},
+        "export": {"source": ck.law_with_values("norton", {"A": 1e-15, "n": 5.0})},
+        "law": {"name": "norton"},
+        "law_with_values": {"source": "norton"},
+        "specimen": {"name": "uniaxial"},
+        "wachtman": {"E0": 1e5},
+    }
+    return by_name | numbers | own_values.get(name, {})
+
+
+def cases(name: str) -> Iterator[tuple[str, str, Callable[[], Any]]]:
+    """(argument, name of the bad value, call); a needed argument without a good value is as bad."""
+    function, good = getattr(ck, name), good_values(name)
+    parameters = inspect.signature(function).parameters
+    several = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    needed = [key for key, p in parameters.items() if p.default is p.empty and p.kind not in several]
+    for argument, parameter in parameters.items():
+        for label, make in BAD.items():
+            if make() is None and parameter.default is None:
+                continue
+            given = {key: good[key] if key in good else make() for key in needed if key != argument}
+            if parameter.kind is parameter.VAR_POSITIONAL:
+                yield argument, label, partial(function, make(), **given)
+            else:
+                key = "x" if parameter.kind is parameter.VAR_KEYWORD else argument
+                yield argument, label, partial(function, **given, **{key: make()})
+
+
+@pytest.mark.parametrize("name", _callables())
+def test_nothing_but_a_sentence_of_creepkit_comes_out(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if name == "train":
+        importlib.import_module("torch")  # which takes longer than a call may
+    wrong = []
+    for argument, label, call in cases(name):
+        start = time.perf_counter()
+        try:
+            with _time_limit(), warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                call()
+        except CreepkitError:
+            pass
+        except Exception as error:
+            wrong.append(f"{argument} = {label}: {type(error).__name__}: {str(error)[:100]}")
+        if time.perf_counter() - start > LONGEST:
+            wrong.append(f"{argument} = {label}: too long")
+    assert wrong == [], "\n".join(wrong)
+
+
+def test_every_exception_is_a_public_name() -> None:
+    assert NOT_CALLED.keys() <= set(ck.__all__)
+
+
+@pytest.mark.parametrize("starts", [[(5, 900.0), (0, 1000.0)], [(0, 900.0), (0, 1000.0)], [(5, 900.0)], [], {"a": 1}])
+def test_steps_out_of_order_are_refused(starts: Any) -> None:
+    with pytest.raises(CreepkitError, match="steps"):
+        ck.Program.steps(starts)
+
+
+@pytest.mark.parametrize("state", [{"temperature": T} for T in (-5.0, 0.0, np.nan, 1e9, [1000.0, np.nan], "x")])
+@pytest.mark.parametrize("source", ["fit", "average"])
+def test_a_rate_is_of_a_state_of_a_material(source: str, state: dict[str, Any]) -> None:
+    rated = _fit() if source == "fit" else ck.rank([_fit()]).model_average
+    for quantity in (rated.rate, rated.local_exponent):
+        with pytest.raises(CreepkitError, match="temperature"):
+            quantity(stress=80.0, **state, warn=False)
+        for stress in (np.nan, np.inf, 0.0, -1.0, "x"):
+            with pytest.raises(CreepkitError, match="stress"):
+                quantity(stress=stress, temperature=1000.0, warn=False)
+    with pytest.raises(CreepkitError, match="temperature"):
+        ck.rate_at(80.0, **state)
+
+
+def test_a_generator_is_as_good_as_a_list() -> None:
+    histories = _histories()
+    fit = ck.identify("norton", (h for h in histories), starts=1, sobol_points=8)
+    assert fit.values == _fit().values
+    assert [q.name for q in ck.rank(f for f in [fit]).laws[0].fit.histories] == [h.name for h in histories]
+    assert ck.select_tests(iter(histories)) == histories
+
+
+@pytest.mark.parametrize("name", ["E0", "b", "T0"])
+@pytest.mark.parametrize("number", [np.nan, np.inf, "1"])
+def test_a_modulus_has_finite_numbers(name: str, number: Any) -> None:
+    with pytest.raises(CreepkitError, match=rf"{name} of wachtman\(\) is .*; allowed is a finite number"):
+        ck.wachtman(**{"E0": 1e5, "b": 10.0, "T0": 300.0, name: number})
+
+
+def test_the_error_names_argument_and_item_and_is_what_python_would_raise() -> None:
+    with pytest.raises(ArgumentError, match=r"tests\[1\] of rupture\(\) is 3; allowed is a History"):
+        ck.rupture([_histories()[0], 3])  # type: ignore[list-item]
+    assert issubclass(ArgumentError, TypeError)
+    assert issubclass(ArgumentError, ValueError)
+
+
+def test_values_are_passed_on_as_they_are() -> None:
+    times = np.array([0.0, 1.0])
+    law = ck.law("norton")
+    assert ck.law_with_values(law, {"A": 1e-15, "n": 5}).law is law
+    assert ck.Channel("a", "temperature", times).values.dtype == float
+    assert inspect.signature(ck.wachtman).parameters.keys() == {"E0", "b", "T0"}
+
+
+def test_a_check_takes_microseconds() -> None:
+    reached = min(timeit.repeat(lambda: ck.State(0.0, ck.stress), number=100, repeat=5)) / 100
+    assert reached < 1e-3
