@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import sympy
 
+from creepkit.exporters.homogeneity import degree
 from creepkit.exporters.unit_conversion import ConvertedValues, reference_sentence
 from creepkit.kernels.log_form import FLOOR, TIME_FLOOR
 from creepkit.language.law import CreepLaw
@@ -19,10 +20,6 @@ from creepkit.records import LawWithValues, Units
 
 STRESSES = (stress, principal_stress, mean_stress)
 POINT_VARIABLES = (*STRESSES, strain, time, temperature)
-
-
-MOST_OPERATIONS = 100
-"""Of a rate whose dimension is derived."""
 
 
 def heading(source: LawWithValues, *, units: str = "", mentions_floors: bool = False) -> Iterator[str]:
@@ -86,8 +83,7 @@ def coefficient_unit(law: CreepLaw, name: str) -> str:
     symbol = next(one for one in law.params if one.name == name)
     rates = [*law.terms.values(), *(state.rate for state in law.states.values())]
     rates = [rate for rate in rates if symbol in rate_coefficients(law, rate)]
-    large = any(rate.count_ops() > MOST_OPERATIONS for rate in rates)
-    if law.params[symbol].unit != "1/s" or not rates or large:
+    if law.params[symbol].unit != "1/s" or not rates:
         return ""
     powers = {(_power(law, rate, STRESSES, "MPa"), _power(law, rate, (time,), "s")) for rate in rates}
     of_stress, of_time = powers.pop()
@@ -109,8 +105,8 @@ def _power(law: CreepLaw, rate: sympy.Expr, variables: Sequence[sympy.Symbol], u
         for symbol, param in law.params.items()
         if param.unit in powers and symbol not in coefficients
     }
-    power = sympy.simplify(sum(p * s * sympy.diff(rate, s) / rate for s, p in scaled.items()))
-    return None if power.free_symbols & {*POINT_VARIABLES, *law.states} else power
+    power = degree(rate, scaled)
+    return None if power is None or power.free_symbols & {*POINT_VARIABLES, *law.states} else power
 
 
 def _unit_with_power(unit: str, power: sympy.Expr) -> str:

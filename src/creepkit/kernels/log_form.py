@@ -16,6 +16,7 @@ from typing import Any
 import sympy
 
 from creepkit.errors import LawError, quoted
+from creepkit.kernels.extremes import Max, Min
 from creepkit.kernels.kernel_functions import (
     Coth,
     ExpDifference,
@@ -296,9 +297,11 @@ _REWRITES: dict[Any, Callable[..., sympy.Basic]] = {
     sympy.coth: Coth,
     sympy.Abs: lambda x: sympy.Piecewise((x, x >= 0), (-x, True)),
     sympy.sign: lambda x: sympy.Piecewise((1, x > 0), (-1, x < 0), (0, True)),
+    sympy.Max: Max,
+    sympy.Min: Min,
     sympy.Heaviside: lambda x, half: sympy.Piecewise((1, x > 0), (0, x < 0), (half, True)),
 }
-"""Functions whose derivatives in sympy are distributions, or lose digits."""
+"""Functions whose derivatives in sympy are distributions, lose digits, or take too long."""
 
 
 _LOG_FUNCTIONS: dict[Any, Any] = {sympy.sinh: LogSinh, sympy.cosh: LogCosh, sympy.tanh: LogTanh}

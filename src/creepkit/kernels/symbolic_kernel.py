@@ -15,6 +15,7 @@ from functools import cached_property, wraps
 
 import sympy
 
+from creepkit.kernels.extremes import Max
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, Floored, LogFloor, assignment_lines, expression_source
 from creepkit.kernels.log_form import (
     FLOOR,
@@ -239,16 +240,11 @@ def _log_sum_exp(
 ) -> tuple[sympy.Expr, list[sympy.Expr], Assignments]:
     """ln of the sum of exponentials, each term's weight in it, and the steps there; finite when every term is off."""
     if len(log_terms) == 1:
-        return sympy.Max(log_terms[0], LOG_RATE_OFF, evaluate=False), [sympy.S.One], {}
+        return Max(log_terms[0], LOG_RATE_OFF), [sympy.S.One], {}
     ln_terms = dict(zip(names.log_terms, log_terms, strict=True))
     largest, total = names.new_symbol("largest"), names.new_symbol("total")
     scaled_terms = {scaled: sympy.exp(ln - largest) for scaled, ln in zip(names.scaled_terms, ln_terms, strict=True)}
-    steps = {
-        **ln_terms,
-        largest: sympy.Max(*ln_terms, LOG_RATE_OFF, evaluate=False),
-        **scaled_terms,
-        total: sympy.Add(*scaled_terms),
-    }
+    steps = {**ln_terms, largest: Max(*ln_terms, LOG_RATE_OFF), **scaled_terms, total: sympy.Add(*scaled_terms)}
     floor = sympy.Float(FLOOR)
     return largest + LogFloor(total, floor), [share / Floored(total, floor) for share in scaled_terms], steps
 
