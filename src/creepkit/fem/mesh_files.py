@@ -53,6 +53,7 @@ def read_mesh(
     return draft.mesh()
 
 
+@checked
 def read_input_deck(path: str | Path, *, pressed: str | None = None, top: str | None = "top") -> Mesh:
     """Read the mesh of an Abaqus or CalculiX deck of CAX4, CAX4R, CAX8 or CAX8R elements; its steps are not read.
 

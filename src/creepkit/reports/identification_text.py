@@ -171,8 +171,8 @@ def _unused_ends(fit: Identification) -> list[str]:
     """What the law would say of rupture times that it was not compared with."""
     ends = [m.rupture for m in fit.tests if m.rupture is not None and not m.rupture.used]
     ratios = [end.ratio for end in ends if not end.censored and math.isfinite(end.ratio)]
-    text = f": time predicted over measured {_spread(ratios)}" if ratios else ""
-    return [f"  ends of {_tests(len(ends))} were not used{text}"] if ends else []
+    text = f"  ends of {_tests(len(ends))} were not used"
+    return [text + (f": time predicted over measured {_spread(ratios)}" if ratios else "")] if ends else []
 
 
 def _spread(ratios: Sequence[float]) -> str:
@@ -219,10 +219,7 @@ def _linear_outputs(fit: Identification) -> list[str]:
 
 
 def _table(fit: Identification) -> list[str]:
-    """One line a test: its error, its offset and weight, and what was found of its nuisances.
-
-    chi2 : as the law is judged, with the test's own rate and offset taken out, where its noise is known.
-    """
+    """A line a test: its error, its chi-square (as the law is judged, where noise is known), offset and nuisances."""
     linear_output_tests = [m for m in fit.tests if m.outputs and not is_logarithmic(m.outputs[0].output)]
     estimates_by_owner = {(n.key, n.owner): n for n in fit.nuisances if n.scope == "test"}
     kinds = list(dict.fromkeys(n.key for n in fit.nuisances if n.scope == "test"))
@@ -281,9 +278,8 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
         interval = " to ".join(interval_ends(fit.law, e))
-        said = e.verdict
-        if rejected(fit):
-            said = if_held if e.verdict == "determined" else f"{e.verdict} {if_held}"
+        verdict = [] if rejected(fit) and e.verdict == "determined" else [e.verdict]
+        said = " ".join([*verdict, *([if_held] if rejected(fit) else [])])
         lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {interval}, {said}")
     lines += _range_lines(fit)
     rate_scatter = f"scatter of rates between tests (one sd) {scatter_of_rates(fit)}"
@@ -301,14 +297,11 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
 
 def _range_lines(fit: Identification) -> list[str]:
     """The range of the tests, and at which temperatures not all of its stresses were tested."""
-    units = {"stress": "MPa", "strain": "", "time": "s"}
-    covered = (
-        f"{name} {celsius_text(low, high)}"
-        if name == "temperature"
-        else f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip()
-        for name, (low, high) in fit.ranges.items()
-    )
-    lines = [f"range of the tests: {', '.join(covered)}"]
+    units = {"stress": " MPa", "time": " s"}
+    covered = {name: f"{low:.4g} to {high:.4g}{units.get(name, '')}" for name, (low, high) in fit.ranges.items()}
+    if "temperature" in covered:
+        covered["temperature"] = celsius_text(*fit.ranges["temperature"])
+    lines = [f"range of the tests: {', '.join(f'{name} {text}' for name, text in covered.items())}"]
     at_temperatures = stresses_at_temperatures(fit)
     low, high = fit.ranges["stress"]
     tolerance = 1.0 + SAME_STRESS
