@@ -10,11 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from creepkit.errors import LONGEST_QUOTE, nearest, quoted
+from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, read_text
 from creepkit.files.writing import write_text
 
 MAXIMUM_DEPTH = 200
 """Lists and objects inside one another; the equations of laws are the deepest, with some 60."""
+
+
+MAXIMUM_CONTAINERS, MAXIMUM_ENTRIES = 1_500_000, 5_000_000
+"""Lists, objects and keys of a document together, which take up to 300 bytes each, and entries of them, up to 60."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,7 @@ def read_json(path: Path, kind: FileKind) -> Any:
 
 def parse_json(text: str, source: str, kind: FileKind) -> Any:
     """The data of a JSON text; the error of `kind`, naming `source`, for any other text."""
+    _check_counts(text, source, kind)
     try:
         data = json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_no_constant, parse_float=_finite_number)
         _check_depth(data)
@@ -152,6 +158,19 @@ def check_keys(data: Mapping[str, Any], allowed: tuple[str, ...], place: str, *,
             return f"{place}: unknown key '{quoted(key)}'; {nearest(str(key)[:LONGEST_QUOTE], allowed)}"
     missing = [key for key in allowed if key not in data]
     return f"{place}: '{missing[0]}' is missing" if missing and not optional else ""
+
+
+def _check_counts(text: str, source: str, kind: FileKind) -> None:
+    """The error of `kind` for a text that would take too much time and memory, by its marks, before it is parsed."""
+    for noun, found, usual in (
+        ("lists, objects and keys", text.count("[") + text.count("{") + text.count(":"), MAXIMUM_CONTAINERS),
+        ("entries", text.count(","), MAXIMUM_ENTRIES),
+    ):
+        if found > usual and found > (most := raised(usual)):
+            raise kind.error(
+                f"{source}: some {found} {noun}, more than {most}, which {kind.noun} never has; {kind.advice}, or "
+                f"{how_to_raise(found, most)}"
+            )
 
 
 class _JsonError(ValueError):

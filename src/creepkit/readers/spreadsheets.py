@@ -6,10 +6,9 @@ and none of time states conditions, one row a test; other sheets are left aside,
 
 from __future__ import annotations
 
-import io
-import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from functools import partial
@@ -18,13 +17,13 @@ from typing import Any
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
-from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, check_readable, read_bytes
 from creepkit.readers.cell_grids import CellGrid, grid_of_rows, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.number_formats import number_text
-from creepkit.readers.spreadsheet_parts import check_sheet, checked_parts
+from creepkit.readers.spreadsheet_parts import WorkbookParts, checked_parts
+from creepkit.readers.spreadsheet_xml import SheetRows, check_formats, check_sheet, text_lengths
 from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
 from creepkit.readers.table_rows import TableRow
 from creepkit.readers.text_tables import SourceText, unknown_text
@@ -34,19 +33,12 @@ from creepkit.records import History
 SPREADSHEET_FILE = FileKind("a spreadsheet of tests", HistoryError, "save the sheet as .xlsx or CSV", 100_000_000)
 
 
-MAXIMUM_CELLS = 5_000_000
-"""Of a sheet, with the empty cells in its rows."""
-
-
 _FILLED_ROWS = 60
 """Rows from the top in which a merged cell counts for all the columns that it covers."""
 
 
 _DAY_ZERO, _FIRST_DATE = datetime(1899, 12, 31), datetime(1902, 1, 1)
 """The day that a spreadsheet counts as 0, and the first on which a creep test may have been made."""
-
-
-_MERGED = re.compile(rb'<(?:\w+:)?mergeCell\s[^<>]*?ref="([A-Z]{1,3})(\d{1,7}):([A-Z]{1,3})\d{1,7}"')
 
 
 def read_sheets(path: Path) -> list[CellGrid]:
@@ -60,15 +52,15 @@ def read_sheets(path: Path) -> list[CellGrid]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of what a workbook holds beside its cells
-            book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
-            shown = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
-            places = {sheet.title: f"{path}, sheet '{sheet.title}'" for sheet in shown}
-            rows = {sheet.title: check_sheet(places[sheet.title], parts.get(_part_of(sheet), b"")) for sheet in shown}
-            formulas = _formulas(content, load_workbook) if any(b"<f" in part for part in parts.values()) else {}
-            grids = [
-                _grid(path, sheet, formulas.get(sheet.title, set()), parts.get(_part_of(sheet), b"")) for sheet in shown
-            ]
-            aside = [f"hidden sheet '{sheet.title}' not read" for sheet in book.worksheets if sheet not in shown]
+            outline = load_workbook(parts.outline(), read_only=True, keep_links=False)
+            rows = _checked_sheets(path, outline.worksheets, parts)
+            stream = parts.with_sheets({name: sheet.content for name, sheet in rows.items()})
+            book = load_workbook(stream, read_only=True, data_only=True, keep_links=False)
+            grids = [_grid(path, sheet, rows[_part_of(sheet)]) for sheet in book.worksheets if _part_of(sheet) in rows]
+            aside = [f"hidden sheet '{one.title}' not read" for one in book.worksheets if _part_of(one) not in rows]
+            remarks = {
+                one.title: rows[_part_of(one)].remarks(one.title) for one in book.worksheets if _part_of(one) in rows
+            }
     except HistoryError:
         raise
     except Exception as error:
@@ -80,74 +72,71 @@ def read_sheets(path: Path) -> list[CellGrid]:
     found = [grid for grid in grids if grid is not None]
     if aside and not found:
         raise HistoryError(f"{path}: {aside[0]}, and no other holds anything; unhide the sheets that count")
-    return [replace(grid, remarks=(*rows[grid.sheet].remarks(grid.sheet), *aside)) for grid in found]
+    return [replace(grid, remarks=(*remarks[grid.sheet], *aside)) for grid in found]
 
 
 def _part_of(sheet: Any) -> str:
     return str(getattr(sheet, "_worksheet_path", "")).lstrip("/")
 
 
-def _formulas(content: bytes, load_workbook: Any) -> dict[str, set[tuple[int, int]]]:
-    """{sheet: row and column of each formula}; their texts are not kept."""
-    book = load_workbook(io.BytesIO(content), read_only=True, data_only=False, keep_links=False)
-    return {
-        sheet.title: {(cell.row, cell.column) for row in _rows(sheet) for cell in row if cell.data_type == "f"}
-        for sheet in book.worksheets
-    }
+def _checked_sheets(path: Path, sheets: Sequence[Any], parts: WorkbookParts) -> dict[str, SheetRows]:
+    """{part: what it says of its rows} of the sheets that are shown; HistoryError for what no cell can hold."""
+    names = Counter(map(_part_of, sheets))
+    lengths = [length for part in parts.of_root("sst") for length in text_lengths(f"{path}: its shared texts", part)]
+    for part in parts.of_root("styleSheet"):
+        check_formats(str(path), part)
+    found = {}
+    for sheet in sheets:
+        name, place = _part_of(sheet), f"{path}, sheet '{sheet.title}'"
+        if names[name] > 1 or parts.roots.get(name) != "worksheet":
+            raise HistoryError(f"{place}: has no rows of its own in the file; save it anew as .xlsx")
+        if sheet.sheet_state == "visible":
+            found[name] = check_sheet(place, parts.contents[name], lengths)
+    return found
 
 
-def _rows(sheet: Any) -> Iterator[tuple[Any, ...]]:
-    """The rows of a sheet as they stand, whatever size the file claims that it has."""
-    sheet.reset_dimensions()
-    count, most = 0, raised(MAXIMUM_CELLS)
-    for row in sheet.iter_rows():
-        count += len(row) + 1
-        if count > most:
-            raise HistoryError(
-                f"sheet '{sheet.title}' has more than {most} cells; save its columns as CSV, or "
-                f"{how_to_raise(2 * most, most)}"
-            )
-        yield row
-
-
-def _grid(path: Path, sheet: Any, formulas: set[tuple[int, int]], part: bytes) -> CellGrid | None:
+def _grid(path: Path, sheet: Any, stated: SheetRows) -> CellGrid | None:
     """A sheet as a grid, None where it is empty."""
     place = f"{path}, sheet '{sheet.title}'"
     rows: list[TableRow] = []
     texts: list[str] = []
-    try:
-        for number, row in enumerate(_rows(sheet), 1):
-            cells = [_cell_text(cell) for cell in row]
-            refuse_unprintable("".join(cells), partial(str.format, "{}, row {}", place, number))
-            if not any(cells) and not any((number, k) in formulas for k in range(1, len(row) + 1)):
-                continue
-            for k, cell in enumerate(cells, 1):
-                if not cell and (number, k) in formulas:
-                    raise HistoryError(
-                        f"{place}, row {number}, column {k}: a formula without a computed value; open the file in a "
-                        "spreadsheet program and save it, or paste the values"
-                    )
+    known: dict[str, str] = {}
+    if stated.uncomputed is not None:
+        raise HistoryError(
+            f"{place}, row {stated.uncomputed[0]}, column {stated.uncomputed[1]}: a formula without a computed value; "
+            "open the file in a spreadsheet program and save it, or paste the values"
+        )
+    sheet.reset_dimensions()
+    for number, row in enumerate(sheet.iter_rows(), 1):
+        if not row:
+            continue
+        cells = [_cell_text(cell, known) for cell in row]
+        refuse_unprintable("".join(cells), partial(str.format, "{}, row {}", place, number))
+        if any(cells):
             texts += [cell for cell, source in zip(cells, row, strict=True) if "," in cell and _is_text(source)]
             rows.append(TableRow(number, cells))
-    except HistoryError as error:
-        raise error if str(error).startswith(str(path)) else HistoryError(f"{path}, {error}") from None
     if not rows:
         return None
     rows = _with_points(rows, texts, place)
-    return grid_of_rows(path, str(sheet.title), _with_merged(rows, part))
+    return grid_of_rows(path, str(sheet.title), _with_merged(rows, stated.merged))
 
 
 def _is_text(cell: Any) -> bool:
     return isinstance(cell.value, str)
 
 
-def _cell_text(cell: Any) -> str:
-    """A cell as text; a number shown in per cent as the number that is shown, with the sign."""
+def _cell_text(cell: Any, known: dict[str, str]) -> str:
+    """A cell as text; a number shown in per cent as the number that is shown, with the sign.
+
+    known : {text of a cell: without further blanks}, so that many cells with one text take the memory of one.
+    """
     value = cell.value
     if value is None:
         return ""
     if isinstance(value, str):
-        return " ".join(value.split())
+        if value not in known:
+            known[value] = " ".join(value.split())
+        return known[value]
     if isinstance(value, bool):
         return str(value).upper()
     if isinstance(value, (int, float)):
@@ -178,25 +167,17 @@ def _with_points(rows: list[TableRow], texts: list[str], place: str) -> list[Tab
     ]
 
 
-def _with_merged(rows: list[TableRow], part: bytes) -> list[TableRow]:
+def _with_merged(rows: list[TableRow], merged: Sequence[tuple[int, int, int]]) -> list[TableRow]:
     """The rows with the text of each merged cell in all columns that it covers, in its first row."""
     by_line = {row.line: row for row in rows}
-    for match in _MERGED.finditer(part):
-        first, last = _column_number(match[1]), _column_number(match[3])
-        row = by_line.get(int(match[2]))
+    for line, first, last in merged:
+        row = by_line.get(line)
         if row is None or row.line > _FILLED_ROWS or last - first > 1000 or first > len(row.cells):
             continue
         cells = [*row.cells, *[""] * (last - len(row.cells))]
         cells[first - 1 : last] = [cells[first - 1]] * (last - first + 1)
         by_line[row.line] = TableRow(row.line, cells)
     return list(by_line.values())
-
-
-def _column_number(letters: bytes) -> int:
-    number = 0
-    for letter in letters:
-        number = 26 * number + letter - ord("A") + 1
-    return number
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,19 @@ MAXIMUM_COLUMNS, MAXIMUM_LINE, MAXIMUM_KEYS = 2000, 1_000_000, 1000
 MAXIMUM_CELL, MAXIMUM_TEXTS = 10_000, 40_000_000
 """Characters of a cell, for units are looked for in it; cells of a table that holds not numbers alone."""
 
+MAXIMUM_SKIPPED_LINES = 100_000
+"""Lines without a cell that holds something, above the table, and in it beyond the number of its rows."""
+
+
+def refuse_many_skipped(path: Path, skipped: int, rows: int) -> None:
+    """Refuse a text that is empty lines and comments for the most part, before all of them are looked at."""
+    if skipped > MAXIMUM_SKIPPED_LINES + rows and skipped > (most := raised(MAXIMUM_SKIPPED_LINES)) + rows:
+        where = f"beside {rows} rows" if rows else "above the first row of a table"
+        raise HistoryError(
+            f"{path}: more than {most} empty lines and comments {where}; remove them, or "
+            f"{how_to_raise(max(skipped - rows, 2 * most), most)}"
+        )
+
 
 def refuse_long_lines(text: str, path: Path) -> None:
     """Refuse a line that no table of tests has, before it is split into cells."""

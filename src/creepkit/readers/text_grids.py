@@ -33,6 +33,7 @@ from creepkit.readers.table_limits import (
     refuse_long_cells,
     refuse_long_lines,
     refuse_many,
+    refuse_many_skipped,
     refuse_many_texts,
 )
 from creepkit.readers.table_rows import NumberRows, TableRow, packed
@@ -45,6 +46,14 @@ _LARGE_TEXT = 65_536
 """Characters above which the rows of a text are read as numbers at once where they hold nothing else."""
 
 
+_DELIMITERS = " ,;|\t"
+"""What stands alone in a row of empty cells."""
+
+
+_CHECKED_LINES = 10_000
+"""Lines that are skipped before their number is compared with the rows anew."""
+
+
 _HEAD_LINES = 1000
 """Lines of a large text within which its names must stand for that."""
 
@@ -55,7 +64,7 @@ def read_text_grid(path: Path) -> CellGrid:
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     refuse_long_lines(text, path)
-    head, offset = _head_of(text)
+    head, offset = _head_of(path, text)
     if offset == len(text):
         problem = "holds a header but no table" if any(line.strip() for line in head) else "is empty"
         raise HistoryError(f"{path}: the file {problem}; write a line of columns such as time_s,strain_pct, then rows")
@@ -66,7 +75,7 @@ def read_text_grid(path: Path) -> CellGrid:
     return _grid_of_texts(path, text, head, offset)
 
 
-def _head_of(text: str) -> tuple[list[str], int]:
+def _head_of(path: Path, text: str) -> tuple[list[str], int]:
     """The lines above the first row, and the character with which that begins."""
     head, offset = list[str](), 0
     while offset < len(text):
@@ -75,6 +84,7 @@ def _head_of(text: str) -> tuple[list[str], int]:
         if line.strip() and not is_comment(line):
             break
         head.append(line)
+        refuse_many_skipped(path, len(head), 0)
         offset += len(line) + 1
     return head, min(offset, len(text))
 
@@ -96,6 +106,7 @@ class _TableLines:
     that are `# key: value`.
     """
 
+    path: Path
     text: str
     offset: int
     first: int
@@ -104,22 +115,27 @@ class _TableLines:
     def numbered(self) -> Iterator[tuple[int, str]]:
         """Number and text of each line that is neither empty nor a comment."""
         self.comments.clear()
-        number = self.first
+        number, skipped = self.first, 0
         for part in parts_of_lines(self.text, self.offset):
             lines = part.split("\n")
             for k, line in enumerate(lines, number):
                 if line and not line.isspace():
                     if not (line[0] in BEFORE_COMMENT and is_comment(line)):
                         yield k, line
+                        if line[0] not in _DELIMITERS or line.strip(_DELIMITERS):
+                            continue
                     elif ":" in line:
                         self.comments.append((k, line))
+                skipped += 1
+                if not skipped % _CHECKED_LINES:
+                    refuse_many_skipped(self.path, skipped, k + 1 - self.first - skipped)
             number += len(lines)
 
 
 def _grid_of_texts(path: Path, text: str, head: Sequence[str], offset: int) -> CellGrid:
     """The grid of a table that holds not numbers alone, whose first row begins at character `offset`."""
     first = len(head) + 1
-    lines = _TableLines(text, offset, first)
+    lines = _TableLines(path, text, offset, first)
     dialect = detect_dialect((line for _, line in lines.numbered()), str(path), stated_decimal(path, head))
     width = len(split_line(next(lines.numbered())[1], dialect, f"{path}:{first}"))
     refuse_many_texts(path, text.count("\n", offset) * max(width, 2))  # a table has two columns or more
@@ -144,7 +160,7 @@ def _rows(numbered: Iterator[tuple[int, str]], dialect: Dialect, path: Path) -> 
 def _grid_of_numbers(path: Path, text: str, head: Sequence[str], offset: int) -> CellGrid | None:
     """The grid of a table that holds numbers alone below its names; None of any other."""
     first = len(head) + 1
-    sample = list(islice(_TableLines(text, offset, first).numbered(), _HEAD_LINES))
+    sample = list(islice(_TableLines(path, text, offset, first).numbered(), _HEAD_LINES))
     names = sample[0][1]
     try:
         dialect = detect_dialect((line for _, line in sample), decimal=stated_decimal(path, head))
@@ -152,7 +168,7 @@ def _grid_of_numbers(path: Path, text: str, head: Sequence[str], offset: int) ->
         return None
     if dialect.delimiter == " " or '"' in names:
         return None
-    body, line_numbers, comments = _without_comments(text[offset + len(names) + 1 :].rstrip("\n"), first + 1)
+    body, line_numbers, comments = _without_comments(path, text[offset + len(names) + 1 :].rstrip("\n"), first + 1)
     numbers = table_of_numbers(body, dialect) if body.strip() else None
     cells = split_line(names, dialect, f"{path}:{first}")
     if numbers is None or numbers.shape != (line_numbers.size, len(cells)) or not np.isfinite(numbers).all():
@@ -163,17 +179,25 @@ def _grid_of_numbers(path: Path, text: str, head: Sequence[str], offset: int) ->
     return CellGrid(path, "", dialect, header, [TableRow(first, cells)], rows, late_entries(path, comments, dialect))
 
 
-def _without_comments(body: str, first_line: int) -> tuple[str, Ints, list[tuple[int, str]]]:
+def _without_comments(path: Path, body: str, first_line: int) -> tuple[str, Ints, list[tuple[int, str]]]:
     """A text without comments and empty lines, the number of each line that stays, and the comments by line."""
     if "\n\n" not in body and not body.startswith("\n") and "#" not in body and "/" not in body:
         return body, first_line + np.arange(body.count("\n") + 1), []
-    lines = body.split("\n")
-    kept = [k for k, line in enumerate(lines) if line and line[0] not in ' \t"#/']
-    others = sorted(set(range(len(lines))).difference(kept))
-    comments = [(first_line + k, lines[k]) for k in others if is_comment(lines[k])]
-    kept += [k for k in others if lines[k].strip() and not is_comment(lines[k])]
-    kept.sort()
-    return "\n".join([lines[k] for k in kept]), first_line + np.array(kept, dtype=int), comments
+    parts, numbers, comments, number = list[str](), list[Ints](), list[tuple[int, str]](), first_line
+    for part in parts_of_lines(body):
+        lines = part.split("\n")
+        kept = [k for k, line in enumerate(lines) if line and line[0] not in ' \t"#/']
+        others = sorted(set(range(len(lines))).difference(kept)) if len(kept) < len(lines) else []
+        comments += [(number + k, lines[k]) for k in others if is_comment(lines[k])]
+        kept += [k for k in others if lines[k].strip() and not is_comment(lines[k])]
+        kept.sort()
+        if kept:
+            parts.append("\n".join([lines[k] for k in kept]))
+            numbers.append(number + np.array(kept, dtype=int))
+        number += len(lines)
+        rows = sum(each.size for each in numbers)
+        refuse_many_skipped(path, number - first_line - rows, rows)
+    return "\n".join(parts), np.concatenate(numbers) if numbers else np.zeros(0, dtype=int), comments
 
 
 def read_table(path: Path, ignored: Collection[str] = ()) -> TextTable:

@@ -15,9 +15,9 @@ import unicodedata
 import zlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from creepkit.errors import ReportError, quoted
+from creepkit.files.json_documents import parse_json
 from creepkit.files.reading import FileKind, read_text
 from creepkit.reports.contents import Attachment
 
@@ -110,10 +110,7 @@ def read_attachments(path: str | Path) -> dict[str, bytes]:
 
 def _listed_files(manifest: str, source: Path) -> list[tuple[str, int, str]]:
     """(name, bytes, sha256) of the files in the manifest."""
-    try:
-        document: Any = json.loads(manifest)
-    except (ValueError, RecursionError):  # ValueError: also of an integer of thousands of digits
-        raise _damaged(source, "its list of files is not JSON") from None
+    document = parse_json(manifest, f"{source}: its list of files", REPORT_FILE)
     if not isinstance(document, dict) or set(document) != {"format", "version", "files"}:
         raise _damaged(source, "its list of files has other keys than format, version and files")
     if document["format"] != _FORMAT or document["version"] != _VERSION or isinstance(document["version"], bool):

@@ -110,6 +110,32 @@ def test_json_is_refused_in_a_sentence(text, problem):
 
 
 @pytest.mark.parametrize(
+    ("text", "noun"),
+    [
+        ("[" + "[]," * 1_500_000 + "1]", "1500001 lists, objects and keys, more than 1500000"),
+        ("[" + "{}," * 1_500_000 + "1]", "1500001 lists, objects and keys, more than 1500000"),
+        ("{" + '"k":1,' * 1_500_000 + "}", "1500001 lists, objects and keys, more than 1500000"),
+        ("[" + "1," * 5_000_001 + "1]", "5000001 entries, more than 5000000"),
+    ],
+    ids=["lists", "objects", "keys", "entries"],
+)
+def test_json_of_many_values_is_refused_before_it_is_parsed(text, noun, monkeypatch):
+    monkeypatch.setattr("json.loads", lambda *_, **__: pytest.fail("it was parsed"))
+    with pytest.raises(
+        FitError, match=f"x.json: some {noun}, which a note never has; give a note, or if it is right, C"
+    ):
+        parse_json(text, "x.json", NOTE)
+
+
+def test_json_of_honest_size_is_read(monkeypatch):
+    """As of 50 MB of numbers of 15 digits, in rows of 8."""
+    rows = ",".join(["[" + ",".join(["0.12345678901234"] * 8) + "]"] * 300_000)
+    assert np.array(parse_json(f'{{"samples": [{rows}]}}', "x.json", NOTE)["samples"]).shape == (300_000, 8)
+    monkeypatch.setenv(VARIABLE, "2")
+    assert len(parse_json("[" + "[]," * 1_500_000 + "[]]", "x.json", NOTE)) == 1_500_001
+
+
+@pytest.mark.parametrize(
     ("lines", "problem"),
     [
         ("*NSET,NSET=A,GENERATE\n1,1000000000000,1", "more than 10000000 numbers"),

@@ -39,3 +39,40 @@ def test_blanks_of_any_width_and_tabs_are_text(tmp_path: Path):
     (tmp_path / "x.csv").write_text(f"{HEAD}# label a: 1\u00a0mm\u202f\t\u2009b\n{FRAMES}\x0c", encoding="utf-8")
     (history,) = HISTORY_CSV.read(tmp_path / "x.csv")
     assert history.labels["a"].startswith("1\u00a0mm")
+
+
+SKIPPED = {
+    "empty": ("\n", "", "above the first row of a table"),
+    "comments above": ("#\n", HEAD + FRAMES, "above the first row of a table"),
+    "empty within": ("\n", "", "beside 4 rows"),
+    "blanks within": (" \n", "", "beside 4 rows"),
+    "comments within": ("# a: b\n", "", "beside 4 rows"),
+    "empty cells": (",\n", "", "beside 4 rows"),
+}
+
+
+@pytest.mark.parametrize("case", SKIPPED)
+def test_lines_that_say_nothing_are_bounded(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    line, below, where = SKIPPED[case]
+    above, below = (f"{HEAD}{FRAMES}", "3,1\n") if "rows" in where else ("", below)
+    path = tmp_path / "x.csv"
+    path.write_text(f"{above}{line * 120_000}{below}", encoding="utf-8")
+    with pytest.raises(
+        HistoryError, match=f"x.csv: more than 100000 empty lines and comments {where}; remove them, or"
+    ):
+        HISTORY_CSV.read(path)
+    if below:
+        monkeypatch.setenv("CREEPKIT_LIMITS", "2")
+        assert len(HISTORY_CSV.read(path)[0].times) == 3 + ("rows" in where)
+
+
+def test_an_empty_line_between_any_two_rows_is_no_excess(tmp_path: Path):
+    """Rows of times k and strains k / 1000, so that each value tells its row."""
+    count = 150_000
+    path = tmp_path / "x.csv"
+    rows = "\n".join(f"{k},{k / 1000}\n" for k in range(count))
+    for comment in ("", "# remark\n"):
+        path.write_text(f"{HEAD}time_s,strain_pct\n{comment}{rows}", encoding="utf-8")
+        (history,) = HISTORY_CSV.read(path)
+        assert len(history.times) == count
+        assert history.times[-1] == count - 1

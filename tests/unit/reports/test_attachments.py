@@ -143,3 +143,9 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ReportError, match="is a folder"):
         read_attachments(tmp_path)
     assert embed([]) == ""
+
+
+def test_a_list_of_millions_is_refused_before_it_is_parsed(tmp_path: Path) -> None:
+    sound = embed([Attachment("a.csv", b"x")])
+    with pytest.raises(ReportError, match="its list of files: some 2000.* lists, objects and keys, more than"):
+        read_attachments(page(tmp_path, sound.replace('"files": [', '"files": [' + "[]," * 2_000_000)))
