@@ -98,8 +98,8 @@ class InputDeck:
         self.members += members
         if self.members > MOST_MEMBERS:
             raise SolveError(
-                f"{place}: the sets and ranges named up to here have more than {MOST_MEMBERS} members together (the limit "
-                "MOST_MEMBERS); name each set only where it is needed"
+                f"{place}: the sets and ranges named up to here have more than {MOST_MEMBERS} members together "
+                "(the limit MOST_MEMBERS); name each set only where it is needed"
             )
 
 

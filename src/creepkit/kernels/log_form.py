@@ -115,14 +115,14 @@ class LogForm:
 
 
 @contextmanager
-def in_one_sentence(law: CreepLaw) -> Iterator[None]:
+def in_one_sentence(law: CreepLaw, done: str = "differentiated and lowered to kernels") -> Iterator[None]:
     """LawError for what sympy raises while it rewrites or differentiates a law, such as conditions on conditions."""
     try:
         yield
     except (ArithmeticError, AttributeError, NotImplementedError, RecursionError, TypeError, ValueError) as error:
         cause = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise LawError(
-            f"law '{law.name}' cannot be differentiated and lowered to kernels ({cause}); write it in another "
+            f"law '{law.name}' cannot be {done} ({cause}); write it in another "
             "form, without conditions within conditions"
         ) from error
 
