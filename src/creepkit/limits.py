@@ -93,8 +93,8 @@ SEARCH_STEPS, SEARCH_POPULATION = Limits(1, 1_000_000), Limits(2, 1_000_000)
 TESTS_IN_A_RUN = Limits(1, 10_000)
 
 
-HOURS = numbers(0, 1e9, above=True)
-"""Of a test, or of an oven."""
+HOURS = numbers(1e-9, 1e9)
+"""Of a test, or of an oven; from a few microseconds on."""
 
 
 SECONDS = numbers(0, 1e12, above=True)

@@ -9,6 +9,7 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.options import is_file_name, is_law_name
 
 if TYPE_CHECKING:
     from creepkit.app.contents import PageContents, PageSource
@@ -52,12 +53,10 @@ def _resolved(words: list[str]) -> tuple[PageSource, list[History]]:
     from creepkit.exporters.law_files import read_law_file
     from creepkit.inverse.ranking_document import RANKING, read_ranking
 
-    laws = ck.available("laws")
     sources: list[PageSource] = []
     tests: list[str] = []
     for word in words:
-        named = word in laws or ("+" in word and not Path(word).exists())
-        if named or not (Path(word).exists() or any(c in word for c in "*?[./\\")):
+        if is_law_name(word) or not (Path(word).exists() or is_file_name(word) or any(c in word for c in "*?[\\")):
             sources.append(ck.law(word))
         elif Path(word).suffix.lower() == ".json" and _format(Path(word)) is not None:
             sources.append(read_ranking(word) if _format(Path(word)) == RANKING.name else read_law_file(Path(word)))

@@ -14,6 +14,7 @@ from creepkit.cli.identification_options import (
     FixOption,
     FramesOption,
     OnlyOption,
+    RuptureTimesOption,
     SeedOption,
     StartsOption,
     SurrogateOption,
@@ -76,6 +77,7 @@ def command(
     seed: SeedOption = None,
     frames: FramesOption = None,
     suspect_frames: SuspectFramesOption = None,
+    rupture_times: RuptureTimesOption = None,
     weights: WeightsOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -100,6 +102,7 @@ def command(
             seed=seed,
             frames=frames,
             suspect_frames=suspect_frames,
+            rupture_times=rupture_times,
             nuisances=parse_nuisances(nuisance),
             weights=weights,
         )

@@ -9,6 +9,7 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.options import is_file_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -64,14 +65,13 @@ def command(
 
 
 def _resolve_source(text: str) -> CreepLaw | Identification | LawWithValues:
-    """A file where there is one, or where its name says so; else a law by name."""
+    """A law by name, or what a file holds."""
     import creepkit as ck
 
-    path = Path(text)
-    if path.suffix.lower() == ".json" or path.is_file():
+    if is_file_name(text):
         from creepkit.exporters.law_files import read_law_file
 
-        return read_law_file(path)
+        return read_law_file(text)
     return ck.law(text)
 
 

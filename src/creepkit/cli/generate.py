@@ -71,6 +71,7 @@ def command(
     design = select_design(
         law, specimen_record, domain, design_changes(ranges or [], end_h, domain, unscreened), interval
     )
+    execution = ck.ParallelExecution(workers, cluster, parse_part(part))
     if dry_run:
         from creepkit.reports.sampling import print_acceptance
 
@@ -80,14 +81,7 @@ def command(
         raise DatasetError("--to FILE is missing: name the HDF5 file to write, such as --to combined.h5")
     with ProgressBar() as progress:
         data = ck.generate(
-            design,
-            specimen_record,
-            samples,
-            draws=draws,
-            seed=seed,
-            to=to,
-            execution=ck.ParallelExecution(workers, cluster, parse_part(part)),
-            progress=progress.tick,
+            design, specimen_record, samples, draws=draws, seed=seed, to=to, execution=execution, progress=progress.tick
         )
     from creepkit.reports.dataset import print_dataset
 

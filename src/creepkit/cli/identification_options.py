@@ -12,9 +12,9 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand
 
 from creepkit import limits
+from creepkit.cli.given_options import CheckedCommand
 from creepkit.cli.options import parse_weights, parsed_number
 
 if TYPE_CHECKING:
@@ -43,6 +43,16 @@ SuspectFramesOption = Annotated[
     typer.Option(
         metavar="WORD",
         help="exclude or keep frames that unload, fall or lie apart; {settings.suspect_frames} by default.",
+    ),
+]
+
+
+RuptureTimesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="WORD",
+        help="auto, use or ignore rupture times and run-outs of tests without curves; {settings.rupture_times} by "
+        "default: used by laws that describe rupture.",
     ),
 ]
 
@@ -83,7 +93,7 @@ SurrogateOption = Annotated[
 ]
 
 
-class CommandWithDefaults(TyperCommand):
+class CommandWithDefaults(CheckedCommand):
     """A command whose help quotes defaults from the records that hold them; loading these takes too long otherwise."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -173,8 +183,8 @@ def _parse_named(option: str, texts: Sequence[str] | None, parse: Callable[[str]
 
     values: dict[str, Any] = {}
     for text in texts or ():
-        name, _, value_text = (part.strip() for part in text.partition("="))
-        if name in values:
+        name, separator, value_text = (part.strip() for part in text.partition("="))
+        if separator and name in values:
             raise FitError(f"{option} {text}: {name} is given twice; keep one of them")
         try:
             values[name] = parse(value_text)

@@ -14,6 +14,7 @@ from creepkit.cli.identification_options import (
     FixOption,
     FramesOption,
     OnlyOption,
+    RuptureTimesOption,
     SeedOption,
     StartsOption,
     SurrogateOption,
@@ -89,6 +90,7 @@ def command(
     seed: SeedOption = None,
     frames: FramesOption = None,
     suspect_frames: SuspectFramesOption = None,
+    rupture_times: RuptureTimesOption = None,
     loss: Annotated[
         str | None,
         typer.Option(help="Of frames: linear, soft_l1, huber, cauchy or arctan; {settings.loss} by default."),
@@ -152,6 +154,7 @@ def command(
         seed=seed,
         frames=frames,
         suspect_frames=suspect_frames,
+        rupture_times=rupture_times,
         nuisances=parse_nuisances(nuisance),
         weights=weights,
         loss=loss,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.api.searches import PENALTIES, SEARCHES, penalty_of_name, search_of_name
@@ -35,6 +36,19 @@ def parsed_integer(text: str) -> int:
     if not text.isascii() or "_" in text:
         raise ValueError(text)
     return int(text)
+
+
+def is_law_name(word: str) -> bool:
+    """Whether a word names a registered law, or a sum of them as norton+strain-hardening, whatever files there are."""
+    import creepkit as ck
+
+    laws = ck.available("laws")
+    return word in laws or all(part.strip() in laws for part in word.split("+"))
+
+
+def is_file_name(word: str) -> bool:
+    """Whether a word that may name a law names a file: it has a suffix or a folder, as ./norton, and is no law."""
+    return not is_law_name(word) and (Path(word).suffix != "" or Path(word).name != word)
 
 
 def search_named(name: str) -> GlobalSearch | None:
@@ -79,9 +93,9 @@ def parse_numbers(texts: Sequence[str], option: str, example: str) -> dict[str, 
 
     values: dict[str, float] = {}
     for text in texts:
-        name, _, number = text.partition("=")
+        name, separator, number = text.partition("=")
         name = name.strip()
-        if name in values:
+        if separator and name in values:
             raise SolveError(f"{option} {text}: {name} is given twice; keep one of them")
         try:
             values[name] = parsed_number(number)

@@ -14,6 +14,7 @@ from creepkit.cli.identification_options import (
     FixOption,
     FramesOption,
     OnlyOption,
+    RuptureTimesOption,
     SeedOption,
     StartsOption,
     SurrogateOption,
@@ -78,6 +79,7 @@ def command(
     seed: SeedOption = None,
     frames: FramesOption = None,
     suspect_frames: SuspectFramesOption = None,
+    rupture_times: RuptureTimesOption = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes; one for each core by default."), limits.WORKERS
     ] = None,
@@ -92,7 +94,12 @@ def command(
     from creepkit.screening.screen import CANDIDATE_LAWS, resolve_tests
 
     changes = setting_changes(
-        starts=starts, seed=seed, frames=frames, suspect_frames=suspect_frames, nuisances=parse_nuisances(nuisance)
+        starts=starts,
+        seed=seed,
+        frames=frames,
+        suspect_frames=suspect_frames,
+        rupture_times=rupture_times,
+        nuisances=parse_nuisances(nuisance),
     )
     settings = change_settings(ck.ScreeningOptions().settings, changes)
     options = ck.ScreeningOptions(

@@ -17,6 +17,7 @@ import sympy
 from creepkit.errors import ExportError
 from creepkit.exporters.law_description import comment_lines, heading
 from creepkit.exporters.unit_conversion import reference_sentence
+from creepkit.kernels.log_form import in_one_sentence
 from creepkit.language.elastic import Elastic
 from creepkit.language.symbols import GAS_CONSTANT, strain, stress, temperature, time
 from creepkit.records import LawWithValues, Units
@@ -92,7 +93,8 @@ def creep_forms_of(source: LawWithValues, target: str, alternative: str) -> tupl
     numbers = {symbol: sympy.Float(source.values[symbol.name], _DIGITS) for symbol in law.params}
     forms = []
     for label, term in law.terms.items():
-        products = sympy.Add.make_args(sympy.expand_mul(term.xreplace(numbers), deep=False))
+        with in_one_sentence(law, "written with numbers for its parameters"):
+            products = sympy.Add.make_args(sympy.expand_mul(term.xreplace(numbers), deep=False))
         for k, product in enumerate(products, 1):
             name = label if len(products) == 1 else f"{label} {k}"
             try:

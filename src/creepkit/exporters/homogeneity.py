@@ -14,7 +14,10 @@ MOST_OPERATIONS = 60
 
 
 def degree(expression: sympy.Basic, degrees: Mapping[sympy.Symbol, int]) -> sympy.Expr | None:
-    """d in f(c^k x, ...) = c^d f(x, ...), where `degrees` says k of each symbol, else 0; None where there is no d."""
+    """d in f(c^k x, ...) = c^d f(x, ...), where `degrees` says k of each symbol, else 0.
+
+    None where there is no d, and for maxima of what changes.
+    """
     if not expression.args or not expression.free_symbols & degrees.keys():
         return sympy.Integer(degrees.get(expression, 0))
     if isinstance(expression, sympy.Pow):
@@ -29,7 +32,7 @@ def degree(expression: sympy.Basic, degrees: Mapping[sympy.Symbol, int]) -> symp
         return None if None in parts else _short(sympy.Add(*parts))
     if isinstance(expression, sympy.Abs):
         return degree(expression.args[0], degrees)
-    if isinstance(expression, sympy.Add | sympy.Max | sympy.Min):
+    if isinstance(expression, sympy.Add):
         return _common(expression.args, degrees)
     if isinstance(expression, sympy.core.relational.Relational):
         return None if _common(expression.args, degrees) is None else sympy.S.Zero

@@ -91,7 +91,10 @@ class MathmlPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
 
     def doprint(self, expr: sympy.Basic) -> str:
         """The expression as MathML without a root element."""
-        kept = expr.replace(sympy.exp, Exponential)
+        try:
+            kept = expr.replace(sympy.exp, Exponential)
+        except ValueError:  # of a maximum, which sympy cannot compare with the exponential of a number
+            kept = expr
         return re.sub(r"&(\w+);", _character_reference, str(super().doprint(kept)))
 
     def _print_Symbol(self, sym: Any, style: str = "plain") -> Any:

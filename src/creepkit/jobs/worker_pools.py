@@ -23,7 +23,7 @@ from typing import IO, Any, Protocol
 from creepkit import limits
 from creepkit.arrays import usable_cores
 from creepkit.checked_arguments import checked
-from creepkit.errors import CreepkitError, DatasetError
+from creepkit.errors import CreepkitError, DatasetError, quoted
 from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task
 from creepkit.jobs.worker_start import setup_message, start_worker
 
@@ -66,8 +66,6 @@ class ClusterWorkers:
             from distributed import Client
         except ImportError:
             raise DatasetError("--cluster needs dask; install it with: pip install 'creepkit[cluster]'") from None
-        if not ADDRESS.fullmatch(self._address):  # a client of such an address takes a minute to go
-            raise DatasetError(f"'{self._address}' is no address of a dask scheduler; write tcp://host:port")
 
         class OwnClient(Client):
             """A client that is closed by us: one that could not connect would be closed for a minute, and fail."""
@@ -203,6 +201,11 @@ class ParallelExecution:
     cluster: str | None = None
     part: tuple[int, int] | None = None
     shard_rows: int | None = None
+
+    def __post_init__(self) -> None:
+        """DatasetError for what is no address; a client of such a one takes a minute to go."""
+        if self.cluster is not None and not ADDRESS.fullmatch(self.cluster):
+            raise DatasetError(f"'{quoted(self.cluster)}' is no address of a dask scheduler; write tcp://host:port")
 
     def start(self, job: ShardedJob) -> AbstractContextManager[Workers]:
         """The workers, which run in the context that is returned."""

@@ -114,15 +114,19 @@ class LogForm:
     coefficients: tuple[tuple[int, ...], ...]
 
 
+_SYMPY_FAILURES = (ArithmeticError, AttributeError, NotImplementedError, RecursionError, TypeError, ValueError)
+"""What sympy raises where it cannot rewrite, differentiate or compare."""
+
+
 @contextmanager
-def in_one_sentence(law: CreepLaw) -> Iterator[None]:
+def in_one_sentence(law: CreepLaw, done: str = "differentiated and lowered to kernels") -> Iterator[None]:
     """LawError for what sympy raises while it rewrites or differentiates a law, such as conditions on conditions."""
     try:
         yield
-    except (ArithmeticError, AttributeError, NotImplementedError, RecursionError, TypeError, ValueError) as error:
+    except _SYMPY_FAILURES as error:
         cause = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise LawError(
-            f"law '{law.name}' cannot be differentiated and lowered to kernels ({cause}); write it in another "
+            f"law '{law.name}' cannot be {done} ({cause}); write it in another "
             "form, without conditions within conditions"
         ) from error
 
@@ -327,10 +331,14 @@ def leading_exponents(form: LogForm) -> tuple[tuple[sympy.Expr, sympy.Expr], ...
 def _exponent_at_zero(term: sympy.Expr, variable: sympy.Symbol) -> sympy.Expr:
     """The limit of x d(ln f)/dx at x -> 0+, with time and strain zero elsewhere."""
     summands = [s for s in sympy.Add.make_args(term) if s.has(variable)]
-    result = sympy.Add(*(_limit(variable * in_sympy_functions(sympy.diff(s, variable)), variable) for s in summands))
-    if _is_undefined(result):
+    try:
+        slopes = [in_sympy_functions(sympy.diff(s, variable)) for s in summands]
+        result = sympy.Add(*(_limit(variable * slope, variable) for slope in slopes))
+        if _is_undefined(result):
+            return sympy.S.Zero
+        result = result.subs({time: 0, strain: 0})
+    except _SYMPY_FAILURES:
         return sympy.S.Zero
-    result = result.subs({time: 0, strain: 0})
     return sympy.S.Zero if _is_undefined(result) else result
 
 

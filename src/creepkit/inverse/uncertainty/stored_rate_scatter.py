@@ -37,6 +37,8 @@ def problem_with(scatter: RateScatter, tests: Sequence[str], unknowns: int) -> s
             return f"{name} holds numbers that are too large"
     if not ((scatter.variance >= 0).all() and (scatter.weight > 0).all()):
         return "a variance is negative, or a weight not above zero"
+    if not (scatter.weight < LARGEST_NUMBER).all():
+        return "weight holds numbers that are too large"
     for level, names in scatter.members.items():
         if level not in LEVELS[:-1] or len(names) != count:
             return f"members of '{quoted(level, 20)}' are not one for each test, of a heat or laboratory"
