@@ -61,11 +61,10 @@ def is_finite_number(value: object) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    if type(value) is float:
-        return True
+    kind: type = type(value)
+    if kind is float or kind is bool:
+        return kind is float
     if isinstance(value, numbers.Real):
-        if type(value) is bool:
-            return False
         return not isinstance(value, numbers.Integral) or abs(int(value)) < 10**300
     return getattr(value, "shape", None) == () and getattr(getattr(value, "dtype", None), "kind", "") in "fiu"
 
