@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from creepkit.errors import quoted
+
 LARGEST_INTEGER = 2**63 - 1
 LARGEST_NAME = 255
 """Bytes of one part of a path."""
@@ -59,11 +61,10 @@ def is_finite_number(value: object) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    if type(value) is float:
-        return True
+    kind: type = type(value)
+    if kind is float or kind is bool:
+        return kind is float
     if isinstance(value, numbers.Real):
-        if isinstance(value, bool):
-            return False
         return not isinstance(value, numbers.Integral) or abs(int(value)) < 10**300
     return getattr(value, "shape", None) == () and getattr(getattr(value, "dtype", None), "kind", "") in "fiu"
 
@@ -234,7 +235,7 @@ class _Checks:
             for k, one in value.items() if isinstance(value, Mapping) else ():
                 if key.accepts(k) and not each.accepts(one):
                     place, wrong, words = each.wrong_part(one)
-                    yield f"[{str(k)[:40]!r}]{place}", wrong, words
+                    yield f"[{quoted(k)!r}]{place}", wrong, words
 
         return Check(accepts, f"a mapping of {key.words} to {each.words}", parts=parts, several=False)
 

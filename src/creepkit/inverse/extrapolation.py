@@ -82,12 +82,13 @@ def check_kelvin(ranges: Mapping[str, tuple[float, float]], temperature: ArrayLi
 
 
 def warn_of_extrapolation(
-    ranges: Mapping[str, tuple[float, float]], point: Mapping[str, ArrayLike | None], stacklevel: int = 3
+    ranges: Mapping[str, tuple[float, float]], point: Mapping[str, ArrayLike | None], stacklevel: int = 4
 ) -> None:
     """FitWarning where a point lies outside the fitted ranges, one for all; FitError for a temperature in Celsius.
 
     point : {name: numbers (...,), or None} in MPa, K, - and s.
-    stacklevel : frames above this one that the warning names: 3 for the caller of the method that calls this.
+    stacklevel : frames above this one that the warning names: 4 for the caller of the method that calls
+        this, which checks its arguments in a frame of its own.
     """
     check_kelvin(ranges, point.get("temperature"))
     sentence = extrapolation_text(ranges, point)

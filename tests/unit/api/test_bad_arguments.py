@@ -8,7 +8,6 @@ from __future__ import annotations
 import importlib
 import inspect
 import signal
-import time
 import timeit
 import warnings
 from collections.abc import Callable, Iterator
@@ -44,7 +43,8 @@ BAD: dict[str, Callable[[], Any]] = {
 }
 
 LONGEST = 5.0
-"""s, of one call."""
+"""s of processor time, of one call."""
+
 
 NOT_CALLED = {
     "hookimpl": "pluggy's decorator",
@@ -58,18 +58,27 @@ NOT_CALLED = {
 }
 
 
+TEXTS = ("empty text", "text", "long text", "no path")
+RIGHT: dict[str, dict[str, tuple[str, ...]]] = {
+    "forecast": {"tolerances": ("{}",)},
+    "report": {"to": ("text",), "title": TEXTS},
+    "screen": {"using": ("{}",), "to": ("empty text", "text")},
+}
+"""Values that are allowed, with which the whole work would be done, which takes longer."""
+
+
 @contextmanager
 def _time_limit() -> Iterator[None]:
     def stop(*_: Any) -> None:
         raise TimeoutError(f"longer than {LONGEST} s")
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, LONGEST)
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, LONGEST)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def _callables() -> list[str]:
@@ -165,7 +174,7 @@ def cases(name: str) -> Iterator[tuple[str, str, Callable[[], Any]]]:
     needed = [key for key, p in parameters.items() if p.default is p.empty and p.kind not in several]
     for argument, parameter in parameters.items():
         for label, make in BAD.items():
-            if make() is None and parameter.default is None:
+            if (make() is None and parameter.default is None) or label in RIGHT.get(name, {}).get(argument, ()):
                 continue
             given = {key: good[key] if key in good else make() for key in needed if key != argument}
             if parameter.kind is parameter.VAR_POSITIONAL:
@@ -175,16 +184,14 @@ def cases(name: str) -> Iterator[tuple[str, str, Callable[[], Any]]]:
                 yield argument, label, partial(function, **given, **{key: make()})
 
 
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="calls cannot be limited in time on Windows")
 @pytest.mark.parametrize("name", _callables())
-def test_nothing_but_a_sentence_of_creepkit_comes_out(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_but_a_sentence_comes_out(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     if name == "train":
         importlib.import_module("torch")  # which takes longer than a call may
     wrong = []
     for argument, label, call in cases(name):
-        start = time.perf_counter()
         try:
             with _time_limit(), warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -193,8 +200,6 @@ def test_nothing_but_a_sentence_of_creepkit_comes_out(
             pass
         except Exception as error:
             wrong.append(f"{argument} = {label}: {type(error).__name__}: {str(error)[:100]}")
-        if time.perf_counter() - start > LONGEST:
-            wrong.append(f"{argument} = {label}: too long")
     assert wrong == [], "\n".join(wrong)
 
 

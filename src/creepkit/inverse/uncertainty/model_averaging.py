@@ -128,7 +128,7 @@ class ModelAverage(Presentable):
 
     def _check_point(self, warn: bool, **point: ArrayLike | None) -> None:
         if warn:
-            warn_of_extrapolation(self.fits[0].ranges, point, stacklevel=4)
+            warn_of_extrapolation(self.fits[0].ranges, point, stacklevel=5)
 
     def distribution(
         self,
