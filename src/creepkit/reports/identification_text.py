@@ -219,10 +219,7 @@ def _linear_outputs(fit: Identification) -> list[str]:
 
 
 def _table(fit: Identification) -> list[str]:
-    """One line a test: its error, its offset and weight, and what was found of its nuisances.
-
-    chi2 : as the law is judged, with the test's own rate and offset taken out, where its noise is known.
-    """
+    """One line a test: its error, chi-square as the law is judged, offset, weight and what was found of nuisances."""
     linear_output_tests = [m for m in fit.tests if m.outputs and not is_logarithmic(m.outputs[0].output)]
     estimates_by_owner = {(n.key, n.owner): n for n in fit.nuisances if n.scope == "test"}
     kinds = list(dict.fromkeys(n.key for n in fit.nuisances if n.scope == "test"))
@@ -301,13 +298,10 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
 
 def _range_lines(fit: Identification) -> list[str]:
     """The range of the tests, and at which temperatures not all of its stresses were tested."""
-    units = {"stress": "MPa", "strain": "", "time": "s"}
-    covered = (
-        f"{name} {celsius_text(low, high)}"
-        if name == "temperature"
-        else f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip()
-        for name, (low, high) in fit.ranges.items()
-    )
+    units = {"stress": " MPa", "time": " s"}
+    spans = {name: f"{low:.4g} to {high:.4g}{units.get(name, '')}" for name, (low, high) in fit.ranges.items()}
+    spans |= {name: celsius_text(*fit.ranges[name]) for name in spans if name == "temperature"}
+    covered = (f"{name} {span}" for name, span in spans.items())
     lines = [f"range of the tests: {', '.join(covered)}"]
     at_temperatures = stresses_at_temperatures(fit)
     low, high = fit.ranges["stress"]
