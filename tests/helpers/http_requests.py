@@ -6,7 +6,7 @@ import json
 import socket
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, NamedTuple
 
 from creepkit.app.contents import PageContents
@@ -38,7 +38,8 @@ def send(server: PageServer, text: bytes) -> Answer:
     """What the server answers to these bytes; an empty answer has status 0."""
     with socket.create_connection(server.server_address[:2], timeout=30) as connection:
         connection.sendall(text)
-        connection.shutdown(socket.SHUT_WR)
+        with suppress(OSError):  # the server may have ended it already
+            connection.shutdown(socket.SHUT_WR)
         received = b""
         while part := connection.recv(1 << 16):
             received += part
