@@ -38,6 +38,7 @@ ALLOWED = {
     "creepkit.cli.failures open": "the null device, in place of a stream that is closed",
     "creepkit.cli.failures TextIOWrapper": "its own output without a buffer, written whole",
     "creepkit.cli.demo read_text": "example data of the package",
+    "creepkit.cli.demo read_bytes": "example data of the package",
     "creepkit.jobs.worker_process fdopen": "the output of a worker, a pipe to its parent",
     "creepkit.jobs.shard_progress open": "a lock that creepkit makes, written and never read",
     "creepkit.cli.app_page open": "a page in a browser: webbrowser.open",

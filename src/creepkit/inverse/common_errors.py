@@ -85,7 +85,10 @@ def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, test: int | Non
 
 
 def activation_energy(problem: LeastSquaresProblem, x: Floats) -> tuple[float, bool]:
-    """J/mol at the reference temperature, and whether it is a usual one, as the law knows no temperature."""
+    """J/mol at the reference temperature, and whether it is a usual one, as the law knows no temperature.
+
+    x : (unknowns,) internal values.
+    """
     T = problem.coordinates.reference.temperature
     return log_rate_per_kelvin(problem, x) * GAS_CONSTANT * T**2, not problem.law.uses(temperature)
 

@@ -28,11 +28,13 @@ from creepkit.inverse.variance_components import LinearisedProblem, LinearSoluti
 
 @dataclass(frozen=True, eq=False)
 class JudgedResiduals:
-    """What is left of every observation, (tests, observations) each; only those where `known.judged` count.
+    """What is left of every observation; only those where `known.judged` count.
 
     residuals : at the optimum, with the random effects of tests. known : the noise they are judged by.
-    deviation : predicted less measured, in the output's unit, offsets, rates and lives of tests taken out.
-    contributions, marginal : to chi-square, that of all outputs together and that of the output alone.
+    deviation : (tests, observations) predicted less measured, in the output's unit, offsets, rates and lives of tests
+        taken out.
+    contributions, marginal : (tests, observations) to chi-square, that of all outputs together and that of the output
+        alone.
     share_of_freedom : degrees of freedom of one observation.
     """
 

@@ -85,7 +85,10 @@ class KnownNoise:
         return float(chi2.sf(reduced * total * 2.0 * mean / variance, 2.0 * mean**2 / variance))
 
     def critical(self, chance: float, share_of_freedom: float, mask: Bools) -> float:
-        """The reduced chi-square that is exceeded with a probability `chance`: the inverse of chance_of_larger."""
+        """The reduced chi-square that is exceeded with a probability `chance`: the inverse of chance_of_larger.
+
+        mask : (tests, observations) which count.
+        """
         groups = self._groups(share_of_freedom, mask)
         total = sum(freedom for freedom, _ in groups)
         if len(groups) == 1:

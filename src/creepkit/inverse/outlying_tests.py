@@ -31,10 +31,11 @@ SMALLEST_SCATTER = 0.05
 
 
 def outlying_tests(log_factors: Floats) -> Bools:
-    """(tests,) which tests lie outside of the others, by ln of their factors on the law's rate, (tests,).
+    """(tests,) which tests lie outside of the others.
 
-    Those beyond OUTSIDE robust standard deviations and OUTLYING_FACTOR are compared with the mean and the standard
-    deviation of all others: Student's t of a new value, its p-value times the number of tests.
+    log_factors : (tests,) ln of their factors on the law's rate. Those beyond OUTSIDE robust standard deviations and
+    OUTLYING_FACTOR are compared with the mean and the standard deviation of all others: Student's t of a new value, its
+    p-value times the number of tests.
     """
     distances = np.abs(log_factors - np.median(log_factors))
     candidates = (distances > OUTSIDE * 1.4826 * float(np.median(distances))) & (distances > np.log(OUTLYING_FACTOR))

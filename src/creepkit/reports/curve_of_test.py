@@ -95,6 +95,6 @@ def line_style(weight: float) -> Literal["-", "--"]:
 
 
 def set_time_range(axes: Axes, hours: Floats, output: str) -> None:
-    """Logarithmic where creep spans decades of time: strains, and stresses that relax."""
+    """Logarithmic where creep spans decades of time: strains, and stresses that relax. hours : (readings,)."""
     logarithmic = is_logarithmic(output) or output.startswith("stress")
     set_range(axes, "x", float(hours.min()) if logarithmic else 0.0, float(hours.max()), logarithmic=logarithmic)

@@ -41,7 +41,7 @@ RESIDUAL_HEADING = "measured less identified, own rates and offsets\nof tests ta
 
 
 class Series(NamedTuple):
-    """The residuals of one test: hours and values, (readings,) each, in the order of time."""
+    """The residuals of one test, in the order of time. hours, values : (readings,)."""
 
     test: int
     hours: Floats
