@@ -8,7 +8,7 @@ this module; the script `creepkit`, and `python -P -m creepkit`, look into no wo
 
 # no `from __future__ import`: that imports a module too, before the working folder is left out; _signal is part of the
 # interpreter, while signal imports enum and others, during which Ctrl-C would end in a traceback
-import _signal
+import _signal  # type: ignore[import-not-found]
 import os
 import sys
 

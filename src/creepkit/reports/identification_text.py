@@ -278,8 +278,8 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
         interval = " to ".join(interval_ends(fit.law, e))
-        verdict = [] if rejected(fit) and e.verdict == "determined" else [e.verdict]
-        said = " ".join([*verdict, *([if_held] if rejected(fit) else [])])
+        own_verdict = [] if rejected(fit) and e.verdict == "determined" else [e.verdict]
+        said = " ".join([*own_verdict, *([if_held] if rejected(fit) else [])])
         lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {interval}, {said}")
     lines += _range_lines(fit)
     rate_scatter = f"scatter of rates between tests (one sd) {scatter_of_rates(fit)}"
