@@ -50,9 +50,9 @@ _WAY_OUT = "open the file in a spreadsheet program and save it anew"
 class SheetRows:
     """What the XML of a sheet says of its rows.
 
-    references : number of cells that refer to shared texts. hidden : numbers of rows. hidden_columns : whether there are some. uncomputed : row and column of the first
-    formula without a value, if any. merged : row, first and last column of each range of merged cells. content : the
-    least worksheet that holds its rows, b"" where there are none.
+    references : number of cells that refer to shared texts. hidden : numbers of rows. hidden_columns : whether there
+    are some. uncomputed : row and column of the first formula without a value, if any. merged : row, first and last
+    column of each range of merged cells. content : the least worksheet that holds its rows, b"" where there are none.
     """
 
     references: int = 0
