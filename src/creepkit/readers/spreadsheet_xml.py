@@ -32,6 +32,10 @@ MAXIMUM_RUNS = 100_000
 """Elements of the texts of a sheet, or of those that it shares, beyond the three of a text that is written alike."""
 
 
+MAXIMUM_UNUSED_TEXTS = 100_000
+"""Shared texts beyond the number of the cells that refer to one."""
+
+
 MAXIMUM_FORMAT, MAXIMUM_BRACKETS = 1000, 20
 """Characters of a number format, of which the format has 255, and those of them that are `[`."""
 
@@ -46,11 +50,12 @@ _WAY_OUT = "open the file in a spreadsheet program and save it anew"
 class SheetRows:
     """What the XML of a sheet says of its rows.
 
-    hidden : numbers of rows. hidden_columns : whether there are some. uncomputed : row and column of the first
-    formula without a value, if any. merged : row, first and last column of each range of merged cells. content : the
-    least worksheet that holds its rows, b"" where there are none.
+    references : number of cells that refer to shared texts. hidden : numbers of rows. hidden_columns : whether there
+    are some. uncomputed : row and column of the first formula without a value, if any. merged : row, first and last
+    column of each range of merged cells. content : the least worksheet that holds its rows, b"" where there are none.
     """
 
+    references: int = 0
     hidden: tuple[int, ...] = ()
     hidden_columns: bool = False
     uncomputed: tuple[int, int] | None = None
@@ -113,7 +118,7 @@ def check_sheet(place: str, part: bytes, shared: Sequence[int] = ()) -> SheetRow
     dimension = f'<dimension xmlns="{MAIN}" ref="A1"/>'.encode()
     content = root + dimension + part[sheet.data_from : part.index(b">", sheet.data_to) + 1] + end
     merged = tuple(sheet.merged)
-    return SheetRows(tuple(sheet.hidden), sheet.hidden_columns, sheet.uncomputed, merged, content)
+    return SheetRows(sheet.references, tuple(sheet.hidden), sheet.hidden_columns, sheet.uncomputed, merged, content)
 
 
 def _parser(start: Callable[[str, Mapping[str, str]], None]) -> Any:
@@ -161,7 +166,7 @@ class _Sheet:
         self.depth = self.row_depth = self.row = self.column = self.ranges = 0
         self.empty, self.cells, self.characters = 0, 0, 0
         self.kind, self.text, self.has_formula, self.values, self.length = "", "", False, 0, 0
-        self.in_value, self.runs = False, 0
+        self.in_value, self.runs, self.references = False, 0, 0
         self.parser = _parser(self.start)
         self.parser.EndElementHandler = self.end
         self.parser.CharacterDataHandler = self.add_text
@@ -301,4 +306,5 @@ class _Sheet:
             self._refuse(
                 f"refers to text {quoted(ascii(text), 20)} of {len(self.shared)} that the file shares; {_WAY_OUT}"
             )
+        self.references += self.values
         return self.shared[number] if self.values else 0

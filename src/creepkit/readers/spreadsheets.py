@@ -17,13 +17,14 @@ from typing import Any
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
+from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, check_readable, read_bytes
 from creepkit.readers.cell_grids import CellGrid, grid_of_rows, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.number_formats import number_text
 from creepkit.readers.spreadsheet_parts import WorkbookParts, checked_parts
-from creepkit.readers.spreadsheet_xml import SheetRows, check_formats, check_sheet, text_lengths
+from creepkit.readers.spreadsheet_xml import MAXIMUM_UNUSED_TEXTS, SheetRows, check_formats, check_sheet, text_lengths
 from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
 from creepkit.readers.table_rows import TableRow
 from creepkit.readers.text_tables import SourceText, unknown_text
@@ -92,6 +93,12 @@ def _checked_sheets(path: Path, sheets: Sequence[Any], parts: WorkbookParts) -> 
             raise HistoryError(f"{place}: has no rows of its own in the file; save it anew as .xlsx")
         if sheet.sheet_state == "visible":
             found[name] = check_sheet(place, parts.contents[name], lengths)
+    unused = len(lengths) - sum(sheet.references for sheet in found.values())
+    if unused > (most := raised(MAXIMUM_UNUSED_TEXTS)):
+        raise HistoryError(
+            f"{path}: more than {most} of its shared texts are in no cell that is shown; save it anew as .xlsx, or "
+            f"{how_to_raise(unused, most)}"
+        )
     return found
 
 

@@ -107,6 +107,11 @@ REFUSED = {
         "texts in more than 100000 parts",
     ),
     "shared runs": (*shared(b"<r/>" * 12_000), "its shared texts: texts in more than 100000 parts"),
+    "unused texts": (
+        TEXTS,
+        lambda part: part.replace(b"</sst>", b"<si/>" * 100_000 + b"</sst>"),
+        "more than 100000 of its",
+    ),
     "long text": (*shared(b"<r><t>" + b"a" * 60_000 + b"</t></r>"), "its shared texts: a cell holds more than 100000"),
     "encoding": (
         SHEET,
