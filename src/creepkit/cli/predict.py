@@ -23,7 +23,6 @@ from creepkit.cli.planned_test import (
     parse_temperature,
     planned_test,
 )
-from creepkit.records.units import celsius_text
 from creepkit.reports.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
@@ -128,6 +127,7 @@ def _temperature(source: Identification | ModelAverage, texts: list[str] | None)
     from creepkit.errors import FitError
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
+    from creepkit.records.units import celsius_text
 
     if texts:
         return parse_temperature(texts)
