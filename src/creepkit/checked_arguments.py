@@ -31,28 +31,30 @@ def checked(public: Anything) -> Anything:
     Numbers must be finite, unless the default is not; those of pairs such as bounds may be infinite. What a constructor
     itself says of a wrong value comes first.
     """
-    if not inspect.isclass(public):
-        function: Anything = _checked_function(public, public.__qualname__, lambda: _function_annotations(public))
-        return function
+    return checked_with_own_words()(public)
+
+
+def checked_with_own_words(*own: str) -> Callable[[Anything], Anything]:
+    """As checked, of a function or class that itself says what is wrong with the arguments of these names."""
+
+    def decorate(public: Anything) -> Anything:
+        if inspect.isclass(public):
+            return _checked_class(public, own)
+        made: Anything = _checked_function(public, public.__qualname__, lambda: _function_annotations(public), own)
+        return made
+
+    return decorate
+
+
+def _checked_class(public: Any, own: tuple[str, ...]) -> Any:
+    """The class, whose constructor checks its arguments."""
     name = "__init__" if "__init__" in public.__dict__ else "__new__"
     constructor = inspect.unwrap(getattr(public, name))
     generated = is_dataclass(public) and not constructor.__code__.co_filename.endswith(".py")
     annotations = (lambda: _field_annotations(public)) if generated else (lambda: _function_annotations(constructor))
-    replacement = _checked_function(constructor, public.__qualname__, annotations, constructs=True)
+    replacement = _checked_function(constructor, public.__qualname__, annotations, own, constructs=True)
     setattr(public, name, replacement)  # of __new__ a static method, as Python takes it for one
     return public
-
-
-def checked_with_own_words(*own: str) -> Callable[[Anything], Anything]:
-    """As checked, of a function that itself says what is wrong with the arguments of these names."""
-
-    def decorate(function: Anything) -> Anything:
-        made: Anything = _checked_function(
-            function, function.__qualname__, lambda: _function_annotations(function), own
-        )
-        return made
-
-    return decorate
 
 
 def _checked_function(

@@ -15,7 +15,9 @@
 # Source: Norton (1929), The Creep of Steel at High Temperatures, McGraw-Hill
 # Source: Bailey (1935), The Utilization of Creep Test Data in Engineering Design, Proc. Inst. Mech. Eng. 131,
 #     131-349
-# Source: Table 1 of Chen et al., Machine Learning-Driven Creep Law Discovery
+# Source: H. Chen, R. Zhou, R. Zha, Z. Chen, W. Li, R. Rolark, J. P. Reidy, J. Cao, I. McCue, P. Guo, D. C.
+#     Dunand, H. D. Espinosa, Machine Learning-Driven Creep Law Discovery Across Alloy Compositional Space
+#     (manuscript), Table 1
 #
 # PowerLawCreepStressUpdate: rate = coefficient s^n_exponent exp(-activation_energy/(gas_constant T)) (t -
 #     start_time)^m_exponent, of equivalent stress s; ComputeMultipleInelasticStress adds the models. t is the

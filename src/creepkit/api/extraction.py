@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import HistoryError
 from creepkit.records import Loading, Program, RecordedLoading, SupportsSurfaceObservation
 from creepkit.registry.arguments import resolve_predictor
@@ -22,7 +22,7 @@ WATCHED = "bulge"
 """The specimen that cameras are taken to watch where none is named."""
 
 
-@checked
+@checked_with_own_words("centers")
 def extract(
     frames: Frames,
     specimen: Specimen | str = WATCHED,

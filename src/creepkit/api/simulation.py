@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import DatasetError, SolveError, SurrogateError
 from creepkit.language import symbols
 from creepkit.records import History, Loading, Predictor, Program, Specimen, Status, call_of_plugin, predict_with
@@ -31,7 +31,7 @@ ROOM_TEMPERATURE = 293.15
 """K; stands where a law does not ask for a temperature."""
 
 
-@checked
+@checked_with_own_words("values", "loading")
 def simulate(
     law: CreepLaw | str,
     using: Predictor | str,
@@ -169,7 +169,7 @@ def resolve_design(source: SamplingDesign | CreepLaw | str, specimen: Specimen, 
     return source
 
 
-@checked
+@checked_with_own_words("recipe", "data")
 def train(
     data: Dataset | str | Path,
     recipe: Recipe,

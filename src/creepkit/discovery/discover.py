@@ -8,7 +8,7 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.discovery.combinations import rank_combinations
 from creepkit.discovery.elastic_moduli import FIRST_FRAMES, ModulusEstimates, identify_moduli
 from creepkit.discovery.forms import CONSTANT, CandidateForm, candidate_forms
@@ -38,7 +38,7 @@ PriorOdds = Mapping[str, Mapping[str, float]]
 """{parameter: {form: odds}}."""
 
 
-@checked
+@checked_with_own_words("fits")
 def discover(
     fits: Sequence[Identification],
     *,
@@ -133,7 +133,7 @@ class TemperatureStudy(Presentable):
 def temperature_study(
     law: CreepLaw | str,
     tests: Sequence[History],
-    using: Predictor | str | None = None,
+    using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     *,
     moduli: bool = False,
     within: float = ISOTHERMAL_RANGE,

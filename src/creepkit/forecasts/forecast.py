@@ -12,7 +12,7 @@ import numpy as np
 
 from creepkit import limits
 from creepkit.arrays import single_threaded_blas
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import FitError, nearest, quoted
 from creepkit.forecasts.draws import check_tolerances, law_draws
 from creepkit.forecasts.forecast_of_test import forecast_test
@@ -74,7 +74,7 @@ class Forecast(Presentable):
         return present(self, "plot", path)
 
 
-@checked
+@checked_with_own_words("level", "targets", "tolerances")
 def forecast(
     source: Identification | WeightedLaws | ModelAverage,
     tests: History | Sequence[History],

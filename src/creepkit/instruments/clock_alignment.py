@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, Ints
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import HistoryError, quoted
 from creepkit.instruments.response_likelihood import (
     DrivingRecord,
@@ -114,7 +114,7 @@ class _Task:
         return replace(self, times=self.times[kept], displacements=self.displacements[kept])
 
 
-@checked
+@checked_with_own_words("record", "channel", "frame_times", "displacement", "search", "drift", "camera_start")
 def align_clocks(
     record: InstrumentRecord,
     channel: str,

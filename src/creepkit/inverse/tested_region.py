@@ -20,13 +20,19 @@ SAME_STRESS = 0.01
 def tested_points(fit: Identification) -> Floats:
     """(points, 2) stress, MPa, and temperature, K, of the holds of the fitted tests; none without their histories."""
     points = [
-        (float(stress), float(celsius) + ZERO_CELSIUS)
+        (float(stress), T)
         for history in fit.histories
         for stress in reference_stresses(history, fit.predictor)
         if stress > 0
-        for celsius in np.unique(np.round(history.temperature_program().at(history.used_times) - ZERO_CELSIUS, 1))
+        for T in _distinct(history.temperature_program().at(history.used_times))
     ]
     return np.array(points, float).reshape(-1, 2)
+
+
+def _distinct(temperatures: Floats) -> list[float]:
+    """Temperatures (readings,) in K, one of those that are the same to 0.1 °C."""
+    first = np.unique(np.round(temperatures - ZERO_CELSIUS, 1), return_index=True)[1]
+    return [float(T) for T in temperatures[first]]
 
 
 def stresses_at_temperatures(fit: Identification) -> list[tuple[float, tuple[float, float]]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, frozen
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import HistoryError
 from creepkit.presentation import Presentable
 
@@ -51,7 +51,7 @@ class ClockAlignment(Presentable):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     @classmethod
-    @checked
+    @checked_with_own_words("lag", "drift", "zero")
     def stated(cls, lag: float, drift: float = 0.0, zero: float = 0.0) -> ClockAlignment:
         """An alignment that is known: the record's time is t - zero + lag + drift (t - zero)."""
         return cls(zero, lag, drift, zero, (lag, lag), (drift, drift))

@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import SolveError, nearest
 from creepkit.records.known_specimens import all_dimensions
 from creepkit.records.specimen_record import NAME_PATTERN
@@ -138,7 +138,7 @@ CLOSE_SPELLING = 0.8
 """Similarity above which an unknown kind is a misspelt one."""
 
 
-@checked
+@checked_with_own_words("sd")
 @dataclass(frozen=True)
 class Nuisance:
     """A nuisance parameter: something unknown about a test that is not part of the law, with its prior.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from creepkit.arrays import ArrayLike
 from creepkit.cameras import reading as camera_reading
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import FitError, LawError, SolveError, quoted
 from creepkit.instruments import reading as instrument_files
 from creepkit.instruments.reading_options import RecordOptions
@@ -78,7 +78,7 @@ def check_histories(values: Sequence[History]) -> list[History]:
     return histories
 
 
-@checked
+@checked_with_own_words("ignore")
 def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: Collection[str] = ()) -> list[History]:
     """Read measured histories from a file, a folder, a pattern such as "in625/*.csv", or several of these.
 
@@ -89,7 +89,7 @@ def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: 
     return reading.read_histories(paths, readers, reader, ignore)
 
 
-@checked
+@checked_with_own_words("path", "times")
 def read_frames(
     path: camera_reading.FramePath,
     format: camera_reading.FormatLike = None,
@@ -115,7 +115,7 @@ def frame_files(path: camera_reading.FramePath, format: camera_reading.FormatLik
     return camera_reading.frame_files(path, formats, format)
 
 
-@checked
+@checked_with_own_words("format", "path", "missing", "options")
 def read_record(path: str | Path, format: str | None = None, **options: Unpack[RecordOptions]) -> InstrumentRecord:
     """Read the record of an instrument: channels of pressure, temperature and others over one clock.
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import FitError, nearest, quoted
 from creepkit.inverse.information_criteria import aicc_penalty, bic_penalty, criterion_weights
 from creepkit.records import History
@@ -54,7 +54,7 @@ LEAST_RATES = 4
 """Tests with a rupture time and a minimum rate from which Monkman-Grant's relation is fitted unasked."""
 
 
-@checked
+@checked_with_own_words("hours", "temperatures", "methods")
 def rupture(
     tests: Sequence[History],
     methods: Sequence[str] | str | None = None,

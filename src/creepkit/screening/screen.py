@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.history_checks import sound_tests
@@ -77,7 +77,7 @@ class ScreeningOptions:
             raise FitError(f'confirm is {self.confirm!r}; allowed are True, False and "when in doubt"')
 
 
-@checked
+@checked_with_own_words("histories")
 def screen(
     histories: Sequence[History] | str | Path,
     laws: Sequence[CreepLaw | str] | None = None,
