@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import CreepkitError, SolveError, quoted
 from creepkit.records import History, Load, Prediction, Status
 from creepkit.records.prediction_assembly import (
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from creepkit.records import NuisanceValues
 
 
-@checked
+@checked_with_own_words("outputs", "status")
 @dataclass(frozen=True)
 class OneTest:
     """What one candidate does in one test, where it does not reach the end.
