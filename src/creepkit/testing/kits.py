@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from creepkit import limits
-from creepkit.checked_arguments import checked
+from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, quoted
 from creepkit.kernels.lowering import lower
 from creepkit.language import arrhenius
@@ -108,7 +108,7 @@ def _checks_of_property(
         return [ConformanceCheck(name, False, f"{type(error).__name__}: {error}")]
 
 
-@checked
+@checked_with_own_words("specimen")
 def check_specimen(
     specimen: Specimen,
     histories: Sequence[History] | None = None,
@@ -168,7 +168,7 @@ def check_predictor(
     return ConformanceReport(predictor, tuple(_all_findings(checks, case)), "predictor")
 
 
-@checked
+@checked_with_own_words("reader")
 def check_reader(reader: Reader, path: str | Path | None = None) -> ConformanceReport:
     """Run every check on a reader.
 
@@ -202,7 +202,7 @@ def check_camera_format(format: CameraFormat, path: str | Path | None = None) ->
     return _report(format, "camera format", checks, case)
 
 
-@checked
+@checked_with_own_words("exporter")
 def check_exporter(exporter: Exporter) -> ConformanceReport:
     """Run every check on an exporter, with every registered law."""
     if isinstance(exporter, type) or not hasattr(exporter, "text"):
