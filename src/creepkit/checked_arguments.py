@@ -35,7 +35,10 @@ def checked(public: Anything) -> Anything:
 
 
 def checked_with_own_words(*own: str) -> Callable[[Anything], Anything]:
-    """As checked, of a function or class that itself says what is wrong with the arguments of these names."""
+    """As checked, of a function or class that itself judges the arguments of these names; its own sentence comes first.
+
+    What it accepts beyond its annotations is right; where it fails without a sentence, that of the check is raised.
+    """
 
     def decorate(public: Anything) -> Anything:
         if inspect.isclass(public):
@@ -64,7 +67,7 @@ def _checked_function(
     own: tuple[str, ...] = (),
     constructs: bool = False,
 ) -> Any:
-    arguments = _Arguments(function, name, annotations, own)
+    arguments = _Arguments(function, name, annotations)
 
     @functools.wraps(function)
     def checking(*args: Any, **kwargs: Any) -> Any:
@@ -74,9 +77,12 @@ def _checked_function(
             wrong = error
         else:
             return function(*args, **kwargs)
-        if constructs:
-            with contextlib.suppress(ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
-                function(*args, **kwargs)
+        says_itself = wrong.argument in own
+        if constructs or says_itself:
+            with contextlib.suppress(ArithmeticError, AttributeError, LookupError, OSError, TypeError, ValueError):
+                result = function(*args, **kwargs)
+                if says_itself:
+                    return result
         raise wrong
 
     return checking
@@ -85,8 +91,8 @@ def _checked_function(
 class _Arguments:
     """The checks of one function by argument, made when it is first called."""
 
-    def __init__(self, function: Any, name: str, annotations: Callable[[], Annotations], own: tuple[str, ...]) -> None:
-        self.function, self.name, self.annotations, self.own = function, name, annotations, own
+    def __init__(self, function: Any, name: str, annotations: Callable[[], Annotations]) -> None:
+        self.function, self.name, self.annotations = function, name, annotations
         code = function.__code__
         further = code.co_varnames[code.co_argcount + code.co_kwonlyargcount :]
         several = bool(code.co_flags & inspect.CO_VARARGS)
@@ -132,10 +138,10 @@ class _Arguments:
             value = tuple(value)
             if check.accepts(value):
                 return value
-        if argument in self.own:
-            return value
         place, wrong, allowed = check.wrong_part(value)
-        raise ArgumentError(f"{argument}{place} of {self.name}() is {quoted_value(wrong)}; allowed is {allowed}")
+        error = ArgumentError(f"{argument}{place} of {self.name}() is {quoted_value(wrong)}; allowed is {allowed}")
+        error.argument = argument
+        raise error
 
 
 def _is_read_once(value: Any) -> bool:

@@ -61,7 +61,9 @@ def _message(text: str) -> str:
 
 
 class ArgumentError(CreepkitError, TypeError, ValueError):
-    """An argument of a public function or record is not what the annotation says."""
+    """An argument of a public function or record is not what the annotation says. argument : its name."""
+
+    argument = ""
 
 
 class LawError(CreepkitError):
