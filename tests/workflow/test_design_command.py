@@ -51,7 +51,7 @@ def test_what_the_rig_can_do_is_said_by_options(saved):
     [
         (("--goal", "rats"), "--goal rats is not known; write law, parameters, rate:60"),
         (("--levels", "4"), "--levels 4 is not known; write --levels 4:14"),
-        (("--budget", "0"), "--budget 0: allowed are numbers above 0 up to"),
+        (("--budget", "0"), "--budget 0: allowed are numbers from 1e-09 to 1000000000"),
         (("--dimension", "x=wide"), "--dimension x wide is not known"),
     ],
 )
