@@ -122,7 +122,7 @@ def test_ranges_of_conditions_and_what_is_left_out_can_be_said():
         ),
         (("generate", "nortn", "--to", "a.h5", "--samples", 9), "did you mean 'norton'"),
         (("generate", "norton", "--specimen", "point", "--to", "a.h5", "--samples", 9), "add the attribute conditions"),
-        (("generate", "norton", "--to", "", "--samples", 9), "it is a folder; name a file in it"),
+        (("generate", "norton", "--to", "", "--samples", 9), "--to is empty; give a value, or leave the option out"),
         (("generate", "norton", "--to", "a.h5", "--samples", 9, "--end-h", "1e9"), "at most 100000 are simulated"),
         (("generate", "norton", "--to", "a.h5", "--samples", 9, "--range", "P1"), "--range P1: write NAME=LOW:HIGH"),
         (("generate", "norton", "--to", "a.h5", "--range", "P9=1:2"), "a bulge test has no condition 'P9'"),
