@@ -64,6 +64,7 @@ def test_what_is_done_is_not_done_again(plate):
 
 
 def test_a_wrong_word_is_told_in_a_line(plate):
-    told = screen(plate[0], "--confirm", "perhaps")
+    words = [str(plate[0] / "tests"), "--to", str(plate[0] / "screened"), *LAWS, "--confirm", "perhaps"]
+    told = CliRunner().invoke(app, ["screen", *words])
     assert told.exit_code == 1
     assert told.stderr == ("creepkit: --confirm perhaps is not known; allowed are when-in-doubt, always, never\n")

@@ -65,12 +65,12 @@ def test_every_mistake_is_one_line_with_file_and_line(folder: Path) -> None:
     assert "did you mean 'norton'" in line
     ran = creepkit("run", folder / "planted_850C_70MPa.csv")
     assert ran.exit_code == 1
-    assert "this is not TOML" in ran.stderr
+    assert "this is no study file, but looks like data" in ran.stderr
     ran = creepkit("run", study, "--only", "identify")
     assert ran.exit_code == 1
     ran = creepkit("init", folder / "missing")
     assert ran.exit_code == 1
-    assert "choose a file in a folder that exists" in ran.stderr
+    assert "there is no folder" in ran.stderr
     (folder.parent / "other").mkdir()
     ran = creepkit("init", folder.parent)
     assert ran.exit_code == 1

@@ -227,7 +227,8 @@ def rank_laws(laws: Sequence[CreepLaw], histories: list[History], **options: Any
     from creepkit.inverse.selection import rank
 
     fits = []
-    options["rupture_times"] = common_rupture_times(laws, ck.IdentificationSettings()).rupture_times
+    asked = ck.IdentificationSettings(rupture_times=options.get("rupture_times", "auto"))
+    options["rupture_times"] = common_rupture_times(laws, asked).rupture_times
     with ProgressBar() as progress:
         for law in laws:
 

@@ -141,7 +141,7 @@ def _named(tests: Sequence[History]) -> str:
 
 
 def common_rupture_times(laws: Sequence[CreepLaw], settings: IdentificationSettings) -> IdentificationSettings:
-    """Settings with which laws are compared from the same values: ends are used where some law has tertiary creep."""
-    if settings.rupture_times != "auto":
+    """Settings with which laws are compared from the same values: ends are used by all if some have tertiary creep."""
+    if settings.rupture_times != "auto" or len(set(map(has_tertiary_creep, laws))) < 2:
         return settings
-    return replace(settings, rupture_times="use" if any(map(has_tertiary_creep, laws)) else "ignore")
+    return replace(settings, rupture_times="use")

@@ -68,7 +68,10 @@ def test_targets_of_a_dimple(saved):
             ["--stress", "80", "--end-h", "1", "--temperature-c", "800", "--level", "2"],
             "--level 2: allowed are numbers from 0.5 to 0.999999",
         ),
-        (["--stress", "80", "--end-h", "-1", "--temperature-c", "800"], "--end-h -1: allowed are numbers from 1e-09 to 1000000000"),
+        (
+            ["--stress", "80", "--end-h", "-1", "--temperature-c", "800"],
+            "--end-h -1: allowed are numbers from 1e-09 to 1000000000",
+        ),
         (["--stress", "80", "--end-h", "1", "--temperature-c", "800", "--plot", "x.txt"], "is no format of pictures"),
     ],
 )
