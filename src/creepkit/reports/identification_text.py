@@ -292,7 +292,8 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
     ]
     adequacy_text = [] if fit.adequacy is None else [f"the law {fit.adequacy}"]
     adequacy_text += [text] if (text := apart_sentence(fit)) else []
-    return [*lines, "; ".join([*errors_text, rate_scatter]), *adequacy_text, *fit.notes]
+    lines += ["; ".join([*errors_text, rate_scatter]), *adequacy_text, *fit.notes]
+    return [line.replace("°C", "C") for line in lines]  # sources in Fortran hold ASCII alone
 
 
 def _range_lines(fit: Identification) -> list[str]:
