@@ -62,3 +62,21 @@ def test_an_unknown_program_is_an_error(monkeypatch, capsys) -> None:
     with pytest.raises(SystemExit):
         programs.main()
     assert "there is no program nonsense" in capsys.readouterr().err
+
+
+def test_short_forms_are_run_as_they_are_listed(monkeypatch, capsys) -> None:
+    run = []
+
+    def done(words, cwd):
+        run.append(words[1:])
+        return programs.argparse.Namespace(returncode=0)
+
+    monkeypatch.setattr(programs.subprocess, "run", done)
+    monkeypatch.setattr(sys, "argv", ["all.py", "--short"])
+    programs.main()
+    short = {name: one.short for name, one in programs.BENCHMARKS.items() if one.short}
+    assert run == [[f"tests/benchmarks/{name}.py", *words] for name, words in short.items()]
+    for words in (["--short", "--write"], ["--short", "import_time"]):
+        monkeypatch.setattr(sys, "argv", ["all.py", *words])
+        with pytest.raises(SystemExit):
+            programs.main()

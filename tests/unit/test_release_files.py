@@ -44,6 +44,10 @@ def test_the_workflow_calls_the_scripts_of_this_folder() -> None:
         assert (ROOT / script).is_file(), script
 
 
+def test_ci_runs_the_programs_on_hostile_input_in_their_short_forms() -> None:
+    assert "tests/benchmarks/all.py --short" in text(".ci/run")
+
+
 def test_the_short_script_runs_the_same_tests_as_make() -> None:
     """Other systems have no make; the installation and the tests are those of the Makefile."""
     for part in ("hatchling>=1.26", "editables>=0.5", "src/core/compile.py", "-n 2 --dist loadgroup"):
