@@ -43,6 +43,13 @@ def _check(values: dict[str, Any], order: list[Any]) -> None:
         for text in given if isinstance(given, list | tuple) else (given,):
             if isinstance(text, str) and not text.strip():
                 raise CreepkitError(f"{name} is empty; give a value, or leave the option out")
-            is_number = option.type_descriptor.annotation in (int, float)
-            if isinstance(text, str) and is_number and (not text.isascii() or "_" in text):
+            if isinstance(text, str) and _is_number(option) and (not text.isascii() or "_" in text):
                 raise CreepkitError(f"{name} {quoted(text)}: write a number without underscores, such as 1000")
+
+
+def _is_number(option: Any) -> bool:
+    """Whether an option takes whole numbers or others; typer before 0.27 has types of click in its options."""
+    described = getattr(option, "type_descriptor", None)
+    if described is not None:
+        return described.annotation in (int, float)
+    return option.type.name.partition(" ")[0] in ("integer", "float")
