@@ -41,9 +41,11 @@ def checked_with_own_words(*own: str) -> Callable[[Anything], Anything]:
     """
 
     def decorate(public: Anything) -> Anything:
+        made: Anything
         if inspect.isclass(public):
-            return _checked_class(public, own)
-        made: Anything = _checked_function(public, public.__qualname__, lambda: _function_annotations(public), own)
+            made = _checked_class(public, own)
+        else:
+            made = _checked_function(public, public.__qualname__, lambda: _function_annotations(public), own)
         return made
 
     return decorate
