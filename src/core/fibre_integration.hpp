@@ -138,7 +138,7 @@ private:
         };
         while (s < 1.0) {
             h = bounded_step(s, h, settings.longest);
-            if (progress.steps + progress.rejected >= settings.max_steps) return end(TOO_MANY_STEPS, s);
+            if (progress.steps + progress.rejected >= most_steps(settings, test.segment_count)) return end(TOO_MANY_STEPS, s);
             if (!(h >= SMALLEST_STEP * s && h >= SMALLEST_FIRST_STEP)) return end(why_small(near, s), s);
             const double error = attempt(segment, clock, s, h, first, before);
             if (!(error <= 1.0)) {

@@ -113,7 +113,7 @@ private:
         };
         while (s < 1.0) {
             h = bounded_step(s, h, settings.longest);
-            if (progress.steps + progress.rejected >= settings.max_steps) return end(TOO_MANY_STEPS, s);
+            if (progress.steps + progress.rejected >= most_steps(settings, test.segment_count)) return end(TOO_MANY_STEPS, s);
             if (!(h >= SMALLEST_STEP * s && h >= SMALLEST_FIRST_STEP)) {
                 const Ending code = near > 0 ? STATE_LIMIT : why_small(s, slope);
                 if (code != STEP_TOO_SMALL && record.jacobian) steep_end(clock, s, near > 0 ? near : 0, steep);

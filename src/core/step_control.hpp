@@ -15,11 +15,19 @@ namespace creepkit {
 // smallest     : strain below which the error is relative to this instead
 // strain_limit : creep strain at which the point has burst
 // first, longest : first and longest step, as shares of a segment (in its transformed time)
-// max_steps    : cap on steps, accepted and rejected, of one history
+// max_steps    : cap on steps, accepted and rejected, of one history; see most_steps
 struct IntegrationSettings {
     double rtol, smallest, strain_limit, first, longest;
     int64_t max_steps;
 };
+
+// Each further straight piece of a program takes some 7 steps of its own; a logged temperature has thousands of pieces.
+constexpr int64_t STEPS_PER_PIECE = 20;
+
+// Steps that one history may take, accepted and rejected: its own programs decide, not those of tests beside it.
+inline int64_t most_steps(const IntegrationSettings& settings, int64_t pieces) {
+    return settings.max_steps + STEPS_PER_PIECE * (pieces > 1 ? pieces - 1 : 0);
+}
 
 // Newton's last correction; its square, the error left, is a thousandth of the step's tolerance.
 inline double newton_tolerance(const IntegrationSettings& settings) {

@@ -98,7 +98,7 @@ private:
             h = smaller(h, settings.longest);
             const bool last = s + 1.001 * h > goal;
             const double step = last ? goal - s : h;
-            if (attempts_ >= settings.max_steps) return TOO_MANY_STEPS;
+            if (attempts_ >= most_steps(settings, call_.segment_count)) return TOO_MANY_STEPS;
             if (!(step >= SMALLEST_STEP * s && step >= SMALLEST_FIRST_STEP)) return why_small(clock, s);
             ++attempts_;
             const double error = attempt(segment, clock, s, step);

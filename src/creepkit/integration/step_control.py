@@ -11,7 +11,8 @@ class IntegrationSettings(NamedTuple):
     rtol : local error allowed in a step, relative to strain and to each state.
     smallest : strain below which the error is relative to this instead.
     strain_limit : creep strain at which the point has burst.
-    max_steps : cap on steps, accepted and rejected, of one history.
+    max_steps : cap on steps, accepted and rejected, of one history, beside 20 for each further straight piece of its
+        programs.
     first, longest : first and longest step, as shares of a segment (in its transformed time).
     """
 

@@ -34,10 +34,6 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
 
-STEPS_PER_BREAKPOINT = 20
-"""Each straight piece of a program takes some 7 steps of its own; a logged temperature has thousands of pieces."""
-
-
 SEARCH_TOLERANCE = 1e-3
 """Tolerance of the integration in a global search; creep of bars scatters by a thousand times as much."""
 
@@ -62,7 +58,7 @@ class Bar:
 
     tolerance : relative local error of a step of the integration; the output is then within about ten times of it.
     strain_limit : logarithmic creep strain at which the bar has ruptured.
-    max_steps : cap on the steps of one history, beside STEPS_PER_BREAKPOINT for each row of its programs.
+    max_steps : cap on the steps of one history, beside 20 for each further straight piece of its programs.
     """
 
     tolerance: float = 1e-5
@@ -207,11 +203,8 @@ class Bar:
         keep_states: bool = False,
     ) -> Integration:
         kernel = kernels.lower(law, "compiled")
-        breaks = max((test.driving.times.size + test.temperature.times.size - 2 for test in tests), default=0)
         settings = integration.IntegrationSettings(
-            rtol=self.tolerance,
-            strain_limit=self.strain_limit,
-            max_steps=int(self.max_steps) + STEPS_PER_BREAKPOINT * breaks,
+            rtol=self.tolerance, strain_limit=self.strain_limit, max_steps=int(self.max_steps)
         )
         return integration.integrate(
             kernel, theta, tests, settings=settings, jacobian=sensitivities, keep_states=keep_states

@@ -28,7 +28,7 @@ from creepkit.records.prediction_assembly import (
     broadcast_candidates,
     check_nuisances,
 )
-from creepkit.specimens.bar import SEARCH_TOLERANCE, STEPS_PER_BREAKPOINT
+from creepkit.specimens.bar import SEARCH_TOLERANCE
 from creepkit.specimens.fibre_beam_text import fibre_beam_text
 from creepkit.specimens.run import Run, run_from_outputs
 from creepkit.specimens.test_piece import TestPiece
@@ -71,7 +71,7 @@ class FibreBeam(TestPiece, ABC):
 
     stations : Gauss points along each stretch of the span over which the moment varies. fibres : in each half of the
     height. tolerance : relative local error of a step. strain_limit : creep strain of the first fibre that breaks.
-    max_steps : cap on the steps of a section, beside STEPS_PER_BREAKPOINT for each row of its programs.
+    max_steps : cap on the steps of a section, beside 20 for each further straight piece of its programs.
     """
 
     stations: int = 6
@@ -210,11 +210,8 @@ class FibreBeam(TestPiece, ABC):
         """One candidate in one test, with the derivatives to its parameters and to its nuisances."""
         piece, tested = self.of_test(history, nuisances)
         moved = [_input(piece, kind, nuisances, tested) for kind in nuisances] if sensitivities else []
-        breaks = tested.loading.program().times.size + tested.temperature_program().times.size - 2
         settings = IntegrationSettings(
-            rtol=self.tolerance,
-            strain_limit=self.strain_limit,
-            max_steps=int(self.max_steps) + STEPS_PER_BREAKPOINT * breaks,
+            rtol=self.tolerance, strain_limit=self.strain_limit, max_steps=int(self.max_steps)
         )
         modulus, parts = piece._modulus(tested), _models(piece)
         creep, slopes = np.zeros(history.times.size), np.zeros((history.times.size, theta.size + len(moved)))

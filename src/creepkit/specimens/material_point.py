@@ -32,7 +32,7 @@ from creepkit.records import (
     Specimen,
     assemble_prediction,
 )
-from creepkit.specimens.bar import NUISANCES, STEPS_PER_BREAKPOINT, isothermal_elasticity, predict_with_nuisances
+from creepkit.specimens.bar import NUISANCES, isothermal_elasticity, predict_with_nuisances
 from creepkit.specimens.run import Run, run_from_outputs
 from creepkit.specimens.settings_checks import check_number, check_whole_number
 
@@ -212,10 +212,7 @@ class MaterialPoint:
         return slopes
 
     def _settings(self, history: History) -> integration.IntegrationSettings:
-        loading = _loading(history)
-        programs = [*loading.stress.values(), *loading.strain.values(), history.temperature_program()]
-        breaks = sum(program.times.size - 1 for program in programs)
-        most = int(self.max_steps) + history.times.size + STEPS_PER_BREAKPOINT * breaks
+        most = int(self.max_steps) + history.times.size
         return integration.IntegrationSettings(rtol=self.tolerance, strain_limit=self.strain_limit, max_steps=most)
 
 

@@ -141,6 +141,20 @@ def test_many_tests_and_candidates_in_one_call_equal_one_by_one() -> None:
             np.testing.assert_array_equal(together.jacobian[c, frames], alone.jacobian[0])
 
 
+def test_the_cap_on_steps_is_that_of_a_tests_own_programs() -> None:
+    kernel, theta = lower(NORTON, "compiled"), NORTON.to_internal({"A": 1e-12, "n": 3.0})
+    times = np.linspace(0.0, 1e4, 60)
+    plain = PointTest(Program.constant(100.0), ROOM, times)
+    pieces = Program(times, 100.0 + np.arange(60.0))
+    logged = PointTest(pieces, ROOM, times)
+    settings = IntegrationSettings(max_steps=2)
+    together = integrate(kernel, theta, [plain, logged], settings=settings)
+    alone = integrate(kernel, theta, [plain], settings=settings)
+    assert alone.terminations[0, 0] == TOO_MANY_STEPS
+    assert together.end_times[0, 0] == alone.end_times[0, 0]
+    assert together.status[0, 1] == Status.COMPLETE, "each further piece may take steps of its own"
+
+
 def test_answers_do_not_depend_on_when_they_are_asked_for() -> None:
     times = np.geomspace(1.0, 1e5, 60)
     dense = run(COMBINED, VALUES, Program.constant(100.0), times).strain[0]
