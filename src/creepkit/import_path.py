@@ -69,6 +69,14 @@ def environment_without_working_folder() -> dict[str, str]:
     return environment
 
 
+def options_of_another_interpreter() -> list[str]:
+    """-P, which leaves the working folder out, and those options of this process that restrict imports further."""
+    if sys.flags.isolated:
+        return ["-I"]
+    given = {"-E": sys.flags.ignore_environment, "-s": sys.flags.no_user_site, "-S": sys.flags.no_site}
+    return ["-P", *(option for option, is_given in given.items() if is_given)]
+
+
 def _entries(path: str) -> list[str]:
     """The entries of a search path; an empty one is the working folder."""
     return path.split(os.pathsep) if path else []

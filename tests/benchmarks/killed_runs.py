@@ -14,9 +14,11 @@ kills found the process at work.
 from __future__ import annotations
 
 import collections
+import functools
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -83,7 +85,7 @@ def data_set(folder: Path) -> None:
 
 COMMANDS = {
     "generate": Command(
-        ("generate", "norton", "--specimen", "uniaxial", "--samples", "2000", "--to", "made.h5", "--workers", "2"),
+        ("generate", "norton", "--specimen", "uniaxial", "--samples", "600", "--to", "made.h5", "--workers", "2"),
         lambda folder: None,
         ("made.h5",),
     ),
@@ -153,12 +155,12 @@ def workers_in(folder: Path) -> int:
     return count
 
 
-def killed_run(name: str, seed: int, reference: dict[str, Any], duration: float) -> dict[str, Any]:
-    """One run that is killed once or twice, and then ends; what was wrong."""
+def killed_run(name: str, seed: int, prepared: Path, reference: dict[str, Any], duration: float) -> dict[str, Any]:
+    """One run in a copy of a prepared folder that is killed once or twice, and then ends; what was wrong."""
     command, rng, found = COMMANDS[name], random.Random(seed), collections.Counter[str]()
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch).resolve()
-        command.prepare(folder)
+        folder = Path(scratch).resolve() / "folder"
+        shutil.copytree(prepared, folder)
         for _ in range(2 if seed % 3 == 0 else 1):
             process = start(command, folder)
             try:
@@ -201,19 +203,22 @@ def main() -> None:
     page, details, faults = Page("killed_runs", __doc__), [], 0
     page.table("command", "runs", "kills", "cut off", *FAULTS)
     for name in options.commands:
+        seeds = [options.seed * 100_000 + i for i in range(options.kills)]
         with tempfile.TemporaryDirectory() as scratch:
-            folder = Path(scratch).resolve()
-            COMMANDS[name].prepare(folder)
+            prepared, folder = Path(scratch).resolve() / "prepared", Path(scratch).resolve() / "folder"
+            prepared.mkdir()
+            COMMANDS[name].prepare(prepared)
+            shutil.copytree(prepared, folder)
             begin = time.monotonic()
             if start(COMMANDS[name], folder).wait(PATIENCE):
                 raise SystemExit(f"{name} fails without a kill: {(folder / 'output.txt').read_text()[-500:]}")
             duration, reference = time.monotonic() - begin, result_of(COMMANDS[name], folder)
             if not reference:
                 raise SystemExit(f"{name} has written no result that can be compared")
-        progress(f"{name}: {duration:.1f} s, {sum(map(len, reference.values()))} numbers and arrays")
-        seeds = [options.seed * 100_000 + i for i in range(options.kills)]
-        with ThreadPoolExecutor(options.jobs) as pool:
-            runs = list(pool.map(lambda seed: killed_run(name, seed, reference, duration), seeds))  # noqa: B023
+            progress(f"{name}: {duration:.1f} s, {sum(map(len, reference.values()))} numbers and arrays")
+            run = functools.partial(killed_run, name, prepared=prepared, reference=reference, duration=duration)
+            with ThreadPoolExecutor(options.jobs) as pool:
+                runs = list(pool.map(run, seeds))
         total = sum((run["counts"] for run in runs), collections.Counter[str]())
         kills = sum(2 if seed % 3 == 0 else 1 for seed in seeds)
         page.row(name, len(runs), kills, total["cut off"], *(total[fault] for fault in FAULTS))

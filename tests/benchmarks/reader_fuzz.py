@@ -54,7 +54,7 @@ from helpers.file_mutations import ENCODINGS, mutation
 from helpers.fuzz_counts import FuzzCounts
 from helpers.reader_samples import ReaderSample, all_samples
 
-CPU_SECONDS, MEMORY_BYTES = 5.0, 1_000_000_000
+CPU_SECONDS, PATIENCE, MEMORY_BYTES = 5.0, 60.0, 1_000_000_000
 NOBODY = 65534
 WARM_UP, WARM_UP_OF_MANY, MOST_DEATHS, SAVED_EVERY = 40, 6, 10, 250
 SHORT = 60
@@ -160,6 +160,7 @@ def work(folder: Path) -> None:
         folders[name] = Path(tempfile.mkdtemp(dir=folder))
     for name, first, last in ranges:
         for seed in range(first, last):
+            signal.setitimer(signal.ITIMER_REAL, PATIENCE)  # for what holds Python up: SIGALRM ends the process
             found = outcome(samples[name], results[name], seed, folders[name])
             print(json.dumps([name, seed, *found]), flush=True)
 
@@ -180,7 +181,8 @@ def _give_up_privileges() -> None:
 def outcomes(ranges: list[tuple[str, int, int]]) -> Iterator[tuple[str, int, str, str, str]]:
     """Sample, seed, kind, outcome and detail of each mutation of samples, from a first seed to before a last.
 
-    A process that dies counts as a traceback of the mutation that it was reading, and is replaced.
+    A process that dies counts as a traceback of the mutation that it was reading, one that does not come back from it
+    as a hang; it is replaced.
     """
     deaths = 0
     while ranges := [one for one in ranges if one[1] < one[2]]:
@@ -199,7 +201,8 @@ def outcomes(ranges: list[tuple[str, int, int]]) -> Iterator[tuple[str, int, str
         ranges = [(name, following[name], last) for name, _, last in ranges if following[name] < last]
         if ranges:
             name, seed, last = ranges[0]
-            yield name, seed, "", "traceback", f"the process ended with status {process.returncode}"
+            found = "hang" if process.returncode == -signal.SIGALRM else "traceback"
+            yield name, seed, "", found, f"the process ended with status {process.returncode}"
             ranges, deaths = [(name, seed + 1, last), *ranges[1:]], deaths + 1
         if deaths > MOST_DEATHS:
             raise SystemExit(f"the process of '{ranges[0][0]}' ended {deaths} times; see what it prints")

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from creepkit import import_path
-from creepkit.jobs import worker_start
 from helpers import source_tree
 
 PLANTED = "import sys; open({ran!r}, 'a').write(__name__ + chr(10))\n"
@@ -156,11 +155,11 @@ def test_restrictions_of_the_interpreter_hold_for_its_workers(monkeypatch: pytes
     class Flags:
         isolated, ignore_environment, no_user_site, no_site = 0, 1, 1, 0
 
-    assert worker_start._interpreter_options()[0] in ("-P", "-I")
+    assert import_path.options_of_another_interpreter()[0] in ("-P", "-I")
     monkeypatch.setattr(sys, "flags", Flags)
-    assert worker_start._interpreter_options() == ["-P", "-E", "-s"]
+    assert import_path.options_of_another_interpreter() == ["-P", "-E", "-s"]
     Flags.isolated = 1
-    assert worker_start._interpreter_options() == ["-I"]
+    assert import_path.options_of_another_interpreter() == ["-I"]
 
 
 STARTING = {
@@ -185,10 +184,14 @@ def _starts_processes(module: str) -> bool:
     return False
 
 
-def test_processes_are_started_in_one_place() -> None:
-    """`worker_pools` waits for workers and ends them; `app_page` asks the desktop for its browser, with our address."""
+def test_processes_are_started_in_two_places() -> None:
+    """Workers, and what tries HDF5 files with the same care; `worker_pools` waits for workers and ends them.
+
+    `app_page` asks the desktop for its browser, with our address.
+    """
     starting = {module for module in source_tree.modules() if _starts_processes(module)}
-    assert starting == {"creepkit.jobs.worker_start", "creepkit.jobs.worker_pools", "creepkit.cli.app_page"}
+    in_jobs = {"creepkit.jobs.worker_start", "creepkit.jobs.worker_pools"}
+    assert starting == in_jobs | {"creepkit.files.hdf5_trial", "creepkit.cli.app_page"}
     pools = source_tree.tree("creepkit.jobs.worker_pools")
     called = {
         node.func.attr

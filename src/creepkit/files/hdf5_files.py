@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 
 from creepkit.errors import CreepkitError, quoted
+from creepkit.files.hdf5_trial import try_hdf5
 from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, check_readable
 from creepkit.files.writing import ADVICE, replace_on_success
@@ -102,6 +103,7 @@ def open_hdf5(path: Path, kind: FileKind, *, bounded: bool = True) -> Iterator[h
         the sizes of the arrays that it reads, and leaves others alone.
     """
     check_readable(path, kind)
+    try_hdf5(path, kind, raised(MAXIMUM_OBJECTS))
     try:
         with h5py.File(path, "r") as file:
             _check_links(file, path, kind, bounded)

@@ -1,4 +1,4 @@
-"""How a worker process is started: the one place of creepkit where a process is, and what that process can import.
+"""How a worker process is started, and what that process can import.
 
 A worker is a new interpreter, because a fork would copy locks of libraries such as torch. Its `sys.path` is the one
 that Python itself makes without the working folder and the folder of a script, so that nothing beside the data is
@@ -22,7 +22,11 @@ from types import ModuleType
 from typing import IO, Any
 
 from creepkit.files.cache_folders import cache_environment
-from creepkit.import_path import environment_without_working_folder, leave_settings_of_working_folder_out
+from creepkit.import_path import (
+    environment_without_working_folder,
+    leave_settings_of_working_folder_out,
+    options_of_another_interpreter,
+)
 from creepkit.registry.plugin_registry import load_plugin_file, loaded_plugin_files
 
 THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMBA")
@@ -38,21 +42,13 @@ WORKER_MODULE = "creepkit.jobs.worker_process"
 def start_worker() -> subprocess.Popen[bytes]:
     """A worker process, in a session of its own: Ctrl-C is for the process that started it, which then ends it."""
     return subprocess.Popen(
-        [sys.executable, *_interpreter_options(), "-m", WORKER_MODULE],
+        [sys.executable, *options_of_another_interpreter(), "-m", WORKER_MODULE],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         bufsize=0,
         env={**environment_without_working_folder(), **cache_environment(), **ONE_THREAD},
         start_new_session=True,
     )
-
-
-def _interpreter_options() -> list[str]:
-    """-P, which leaves the working folder out, and those options of this process that restrict imports further."""
-    if sys.flags.isolated:
-        return ["-I"]
-    given = {"-E": sys.flags.ignore_environment, "-s": sys.flags.no_user_site, "-S": sys.flags.no_site}
-    return ["-P", *(option for option, is_given in given.items() if is_given)]
 
 
 # ---- what a worker is sent -----------------------------------------------------------------------------------------

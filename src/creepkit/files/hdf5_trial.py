@@ -1,0 +1,109 @@
+"""HDF5 files are tried in another process first: damaged ones can keep the HDF5 library for ever, or make it crash.
+
+While the library is in such a loop, no line of Python runs in its process, not even at Ctrl-C. The process that tries
+is started with the first file and kept (see `hdf5_walk`).
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from pathlib import Path
+
+from creepkit.files.limits import how_to_raise, raised
+from creepkit.files.reading import FileKind
+from creepkit.import_path import environment_without_working_folder, options_of_another_interpreter
+
+CPU_SECONDS = 4
+"""In which HDF5 has to come to the end of a file's structure; 20,000 objects take one."""
+
+
+_PROGRAM = Path(__file__).with_name("hdf5_walk.py")
+
+
+def try_hdf5(path: Path, kind: FileKind, most: int) -> None:
+    """Raise the error of `kind` for a file that the HDF5 library does not come to the end of, or crashes at.
+
+    most : objects that are looked at. Where no other process can be started, nothing is tried.
+    """
+    seconds = raised(CPU_SECONDS)
+    with _trial.lock:
+        ended = _trial.end_of(path, seconds, most)
+    if ended is None:
+        return
+    raise kind.error(
+        f"{path}: the HDF5 library does not come to the end of this file in {seconds} s of CPU time, or crashes at it; "
+        f"it seems damaged; {kind.advice}, or {how_to_raise(4 * seconds, seconds)}"
+    )
+
+
+class _Trial:
+    """The process that tries files, once there is one."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self._process: subprocess.Popen[str] | None = None
+        self._owner = 0
+
+    def end_of(self, path: Path, seconds: int, most: int) -> int | None:
+        """How the process ended at a file; None where it came to the file's end, or no process can be started."""
+        process = self._running()
+        if process is None:
+            return None
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            print(json.dumps([os.path.abspath(path), seconds, most]), file=process.stdin, flush=True)
+            if process.stdout.readline():
+                return None
+        except OSError:  # it has ended
+            pass
+        self.close()
+        return process.returncode
+
+    def close(self) -> None:
+        """Let the process end, if it has not."""
+        if self._process is not None and self._owner == os.getpid():
+            _end(self._process)
+        self._process = None
+
+    def _running(self) -> subprocess.Popen[str] | None:
+        if self._process is not None and (self._owner != os.getpid() or self._process.poll() is not None):
+            self.close()  # this process is a fork of the one that started it, or someone else has ended it
+        if self._process is None and sys.executable:
+            try:
+                process = subprocess.Popen(
+                    [sys.executable, *options_of_another_interpreter(), str(_PROGRAM)],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.DEVNULL,
+                    text=True,
+                    cwd=_PROGRAM.parent,
+                    env=environment_without_working_folder(),
+                )
+            except OSError:
+                return None
+            assert process.stdout is not None
+            if not process.stdout.readline():  # it cannot import what it needs, for lack of memory for example
+                _end(process)
+                return None
+            self._process, self._owner = process, os.getpid()
+        return self._process
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """Close a process's streams, which ends it."""
+    for stream in (process.stdin, process.stdout):
+        with suppress(OSError):
+            if stream is not None:
+                stream.close()
+    process.wait()
+
+
+_trial = _Trial()
+atexit.register(_trial.close)
