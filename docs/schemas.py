@@ -17,11 +17,14 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 from pydantic.json_schema import GenerateJsonSchema
 
+from creepkit.exporters import law_files
 from creepkit.files.json_documents import DocumentFormat
 from creepkit.files.record_codec import RecordCodec
-from creepkit.inverse import identification_document
+from creepkit.inverse import identification_document, ranking_document
 from creepkit.inverse.identification import Identification
 from creepkit.language import CreepLaw, law_codec
+from creepkit.rupture_assessment import assessment_document
+from creepkit.rupture_assessment.assessment import RuptureAssessment
 from creepkit.studies.model import StudyModel
 
 FOLDER = Path(__file__).parent / "reference" / "schemas"
@@ -111,6 +114,38 @@ def document_schema(document: DocumentFormat, codec: RecordCodec, record: type) 
     }
 
 
+def valued_law_schema() -> dict[str, Any]:
+    """The schema of an exported law: its conventions are these and no others."""
+    whole = document_schema(law_files.VALUED_LAW, RecordCodec(), law_files._Values)
+    schemas = Schemas(RecordCodec())
+    own = {"law": schemas.of(CreepLaw), **{key: {"const": value} for key, value in law_files._CONVENTIONS.items()}}
+    return {
+        **whole,
+        "properties": {**whole["properties"], **own},
+        "required": [*whole["required"], *own],
+        "$defs": dict(sorted({**whole["$defs"], **schemas.definitions}.items())),
+    }
+
+
+def ranking_schema() -> dict[str, Any]:
+    """The schema of a ranking: names of files beside it, and weights."""
+    properties = {"file": {"type": "string"}, "weight": {"type": "number", "minimum": 0, "maximum": 1}}
+    entry = {"type": "object", "properties": properties, "required": ["file", "weight"], "additionalProperties": False}
+    ranking = ranking_document.RANKING
+    return {
+        "$schema": DIALECT,
+        "title": f"{ranking.name}, version {ranking.version}",
+        "type": "object",
+        "properties": {
+            "format": {"const": ranking.name},
+            "version": {"const": ranking.version},
+            "laws": {"type": "array", "items": entry, "minItems": 1, "maxItems": ranking_document.MOST_LAWS},
+        },
+        "required": ["format", "version", "laws"],
+        "additionalProperties": False,
+    }
+
+
 class StudySchema(GenerateJsonSchema):
     """Of the tables of a study file, where a short form stands for a list."""
 
@@ -133,10 +168,16 @@ def schemas() -> dict[str, dict[str, Any]]:
     identification = document_schema(
         identification_document.IDENTIFICATION, identification_document.CODEC, Identification
     )
+    law = document_schema(law_codec.LAW, law_codec._CODEC, law_codec.LawDocument)
     return {
         "study.schema.json": study,
         "identification.schema.json": identification,
-        "law.schema.json": document_schema(law_codec.LAW, law_codec._CODEC, law_codec.LawDocument),
+        "ranking.schema.json": ranking_schema(),
+        "law.schema.json": law,
+        "valued-law.schema.json": valued_law_schema(),
+        "rupture-assessment.schema.json": document_schema(
+            assessment_document.ASSESSMENT, assessment_document.CODEC, RuptureAssessment
+        ),
     }
 
 

@@ -84,6 +84,30 @@ def test_written_documents_follow_the_schemas() -> None:
     assert problems("law", {**document["law"], "version": 1})
 
 
+@pytest.mark.parametrize("name", ["ranking", "valued-law", "rupture-assessment"])
+def test_documents_follow_the_schemas_of_their_kind(name: str) -> None:
+    path = FORMATS / ck.__version__ / f"{name.replace('-', '_')}.json"
+    document = json.loads(path.read_text(encoding="utf-8"))
+    assert problems(name, document) == []
+    assert problems(name, {**document, "colour": 1})
+    assert problems(name, {key: value for key, value in document.items() if key != "version"})
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_data_sets_and_surrogates_are_read(version: str) -> None:
+    data = ck.read_dataset(FORMATS / version / "data_set.h5")
+    assert (data.law.name, data.status.size) == ("norton", 16)  # rejected samples among them
+    surrogate = ck.surrogate(FORMATS / version / "surrogate.safetensors")
+    assert surrogate.law.name == "norton"
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_rupture_assessments_are_read(version: str) -> None:
+    assessment = ck.load_rupture_assessment(FORMATS / version / "rupture_assessment.json")
+    assert {one.fit.method for one in assessment.ranked} == {"larson-miller"}
+    assert len(assessment.tests) == 8
+
+
 @pytest.mark.parametrize(
     "path", [*ROOT.glob("src/creepkit/example_data/*/study.toml"), *ROOT.glob("examples/studies/*/*.toml")], ids=str
 )
