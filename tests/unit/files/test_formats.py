@@ -98,7 +98,7 @@ def test_data_sets_and_surrogates_are_read(version: str) -> None:
     data = ck.read_dataset(FORMATS / version / "data_set.h5")
     assert (data.law.name, data.status.size) == ("norton", 16)  # rejected samples among them
     surrogate = ck.surrogate(FORMATS / version / "surrogate.safetensors")
-    assert surrogate.law.name == "norton"
+    assert surrogate.metadata.law.name == "norton"
 
 
 @pytest.mark.parametrize("version", VERSIONS)
