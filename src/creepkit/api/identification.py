@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 from creepkit import registry
 from creepkit.checked_arguments import checked
-from creepkit.errors import ExportError, FitError, nearest
+from creepkit.errors import ExportError, FitError, nearest, quoted
 from creepkit.records import History, LawWithValues, Nuisance, Predictor, Units, dimension_named, exported_text
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictors
 
@@ -240,6 +240,10 @@ def _resolve_through(
 
     if not isinstance(through, str):
         return through
+    if through != "auto":
+        raise FitError(
+            f"through is '{quoted(through)}'; give 'auto', None or a predictor such as ck.surrogate('dimple')"
+        )
     reduced = None if isinstance(predictor, Mapping) else reduced_order_model_of(predictor)
     return reduced if reduced is not None and prediction_errors_of(reduced) else None
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import ExportError, HistoryError, LawError, SolveError
+from creepkit.errors import ExportError, FitError, HistoryError, LawError, SolveError
 from creepkit.records import History, LawWithValues, Prediction, Status
 from creepkit.registry import default_registry
 from helpers.written_files import names_in
@@ -214,3 +214,11 @@ def test_export_writes_the_text_it_returns(tmp_path: Path) -> None:
         ck.export(law, "latx", values)
     with pytest.raises(LawError, match="needs a value for n"):
         ck.export(law, "latex", {"A": 1e-16})
+
+
+def test_a_predictor_to_search_through_is_auto_or_an_object() -> None:
+    run = ck.simulate(
+        "norton", "uniaxial", {"A": 1e-16, "n": 4.0}, loading=ck.constant_stress(80.0), times=np.linspace(0.0, 1e4, 9)
+    )
+    with pytest.raises(FitError, match=r"^through is 'rom'; give 'auto', None or a predictor"):
+        ck.identify("norton", [run], through="rom")
