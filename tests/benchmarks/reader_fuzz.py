@@ -33,7 +33,6 @@ from __future__ import annotations
 import argparse
 import codecs
 import json
-import os
 import re
 import resource
 import signal
@@ -48,6 +47,7 @@ from types import FrameType
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from adverse_surroundings import ROOT_ALONE, STRANGER
 from measured import Page, arguments, progress
 
 from helpers.file_mutations import ENCODINGS, mutation
@@ -55,7 +55,6 @@ from helpers.fuzz_counts import FuzzCounts
 from helpers.reader_samples import ReaderSample, all_samples
 
 CPU_SECONDS, PATIENCE, MEMORY_BYTES = 5.0, 60.0, 1_000_000_000
-NOBODY = 65534
 WARM_UP, WARM_UP_OF_MANY, MOST_DEATHS, SAVED_EVERY = 40, 6, 10, 250
 SHORT = 60
 OUTCOMES = ("read", "refused", "traceback", "hang", "memory", "unclear message", "wrong acceptance")
@@ -155,7 +154,7 @@ def work(folder: Path) -> None:
         results[name] = samples[name].read(samples[name].write(own))
         for seed in range(-warm_up, 0):  # imports what readers import late, while it may be read
             outcome(samples[name], results[name], seed, own)
-    _give_up_privileges()
+    _limit_memory()
     for name, _, _ in ranges:
         folders[name] = Path(tempfile.mkdtemp(dir=folder))
     for name, first, last in ranges:
@@ -165,17 +164,13 @@ def work(folder: Path) -> None:
             print(json.dumps([name, seed, *found]), flush=True)
 
 
-def _give_up_privileges() -> None:
-    """Limit the memory, and become nobody where the process is root's."""
+def _limit_memory() -> None:
+    """Take what is used now and MEMORY_BYTES for the most; codecs are looked up while there is enough."""
     for encoding in (*ENCODINGS, "utf-16-le", "utf-32-le", "utf-32-be", "cp1252"):
         codecs.lookup(encoding)
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_BYTES, used + MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    if os.geteuid() == 0:
-        os.setgroups([])
-        os.setgid(NOBODY)
-        os.setuid(NOBODY)
 
 
 def outcomes(ranges: list[tuple[str, int, int]]) -> Iterator[tuple[str, int, str, str, str]]:
@@ -187,8 +182,9 @@ def outcomes(ranges: list[tuple[str, int, int]]) -> Iterator[tuple[str, int, str
     deaths = 0
     while ranges := [one for one in ranges if one[1] < one[2]]:
         with tempfile.TemporaryDirectory() as folder:
-            Path(folder).chmod(0o777)  # the process that writes there is nobody's
-            command = [sys.executable, __file__, "--work", folder]
+            Path(folder).chmod(0o777)  # the process that writes there is a stranger's
+            # a reader that may read alone: it can start Python again, as the trial of HDF5 files does
+            command = [*(STRANGER if ROOT_ALONE else ()), sys.executable, __file__, "--work", folder]
             with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
                 assert process.stdout is not None
                 assert process.stdin is not None
