@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from creepkit import integration, kernels
-from creepkit.arrays import Floats
+from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.integration.time_discretisation import SDIRK4_TEXT
 from creepkit.records import (
@@ -129,7 +129,10 @@ class Bar:
         return None
 
     def end_reason(self, history: History, reason: str, output: Floats, end: float) -> str:
-        """Why a test ended at `end`, s, from what the integration says; output : (times,) up to there, then NaN."""
+        """Why a test ended at `end`, s, from what the integration says; output : (times,) up to there, then NaN.
+
+        The integration says nothing, "", where it went on, and the output is not shown.
+        """
         return reason
 
     # ---- of every bar ---------------------------------------------------------------------------------------------
@@ -163,10 +166,12 @@ class Bar:
         """Run one test: what its history would show at its times, how it ended, and the states of the law."""
         theta = law.to_internal(law.values(values))
         result = self._integrate(law, theta, self._tests([plan]), False, keep_states=True)
-        rows = self.observed_output(plan, result.of(0))[0]
-        end, reason = float(result.end_times[0, 0]), integration.REASONS[int(result.terminations[0, 0])]
-        reason = self.end_reason(plan, reason, rows, end)
-        status = Status(int(result.status[0, 0]))
+        prediction = self._observed_prediction([plan], result)
+        rows, status = prediction.values[0, 0, :, 0], Status(int(prediction.status[0, 0]))
+        end, hidden = float(prediction.end_times[0, 0]), (prediction.end_times != result.end_times).any()
+        reason = "" if hidden else integration.REASONS[int(result.terminations[0, 0])]
+        if status is not Status.COMPLETE:
+            reason = self.end_reason(plan, reason, rows, end)
         run = run_from_outputs(BarRun, plan, self.outputs, rows[:, None], status, end, reason)
         reached = np.isin(plan.times, run.times)
         assert result.states is not None
@@ -189,8 +194,11 @@ class Bar:
             if result.jacobian is not None:
                 derivative = self.output_derivative(history, creep)[..., None]
                 jacobian = (result.jacobian[:, frames] * derivative)[:, :, None]
-            values = self.observed_output(history, creep)[..., None]
-            parts.append(HistoryPrediction(values, result.status[:, k], result.end_times[:, k], jacobian))
+            values, status, ends = self.observed_output(history, creep), result.status[:, k], result.end_times[:, k]
+            hidden = np.isnan(values) & np.isfinite(creep)
+            if hidden.any():
+                values, status, ends = _ended_where_hidden(hidden, values, status, ends, history.times)
+            parts.append(HistoryPrediction(values[..., None], status, ends, jacobian))
         return assemble_prediction(parts, histories, self.outputs, len(result.strain))
 
     def _integrate(
@@ -209,6 +217,23 @@ class Bar:
         return integration.integrate(
             kernel, theta, tests, settings=settings, jacobian=sensitivities, keep_states=keep_states
         )
+
+
+def _ended_where_hidden(
+    hidden: Bools, values: Floats, status: Ints, ends: Floats, times: Floats
+) -> tuple[Floats, Ints, Floats]:
+    """Values, status and ends where rows have ended at the last frame before one that no instrument shows.
+
+    hidden, values : (candidates, times).
+    """
+    rows, first = hidden.any(axis=1), hidden.argmax(axis=1)
+    from_there_on = rows[:, None] & (np.arange(times.size) >= first[:, None])
+    before = np.where(first > 0, times[first - 1], 0.0)
+    return (
+        np.where(from_there_on, np.nan, values),
+        np.where(rows, int(Status.NOT_CONVERGED), status),
+        np.where(rows, np.minimum(before, ends), ends),
+    )
 
 
 DIFFERENCE_STEPS = {"temperature": 0.1, "modulus": 1e-3}

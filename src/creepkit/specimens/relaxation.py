@@ -52,7 +52,7 @@ class Relaxation(Bar):
         return point_test(history)
 
     def observed_output(self, history: History, creep: Floats) -> Floats:
-        """The stress, (candidates, times) MPa; NaN where a step down compresses the bar.
+        """The stress, (candidates, times) MPa; NaN where the bar is compressed.
 
         creep : (candidates, times) logarithmic creep strain.
         """
@@ -72,9 +72,12 @@ class Relaxation(Bar):
         from creepkit.integration.event_location import STEP_TOO_SMALL
 
         driving, moment = point_test(history).driving, 1e-9 * max(end, 1e-3)
+        compressed = "the stress falls below zero, and a compressed bar needs the specimen point"
         stuck = reason == integration.REASONS[STEP_TOO_SMALL]
-        if stuck and driving.at(end + moment) < driving.at(end - moment):
-            return f"{reason}: the stress falls below zero, and a compressed bar needs the specimen point"
+        if not reason:
+            return compressed
+        if stuck and (driving.at(end + moment) < driving.at(end - moment) or driving.at(end) < 0.0):
+            return f"{reason}: {compressed}"
         return reason
 
     def reference_stress(self, history: History) -> Floats:

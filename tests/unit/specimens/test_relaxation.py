@@ -123,6 +123,18 @@ def test_a_ramp_down_that_compresses_says_so_however_far_the_last_frame_is():
     assert run.end_time == pytest.approx(1e7 + 3 * relaxed(START, 1e7), abs=0.5)
 
 
+def test_a_bar_that_begins_in_compression_is_not_complete():
+    """Later frames would show a stress, though what the bar crept before is unknown."""
+    ramp = RecordedLoading(Program(np.array([0.0, 1000.0]), np.array([-1e-4, 1e-3])), "strain")
+    plan = held(times=np.array([0.0, 500.0, 1000.0]), loading=ramp)
+    prediction = stress(plan, held())
+    assert prediction.status[0].tolist() == [Status.NOT_CONVERGED, Status.COMPLETE]
+    assert np.isnan(prediction.of(0)).all()
+    assert prediction.end_times[0, 0] == 0.0
+    with pytest.raises(SolveError, match="a compressed bar needs the specimen point"):
+        TIGHT.run(NORTON, VALUES, plan)
+
+
 def test_no_frame_shows_a_bar_in_compression():
     down = StrainSteps(((0, START / E), (1e4, 0.0)))
     run = ck.simulate(NORTON, TIGHT, VALUES, loading=down, times=[0.0, 1e3, 1e4, 2e4], elastic=ck.Elastic(E))
