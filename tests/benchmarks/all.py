@@ -93,7 +93,9 @@ BENCHMARKS = {
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "structure": Benchmark(0.1),
     "rate_tables": Benchmark(20, needs=DATA),
-    "reader_fuzz": Benchmark(40, short=("--short", "--first", "700000", "--jobs", "2")),
+    "reader_fuzz": Benchmark(
+        25, (("--per-kind", "10000", "--first", "2000000"),), short=("--short", "--first", "700000", "--jobs", "2")
+    ),
     "large_files": Benchmark(3, short=("--megabytes", "10")),
     "adverse_surroundings": Benchmark(25, short=("--short", "--jobs", "2")),
     "code_execution": Benchmark(
