@@ -39,13 +39,14 @@ from numpy.typing import NDArray
 
 from creepkit.arrays import Bools
 from creepkit.checked_arguments import checked
-from creepkit.dataset.dataset import COLUMNS, HOLD_TIMES, Dataset, empty_columns
-from creepkit.errors import DatasetError, LawError, steering
+from creepkit.dataset.dataset import COLUMNS, HOLD_TIMES, NOT_SIMULATED, Dataset, empty_columns
+from creepkit.errors import DatasetError, LawError, quoted_value, steering
 from creepkit.files.hdf5_files import open_hdf5, write_hdf5, write_names
 from creepkit.files.json_documents import compact_json, parse_json
 from creepkit.files.reading import FileKind
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
+from creepkit.records import Status
 from creepkit.registry.arguments import specimen_by_name
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import MOST_FRAMES, TimeGrid
@@ -71,18 +72,41 @@ NAME_LISTS = ("outputs", "parameter_names", "condition_names", "reason_names", "
 def check_format(file: h5py.File, source: str) -> None:
     """DatasetError when the file is not one of ours, or of another layout or unit."""
     format_name = file.attrs.get("format")
-    if format_name != FORMAT:
-        raise DatasetError(f"{source}: an HDF5 file, but no data set of creepkit (its format is {format_name!r})")
+    if not isinstance(format_name, str) or format_name != FORMAT:
+        raise DatasetError(
+            f"{source}: an HDF5 file, but no data set of creepkit (its format is {quoted_value(format_name)})"
+        )
     layout = file.attrs.get("layout")
-    if layout != LAYOUT_VERSION:
-        newer = isinstance(layout, int | np.integer) and layout > LAYOUT_VERSION
+    whole = isinstance(layout, int | np.integer) and not isinstance(layout, bool)
+    if not whole or layout != LAYOUT_VERSION:
+        newer = whole and layout > LAYOUT_VERSION
         advice = "upgrade creepkit" if newer else "generate it again"
-        raise DatasetError(f"{source}: its layout is {layout}, this creepkit reads layout {LAYOUT_VERSION}; {advice}")
-    if file.attrs.get("units") != FILE_UNITS:
-        raise DatasetError(f"{source}: its units are {file.attrs.get('units')!r}; allowed are '{FILE_UNITS}'")
+        raise DatasetError(
+            f"{source}: its layout is {layout if whole else quoted_value(layout)}, this creepkit reads layout "
+            f"{LAYOUT_VERSION}; {advice}"
+        )
+    units = file.attrs.get("units")
+    if not isinstance(units, str) or units != FILE_UNITS:
+        raise DatasetError(f"{source}: its units are {quoted_value(units)}; allowed are '{FILE_UNITS}'")
     for name in (*NAME_LISTS, "law", "specimen", "design", "provenance"):
         if name not in file.attrs:
             raise DatasetError(f"{source}: the attribute '{name}' is missing; the file is damaged")
+
+
+def stored_array(file: h5py.File, name: str, kinds: str, source: str) -> h5py.Dataset:
+    """An array of one axis or more; DatasetError when there is none, or its numbers are of another kind of NumPy."""
+    array = file.get(name)
+    if not isinstance(array, h5py.Dataset) or not array.shape or array.dtype.kind not in kinds:
+        raise DatasetError(f"{source}: the array '{name}' is missing, or is none of its kind; the file is damaged")
+    return array
+
+
+def stored_names(file: h5py.File, name: str, source: str) -> tuple[str, ...]:
+    """An attribute that is a list of texts; DatasetError when it is something else."""
+    value = file.attrs[name]
+    if not (isinstance(value, np.ndarray) and value.ndim == 1 and all(isinstance(word, str) for word in value)):
+        raise DatasetError(f"{source}: the attribute '{name}' is no list of texts; the file is damaged")
+    return tuple(str(word) for word in value)
 
 
 def check_shapes(file: h5py.File, expected: dict[str, Any], source: str) -> None:
@@ -92,7 +116,10 @@ def check_shapes(file: h5py.File, expected: dict[str, Any], source: str) -> None
         if not isinstance(array, h5py.Dataset):
             raise DatasetError(f"{source}: the array '{name}' is missing; the file is damaged")
         kind = np.dtype(COLUMNS[name].file_type).kind
-        if array.shape != (len(file["index"]), *empty.shape[1:]) or array.dtype.kind != kind:
+        if (
+            array.shape != (stored_array(file, "index", "i", source).shape[0], *empty.shape[1:])
+            or array.dtype.kind != kind
+        ):
             description = f"{array.dtype} {array.shape}"
             raise DatasetError(f"{source}: the array '{name}' is {description}, which does not fit the others")
 
@@ -123,7 +150,7 @@ def _texts(value: Any) -> Iterator[str]:
 
 
 def check_values(columns: dict[str, Any], header: Dataset, source: str) -> None:
-    """DatasetError when what was drawn is not finite, a reason is none, or an accepted sample has no history."""
+    """DatasetError when what was drawn is no value of the law, a code is none, or a history contradicts its end."""
     for name in ("parameters", "conditions"):
         invalid = np.argwhere(~np.isfinite(columns[name]))
         if invalid.size:
@@ -131,6 +158,19 @@ def check_values(columns: dict[str, Any], header: Dataset, source: str) -> None:
             raise DatasetError(
                 f"{source}: {name} of sample {invalid[0, 0]} ({column_name}) are not finite; the file is damaged"
             )
+    with np.errstate(invalid="ignore"):
+        theta = header.law.to_internal(dict(zip(header.parameter_names, columns["parameters"].T, strict=True)))
+    if (impossible := np.argwhere(np.isnan(theta))).size:
+        row, name = impossible[0, 0], header.law.names[impossible[0, 1]]
+        raise DatasetError(f"{source}: the parameter {name} of sample {row} is below zero; the file is damaged")
+    known = [NOT_SIMULATED, *map(int, Status)]
+    invalid_status = np.flatnonzero(~np.isin(columns["status"], known))
+    if invalid_status.size:
+        row = invalid_status[0]
+        raise DatasetError(
+            f"{source}: the status of sample {row} is {columns['status'][row]}; allowed are {known[0]} to {known[-1]}; "
+            "the file is damaged"
+        )
     invalid_reasons = np.flatnonzero((columns["reasons"] < -1) | (columns["reasons"] >= len(header.reason_names)))
     if invalid_reasons.size:
         raise DatasetError(
@@ -144,6 +184,21 @@ def check_values(columns: dict[str, Any], header: Dataset, source: str) -> None:
     if not has_history.all():
         row = np.flatnonzero(accepted)[~has_history][0]
         raise DatasetError(f"{source}: sample {row} was accepted and has no history; the file is damaged")
+    shown = np.isfinite(columns["values"]).any(axis=2)
+    begun = np.maximum.accumulate(shown, axis=1)
+    still = np.maximum.accumulate(shown[:, ::-1], axis=1)[:, ::-1]
+    broken = (begun & still & ~shown).any(axis=1) | np.isinf(columns["values"]).any(axis=(1, 2))
+    broken |= columns["end_times"] < 0.0
+    if broken.any():
+        row = np.flatnonzero(broken)[0]
+        raise DatasetError(
+            f"{source}: the history of sample {row} has a gap, an infinite number or an end before its begin; the file "
+            "is damaged"
+        )
+
+
+_TEXT_BYTES = 16_000_000
+"""Of texts that are read at once."""
 
 
 COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
@@ -220,16 +275,18 @@ def read_dataset(path: str | Path, *, accepted_only: bool = False) -> Dataset:
 def read_header(file: h5py.File, source: str) -> Dataset:
     """The data set of a file with no samples in it yet."""
     check_format(file, source)
-    name_lists: dict[str, Any] = {name: tuple(str(word) for word in file.attrs[name]) for name in NAME_LISTS}
-    documents = {
-        name: parse_json(str(file.attrs[name]), f"{source}: its {name}", DATASET_FILE)
-        for name in ("law", "specimen", "design", "provenance")
-    }
+    name_lists: dict[str, Any] = {name: stored_names(file, name, source) for name in NAME_LISTS}
+    documents = {}
+    for name in ("law", "specimen", "design", "provenance"):
+        text = file.attrs[name]
+        if not isinstance(text, str):
+            raise DatasetError(f"{source}: the attribute '{name}' is no text; the file is damaged")
+        documents[name] = parse_json(text, f"{source}: its {name}", DATASET_FILE)
     check_attributes({**name_lists, **documents}, source)
     sizes = {
         **{name: len(values) for name, values in name_lists.items()},
         "holds": HOLD_TIMES,
-        "frames": len(file["time_grid"]),
+        "frames": len(stored_array(file, "time_grid", "f", source)),
     }
     columns = empty_columns(sizes)
     check_shapes(file, columns, source)
@@ -256,10 +313,14 @@ def _read_law(document: Any, names: tuple[str, ...], source: str) -> CreepLaw:
 
 
 def _read_grid(array: h5py.Dataset, source: str) -> TimeGrid:
-    if array.size > MOST_FRAMES or array.dtype.kind != "f":
-        raise DatasetError(f"{source}: its time grid is {array.dtype} {array.shape}; the file is damaged")
+    relative = array.attrs.get("relative")
+    if array.size > MOST_FRAMES or array.ndim != 1 or not isinstance(relative, bool | np.bool_):
+        raise DatasetError(
+            f"{source}: its time grid is {array.dtype} {array.shape}, relative {quoted_value(relative)}; the file is "
+            "damaged"
+        )
     try:
-        return TimeGrid(array[:], bool(array.attrs["relative"]))
+        return TimeGrid(array[:], bool(relative))
     except DatasetError as error:
         raise DatasetError(f"{source}: {error}") from None
 
@@ -270,10 +331,29 @@ def read_samples(file: h5py.File, header: Dataset, accepted_only: bool = False) 
     selected = reasons == 0 if accepted_only else np.ones(len(reasons), dtype=bool)
     columns: dict[str, Any] = {name: _read_rows(file[name], selected, COLUMNS[name].memory_type) for name in COLUMNS}
     new_row = {int(row): k for k, row in enumerate(np.flatnonzero(selected))}
-    rows, texts = file["failures/rows"][:], file["failures/texts"].asstr()[:]
-    failures = {new_row[row]: str(text) for row, text in zip(rows.tolist(), texts, strict=True) if row in new_row}
+    failures = {new_row[row]: text for row, text in _read_failures(file, len(reasons)).items() if row in new_row}
     check_values(columns, header, file.filename)
     return replace(header, **columns, failures=failures)
+
+
+def _read_failures(file: h5py.File, samples: int) -> dict[int, str]:
+    """{row: why it failed}; DatasetError for rows that are none, and for texts that no file of this size holds."""
+    source = file.filename
+    rows = stored_array(file, "failures/rows", "i", source)
+    texts = stored_array(file, "failures/texts", "O", source)
+    size = max(Path(source).stat().st_size, 1)
+    numbers = rows[:].tolist() if rows.ndim == 1 and rows.shape == texts.shape else [-1]
+    if len(set(numbers)) < len(numbers) or not all(0 <= row < samples for row in numbers):
+        raise DatasetError(f"{source}: its failures are not of samples, each with one text; the file is damaged")
+    found: list[str] = []
+    length, block = 0, max(_TEXT_BYTES // size, 1)  # every text may refer to all that the file holds
+    for start in range(0, len(numbers), block):
+        words = texts.asstr()[start : start + block].tolist()
+        length += sum(map(len, words))
+        if length > size or steering("".join(words)):
+            raise DatasetError(f"{source}: a text of its failures is none that creepkit wrote; the file is damaged")
+        found += words
+    return dict(zip(numbers, found, strict=True))
 
 
 def _read_rows(dataset: h5py.Dataset, selected: Bools, dtype: type, block: int = 4096) -> NDArray[Any]:

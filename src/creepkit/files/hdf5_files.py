@@ -7,6 +7,7 @@ error is kept, later writes are discarded, and the error is raised when HDF5 is 
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,20 +18,21 @@ import numpy as np
 
 from creepkit.errors import CreepkitError, quoted
 from creepkit.files.hdf5_trial import try_hdf5
+from creepkit.files.hdf5_walk import promises_too_much
 from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, check_readable
 from creepkit.files.writing import ADVICE, replace_on_success
 
-LARGEST_COMPRESSION = 1032
-"""Bytes that one of gzip's may stand for, at most; what lies outside chunks is not compressed at all."""
-
-
-_ALWAYS_ALLOWED_BYTES = 1_000_000
-"""Of an array whose values are nowhere, as those of a file that was only begun."""
-
-
 MAXIMUM_OBJECTS = 20_000
 """Groups and arrays in a file that is read; a data set has some twenty."""
+
+
+MAXIMUM_CHUNK_BYTES = 64_000_000
+"""Of a piece in which an array is stored; a compressed one is unpacked whole, however little of it is wanted."""
+
+
+FILTERS = frozenset({h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF})
+"""By which pieces may be stored; others read beyond their memory where a file lies about sizes."""
 
 
 class FaultTolerantFile(io.FileIO):
@@ -103,6 +105,8 @@ def open_hdf5(path: Path, kind: FileKind, *, bounded: bool = True) -> Iterator[h
         the sizes of the arrays that it reads, and leaves others alone.
     """
     check_readable(path, kind)
+    if not h5py.is_hdf5(path):
+        raise kind.error(f"{path}: not an HDF5 file; {kind.advice}")
     try_hdf5(path, kind, raised(MAXIMUM_OBJECTS))
     try:
         with h5py.File(path, "r") as file:
@@ -111,8 +115,6 @@ def open_hdf5(path: Path, kind: FileKind, *, bounded: bool = True) -> Iterator[h
     except MemoryError:
         raise kind.error(f"{path}: holds more than there is memory for") from None
     except (OSError, RuntimeError, LookupError, ValueError, TypeError, NotImplementedError, RecursionError) as error:
-        if path.is_file() and not h5py.is_hdf5(path):
-            raise kind.error(f"{path}: not an HDF5 file; {kind.advice}") from None
         raise kind.error(
             f"{path}: cannot be read, it seems damaged: {quoted(' '.join(str(error).split()), 300)}"
         ) from None
@@ -145,6 +147,7 @@ def _check_links(file: h5py.File, path: Path, kind: FileKind, bounded: bool) -> 
                 groups.append(item)
             elif isinstance(item, h5py.Dataset):
                 _check_place(item, path, kind)
+                _check_pieces(item, path, kind)
                 if bounded:
                     _check_size(item, path, kind)
 
@@ -157,12 +160,29 @@ def _check_place(array: h5py.Dataset, path: Path, kind: FileKind) -> None:
         )
 
 
+def _check_pieces(array: h5py.Dataset, path: Path, kind: FileKind) -> None:
+    """Raise the error of `kind` for an array in pieces that are large, or stored in a way that few files are."""
+    if not array.chunks:
+        return
+    found, most = math.prod(array.chunks) * array.dtype.itemsize, raised(MAXIMUM_CHUNK_BYTES)
+    if found > most:
+        raise kind.error(
+            f"{path}: the array '{quoted(array.name)}' is stored in pieces of {found} bytes, more than {most}; "
+            f"{kind.advice}, or {how_to_raise(found, most)}"
+        )
+    properties = array.id.get_create_plist()
+    filters = [properties.get_filter(k)[0] for k in range(properties.get_nfilters())]
+    if not set(filters) <= FILTERS or len(set(filters)) < len(filters):
+        raise kind.error(
+            f"{path}: the array '{quoted(array.name)}' is stored by the HDF5 filters {filters}; read are "
+            f"gzip, lzf, shuffle and checksums, once each; {kind.advice}"
+        )
+
+
 def _check_size(array: h5py.Dataset, path: Path, kind: FileKind) -> None:
     """Raise the error of `kind` for an array that says to be larger than its bytes can be."""
-    stored = array.id.get_storage_size()
-    allowed = stored * LARGEST_COMPRESSION if array.chunks else stored
-    if array.nbytes > max(allowed, _ALWAYS_ALLOWED_BYTES):
+    if promises_too_much(array):
         raise kind.error(
-            f"{path}: the array '{quoted(array.name)}' says to have {array.nbytes} bytes, and holds {stored}; "
-            f"{kind.advice}"
+            f"{path}: the array '{quoted(array.name)}' says to have {array.nbytes} bytes, and holds "
+            f"{array.id.get_storage_size()}; {kind.advice}"
         )

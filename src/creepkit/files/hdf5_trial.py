@@ -15,56 +15,73 @@ import threading
 from contextlib import suppress
 from pathlib import Path
 
+from creepkit.errors import quoted
 from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind
 from creepkit.import_path import environment_without_working_folder, options_of_another_interpreter
 
 CPU_SECONDS = 4
-"""In which HDF5 has to come to the end of a file's structure; 20,000 objects take one."""
+"""In which HDF5 has to come to the end of a small file; 20,000 objects take one."""
+
+
+BYTES_PER_SECOND = 10_000_000
+"""Of a larger file, that are read in one second of CPU time at least."""
+
+
+MOST_REMEMBERED = 100_000
+"""Files that are not tried twice while they stay as they are."""
 
 
 _PROGRAM = Path(__file__).with_name("hdf5_walk.py")
 
 
 def try_hdf5(path: Path, kind: FileKind, most: int) -> None:
-    """Raise the error of `kind` for a file that the HDF5 library does not come to the end of, or crashes at.
+    """Raise the error of `kind` for a file that the HDF5 library cannot read, never ends with, or crashes at.
 
     most : objects that are looked at. Where no other process can be started, nothing is tried.
     """
-    seconds = raised(CPU_SECONDS)
+    state = path.stat()
+    key = (os.path.abspath(path), state.st_size, state.st_mtime_ns, state.st_ino, most)
+    seconds = raised(CPU_SECONDS + state.st_size // BYTES_PER_SECOND)
     with _trial.lock:
-        ended = _trial.end_of(path, seconds, most)
-    if ended is None:
-        return
-    raise kind.error(
-        f"{path}: the HDF5 library does not come to the end of this file in {seconds} s of CPU time, or crashes at it; "
-        f"it seems damaged; {kind.advice}, or {how_to_raise(4 * seconds, seconds)}"
-    )
+        if key in _trial.read:
+            return
+        problem = _trial.problem_with(path, seconds, most)
+        if problem == "" and len(_trial.read) < MOST_REMEMBERED:
+            _trial.read.add(key)
+    if problem is None:
+        raise kind.error(
+            f"{path}: the HDF5 library does not come to the end of this file in {seconds} s of CPU time, or crashes at "
+            f"it; it seems damaged; {kind.advice}, or {how_to_raise(4 * seconds, seconds)}"
+        )
+    if problem:
+        raise kind.error(f"{path}: cannot be read, it seems damaged: {quoted(problem, 300)}")
 
 
 class _Trial:
-    """The process that tries files, once there is one."""
+    """The process that tries files, once there is one. read : what identifies files that were read to their ends."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
+        self.read = set[tuple[object, ...]]()
         self._process: subprocess.Popen[str] | None = None
         self._owner = 0
 
-    def end_of(self, path: Path, seconds: int, most: int) -> int | None:
-        """How the process ended at a file; None where it came to the file's end, or no process can be started."""
+    def problem_with(self, path: Path, seconds: int, most: int) -> str | None:
+        """What HDF5 says is wrong with a file, "" for nothing, or where no process can be started; None of an end."""
         process = self._running()
         if process is None:
-            return None
+            return ""
         assert process.stdin is not None
         assert process.stdout is not None
         try:
             print(json.dumps([os.path.abspath(path), seconds, most]), file=process.stdin, flush=True)
-            if process.stdout.readline():
-                return None
+            if line := process.stdout.readline():
+                return str(json.loads(line))
         except OSError:  # it has ended
             pass
         self.close()
-        return process.returncode
+        return None
 
     def close(self) -> None:
         """Let the process end, if it has not."""

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -321,6 +322,38 @@ def enormous(file):
         file[name].resize(10**12, axis=0)
 
 
+def put_group(name):
+    """A change that puts a group in the place of an array."""
+
+    def change(file):
+        del file[name]
+        file.create_group(name)
+
+    return change
+
+
+def of_accepted(name, value):
+    """A change of what an array says of the first accepted sample."""
+
+    def change(file):
+        file[name][np.flatnonzero(file["reasons"][:] == 0)[0]] = value
+
+    return change
+
+
+def gap(file):
+    """A frame amid the first accepted history is empty."""
+    file["values"][np.flatnonzero(file["reasons"][:] == 0)[0], 1] = np.nan
+
+
+def stored_in_one_piece(file):
+    """The numbers of samples in a piece that would be unpacked into 0.8 GB."""
+    values = file["index"][:]
+    del file["index"]
+    file.create_dataset("index", (32,), "i8", chunks=(100_000_000,), maxshape=(None,), compression="gzip")
+    file["index"].id.write_direct_chunk((0,), zlib.compress(values.tobytes()))
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -330,20 +363,33 @@ def enormous(file):
         (replaced("parameters", np.full((32, 2), b"1e-12")), "'parameters' is |S5"),
         (replaced("time_grid", np.array([0.0, np.nan, 1000.0, 3600.0])), "a time grid needs two or more finite times"),
         (replaced("time_grid", np.array([0.0, 100.0, 100.0, 3600.0])), "must start at or after 0 and increase"),
-        (replaced("time_grid", np.zeros((4, 4))), "a time grid needs"),
-        (replaced("time_grid", np.array([b"0", b"1", b"2", b"3"])), "its time grid is |S1"),
-        (lambda file: file["time_grid"].attrs.__delitem__("relative"), "cannot be read, it seems damaged"),
+        (replaced("time_grid", np.zeros((4, 4))), r"its time grid is float64 \(4, 4\)"),
+        (replaced("time_grid", np.array([b"0", b"1", b"2", b"3"])), "'time_grid' is missing, or is none of its kind"),
+        (lambda file: file["time_grid"].attrs.__delitem__("relative"), "its time grid is .*, relative None"),
         (lambda file: file.__setitem__("marks", h5py.ExternalLink("b.h5", "/values")), "is a link to elsewhere"),
         (lambda file: file.__setitem__("marks", h5py.SoftLink("/values")), "is a link to elsewhere"),
         (lambda file: file.create_dataset("x", (4,), "i4", external="x.bin"), "'/x' lies in other files"),
         (lambda file: file.__setitem__("failures/again", file["failures"]), "links in a circle"),
-        (lambda file: file.__delitem__("time_grid"), "cannot be read, it seems damaged"),
-        (lambda file: file.__delitem__("failures"), "cannot be read, it seems damaged"),
-        (replaced("failures/rows", np.array([1, 2, 3])), "cannot be read, it seems damaged"),
+        (lambda file: file.__delitem__("time_grid"), "the array 'time_grid' is missing"),
+        (lambda file: file.__delitem__("failures"), "the array 'failures/rows' is missing"),
+        (replaced("failures/rows", np.array([1, 2, 3])), "its failures are not of samples, each with one text"),
+        (replaced("failures/rows", np.array([1.5])), "'failures/rows' is missing, or is none of its kind"),
+        (replaced("failures/rows", np.array([10**9])), "its failures are not of samples"),
+        (replaced("failures/texts", ["\x1b[2J"], dtype=h5py.string_dtype()), "a text of its failures is none that"),
+        (put_group("time_grid"), "the array 'time_grid' is missing, or is none of its kind"),
+        (put_group("failures/texts"), "the array 'failures/texts' is missing, or is none of its kind"),
+        (of_accepted("status", 77), "the status of sample .* is 77; allowed are -1 to 4"),
+        (of_accepted("end_times", -5.0), "the history of sample .* has a gap, an infinite number or an end before"),
+        (of_accepted("values", np.inf), "sample .* was accepted and has no history|has a gap, an infinite number"),
+        (of_accepted("parameters", -1.0), "the parameter A of sample .* is below zero"),
+        (gap, "the history of sample .* has a gap"),
+        (stored_in_one_piece, "'/index' is stored in pieces of 800000000 bytes, more than 64000000"),
+        (replaced("index", np.arange(32), chunks=(32,), scaleoffset=0), r"stored by the HDF5 filters \[6\]"),
+        (lambda file: file.attrs.__setitem__("layout", 1.0), r"its layout is np.float64\(1.0\)"),
         (lambda file: file.attrs.__setitem__("provenance", "[]"), "the attribute 'provenance' is no record"),
         (lambda file: file.attrs.__setitem__("design", "3"), "the attribute 'design' is no record"),
         (lambda file: file.attrs.__setitem__("law", "[" * 100_000), "its law: lists nested too deep"),
-        (lambda file: file.attrs.__setitem__("outputs", 3.0), "cannot be read, it seems damaged"),
+        (lambda file: file.attrs.__setitem__("outputs", 3.0), "the attribute 'outputs' is no list of texts"),
         (lambda file: file.attrs.__setitem__("parameter_names", ["n", "A"]), "its parameters are n, A, those of its"),
         (lambda file: file.attrs.__setitem__("reason_texts", ["met"]), "not a text for each reason"),
         (lambda file: file.attrs.__setitem__("condition_names", ["\x1b[2J"]), r"'condition_names' .* U\+001B"),

@@ -91,3 +91,44 @@ def test_one_process_tries_all_files(own_trial: hdf5_trial._Trial, tmp_path: Pat
     assert own_trial._process is first
     own_trial.close()
     assert first.poll() == 0
+
+
+@pytest.mark.usefixtures("own_trial")
+def test_an_attribute_that_cannot_be_read_hides_nothing(tmp_path: Path) -> None:
+    """What comes before it by name would be read by name."""
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w", libver=("earliest", "v108")) as file:
+        write_names(file, "names", ("first", "second"))
+        file.attrs["zzz_last"] = 1
+    content = bytearray(path.read_bytes())
+    version = content.rindex(b"zzz_last") - 8
+    assert content[version] in (1, 3)
+    content[version] = 99
+    path.write_bytes(content)
+    with pytest.raises(CreepkitError, match="cannot be read, it seems damaged: "):
+        opened(path)
+
+
+@pytest.mark.usefixtures("own_trial")
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory is limited where a process knows its own")
+def test_texts_that_are_all_the_same_one_do_not_fill_the_memory(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w", libver=("earliest", "v108")) as file:
+        file.attrs.create("names", np.array(["x" * 1_000_000] + ["y"] * 1999, dtype=object), dtype=h5py.string_dtype())
+    content = path.read_bytes()
+    first = content.index((1_000_000).to_bytes(4, "little"), content.index(b"names\0"))
+    content = content[:first] + content[first : first + 16] * 2000 + content[first + 16 * 2000 :]
+    path.write_bytes(content)
+    with pytest.raises(CreepkitError, match="cannot be read, it seems damaged|does not come to the end"):
+        opened(path)
+
+
+@pytest.mark.usefixtures("own_trial")
+def test_a_file_is_tried_once_while_it_stays_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = whole_file(tmp_path / "a.h5")
+    opened(path)
+    monkeypatch.setattr(hdf5_trial._Trial, "problem_with", lambda *_: "tried again")
+    assert opened(path) == 7.0
+    path.write_bytes(path.read_bytes() + b"\0")
+    with pytest.raises(CreepkitError, match="tried again"):
+        opened(path)
