@@ -160,6 +160,9 @@ class _Checks:
             return Check(lambda value: isinstance(value, type), "a class")
         if _is_numpy_array(origin or annotation):
             return ARRAY
+        alias = origin if hasattr(origin, "__value__") else annotation if hasattr(annotation, "__value__") else None
+        if alias is not None:  # newer releases of NumPy define NDArray as one
+            return self.of(alias.__value__[args] if args else alias.__value__)
         if origin in (tuple, list):
             return self._tuple(args) if origin is tuple and args and args[-1] is not ... else self._several(args)
         if isinstance(origin, type) and issubclass(origin, Mapping):
@@ -266,7 +269,29 @@ def _is_series(value: Any) -> bool:
         return True
     if isinstance(value, str | bytes | bytearray | Mapping) or not hasattr(value, "__len__"):
         return False
-    return getattr(value, "shape", None) != () and hasattr(value, "__iter__")
+    shape = getattr(value, "shape", None)
+    if isinstance(shape, tuple) and (shape == () or 0 in shape):  # an array of nothing has no truth value
+        return False
+    return hasattr(value, "__iter__")
+
+
+MOST_LEVELS = 100
+"""Of lists in lists; Python prints a thousand at most."""
+
+
+def is_nested_deep(value: Any) -> bool:
+    """Whether lists, tuples and mappings stand in one another in more levels than any argument has."""
+    waiting, looked_at = [(value, 0)], 0
+    while waiting and looked_at < 100_000:
+        looked_at += 1
+        one, level = waiting.pop()
+        if level > MOST_LEVELS:
+            return True
+        if isinstance(one, list | tuple):
+            waiting += [(item, level + 1) for item in one]
+        elif isinstance(one, Mapping):
+            waiting += [(item, level + 1) for item in one.values()]
+    return False
 
 
 def _is_numpy_array(kind: Any) -> bool:

@@ -17,12 +17,16 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
-from creepkit.annotation_checks import Check, check_of, is_finite_number, names_of_module
+from creepkit.annotation_checks import MOST_LEVELS, Check, check_of, is_finite_number, is_nested_deep, names_of_module
 from creepkit.errors import ArgumentError, quoted_value
 
 Anything = TypeVar("Anything", bound=Callable[..., Any])
 Annotations = Iterator[tuple[str, Any, Mapping[str, Any]]]
 """(argument, annotation, names that it may use)."""
+
+
+WITHOUT_A_SENTENCE = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
+"""Errors of Python's in place of which the error of a check is raised."""
 
 
 def checked(public: Anything) -> Anything:
@@ -78,10 +82,14 @@ def _checked_function(
         except ArgumentError as error:
             wrong = error
         else:
-            return function(*args, **kwargs)
+            try:
+                return function(*args, **kwargs)
+            except RecursionError:
+                arguments.check_depth(args, kwargs)
+                raise
         says_itself = wrong.argument in own
         if constructs or says_itself:
-            with contextlib.suppress(ArithmeticError, AttributeError, LookupError, OSError, TypeError, ValueError):
+            with contextlib.suppress(*WITHOUT_A_SENTENCE):
                 result = function(*args, **kwargs)
                 if says_itself:
                     return result
@@ -121,6 +129,15 @@ class _Arguments:
             if check is not None and not check.accepts(value):
                 kwargs[argument] = self._converted(value, check, argument)
         return args
+
+    def check_depth(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
+        """ArgumentError for an argument of lists in lists that no function of Python can print."""
+        named = {**dict(zip(self.positional, args, strict=False)), **kwargs}
+        for argument, value in named.items():
+            if is_nested_deep(value):
+                raise ArgumentError(
+                    f"{argument} of {self.name}() is nested more than {MOST_LEVELS} deep; give lists of plain values"
+                ) from None
 
     def _made(self) -> dict[str, Check]:
         parameters = inspect.signature(self.function).parameters

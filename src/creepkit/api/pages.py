@@ -54,7 +54,7 @@ def write_page(contents: PageContents, path: Path, *, force: bool = False) -> Pa
     from creepkit.app.page import LARGEST_PAGE, page_html
 
     check_target(path, ExportError, force=force)
-    text = page_html(contents)
+    text = page_html(contents).encode("utf-8", "replace").decode("utf-8")  # half a character is none
     size = len(text.encode("utf-8"))
     if size > LARGEST_PAGE:
         raise ExportError(

@@ -87,6 +87,8 @@ def kept_from_json(data: Any, source: str) -> Identification:
     fit = identification_from_json(data["identification"], source)
     stored = data["linearised"]
     linearised = None if stored is None else PLAIN.from_json(LinearisedProblem, stored)
+    if linearised is not None and (wrong := _contradiction(linearised)):
+        raise RecordError(f"linearised: {wrong}")
     changes = PLAIN.from_json(list[Floats], data["residual_changes"], "residual_changes")
     if len(changes) != len(fit.unmodelled):
         raise RecordError("residual_changes are not those of the unmodelled effects")
@@ -96,6 +98,27 @@ def kept_from_json(data: Any, source: str) -> Identification:
         for effect, change in zip(fit.unmodelled, changes, strict=True)
     )
     return replace(fit, linearised=linearised, unmodelled=unmodelled)
+
+
+def _contradiction(linearised: LinearisedProblem) -> str:
+    """What of a linearised problem no identification has written, in a clause; "" where nothing is."""
+    residuals, unknowns = linearised.residuals, linearised.precision.size
+    shapes = {
+        "precision": (linearised.precision, (unknowns,)),
+        "prior_residual": (linearised.prior_residual, (unknowns,)),
+        "free": (linearised.free, (unknowns,)),
+        "step_bounds": (linearised.step_bounds, (2, unknowns)),
+        "values": (residuals.values, residuals.values.shape[:2]),
+        "jacobian": (residuals.jacobian, (*residuals.values.shape, unknowns)),
+    }
+    for name, (array, shape) in shapes.items():
+        if array is not None and array.size and array.shape != shape:
+            return f"{name} has the shape {array.shape}, not {shape}"
+        if array is not None and np.isnan(array).any():
+            return f"{name} holds what is no number"
+    if (linearised.precision < 0).any():
+        return "precision holds what is below zero"
+    return ""
 
 
 KEPT_PARTS = ("identification", "linearised", "residual_changes")

@@ -40,7 +40,18 @@ BAD: dict[str, Callable[[], Any]] = {
     "generator": lambda: (one for one in ["x"]),
     "long text": lambda: "x" * 100_000,
     "no path": lambda: "\0",
+    "half a character": lambda: "\ud800",
+    "array of no rows": lambda: np.zeros((0, 3)),
+    "lists in lists": lambda: _nested(5000),
 }
+
+
+def _nested(levels: int) -> list[Any]:
+    value: list[Any] = []
+    for _ in range(levels):
+        value = [value]
+    return value
+
 
 LONGEST = 5.0
 """s of processor time, of one call."""
@@ -58,7 +69,7 @@ NOT_CALLED = {
 }
 
 
-TEXTS = ("empty text", "text", "long text", "no path")
+TEXTS = ("empty text", "text", "long text", "no path", "half a character")
 RIGHT: dict[str, dict[str, tuple[str, ...]]] = {
     "forecast": {"tolerances": ("{}",)},
     "report": {"to": ("text",), "title": TEXTS},
