@@ -23,7 +23,7 @@ def document() -> Any:
             f"{s:g}",
             times,
             {"strain": 1e-15 * s**5 * times + rng.normal(0.0, 2e-6, times.size)},
-            ck.constant_stress(s),
+            ck.constant_stress(s, control="stress"),
             1000.0,
             standard_deviation={"strain": 2e-6},
         )
