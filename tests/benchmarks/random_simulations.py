@@ -92,7 +92,10 @@ def random_tree(rng: np.random.Generator, leaves: list[sympy.Expr], depth: int) 
         return FUNCTIONS[rng.integers(len(FUNCTIONS))](first)
     second = random_tree(rng, leaves, depth - 1)
     if kind < 0.75:
-        return TWO[rng.integers(len(TWO))](first, second)
+        try:
+            return TWO[rng.integers(len(TWO))](first, second)
+        except ValueError:  # the larger of complex numbers, which sympy itself refuses
+            return first
     if kind < 0.87:
         return first / second
     return first**second
