@@ -130,7 +130,9 @@ class GenerationJob:
         """Make the folder, or check that the one that is there belongs to this job."""
         path = self.folder / GENERATION_NAME
         if self.folder.is_symlink():
-            raise DatasetError(f"{self.folder}: is a link, and shards are kept in a folder of their own; remove the link")
+            raise DatasetError(
+                f"{self.folder}: is a link, and shards are kept in a folder of their own; remove the link"
+            )
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             if not path.exists():

@@ -17,6 +17,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
+from importlib import import_module
 from typing import Any
 
 import h5py
@@ -120,8 +121,7 @@ def _pieces(array: h5py.Dataset, size: int) -> Iterator[Any]:
 def limit_memory() -> None:
     """Allow little more than what this process has, where the system can."""
     with suppress(Exception):
-        import resource
-
+        resource = import_module("resource")  # not on Windows
         with open("/proc/self/statm", encoding="ascii") as file:
             used = int(file.read().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_BYTES, resource.getrlimit(resource.RLIMIT_AS)[1]))

@@ -13,7 +13,6 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
-import secrets
 import stat
 import time
 from collections.abc import Iterator
@@ -25,6 +24,7 @@ from typing import Literal
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError
 from creepkit.files.reading import FileKind, read_bytes
+from creepkit.files.temporary_names import PART, temporary_beginning, temporary_name
 
 RECORD = ".creepkit-written"
 """The list of what creepkit wrote in a folder."""
@@ -78,7 +78,7 @@ def replace_on_success(
     """
     rule = "replace" if force or internal else _foreign_rule.get()
     check_target(path, error, force=rule != "refuse")
-    temporary = _temporary_name(path)
+    temporary = temporary_name(path)
     try:
         yield temporary
         if not internal:
@@ -120,7 +120,7 @@ def write_bytes(
 
 def write_if_absent(path: Path, text: str) -> None:
     """Write a file that the first of several writers decides; OSError when there is no space for it."""
-    temporary = _temporary_name(path)
+    temporary = temporary_name(path)
     try:
         temporary.write_bytes(text.encode("utf-8"))
         try:
@@ -187,7 +187,7 @@ def digest_of(path: Path) -> str:
 def remove_temporary_files(path: Path) -> None:
     """Remove what processes that ended while they wrote `path` have left; none may be writing it now."""
     for temporary in path.parent.iterdir():
-        if temporary.name.startswith(_temporary_beginning(path)) and temporary.name.endswith(".part"):
+        if temporary.name.startswith(temporary_beginning(path)) and temporary.name.endswith(PART):
             temporary.unlink(missing_ok=True)
 
 
@@ -269,7 +269,7 @@ def _note(path: Path, content: Path) -> None:
             return  # somebody else's, or damaged
         if os.path.lexists(record) and record.stat().st_size > MOST_RECORD_BYTES:
             last = {name: digest for digest, name in known}
-            temporary = _temporary_name(record)
+            temporary = temporary_name(record)
             temporary.write_bytes(b"".join(_line(digest, name) for name, digest in last.items()))
             _replace(temporary, record)
         flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
@@ -292,18 +292,7 @@ def _unescaped(name: bytes) -> bytes:
     return b"\\".join(piece.replace(b"\\n", b"\n").replace(b"\\r", b"\r") for piece in pieces)
 
 
-# ---- temporary names and failures ----------------------------------------------------------------------------------
-
-
-def _temporary_beginning(path: Path) -> str:
-    name = path.name
-    if len(os.fsencode(name)) > 200:  # of 255 bytes that a file system allows
-        name = hashlib.sha256(os.fsencode(name)).hexdigest()[:32]
-    return f".{name}."
-
-
-def _temporary_name(path: Path) -> Path:
-    return path.with_name(f"{_temporary_beginning(path)}{secrets.token_hex(4)}.part")
+# ---- the end of a writing, and failures -----------------------------------------------------------------------------
 
 
 def _flush(temporary: Path) -> None:
