@@ -226,7 +226,7 @@ def _ended_where_hidden(
 
     hidden, values : (candidates, times).
     """
-    rows, first = hidden.any(axis=1), hidden.argmax(axis=1)
+    rows, first = np.asarray(hidden.any(axis=1)), hidden.argmax(axis=1)
     from_there_on = rows[:, None] & (np.arange(times.size) >= first[:, None])
     before = np.where(first > 0, times[first - 1], 0.0)
     return (
