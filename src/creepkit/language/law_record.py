@@ -9,7 +9,8 @@ not enter.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any, Self
@@ -138,16 +139,30 @@ _FIXED_POINTS = ((83.0, 0.013, 5.1e3, 1041.0, 71.0, 23.0), (141.0, 2.3e-4, 7.7e4
 
 
 def fingerprint_of(law: LawRecord) -> str:
-    """Return ``structure-numbers``, 12 + 8 hexadecimal digits."""
-    return f"{_hash(structure_of(law))[:12]}-{_hash(_signature(law))[:8]}"
+    """Return ``structure-numbers``, 12 + 8 hexadecimal digits; LawError where sympy fails at the expressions."""
+    with _failures_said(law):
+        return f"{_hash(structure_of(law))[:12]}-{_hash(_signature(law))[:8]}"
 
 
 def structure_of(law: LawRecord) -> str:
     """The law's mathematics as text, for hashing only (it is never parsed)."""
-    parts = [f"{label} = {sympy.srepr(expression)}" for label, expression in law.terms.items()]
-    parts += [f"{s.name}' = {sympy.srepr(v.rate)} from {v.initial!r} to {v.limit!r}" for s, v in law.states.items()]
-    parts += [f"{s.name}: {p.scale}" for s, p in law.params.items()]
-    return "\n".join(parts)
+    with _failures_said(law):
+        parts = [f"{label} = {sympy.srepr(expression)}" for label, expression in law.terms.items()]
+        parts += [f"{s.name}' = {sympy.srepr(v.rate)} from {v.initial!r} to {v.limit!r}" for s, v in law.states.items()]
+        parts += [f"{s.name}: {p.scale}" for s, p in law.params.items()]
+        return "\n".join(parts)
+
+
+@contextmanager
+def _failures_said(law: LawRecord) -> Iterator[None]:
+    """LawError in the place of what sympy raises of a comparison with what is no number, deep in an expression."""
+    try:
+        yield
+    except LawError:
+        raise
+    except (ArithmeticError, AttributeError, TypeError, ValueError) as error:
+        why = quoted(" ".join(str(error).split()))
+        raise LawError(f"law '{law.name}': sympy fails at its expressions ({why}); write them another way") from None
 
 
 def _signature(law: LawRecord) -> str:

@@ -124,3 +124,16 @@ def test_a_forged_file_with_its_own_fingerprint_is_harmless(original, data):
     law = read({**document, "fingerprint": found[1]})
     assert isinstance(law, CreepLaw)
     assert law_from_json(json.loads(json.dumps(law_to_json(law)))) == law
+
+
+def test_an_expression_that_sympy_fails_at_is_said():
+    """Found by the test of mutated laws: sympy compares what is no number when it writes such a power."""
+    document = copy.deepcopy(ORIGINALS[1])
+    place = document
+    path = ("terms", 0, "expression", 3, 2, 3, 3, 1, 2)
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = ["pow", ["piecewise", ["A", ["ge", 0, 0]], ["A", ["true"]]], "A"]
+    law = read(document)
+    assert isinstance(law, str)
+    assert "sympy fails at its expressions" in law
