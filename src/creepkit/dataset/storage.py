@@ -111,15 +111,13 @@ def stored_names(file: h5py.File, name: str, source: str) -> tuple[str, ...]:
 
 def check_shapes(file: h5py.File, expected: dict[str, Any], source: str) -> None:
     """DatasetError when an array is missing, or does not fit the words of the file."""
+    samples = stored_array(file, "index", "i", source).shape[0]
     for name, empty in expected.items():
         array = file.get(name)
         if not isinstance(array, h5py.Dataset):
             raise DatasetError(f"{source}: the array '{name}' is missing; the file is damaged")
         kind = np.dtype(COLUMNS[name].file_type).kind
-        if (
-            array.shape != (stored_array(file, "index", "i", source).shape[0], *empty.shape[1:])
-            or array.dtype.kind != kind
-        ):
+        if array.shape != (samples, *empty.shape[1:]) or array.dtype.kind != kind:
             description = f"{array.dtype} {array.shape}"
             raise DatasetError(f"{source}: the array '{name}' is {description}, which does not fit the others")
 
