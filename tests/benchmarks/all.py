@@ -43,7 +43,7 @@ BENCHMARKS = {
     "page_latency": Benchmark(1, needs="Chromium and playwright"),
     "core_speed": Benchmark(2),
     "random_simulations": Benchmark(30, short=("--cases", "1000", "--laws", "10", "--seed", "7", "--jobs", "2")),
-    "killed_runs": Benchmark(90, short=("--kills", "5", "--seed", "7", "--jobs", "2")),
+    "killed_runs": Benchmark(90, short=("--runs", "2", "--kills-in-a-run", "3", "--seed", "7", "--jobs", "2")),
     "camera_reading": Benchmark(0.5),
     "rendered_speckle": Benchmark(1, needs="pyvale 2026.10, here or in the Python of the option --python"),
     "user_costs": Benchmark(2, needs=DATA),

@@ -1,14 +1,15 @@
 """Kills of long jobs at random moments: started again, they end with what an uninterrupted run writes.
 
-    python tests/benchmarks/killed_runs.py [--kills 100] [--seed 1] [--commands NAME ...] [--jobs 1] [--write]
+    python tests/benchmarks/killed_runs.py [--runs 100] [--kills-in-a-run K] [--seed 1] [--commands NAME ...] [--jobs 1]
+                                           [--write]
 
-generate, train, sweep, screen and run are each done once without interruption, and then `kills` times: the process is
+generate, train, sweep, screen and run are each done once without interruption, and then `runs` times: the process is
 ended by SIGKILL after a random share of the time that the whole took, every third time once more during the second
-attempt, and the same command is run to its end. Its numbers are compared bit by bit with those of the uninterrupted
-run: all arrays of data sets and networks, all numbers of JSON documents but times of the clock and durations. "other
-result" counts runs whose numbers differ, "failed" those whose last attempt ended with another exit code than 0, "left
-behind" those after which a temporary file lies there or a worker process lives on. "cut off" says how many
-kills found the process at work.
+attempt, or as often as asked for, and the same command is run to its end. Its numbers are compared bit by bit with
+those of the uninterrupted run: all arrays of data sets and networks, all numbers of JSON documents but times of the
+clock and durations. "other result" counts runs whose numbers differ, "failed" those whose last attempt ended with
+another exit code than 0, "left behind" those after which a temporary file lies there or a worker process lives on.
+"cut off" says how many kills found the process at work.
 """
 
 from __future__ import annotations
@@ -155,13 +156,15 @@ def workers_in(folder: Path) -> int:
     return count
 
 
-def killed_run(name: str, seed: int, prepared: Path, reference: dict[str, Any], duration: float) -> dict[str, Any]:
-    """One run in a copy of a prepared folder that is killed once or twice, and then ends; what was wrong."""
+def killed_run(
+    name: str, seed: int, kills: int, prepared: Path, reference: dict[str, Any], duration: float
+) -> dict[str, Any]:
+    """One run in a copy of a prepared folder that is killed so often, and then ends; what was wrong."""
     command, rng, found = COMMANDS[name], random.Random(seed), collections.Counter[str]()
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch).resolve() / "folder"
         shutil.copytree(prepared, folder)
-        for _ in range(2 if seed % 3 == 0 else 1):
+        for _ in range(kills):
             process = start(command, folder)
             try:
                 process.wait(rng.uniform(0.0, duration))
@@ -196,14 +199,15 @@ def killed_run(name: str, seed: int, prepared: Path, reference: dict[str, Any], 
 def main() -> None:
     """Run every command once whole and then with kills."""
     parser = arguments(__doc__)
-    for option, default in (("kills", 100), ("seed", 1), ("jobs", 1)):
+    for option, default in (("runs", 100), ("kills-in-a-run", 0), ("seed", 1), ("jobs", 1)):
         parser.add_argument(f"--{option}", type=int, default=default)
     parser.add_argument("--commands", nargs="+", choices=list(COMMANDS), default=list(COMMANDS))
     options = parser.parse_args()
     page, details, faults = Page("killed_runs", __doc__), [], 0
     page.table("command", "runs", "kills", "cut off", *FAULTS)
     for name in options.commands:
-        seeds = [options.seed * 100_000 + i for i in range(options.kills)]
+        seeds = [options.seed * 100_000 + i for i in range(options.runs)]
+        kills = [options.kills_in_a_run or (2 if seed % 3 == 0 else 1) for seed in seeds]
         with tempfile.TemporaryDirectory() as scratch:
             prepared, folder = Path(scratch).resolve() / "prepared", Path(scratch).resolve() / "folder"
             prepared.mkdir()
@@ -218,10 +222,9 @@ def main() -> None:
             progress(f"{name}: {duration:.1f} s, {sum(map(len, reference.values()))} numbers and arrays")
             run = functools.partial(killed_run, name, prepared=prepared, reference=reference, duration=duration)
             with ThreadPoolExecutor(options.jobs) as pool:
-                runs = list(pool.map(run, seeds))
+                runs = list(pool.map(run, seeds, kills))
         total = sum((run["counts"] for run in runs), collections.Counter[str]())
-        kills = sum(2 if seed % 3 == 0 else 1 for seed in seeds)
-        page.row(name, len(runs), kills, total["cut off"], *(total[fault] for fault in FAULTS))
+        page.row(name, len(runs), sum(kills), total["cut off"], *(total[fault] for fault in FAULTS))
         faults += sum(total[fault] for fault in FAULTS)
         details += [f"{name}: {run['detail']}" for run in runs if run["detail"]]
     for line in details[:20]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from creepkit.cli.failures import prepare_streams, print_warnings_plainly, run_to_the_end
+from creepkit.cli.failures import check_working_folder, prepare_streams, print_warnings_plainly, run_to_the_end
 from creepkit.cli.interrupts import interrupt_at_signals
 from creepkit.import_path import leave_settings_of_working_folder_out
 
@@ -15,6 +15,7 @@ def main() -> None:
 def _run() -> None:
     interrupt_at_signals()
     prepare_streams()
+    check_working_folder()
     print_warnings_plainly()
     leave_settings_of_working_folder_out()
     from creepkit.cli.app import app

@@ -264,4 +264,6 @@ def _sentence(error: Exception) -> str:
     if error.filename is None and error.errno in FULL:  # errors of files that we write have their names
         return output_sentence(error)
     place = f"{error.filename}: " if error.filename is not None else ""
+    if error.strerror.startswith("No usable temporary directory"):  # PyTorch wants one to train networks
+        return f"{error.strerror}; set the environment variable TMPDIR to a folder that you can write to"
     return f"{place}{error.strerror}; check the name, who may read and write there, and the space of the disk"

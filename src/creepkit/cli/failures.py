@@ -114,6 +114,17 @@ def prepare_streams() -> None:
             stream.reconfigure(errors=AS_TERMINALS_CAN)
 
 
+def check_working_folder() -> None:
+    """SystemExit, after a sentence, where the working folder has been deleted: libraries fail there without one."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        say("the working folder has been deleted; change to one that exists (cd), and run the command again")
+        raise SystemExit(1) from None
+    except OSError:  # it is there, and cannot be named
+        pass
+
+
 def print_warnings_plainly() -> None:
     """Have warnings of creepkit printed as one line without the place in the code."""
     others = warnings.formatwarning

@@ -1,5 +1,6 @@
 """How the command line ends where nobody foresaw it: one line, an exit code, a file for the report, no traceback."""
 
+import errno
 import os
 import stat
 import subprocess
@@ -125,6 +126,27 @@ def test_without_a_home_or_a_cache_or_a_known_user(tmp_path):
     assert "Traceback" not in run.stderr
     assert run.returncode == 0, run.stderr
     assert "time" in run.stdout
+
+
+@LINUX
+def test_a_working_folder_that_was_deleted_is_said(tmp_path):
+    """Intel's MKL in PyTorch ends the process there."""
+    gone = 'mkdir gone && cd gone && rmdir "$PWD" && exec "$@"'
+    run = subprocess.run(
+        ["/bin/sh", "-c", gone, "sh", *CREEPKIT, "laws"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 1
+    assert run.stderr.startswith("creepkit: the working folder has been deleted; change to one")
+    assert run.stderr.count("\n") == 1
+
+
+def test_without_temporary_folder_training_says_what_to_set(monkeypatch):
+    def none(*_, **__):
+        raise FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/none']")
+
+    monkeypatch.setattr(ck, "law", none)
+    run = creepkit("simulate", "norton", "--set", "A=1", "--end-h", "1")
+    assert "set the environment variable TMPDIR" in one_line(run)
 
 
 def test_a_report_names_the_address_of_the_project():
