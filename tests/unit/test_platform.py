@@ -3,6 +3,7 @@
 import ast
 import errno
 import itertools
+import ntpath
 import os
 import subprocess
 import sys
@@ -228,7 +229,8 @@ def test_a_result_whose_file_stays_open_in_a_spreadsheet_is_kept_beside_it(tmp_p
 
 def is_savable(name: str) -> bool:
     """Whether Windows can save a file of this name, by the rules that Microsoft states for names."""
-    reserved = PureWindowsPath(name).is_reserved() or name.split(".")[0].casefold() in DEVICE_NAMES
+    is_reserved = getattr(ntpath, "isreserved", None) or (lambda one: PureWindowsPath(one).is_reserved())  # from 3.13
+    reserved = is_reserved(name) or name.split(".")[0].casefold() in DEVICE_NAMES
     return not (reserved or set(name) & set('<>:"/\\|?*') or name.endswith((".", " ")) or len(name) > 200)
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection import Ranking
     from creepkit.studies.result import StudyResult
+    from creepkit.studies.study_file import StudyFile
 
 
 EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
@@ -86,8 +87,6 @@ def _measured_creep_curves(folder: Path) -> StudyResult:
     )
     result = _run(MEASURED, folder)
     ranking = result.rankings[""]
-    if len(ranking.laws) == 1:
-        typer.echo("the plugins with tertiary creep are not installed: Norton's law breaks by loss of section alone")
     _print_ranking(ranking)
     _print_values(ranking.best)
     _print_rupture_times(ranking.best)
@@ -120,22 +119,41 @@ def _planted_bulge_test(folder: Path) -> StudyResult:
 
 def _run(data: Path, folder: Path) -> StudyResult:
     """Carry out the study of example data, with those of its laws that are installed; FitError where a stage fails."""
-    from dataclasses import replace
-
     import creepkit as ck
     from creepkit.errors import FitError
-    from creepkit.studies.study_file import read_study_file
 
-    file = read_study_file(data / "study.toml")
-    part = file.model.identification
-    assert part is not None
-    installed = part.model_copy(update={"laws": [name for name in part.laws if name in ck.available("laws")]})
-    study = ck.Study(replace(file, model=file.model.model_copy(update={"identification": installed})))
+    study = ck.Study(_with_installed_laws(data / "study.toml"))
     with ProgressBar() as progress:
         result = study.run(to=folder, progress=progress.tick)
     for failure in result.failures:
         raise FitError(f"{failure.stage}: {failure.sentence}")
     return result
+
+
+def _with_installed_laws(path: Path) -> StudyFile:
+    """A study without the laws whose packages are not installed, which it says, and what it fixes of them."""
+    from dataclasses import replace
+
+    import creepkit as ck
+    from creepkit.registry.plugin_registry import package_with_law
+    from creepkit.studies.study_file import read_study_file
+
+    file = read_study_file(path)
+    part = file.model.identification
+    assert part is not None
+    available = ck.available("laws")
+    missing = [name for name in part.laws if name not in available]
+    if not missing:
+        return file
+    packages = " ".join(sorted(set(map(package_with_law, missing))))
+    typer.echo(
+        f"without {' and '.join(missing)}, the laws that have tertiary creep: 'pip install {packages}' brings them;\n"
+        "Norton's law alone breaks by loss of section, and does not explain these curves"
+    )
+    laws = [ck.law(name) for name in part.laws if name in available]
+    fixed = {name: value for name, value in part.fix.items() if any(name in law.names for law in laws)}
+    changes = {"laws": [law.name for law in laws], "fix": fixed}
+    return replace(file, model=file.model.model_copy(update={"identification": part.model_copy(update=changes)}))
 
 
 def _print_ranking(ranking: Ranking) -> None:
