@@ -5,8 +5,8 @@
 # make sanitize   tests of the core with checks of addresses and of undefined behaviour; needs g++ and its libasan
 # make demo   set up .venv, then identify laws from measured creep curves and a simulated bulge test; plots in demo/
 #
-# Both need make and Python alone; tests that need a compiler are skipped without it. The core is compiled by the
-# machine's C++ compiler, else by the one in the package ziglang (400 MB in .venv). PYTEST_OPTIONS goes to pytest.
+# Both need make, Python and a network for pip; tests that need a compiler are skipped without it. The core is compiled by
+# the machine's C++ compiler, else by that in the package ziglang (400 MB in .venv). PYTEST_OPTIONS goes to pytest.
 # TORCH chooses another build of torch: make test TORCH='torch==2.13.0' on a machine with a GPU.
 
 SHELL := /bin/bash

@@ -6,7 +6,6 @@ The library is loaded by ctypes, so one wheel serves every version of Python: py
 from __future__ import annotations
 
 import importlib.util
-import platform
 import shutil
 import sys
 import sysconfig
@@ -29,8 +28,11 @@ def _compilation() -> Any:
 
 
 def _platform() -> str:
-    """As the name of a wheel has it; a Python of macOS may serve two kinds of processor, our library serves one."""
-    name = sysconfig.get_platform().replace("universal2", platform.machine())
+    """As the name of a wheel has it."""
+    name = sysconfig.get_platform()
+    if name.startswith("macosx"):
+        compilation = _compilation()
+        name = f"macosx-{compilation.macos_version()}-{compilation.macos_processor()}"
     return name.replace("-", "_").replace(".", "_")
 
 

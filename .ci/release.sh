@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
 # What is published, built and tried as a stranger would: source distribution and wheel, twice from two folders, byte for
-# byte equal; the wheels of creepkit and of its plugins, installed into an empty environment with the lowest versions
-# that are declared and no extra; their tests, run from outside the source tree.
+# byte equal; the wheel alone, installed into an empty environment with the lowest versions that are declared and no
+# extra, and its demonstration; then the wheels of the plugins, and their tests, run from outside the source tree. Files
+# in wheels have the date of the commit (SOURCE_DATE_EPOCH). `.ci/release.sh FOLDER` also copies what was built there.
 set -euo pipefail
+copies=${1:+$(realpath -m "$1")}
 cd "$(dirname "$0")/.."
 here=$PWD
 python=$here/.venv/bin/python
@@ -27,24 +29,34 @@ done
 diff --recursive "$folder/first" "$folder/second"
 "$python" .ci/wheel_content.py "$folder"/first/creepkit-*.whl "$folder"/first/creepkit-*.tar.gz
 
-echo "the wheels in an empty environment, with the lowest versions that are declared"
+if [ -n "$copies" ]; then
+    mkdir -p "$copies"
+    cp "$folder"/first/* "$copies"
+fi
+
+echo "the wheel in an empty environment, with the lowest versions that are declared"
 "$python" .ci/lower_bounds.py >"$folder/lowest.txt"
 "$python" -m venv "$folder/env"
 pip="$folder/env/bin/python -m pip --disable-pip-version-check --quiet"
-if ! $pip install --constraint "$folder/lowest.txt" "$folder"/first/*.whl pytest hypothesis jsonschema 2>"$folder/log"; then
+if ! $pip install --constraint "$folder/lowest.txt" "$folder"/first/creepkit-*.whl 2>"$folder/log"; then
     cat "$folder/log"
     [ -z "${CI:-}" ] || exit 1
     echo "the lowest versions cannot be had here; the wheels are not tried"
     exit 0
 fi
-$pip check
 mkdir "$folder/outside" "$folder/empty"
+cd "$folder/empty"
+env -i HOME="$folder/empty" PATH="$folder/env/bin" creepkit demo >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
+tail -n 2 "$folder/log"
+cd "$here"
+
+echo "the plugins, and tests"
+$pip install --no-index --find-links "$folder/first" 'creepkit[plugins]'
+$pip install --constraint "$folder/lowest.txt" pytest hypothesis jsonschema packaging
+$pip check
 cp -R tests "$folder/outside"
 cp -R --parents pyproject.toml docs/schemas.py docs/reference/schemas "$folder/outside"  # settings of pytest; schemas
 cd "$folder/outside"
 # The schemas that are kept are those that today's pydantic writes, not the lowest.
 "$folder/env/bin/python" -m pytest -q -p no:cacheprovider --deselect tests/unit/files/test_formats.py::test_the_schemas_are_current \
     tests/conformance/test_registered_laws.py tests/unit/core tests/unit/files tests/unit/language
-cd "$folder/empty"
-env -i HOME="$folder/empty" PATH="$folder/env/bin" creepkit demo --uniaxial >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
-tail -n 2 "$folder/log"

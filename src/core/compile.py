@@ -1,8 +1,8 @@
 """Compile the core: `python src/core/compile.py`, which needs nothing but Python and what it asks for.
 
-The compiler is CXX, or else the first of c++, g++ and clang++ that the machine has, or else the one in the package
-`ziglang`. CMake and Ninja come from the packages of their names where the machine has none. `--requirements` prints
-those packages that are wanted, and missing from the machine.
+The compiler is CXX, or else the first of c++, g++ and clang++ that the machine has, or else, and always on Windows, the
+one in the package `ziglang`. CMake and Ninja come from the packages of their names where the machine has none.
+`--requirements` prints those packages that are wanted, and missing from the machine.
 
 `hatch_build.py` calls this file when pip installs creepkit or builds a wheel of it, `make core` when sources changed.
 """
@@ -13,10 +13,12 @@ import argparse
 import importlib
 import importlib.util
 import os
+import platform
 import shlex
 import shutil
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 SOURCES = Path(__file__).parent
@@ -47,6 +49,8 @@ def system_compiler() -> list[str] | None:
     """Command of the machine's C++ compiler; None where there is none."""
     if os.environ.get("CXX"):
         return shlex.split(os.environ["CXX"])
+    if sys.platform == "win32":  # other compilers bring libraries of their own, which a wheel would have to hold
+        return None
     paths = filter(None, map(shutil.which, COMPILERS))
     return next(([path] for path in paths), None)
 
@@ -70,10 +74,29 @@ def compile_core(build: Path, output: Path = IN_PLACE, sanitize: bool = False) -
         f"-DCREEPKIT_SANITIZE={'ON' if sanitize else 'OFF'}",
         "-DCMAKE_BUILD_TYPE=Release",
     ]
+    if sys.platform == "darwin":
+        options.append(f"-DCMAKE_OSX_DEPLOYMENT_TARGET={macos_version()}")
     _remove_other_configuration(build, generator[0], shutil.which((compiler or _zig())[0]) or "")
     _run([cmake, "-S", str(SOURCES), "-B", str(build), *options])
     _run([cmake, "--build", str(build), "--parallel", str(os.cpu_count() or 1)])
-    return output / LIBRARY_NAME
+    library = output / LIBRARY_NAME
+    if not library.is_file():
+        raise CompilationError(f"the core of creepkit cannot be compiled: {library} was not written")
+    return library
+
+
+def macos_version() -> str:
+    """The oldest macOS that the library is compiled for: that of this Python, at least 11.0 on Apple silicon."""
+    major, minor = sysconfig.get_platform().split("-")[1].split(".")[:2]
+    if macos_processor() == "arm64":
+        major = str(max(int(major), 11))
+    return f"{major}.{minor if major == '10' else 0}"  # from 11 on, names of wheels have no second number but 0
+
+
+def macos_processor() -> str:
+    """The kind of processor that the library is compiled for; a Python of macOS may serve two."""
+    name = sysconfig.get_platform().split("-")[2]
+    return platform.machine() if name == "universal2" else name
 
 
 def _remove_other_configuration(build: Path, generator: str, compiler: str) -> None:

@@ -139,6 +139,8 @@ PAGES: dict[str, tuple[str, Callable[[str], str]]] = {
 
 def seen(browser: Any, path: Path) -> tuple[dict[str, Any], list[str]]:
     """What stands in a page that was opened and touched, and the addresses it asked for beside its own."""
+    from playwright.sync_api import Error
+
     context = browser.new_context(bypass_csp=True, offline=True)
     try:
         page, asked = context.new_page(), []
@@ -148,7 +150,10 @@ def seen(browser: Any, path: Path) -> tuple[dict[str, Any], list[str]]:
         page.mouse.move(200, 200)
         page.wait_for_timeout(150)
         outside = [url for url in asked if not url.startswith(("data:", "blob:", "about:")) and url != path.as_uri()]
-        return page.evaluate(FOUND), outside
+        try:
+            return page.evaluate(FOUND), outside
+        except Error as error:  # a text had the browser leave the page meanwhile
+            return {"harmed": str(error).partition("\n")[0], "handlers": []}, outside
     finally:
         context.close()
 
