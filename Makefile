@@ -33,9 +33,10 @@ SANITIZED_TESTS := tests/unit/core tests/unit/fem tests/unit/specimens $(wildcar
 test: core
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
-	@for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q -n 2); done
+	@mkdir -p build; $(BIN)/mypy >build/types 2>&1 & types=$$!; \
+	for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q); done; \
+	wait $$types || { cat build/types; exit 1; }; cat build/types
 	$(BIN)/pytest -q -n 2 --dist loadgroup $(PYTEST_OPTIONS)
 
 core: .venv/.ok

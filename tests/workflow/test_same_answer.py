@@ -71,6 +71,14 @@ def tests_folder(request, tmp_path_factory):
     return folder, "dimple" if request.param is dimples else None
 
 
+@pytest.fixture(scope="module")
+def bars_folder(tmp_path_factory):
+    """Bars alone, for options that go the same way whatever the tests are."""
+    folder = tmp_path_factory.mktemp("bars")
+    curves(folder)
+    return folder, None
+
+
 def predictor(name):
     return None if name is None else ck.surrogate(name)
 
@@ -123,8 +131,16 @@ def test_identify(tests_folder, tmp_path, words, options, excluded):
     assert any("suspect frames were left out: 1 of" in note for note in fit.notes) == excluded
 
 
-@pytest.mark.parametrize(("words", "options"), [((), {}), (("--no-sums", "--seed", "2"), {"sums": False, "seed": 2})])
-def test_select(tests_folder, tmp_path, words, options):
+def test_select(tests_folder, tmp_path):
+    selected(tests_folder, tmp_path, (), {})
+
+
+def test_select_with_other_options(bars_folder, tmp_path):
+    selected(bars_folder, tmp_path, ("--no-sums", "--seed", "2"), {"sums": False, "seed": 2})
+
+
+def selected(tests_folder, tmp_path, words, options):
+    """Compare a selection by Python with one by these words."""
     folder, surrogate = tests_folder
     tests, laws = ck.read_histories(folder), ("norton", "strain-hardening")
     candidates = [ck.with_arrhenius(ck.law(name), tests) for name in laws]
@@ -156,11 +172,18 @@ def test_screen(tests_folder, tmp_path):
     assert any("suspect frames were left out: 1 of" in note for note in result.notes)
 
 
-@pytest.mark.parametrize(("words", "changes"), [((), {}), (("--seed", "5", "--suspect-frames", "keep"), {"seed": 5})])
-def test_discover(tests_folder, tmp_path, words, changes):
+def test_discover(tests_folder, tmp_path):
+    discovered(tests_folder, tmp_path, (), {})
+
+
+def test_discover_with_other_options(bars_folder, tmp_path):
+    words = ("--seed", "5", "--suspect-frames", "keep")
+    discovered(bars_folder, tmp_path, words, {"seed": 5, "suspect_frames": "keep"})
+
+
+def discovered(tests_folder, tmp_path, words, changes):
+    """Compare a study of temperature by Python with one by these words."""
     folder, surrogate = tests_folder
-    if words:
-        changes = {**changes, "suspect_frames": "keep"}
     settings = ck.IdentificationSettings(**QUICK, **changes)
     forms = {"A": ["arrhenius"], "n": ["constant", "linear"]}
     study = ck.temperature_study(
