@@ -1,4 +1,4 @@
-"""Check what a wheel and a source distribution hold: every file that git tracks in the package, and nothing else."""
+"""Check what a wheel and a source distribution hold: every file that git tracks, in the package or at all; no other."""
 
 import subprocess
 import sys
@@ -16,14 +16,12 @@ package = {name.removeprefix("src/") for name in files if name.startswith("src/c
 library = {name for name in in_wheel - package if Path(name).name.rpartition("creepkit_core.")[1]}
 with tarfile.open(distribution) as archive:
     in_source = {name.partition("/")[2] for name in archive.getnames()}
-TOP = {"hatch_build.py", "LICENSE", "README.md", "CHANGELOG.md", "CITATION.cff", "pyproject.toml"}
-wanted = {name for name in files if name.startswith("src/")} | TOP
 
 problems = [
     *(f"the wheel lacks {name}" for name in sorted(package - in_wheel)),
     *(f"the wheel holds {name}" for name in sorted(in_wheel - package - library)),
-    *(f"the source distribution lacks {name}" for name in sorted(wanted - in_source)),
-    *(f"the source distribution holds {name}" for name in sorted(in_source - wanted - {"PKG-INFO", ".gitignore"})),
+    *(f"the source distribution lacks {name}" for name in sorted(files - in_source)),
+    *(f"the source distribution holds {name}" for name in sorted(in_source - files - {"PKG-INFO"})),
 ]
 if len(library) != 1:
     problems.append(f"the wheel holds {len(library)} compiled cores")
