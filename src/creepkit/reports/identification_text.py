@@ -11,7 +11,7 @@ from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.nuisance_plausibility import nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
-from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
+from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import is_logarithmic, kind_and_start, output_unit
 from creepkit.records.units import celsius_text
@@ -71,7 +71,7 @@ def _values(fit: Identification) -> list[str]:
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
         note = "" if e.verdict == "determined" else f"   <- {e.verdict}"
-        note += " by these data" if e.verdict == "not determined" else ""
+        note += " by these data" if e.verdict in (NOT_DETERMINED, POORLY_DETERMINED) else ""
         low, high = interval_ends(fit.law, e)
         lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{low}, {high}]{unit}{note}")
     return lines

@@ -18,9 +18,7 @@ def tests_under_load():
     times, rng = np.geomspace(3.6e3, 3.6e5, 20), np.random.default_rng(3)
     values = {"A": 1e-18, "n": 5.0}
     found = [
-        ck.simulate(
-            "norton", "uniaxial", values, times=times, loading=ck.constant_stress(s, "load"), temperature=1073.15
-        )
+        ck.simulate("norton", "uniaxial", values, times=times, loading=load, temperature=1073.15)
         for load in (ck.constant_stress(s, "load") for s in (80.0, 100.0, 120.0))
     ]
     return [

@@ -23,7 +23,7 @@ from creepkit.reports.html.elements import (
     with_interval,
 )
 from creepkit.reports.html.law_names import LawNames, title_in_sentence
-from creepkit.reports.html.law_tables import credible_values, titled_law
+from creepkit.reports.html.law_tables import credible_values, titled_law, verdict_given_law
 from creepkit.reports.html.single_values import single_value_blocks
 from creepkit.reports.identification_text import rejected
 from creepkit.reports.interval_basis import interval_basis
@@ -136,7 +136,7 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     if misfit:
         blocks.append(Paragraph(REJECTED))
     elif undetermined:
-        blocks += [Paragraph("What these tests do not determine, given this law:"), Items(undetermined)]
+        blocks += [Paragraph("What these tests do not determine, or poorly, given this law:"), Items(undetermined)]
     else:
         blocks.append(Paragraph("The tests determine every parameter, given this law."))
     blocks += credible_values(found.ranking)
@@ -161,7 +161,7 @@ def _values(fit: Identification) -> Table:
             table[e.name].meaning,
             *with_interval(e.value, e.low, e.high, bound_marks(fit.law, e)),
             "" if e.unit == "1" else e.unit,
-            "–" if rejected(fit) and e.verdict == "determined" else e.verdict,
+            "–" if rejected(fit) and e.verdict == "determined" else verdict_given_law(fit, e),
         )
         for e in fit.estimates
     ]
