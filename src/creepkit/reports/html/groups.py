@@ -92,6 +92,9 @@ def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[B
         blocks.append(
             Paragraph(f"Drawn are the {len(worst)} of {len(with_frames)} tests whose misfit is largest.", "note")
         )
+    blocks.append(
+        Paragraph(f"Figures of tests: measured (dots), identified with 95 % band, and {residual_caption(fit)}.")
+    )
     for k in sorted(worst):
         name = printable(fit.tests[k].name, 120)
         blocks.append(
@@ -99,7 +102,7 @@ def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[B
                 partial(fitted_test_figure, fit, curves, k),
                 f"Test {name}",
                 fitted_test_text(fit, curves, k),
-                f"{name}: measured (dots), identified with 95 % band of the law, and {residual_caption(fit)}.",
+                f"{name}: measured, identified and residuals.",
             )
         )
     return blocks
