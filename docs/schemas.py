@@ -128,8 +128,12 @@ def valued_law_schema() -> dict[str, Any]:
 
 
 def ranking_schema() -> dict[str, Any]:
-    """The schema of a ranking: names of files beside it, and weights."""
-    properties = {"file": {"type": "string"}, "weight": {"type": "number", "minimum": 0, "maximum": 1}}
+    """The schema of a ranking: names of files beside it, weights, and the SHA-256 of each file."""
+    properties = {
+        "file": {"type": "string"},
+        "weight": {"type": "number", "minimum": 0, "maximum": 1},
+        "sha256": {"type": "string"},
+    }
     entry = {"type": "object", "properties": properties, "required": ["file", "weight"], "additionalProperties": False}
     ranking = ranking_document.RANKING
     return {

@@ -55,8 +55,8 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "forecast": "creepkit.forecasts.forecast:forecast",
         "with_histories": "creepkit.inverse.attached_histories:with_attached",
     },
-    "CrossValidation": {"text": "creepkit.reports.identification_text:cross_validation_text"},
-    "Confirmation": {"text": "creepkit.reports.identification_text:confirmation_text"},
+    "CrossValidation": {"text": "creepkit.reports.confirmation_text:cross_validation_text"},
+    "Confirmation": {"text": "creepkit.reports.confirmation_text:confirmation_text"},
     "SearchTrace": {"plot": "creepkit.reports.search:search_figure"},
     "Ranking": {
         "text": "creepkit.reports.ranking:ranking_text",

@@ -22,7 +22,7 @@ def command(
     from dataclasses import replace
 
     import creepkit as ck
-    from creepkit.reports.identification_text import CONFIRMATION_COLUMNS, confirmation_rows, confirmation_to_json
+    from creepkit.reports.confirmation_text import CONFIRMATION_COLUMNS, confirmation_rows, confirmation_to_json
 
     identification, histories = ck.load(fit), ck.read_histories(tests)
     if surrogate is not None:

@@ -181,6 +181,7 @@ def _print_values(fit: Identification) -> None:
     ]
     for start in range(0, len(texts), 3):
         typer.echo("  " + ", ".join(texts[start : start + 3]))
+    _print_interval_basis(fit)
 
 
 def _print_rupture_times(fit: Identification) -> None:
@@ -213,6 +214,14 @@ def _print_truth(folder: Path, fit: Identification) -> None:
         rows.append(("rate between tests", *sds, "", ""))
     typer.echo(f"the truth: {truth['law']}")
     _print_rows(("parameter", "true", "identified", "95 % interval", "inside"), rows)
+    _print_interval_basis(fit)
+
+
+def _print_interval_basis(fit: Identification) -> None:
+    from creepkit.reports.interval_basis import interval_basis
+
+    for line in interval_basis(fit):
+        typer.echo(f"  {line}")
 
 
 def _print_rows(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

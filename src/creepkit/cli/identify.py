@@ -25,6 +25,7 @@ from creepkit.cli.identification_options import (
     setting_changes,
     surrogate_named,
 )
+from creepkit.cli.identified_folder import identifying_alone, write_ranking
 from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, penalty_named, search_named
 from creepkit.reports.ranking import print_ranking, ranking_to_json
 from creepkit.reports.terminal import ProgressBar, print_json
@@ -35,31 +36,6 @@ if TYPE_CHECKING:
     from creepkit.inverse.selection import Ranking
     from creepkit.language import CreepLaw
     from creepkit.records import History
-
-
-def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
-    """Write JSON and plot of every law, the ranking's plot, and the best law as LaTeX and Python; returns the paths."""
-    import creepkit as ck
-    from creepkit.files.file_names import LAW_SIGNS, numbered_stems
-    from creepkit.inverse.ranking_document import write_ranking_document
-
-    folder.mkdir(parents=True, exist_ok=True)
-    written, weights = [], {}
-    ranking_name, *names = numbered_stems(
-        ["ranking", *(entry.fit.law.name for entry in ranking.laws)], "law", LAW_SIGNS
-    )
-    for name, entry in zip(names, ranking.laws, strict=True):
-        written.append(entry.fit.save(folder / f"{name}.json"))
-        weights[f"{name}.json"] = entry.weight
-        entry.fit.plot(folder / f"{name}.png")
-        written.append(folder / f"{name}.png")
-    ranking.plot(folder / f"{ranking_name}.png")
-    written += [folder / f"{ranking_name}.png", write_ranking_document(weights, folder / f"{ranking_name}.json")]
-    for language, suffix in (("latex", ".tex"), ("python", ".py")):
-        path = folder / f"{names[0]}{suffix}"
-        ck.export(ranking, language, to=path)
-        written.append(path)
-    return written
 
 
 def command(
@@ -131,8 +107,6 @@ def command(
     """
     import creepkit as ck
     from creepkit.errors import FitError
-    from creepkit.files.file_names import LAW_SIGNS, numbered_stems
-    from creepkit.files.writing import check_folder_target
 
     if temperature not in ("auto", "none"):
         raise FitError(f"--temperature {temperature} is not known; allowed are auto and none")
@@ -145,10 +119,6 @@ def command(
     if temperature == "auto":
         candidate_laws = [ck.with_arrhenius(candidate_law, histories) for candidate_law in candidate_laws]
     candidate_laws = change_laws(candidate_laws, fix, bound)
-    _, *stems = numbered_stems(["ranking", *(candidate.name for candidate in candidate_laws)], "law", LAW_SIGNS)
-    check_folder_target(
-        to, FitError, tuple(f"{s}{suffix}" for s in stems for suffix in (".json", ".png", ".tex", ".py"))
-    )
     changes = setting_changes(
         starts=starts,
         seed=seed,
@@ -165,13 +135,14 @@ def command(
     by_likelihood = by_likelihood and penalty is None
     if sums is not None and not by_likelihood:
         raise FitError("--sums compares laws by their likelihood: leave out --weights, --search, --penalty and --loss")
-    if by_likelihood and (len(candidate_laws) > 1 or sums is not None):
-        ranking = select_laws(candidate_laws, histories, **({} if sums is None else {"sums": sums}), **options)
-    else:
-        ranking = rank_laws(
-            candidate_laws, histories, search=search_named(search), penalty=penalty_named(penalty), **options
-        )
-    written = write_ranking(ranking, to)
+    with identifying_alone(to, candidate_laws):
+        if by_likelihood and (len(candidate_laws) > 1 or sums is not None):
+            ranking = select_laws(candidate_laws, histories, **({} if sums is None else {"sums": sums}), **options)
+        else:
+            ranking = rank_laws(
+                candidate_laws, histories, search=search_named(search), penalty=penalty_named(penalty), **options
+            )
+        written = write_ranking(ranking, to)
     if as_json:
         print_json(ranking_to_json(ranking, written))
     else:

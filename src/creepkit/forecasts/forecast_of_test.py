@@ -383,10 +383,11 @@ def _caution(laws: Sequence[LawDraws]) -> str:
         open_ = [e.name for e in draws.fit.estimates if e.verdict not in ("determined", ONE_SIDED)]
         if open_ and not has_sampled_draws(draws.fit):
             outside = f"{100 * draws.outside:.0f} % of them"
+            names = ", ".join(open_)
             return (
-                f"the band is not that of the tests, and what parameters add to it may be far too wide: tests do not "
-                f"determine {', '.join(open_)}, and its draws are Gaussian about the values, not compared with the "
-                f"tests; {outside} lay outside the bounds of the law and were left out"
+                f"the band is not that of the tests, and what parameters add to it may be far too wide: tests do not, "
+                f"or poorly, determine {names}, and its draws are Gaussian about the values, not compared with "
+                f"the tests; {outside} lay outside the bounds of the law and were left out"
             )
     return ""
 

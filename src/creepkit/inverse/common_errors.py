@@ -2,7 +2,9 @@
 
 Tests repeated on one rig do not average them out. With s(tests, observations) the change of the residuals by one such
 error, the values move by the sum over tests of what each contributes, while independent errors add in quadrature (see
-inverse.unmodelled_effects). A temperature or load that is off changes the creep rate of each test by its own factor.
+inverse.unmodelled_effects). A temperature or load that is off changes the creep rate of each test by its own factor. Of
+tests under an imposed strain or displacement the modulus and what is imposed move the stress itself (see
+inverse.imposed_motion_errors).
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.inverse.imposed_motion_errors import imposed_motion_errors
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.uncertainty.quantities import local_exponent, log_rate
@@ -69,7 +72,7 @@ def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedPro
         )
         change = COMMON_LOAD_ERROR * by_test[:, None] * sensitivity
         errors.append(CommonError("load", 100 * COMMON_LOAD_ERROR, "%", change))
-    return errors
+    return [*errors, *(CommonError(*one) for one in imposed_motion_errors(problem, x, linear))]
 
 
 def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, test: int | None = None) -> float:

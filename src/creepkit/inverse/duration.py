@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from creepkit.inverse.rupture_use import has_tertiary_creep
 from creepkit.language import CreepLaw, strain, time
 from creepkit.records import UNKNOWN_DURATION, History
 
@@ -35,3 +38,22 @@ def needs_durations(law: CreepLaw) -> bool:
     Over a duration that is assumed from the measured rate such a law would predict that rate from itself.
     """
     return law.uses(strain) or law.uses(time)
+
+
+UNTESTABLE = (
+    "no test has a curve: how the rate of this law falls with strain or time rests on the stated durations alone, at "
+    "whose end its rate is taken for the minimum; its values and intervals, n and Q among them, are not tested by "
+    "minimum rates and may exclude the true ones"
+)
+"""What is said of a law whose rates rest on durations."""
+
+
+def rests_on_durations(law: CreepLaw, histories: Sequence[History]) -> bool:
+    """Whether a hardening law is compared with minimum rates of tests without curves.
+
+    Its rate falls with strain or time and has neither a minimum nor a steady state, so that its value at the end of
+    each test, a time that damage decides, is compared with the rate.
+    """
+    compared = [history for history in histories if history.outputs or compares_minimum_rate(history)]
+    curves = any(history.outputs for history in compared)
+    return bool(compared) and not curves and needs_durations(law) and not has_tertiary_creep(law)

@@ -10,7 +10,7 @@ from importlib.metadata import version
 import numpy as np
 
 from creepkit import registry
-from creepkit.inverse.duration import followed_duration
+from creepkit.inverse.duration import UNTESTABLE, followed_duration, rests_on_durations
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.goodness_of_fit import TestFit
 from creepkit.inverse.iterative_estimation import EstimationResult
@@ -118,6 +118,7 @@ def identification_notes(
         likelihood_note = "how their rates scatter cannot be seen, and intervals are those of these tests alone"
         note = likelihood_note if settings.weights == "likelihood" else assumption_note
         sentences.append(f"fewer than {MINIMUM_TESTS} tests: {note}")
+    sentences += [UNTESTABLE] if rests_on_durations(law, histories) else []
     sentences += _large_strain_notes(histories)
     with_both = [h.name for h in histories if h.minimum_rate is not None and h.outputs]
     if with_both:

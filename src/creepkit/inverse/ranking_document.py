@@ -1,4 +1,7 @@
-"""A ranking as a file: its laws' identifications, each in a file beside it, with their weights."""
+"""A ranking as a file: its laws' identifications, each in a file beside it, with their weights.
+
+It states the SHA-256 of each of these files: one that another run has written since under the same name is refused.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from typing import Any
 from creepkit.errors import FitError, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, read_json, write_json
 from creepkit.files.reading import FileKind
+from creepkit.files.writing import digest_of
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json, read_identification
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
@@ -26,16 +30,31 @@ MOST_LAWS = 100
 
 
 def write_ranking_document(weights: Mapping[str, float], path: Path) -> Path:
-    """Write the ranking; weights : {file of an identification, beside it: weight}."""
-    return write_json(ranking_to_document(weights), path, RANKING.kind)
+    """Write the ranking; weights : {file of an identification, which is there beside it: weight}."""
+    digests = {name: digest_of(path.parent / name) for name in weights}
+    return write_json(ranking_to_document(weights, digests), path, RANKING.kind)
 
 
-def ranking_to_document(weights: Mapping[str, float]) -> dict[str, Any]:
-    """The ranking as JSON-able data; weights : {file of an identification, beside it: weight}."""
+def ranking_to_document(weights: Mapping[str, float], digests: Mapping[str, str]) -> dict[str, Any]:
+    """The ranking as JSON-able data.
+
+    weights : {file of an identification, beside it: weight}. digests : {the same file: SHA-256 of what it holds}.
+    """
     if len(weights) > MOST_LAWS:  # those of least weight say nothing
         weights = dict(sorted(weights.items(), key=lambda pair: -pair[1])[:MOST_LAWS])
-    laws = [{"file": name, "weight": weight} for name, weight in weights.items()]
+    laws = [{"file": name, "weight": weight, "sha256": digests[name]} for name, weight in weights.items()]
     return {**RANKING.heading, "laws": laws}
+
+
+def files_of_ranking(path: Path) -> dict[str, str | None]:
+    """{file of a law: its SHA-256, None where it is not stated}, the best first; {} where no ranking can be read."""
+    try:
+        laws = check_heading(read_json(path, RANKING.kind), str(path), RANKING).get("laws")
+    except FitError:
+        return {}
+    entries = [one for one in laws if isinstance(one, dict)] if isinstance(laws, list) else []
+    names = [(entry.get("file"), entry.get("sha256")) for entry in entries]
+    return {name: sha256 for name, sha256 in names if isinstance(name, str) and Path(name).name == name}
 
 
 def read_fit_or_ranking(path: str | Path) -> Identification | ModelAverage:
@@ -60,7 +79,8 @@ def _ranking_from_json(data: Any, path: str | Path) -> ModelAverage:
     fits: list[Identification] = []
     weights: list[float] = []
     for entry in laws:
-        if not isinstance(entry, dict) or check_keys(entry, ("file", "weight"), "laws"):
+        keys = ("file", "weight", *(("sha256",) if isinstance(entry, dict) and "sha256" in entry else ()))
+        if not isinstance(entry, dict) or check_keys(entry, keys, "laws"):
             raise FitError(f"{path}: each of its laws is a file and a weight, found {quoted(repr(entry), 60)}")
         name, weight = entry["file"], entry["weight"]
         if not isinstance(name, str) or Path(name).name != name or name in ("", ".", "..", Path(path).name):
@@ -69,10 +89,7 @@ def _ranking_from_json(data: Any, path: str | Path) -> ModelAverage:
             raise FitError(f"{path}: the weight of {name} is {quoted(repr(weight), 20)}; it is a number from 0 to 1")
         if name in (known["file"] for known in laws[: len(fits)]):
             raise FitError(f"{path}: {name} is among its laws twice; keep one of them")
-        try:
-            fits.append(read_identification(Path(path).parent / name))
-        except FitError as error:
-            raise FitError(f"{path} names {name}: {error}") from None
+        fits.append(_fit_of_law(Path(path), name, entry.get("sha256")))
         weights.append(float(weight))
     if len({fit.provenance.get("data") for fit in fits}) > 1:
         raise FitError(f"{path}: its laws were not identified alike from the same tests; {RANKING.kind.advice}")
@@ -81,3 +98,17 @@ def _ranking_from_json(data: Any, path: str | Path) -> ModelAverage:
     if not sum(weights) > 0:
         raise FitError(f"{path}: no law has a weight above zero; {RANKING.kind.advice}")
     return ModelAverage(tuple(fits), tuple(weights))
+
+
+def _fit_of_law(path: Path, name: str, sha256: Any) -> Identification:
+    """The identification in a file beside a ranking; sha256 : of the file, None where the ranking does not state it."""
+    try:
+        fit = read_identification(path.parent / name)
+    except FitError as error:
+        raise FitError(f"{path} names {name}: {error}") from None
+    if sha256 is not None and digest_of(path.parent / name) != sha256:
+        raise FitError(
+            f"{path}: {name} is not the file that this ranking was made with: it has been changed, or written by "
+            f"another run; {RANKING.remedy}"
+        )
+    return fit

@@ -93,7 +93,10 @@ class UnmodelledEffect:
             stated = {
                 "temperature": f"temperatures {size} above those stated, in {of_tests}",
                 "load": f"loads {size} above those stated, in {of_tests}",
+                "modulus": f"Young's moduli {size} above those stated, in {of_tests}",
             }
+            if self.kind.startswith("imposed "):
+                return f"{self.kind} {size} above that stated, in {of_tests}"
             return stated.get(self.kind, f"a {self.kind} {size} above that stated, in {of_tests}")
         several = self.tests > 1
         each = f"each of the {self.tests} tests" if several else "the test"

@@ -9,7 +9,7 @@ usual size), moves the values by
 to first order, and with it the rate. C is the covariance under which values are found. Where the scatter of rates is
 estimated from the tests, independent errors of them are found as such scatter: C then holds the scatter that they make,
 and each test weighs as much as any other, however small the scatter is without them. An error common to all tests
-makes no scatter (see inverse.common_errors).
+makes no scatter (see inverse.common_errors); one that moves the stresses of all tests is found as offsets of them.
 
 The same effects, as random effects in the covariance, show whether the choice of a law rests on their absence (see
 selection.challenges).
@@ -26,6 +26,7 @@ import sympy
 from creepkit.arrays import Floats
 from creepkit.inverse.common_errors import activation_energy, common_errors, log_rate_per_kelvin
 from creepkit.inverse.composite_predictor import predict_with_sensitivities, predictor_for, supports_nuisance
+from creepkit.inverse.imposed_motion_errors import moves_stress
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.nuisance_parameters import prior_mean
@@ -86,7 +87,9 @@ def unmodelled_effects(
         effect = UnmodelledEffect(kind, size, unit, rate_change, size * likeness[0], likeness[1], change, tests=count)
         effects.append(replace(effect, activation_energy=energy, assumed=assumed) if kind == DRIFT else effect)
     for kind, size, unit, change in common:
-        rate_change = float(_rate_changes(problem, x, linear, fitting_noise or noise_model, change).sum())
+        noise = fitting_noise or noise_model
+        noise = _with_offset_of(change, problem, linear, noise) if moves_stress(kind) else noise
+        rate_change = float(_rate_changes(problem, x, linear, noise, change).sum())
         effect = UnmodelledEffect(kind, size, unit, rate_change, common=True, tests=count)
         of_heat = kind == "temperature"
         effects.append(replace(effect, activation_energy=energy, assumed=assumed) if of_heat else effect)
@@ -123,6 +126,28 @@ def _with_scatter_of(
     like_rates = (change * weighted).sum(axis=1) / information
     scatter = float(np.hypot(noise_model.rate, np.sqrt(np.mean(like_rates**2))))
     return replace(noise_model, rate=min(scatter, LARGEST_RATE_SCATTER))
+
+
+def _with_offset_of(
+    change: Floats, problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel
+) -> NoiseModel:
+    """The noise model with the offsets of tests that an error common to them would be estimated as.
+
+    change : (tests, observations) -, of the residuals. Of each output the mean of a test, in its unit, counts.
+    """
+    fixed = components_fixed_by_priors(problem.settings.nuisances, list(noise_model.outputs))
+    observations, slopes = problem.observations, linear.residuals.offset_sensitivity
+    if not any(n.kind == "offset" for n in problem.settings.nuisances):
+        return noise_model
+    for position, name in enumerate(observations.outputs):
+        if (name, "offset") in fixed or name not in noise_model.outputs:
+            continue
+        mask = linear.residuals.present & (observations.output_index == position)
+        weights = np.where(mask, slopes**2, 0.0).sum(axis=1)
+        means = np.where(mask, change * slopes, 0.0).sum(axis=1) / np.maximum(weights, 1e-300)
+        offset = float(np.sqrt(np.mean(means[weights > 0] ** 2))) if (weights > 0).any() else 0.0
+        noise_model = noise_model.with_output(name, offset=float(np.hypot(noise_model[name].offset, offset)))
+    return noise_model
 
 
 def tolerated_dimensions(problem: LeastSquaresProblem) -> list[Dimension]:

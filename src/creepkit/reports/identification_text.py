@@ -1,29 +1,27 @@
-"""Text of identifications, for a terminal and as comments for exported laws, and of their confirmation."""
+"""Text of identifications, for a terminal and as comments for exported laws."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from statistics import median
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.nuisance_plausibility import nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
-from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
+from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import is_logarithmic, kind_and_start, output_unit
 from creepkit.records.units import celsius_text
-from creepkit.reports.judged_readings import judged_readings
+from creepkit.reports.interval_basis import interval_basis
+from creepkit.reports.judged_readings import LAW_RATE_MEANING, LAW_RATE_MISFIT, OWN_RATE_CHI_SQUARE, judged_readings
 from creepkit.reports.stress_exponents import reference_sentences
 from creepkit.reports.tests_apart import apart_sentence
 
 if TYPE_CHECKING:
-    from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
-    from creepkit.inverse.cross_validation import CrossValidation
-    from creepkit.inverse.goodness_of_fit import RateComparison, RuptureComparison
+    from creepkit.inverse.goodness_of_fit import RuptureComparison
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 
@@ -42,6 +40,7 @@ def identification_text(fit: Identification) -> str:
         "",
         *_values(fit),
         *([] if rejected(fit) else _reference(fit)),
+        *(f"  {line}" for line in interval_basis(fit)),
         "",
         *_strains(fit),
         *_minimum_rates(fit),
@@ -72,7 +71,7 @@ def _values(fit: Identification) -> list[str]:
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
         note = "" if e.verdict == "determined" else f"   <- {e.verdict}"
-        note += " by these data" if e.verdict == "not determined" else ""
+        note += " by these data" if e.verdict in (NOT_DETERMINED, POORLY_DETERMINED) else ""
         low, high = interval_ends(fit.law, e)
         lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{low}, {high}]{unit}{note}")
     return lines
@@ -210,8 +209,9 @@ def _linear_outputs(fit: Identification) -> list[str]:
         rms = f"rms {e.mean_squared_error**0.5:.3g}{unit} ({100 * e.relative_rms_error:.2g} %)"
         lines.append(
             f"  {name}: relative squared error {e.relative_squared_error:.3g}, {rms}, noise {s.noise:.2g}{unit}, "
-            f"offsets {s.offset:.2g}{unit}, reduced chi-square {e.chi_square:.3g}"
+            f"offsets {s.offset:.2g}{unit}, {LAW_RATE_MISFIT} {e.chi_square:.3g}"
         )
+    lines += [f"  the {LAW_RATE_MEANING}"] if lines else []
     if lines and not logarithmic_output(fit):
         count = _tests(len(fit.tests))
         lines.append(f"  {count}; scatter of the rate between tests (one sd) {scatter_of_rates(fit)}")
@@ -228,7 +228,8 @@ def _table(fit: Identification) -> list[str]:
     width = max(len(m.name) for m in fit.tests)
     readings = judged_readings(fit)
     head = f"  {'test':{width}}  {'condition':22} {'error':>9} {'chi2':>8} {'offset':>9} {'rate':>6} {'weight':>6}"
-    lines = ["", head + "".join(f" {kind + _unit(kind):>18}" for kind in kinds)]
+    explained = [f"  chi2: {OWN_RATE_CHI_SQUARE}"] if readings is not None else []
+    lines = ["", *explained, head + "".join(f" {kind + _unit(kind):>18}" for kind in kinds)]
     for k, m in enumerate(fit.tests):
         first_output = m.outputs[0]
         test_estimates = [estimates_by_owner.get((kind, m.name)) for kind in kinds]
@@ -325,75 +326,3 @@ MOST_TEMPERATURES_NAMED = 12
 def rupture_rows(fit: Identification) -> list[tuple[str, str, RuptureComparison]]:
     """(test, condition, rupture) of the tests whose end is known and was compared with the law."""
     return [(m.name, m.condition, m.rupture) for m in fit.tests if m.rupture is not None and m.rupture.used]
-
-
-def confirmation_text(confirmation: Confirmation) -> str:
-    """The verdict, and chi-square of the simulation and of the fit, one line an output of a test."""
-    lines = [f"{confirmation.law}: {confirmation.verdict}"]
-    for test in confirmation.tests:
-        for o in test.outputs:
-            fit = "" if o.fit_errors is None else f", of the fit {o.fit_errors.chi_square:.3g}"
-            difference = f"; apart {o.rms_difference:.2g} noise" if math.isfinite(o.rms_difference) else ""
-            chi_square = f"chi-square {o.simulation_errors.chi_square:.3g}{fit}{difference}"
-            lines.append(f"  {test.name}, {o.output}: {chi_square}")
-    return "\n".join(lines)
-
-
-def cross_validation_text(validation: CrossValidation) -> str:
-    """One line for each held-out test: its relative squared errors, about the mean of the test.
-
-    Of its rupture time and minimum rate the prediction over the measured one, with its 95 % interval.
-    """
-    lines = [f"law '{validation.fit.law.name}', held out by {validation.by}: relative squared errors"]
-    for name, errors in validation.errors.items():
-        cells = [f"{output} {e.relative_squared_error:.3g}" for output, e in errors.items()]
-        cells += [f"{what} {_held_out_text(one)}" for what, one in validation.single_values[name].items()]
-        lines.append(f"  {name}: {', '.join(cells)}")
-    return "\n".join(lines)
-
-
-def _held_out_text(one: RuptureComparison | RateComparison) -> str:
-    """Predicted over measured, with the interval of a single test."""
-    low, high = one.low / one.measured, one.high / one.measured
-    unbroken = " of the time it lasted unbroken" if getattr(one, "censored", False) else ""
-    return f"predicted over measured {one.ratio:.3g} [{low:.3g}, {high:.3g}]{unbroken}"
-
-
-def confirmation_to_json(confirmation: Confirmation) -> dict[str, Any]:
-    """The same as JSON-able data."""
-    values: dict[str, Any] = _json_value(asdict(confirmation))
-    return {"holds": confirmation.confirmed, "verdict": confirmation.verdict, **values}
-
-
-CONFIRMATION_COLUMNS = ("test", "output", "chi-square", "of the fit", "rms", "apart, noise")
-
-
-def confirmation_rows(confirmation: Confirmation) -> list[tuple[str, ...]]:
-    """One row an output of a test."""
-    return [_confirmation_row(test.name, comparison) for test in confirmation.tests for comparison in test.outputs]
-
-
-def _confirmation_row(test: str, comparison: ConfirmedOutput) -> tuple[str, ...]:
-    fit_chi_square = "" if comparison.fit_errors is None else _number_text(comparison.fit_errors.chi_square)
-    rms = _number_text(math.sqrt(comparison.simulation_errors.mean_squared_error))
-    return (
-        test,
-        comparison.output,
-        _number_text(comparison.simulation_errors.chi_square),
-        fit_chi_square,
-        rms,
-        _number_text(comparison.rms_difference),
-    )
-
-
-def _number_text(number: float) -> str:
-    return "" if math.isnan(number) else f"{number:.3g}"
-
-
-def _json_value(value: Any) -> Any:
-    """The same with null for what JSON cannot hold."""
-    if isinstance(value, dict):
-        return {name: _json_value(item) for name, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_json_value(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

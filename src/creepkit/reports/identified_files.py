@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -31,11 +32,13 @@ def identified_files(rankings: Mapping[str, Ranking]) -> list[ExportedFile]:
     names = (f"{stem}.json" for stem in numbered_stems(texts, "law", LAW_SIGNS))
     for ranking in rankings.values():
         weights: dict[str, float] = {}
+        digests: dict[str, str] = {}
         for one in ranking.laws:
             name = next(names)
             weights[name] = one.weight
             text = json_text(identification_to_json(one.fit))
+            digests[name] = hashlib.sha256(text.encode()).hexdigest()
             files.append(ExportedFile(name, f"identification of {one.fit.law.name}, read by ck.load", text))
-        name, text = next(names), json_text(ranking_to_document(weights))
+        name, text = next(names), json_text(ranking_to_document(weights, digests))
         files.append(ExportedFile(name, "ranking, with the identifications in the same folder", text))
     return files

@@ -20,6 +20,19 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
 
 
+OWN_RATE_CHI_SQUARE = (
+    "reduced chi-square of each test, its own rate, rupture life and offset taken out, by which the law is judged: "
+    "over all tests it is that of the verdict, 1 is noise alone"
+)
+"""What the chi-square of a test is, wherever one is shown."""
+
+
+LAW_RATE_MISFIT = "mean square misfit over noise² with the law's rate for every test"
+
+
+LAW_RATE_MEANING = f"{LAW_RATE_MISFIT} holds the scatter between tests, which is no fault of the law"
+
+
 @dataclass(frozen=True, eq=False)
 class JudgedReadings:
     """The readings of the tests of an identification by which its law is judged.

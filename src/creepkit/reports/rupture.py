@@ -155,7 +155,7 @@ def strength_rows(assessment: RuptureAssessment) -> tuple[list[str], list[tuple[
         note = "no bounds of a new heat: the tests tell no heats or laboratories apart"
     elif not scattering:
         groups = " and ".join(map(_plural, assessment.tests.groups))
-        note = f"no bounds of a new heat: no scatter between {groups} is found"
+        note = f"a new heat has the bounds of the mean: no scatter between {groups} is found"
     return [*heads, "of one test", ""], rows, note
 
 

@@ -101,6 +101,10 @@ def bound_curves(models: WeightedModels, at: Conditions, level: float) -> dict[t
     return {(of, p): curves[of, p] for of in BOUND_KINDS for p in (tail, 1.0 - tail)}
 
 
+BOUND_NAMES = {"mean": "the mean", "heat": "a new heat", "test": "one test"}
+"""Of what bounds are, in words, as the heads of tables have it."""
+
+
 def strength_estimates(
     models: WeightedModels,
     name: str,
@@ -139,11 +143,14 @@ def _estimate(
     reasons = [reason] if reason else []
     bounds: dict[str, list[float | None]] = {of: [] for of in BOUND_KINDS}
     stress, curves = bound_of_time
+    lacking: dict[str, list[str]] = {"lower": [], "upper": []}
     for k, ((of, _), curve) in enumerate(curves.items()):
         bound, reason = (None, "") if value is None else _bound(stress, curve, hours, value, upper=bool(k % 2))
         bounds[of].append(bound)
         if reason:
-            reasons.append(f"no {'upper' if k % 2 else 'lower'} bound of the {of}: {reason}")
+            lacking["upper" if k % 2 else "lower"].append(f"{BOUND_NAMES[of]}: {reason}")
+    # Of the narrowest kind alone: wider ones hold it, and where heats do not scatter nothing is said of a new heat.
+    reasons += [f"no {side} bound of {ofs[0]}" for side, ofs in lacking.items() if ofs]
     pairs = {f"bounds_of_{of}": (ends[0], ends[1]) for of, ends in bounds.items()}
     flag = extrapolation(tests, hours, temperature, value)
     return StrengthEstimate(hours, temperature, name, value, **pairs, extrapolation=flag, reason="; ".join(reasons))

@@ -9,18 +9,18 @@ from itertools import pairwise
 from pathlib import Path
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.inverse.duration import duration_known, followed_duration, needs_durations
+from creepkit.inverse.duration import duration_known, followed_duration, needs_durations, rests_on_durations
 from creepkit.inverse.held_levels import held_temperatures
-from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
-from creepkit.quality.flags import frame_ranges_text
+from creepkit.quality import DataQuality
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
 from creepkit.records.units import celsius_text
 from creepkit.studies.camera_proposal import CameraProposal, proposed_cameras, text_of_cameras
+from creepkit.studies.exclusion_proposal import MOST_REMARKS, exclude_part, left_out_lines
 from creepkit.studies.folders import folders_with_tests
 from creepkit.studies.study_file import parse_study
 from creepkit.studies.swapped_units import swapped_units
 from creepkit.studies.tertiary_creep import shows_tertiary_creep
-from creepkit.studies.toml_text import CITATION_LINE, comment, comments, one_line, quoted, quoted_list, study_part
+from creepkit.studies.toml_text import CITATION_LINE, comment, quoted, quoted_list, study_part
 
 SECONDARY_LAWS = ("norton", "strain-hardening", "time-hardening")
 SEVERAL_STRESSES_LAW = "hyperbolic-sine"
@@ -45,10 +45,6 @@ FEWEST_RUPTURES = 5
 
 SAME_TEMPERATURE = 5.0
 """K."""
-
-
-MOST_REMARKS = 20
-"""Files that were not read, and flags, that the comments name."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +156,14 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
     parse_study(path, text)  # what is written must be valid
     doubts = [f"check the units: {line}" for line in swapped_units(tests)]
     return StudyProposal(
-        text, (*summary.lines, *doubts, *cameras.summary, *(f"not read: {line}" for line in problems[:MOST_REMARKS]))
+        text,
+        (
+            *summary.lines,
+            *doubts,
+            *left_out_lines(quality),
+            *cameras.summary,
+            *(f"not read: {line}" for line in problems[:MOST_REMARKS]),
+        ),
     )
 
 
@@ -225,6 +228,8 @@ def candidate_laws(summary: DataSummary) -> list[str]:
     if summary.rupture_table and not set(DAMAGE_LAWS) - set(installed):
         names = DAMAGE_LAWS
     chosen = [name for name in names if name in installed and (judged or not needs_durations(ck.law(name)))]
+    testable = [name for name in chosen if not rests_on_durations(ck.law(name), summary.tests)]
+    judged, chosen = judged and testable == chosen, testable
     several = len(summary.loads) > 2 and summary.loads[-1] > STRESS_RATIO * summary.loads[0]
     if several and names is SECONDARY_LAWS and SEVERAL_STRESSES_LAW in installed:
         chosen.append(SEVERAL_STRESSES_LAW)
@@ -246,8 +251,8 @@ def _text(
     parts = [
         study_part(folder),
         list(cameras.lines),
-        _data_part(files, reader, summary, problems),
-        _exclude_part(quality),
+        _data_part(files, reader, summary, problems, left_out_lines(quality)),
+        exclude_part(quality),
     ]
     if summary.framed:
         parts += [_identification_part(summary), _temperature_part(summary)]
@@ -260,7 +265,10 @@ def _text(
     return "\n\n".join("\n".join(lines) for lines in parts if lines) + "\n"
 
 
-def _data_part(files: Sequence[str], reader: str | None, summary: DataSummary, problems: Sequence[str]) -> list[str]:
+def _data_part(
+    files: Sequence[str], reader: str | None, summary: DataSummary, problems: Sequence[str], left_out: Sequence[str]
+) -> list[str]:
+    """left_out : what is going to be left out of the tests, in sentences."""
     doubts = [comment(f"Check the units: {line}") for line in swapped_units(summary.tests)]
     lines = [*map(comment, summary.lines), *doubts, "[data]", f"files = {quoted_list(files)}"]
     lines += [f"reader = {quoted(reader)}"] if reader is not None else []
@@ -270,35 +278,9 @@ def _data_part(files: Sequence[str], reader: str | None, summary: DataSummary, p
             f"# only = {{ temperature_C = [{summary.temperatures[0] - ZERO_CELSIUS:.0f}] }}  # these tests alone"
         )
     lines.append('suspect_frames = "exclude"  # frames that unload, fall or lie apart; or "keep"')
+    lines += map(comment, left_out)
     lines.append(CITATION_LINE)
     return [*lines, *(comment(f"not read: {line}") for line in problems[:MOST_REMARKS])]
-
-
-def _exclude_part(quality: DataQuality) -> list[str]:
-    """Copies of tests, left out; proposals for other suspect tests, as comments.
-
-    Suspect frames are left out by [data] suspect_frames.
-    """
-    copies = [one for one in quality if one.kind == "copy"]
-    lines = []
-    flags = [one for one in quality if len(one.tests) == 1 and one.kind not in ("copy", *FRAME_FLAG_KINDS)]
-    for flag in flags[:MOST_REMARKS]:
-        lines += [*comments(str(flag)), "# [[exclude]]", f"# test = {quoted(one_line(flag.history))}"]
-        if flag.frames:
-            text = frame_ranges_text(flag.frames).partition(" ")[2]
-            lines.append(f"# frames = {quoted(text)}")
-        elif flag.time is not None:
-            lines.append(f"# from_h = {flag.time / SECONDS_PER_HOUR:.6g}")
-        lines += [f"# reason = {quoted(flag.kind)}", "#"]
-    if copies:
-        tables = [
-            ["[[exclude]]", f"test = {quoted(one_line(one.history))}", f"reason = {quoted(one_line(one.reason))}"]
-            for one in copies
-        ]
-        return [*(line for table in tables for line in (*table, "")), *lines][:-1]
-    if not lines:
-        return ["# [[exclude]]", '# test = "name of a test"', '# frames = "97-191, 193"', '# reason = "why"']
-    return lines[:-1]
 
 
 def _identification_part(summary: DataSummary) -> list[str]:
@@ -310,6 +292,8 @@ def _identification_part(summary: DataSummary) -> list[str]:
         lines.append("# All tests are at one load: how rates depend on stress they do not say.")
     if not all(map(duration_known, summary.tests)):
         lines.append("# Minimum rates of tests of unknown duration cannot judge laws that depend on strain or time.")
+    elif not any(history.outputs for history in summary.tests):
+        lines.append("# Without curves laws of hardening are not proposed: minimum rates do not test them.")
     lines += ["[identification]", f"laws = {quoted_list(laws)}  # creepkit laws lists all"]
     with_alpha = [name for name in laws if "alpha" in ck.law(name).names]
     if with_alpha and summary.rupture_table:

@@ -60,7 +60,9 @@ def test_a_fit_brings_its_values_intervals_and_likely_directions():
     for row in rows.values():
         low, high = row["interval"]
         assert low <= row["value"] <= high
-        assert row["verdict"] in ("determined", "at its bound", "bounded on one side only", "not determined")
+        assert row["verdict"] in (
+            *("determined", "poorly determined", "at its bound", "bounded on one side only", "not determined"),
+        )
     steps = np.array([[step[name] for name in fit.law.names] for step in data["directions"]])
     known = correlation(fit)
     np.testing.assert_allclose(steps.T @ steps, known.matrix * np.outer(known.sd, known.sd), rtol=1e-6)

@@ -49,7 +49,7 @@ def test_damage_is_proposed_for_tables_where_it_is_installed(folder, monkeypatch
     without = {name: law for name, law in available("laws").items() if name in ("norton", "strain-hardening")}
     monkeypatch.setattr(ck, "available", lambda kind: without if kind == "laws" else available(kind))
     text = propose_study(folder / "data", study).text
-    assert 'laws = ["norton", "strain-hardening"]' in text
+    assert 'laws = ["norton"]  #' in text  # of minimum rates without curves no law of hardening is proposed
     assert "# No law of damage is installed: rupture times of tests without curves are not used to identify." in text
 
 

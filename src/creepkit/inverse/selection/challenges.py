@@ -248,7 +248,7 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     least, x = _least_chi_square(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
-    description = f"its sum with {other.law.name}, which carries {100 * SHARE:.0f} % of the rate,"
+    description = f"its sum with {other.law.name}, tried with {100 * SHARE:.0f} % of the rate carried by it,"
     excess = least - _chi_square(best.problem, best.x)
     return AlteredLaw("sum", problem, x, excess, share.jacobian(x), other.law.name, description)
 

@@ -15,7 +15,7 @@ import numpy as np
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
-from creepkit.inverse.duration import duration_known, needs_durations
+from creepkit.inverse.duration import duration_known, needs_durations, rests_on_durations
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify, identify_values
 from creepkit.inverse.reference_conditions import with_arrhenius
@@ -130,7 +130,13 @@ def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLa
     tried = {law.fingerprint for law in laws}
     richer = _distinct_laws([*(laws[0] + other for other in laws[1:]), *_registered_laws(laws, histories)])
     judged = all(map(duration_known, histories))
-    return [law for law in richer if law.fingerprint not in tried and (judged or not needs_durations(law))]
+    return [
+        law
+        for law in richer
+        if law.fingerprint not in tried
+        and (judged or not needs_durations(law))
+        and not rests_on_durations(law, histories)
+    ]
 
 
 def _registered_laws(tried: Sequence[CreepLaw], histories: Sequence[History]) -> list[CreepLaw]:

@@ -18,6 +18,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED
 from creepkit.presentation import Presentable, present
 from creepkit.records.units import celsius_text
 
@@ -26,6 +27,10 @@ if TYPE_CHECKING:
 
 
 CoordinateSystem = Literal["author", "conditioned"]
+
+
+LOOSE = (NOT_DETERMINED, POORLY_DETERMINED)
+"""Verdicts on parameters of which other ones, or a combination, may be determined."""
 
 
 STRONG_CORRELATION = 0.95
@@ -72,12 +77,12 @@ def correlation(fit: Identification, coordinates: CoordinateSystem = "author") -
 
 
 def undetermined(fit: Identification) -> tuple[str, ...]:
-    """What the tests do not determine, a sentence for each group of parameters, and which combination they do.
+    """What the tests do not or poorly determine, a sentence a group of parameters, and which combination they do.
 
     A parameter counts as such where the verdict of its estimate says so; those tied to it by a correlation of 0.95 or
     more belong to its group. Empty where every parameter is determined.
     """
-    undetermined_indices = np.flatnonzero([one.verdict == "not determined" for one in fit.estimates])
+    undetermined_indices = np.flatnonzero([one.verdict in LOOSE for one in fit.estimates])
     groups = _groups(fit, undetermined_indices)
     sentences = [_undetermined_sentence(fit, group) for group in groups]
     return (*sentences, _determined_sentence(fit)) if sentences else ()
@@ -129,8 +134,8 @@ def _undetermined_sentence(fit: Identification, group: list[int]) -> str:
         estimate, relative_width = fit.estimates[group[0]], float(_relative_widths(fit)[group[0]])
         interval = f"[{estimate.low:.3g}, {estimate.high:.3g}]"
         fills = f"its interval {interval} fills {relative_width:.0%} of its bounds"
-        return f"the parameter {names[0]} ({fit.law.table[names[0]].meaning}) is not determined: {fills}"
-    loose = [name for k, name in zip(group, names, strict=True) if fit.estimates[k].verdict == "not determined"]
+        return f"the parameter {names[0]} ({fit.law.table[names[0]].meaning}) is {estimate.verdict}: {fills}"
+    loose = [name for k, name in zip(group, names, strict=True) if fit.estimates[k].verdict in LOOSE]
     tied = [name for name in names if name not in loose]
     several = len(loose) > 1
     sentence = f"the parameter{'s' * several} {_listed(loose)} {'are' if several else 'is'} not determined singly"

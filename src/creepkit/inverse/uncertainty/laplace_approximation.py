@@ -127,7 +127,12 @@ def _covariance_derivative(residuals: Residuals, noise_model: NoiseModel, output
 
 
 UNDETERMINED_WIDTH = 1.0 / 3.0
-"""Width of a 95 % interval over that of the bounds from which on a parameter is not determined."""
+"""Width of a 95 % interval over that of the bounds from which on a parameter is determined poorly, or not at all."""
+
+
+NOT_DETERMINED, POORLY_DETERMINED = "not determined", "poorly determined"
+"""Verdicts on a parameter whose interval is so wide: where it ends at a bound of the search, and where the tests bound
+it on both sides."""
 
 
 AT_BOUND = 1e-4
@@ -314,18 +319,18 @@ def interval_ends(law: CreepLaw, estimate: Estimate) -> tuple[str, str]:
 def verdict_of_interval(value: float, interval: tuple[float, float], bounds: tuple[float, float]) -> str:
     """What the tests say of a parameter, given its law: the one rule of tables, texts and exports.
 
-    "not determined" where the 95 % interval fills a third of the bounds or more; "at its bound" where the value lies
+    Of a 95 % interval that fills a third of the bounds or more "not determined" where it ends at one of them, and
+    "poorly determined" where the tests bound it on both sides; "at its bound" where the value lies
     there; "bounded on one side only" where the interval ends at a bound of the search; else "determined". All numbers
     are on the internal scale of the parameter, the interval cut at the bounds.
     """
     (low, high), width = interval, bounds[1] - bounds[0]
+    cut = min(low - bounds[0], bounds[1] - high) <= 1e-9 * width
     if high - low >= UNDETERMINED_WIDTH * width:
-        return "not determined"
+        return NOT_DETERMINED if cut else POORLY_DETERMINED
     if min(value - bounds[0], bounds[1] - value) <= AT_BOUND * width:
         return "at its bound"
-    if min(low - bounds[0], bounds[1] - high) <= 1e-9 * width:
-        return ONE_SIDED
-    return "determined"
+    return ONE_SIDED if cut else "determined"
 
 
 def delta_method(

@@ -23,11 +23,12 @@ from creepkit.reports.html.elements import (
     with_interval,
 )
 from creepkit.reports.html.law_names import LawNames, title_in_sentence
-from creepkit.reports.html.law_tables import credible_values, titled_law
+from creepkit.reports.html.law_tables import credible_values, titled_law, verdict_given_law
 from creepkit.reports.html.single_values import single_value_blocks
 from creepkit.reports.identification_text import rejected
+from creepkit.reports.interval_basis import interval_basis
 from creepkit.reports.ranking import equivalents_among_remaining
-from creepkit.reports.stress_exponents import constant_load_sentence, reference_sentences
+from creepkit.reports.stress_exponents import reference_sentences
 from creepkit.reports.tests_apart import apart_sentence
 
 if TYPE_CHECKING:
@@ -130,13 +131,12 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     blocks.append(_values(fit))
     blocks += [] if misfit else [_point(fit)]
     blocks += single_value_blocks(fit)
-    conditional = constant_load_sentence(fit)
-    blocks += [Paragraph(sentence(conditional))] if conditional and not misfit else []
+    blocks += [Paragraph(sentence(text)) for text in interval_basis(fit)]
     undetermined = () if misfit else _undetermined(fit)
     if misfit:
         blocks.append(Paragraph(REJECTED))
     elif undetermined:
-        blocks += [Paragraph("What these tests do not determine, given this law:"), Items(undetermined)]
+        blocks += [Paragraph("What these tests do not determine, or poorly, given this law:"), Items(undetermined)]
     else:
         blocks.append(Paragraph("The tests determine every parameter, given this law."))
     blocks += credible_values(found.ranking)
@@ -161,7 +161,7 @@ def _values(fit: Identification) -> Table:
             table[e.name].meaning,
             *with_interval(e.value, e.low, e.high, bound_marks(fit.law, e)),
             "" if e.unit == "1" else e.unit,
-            "–" if rejected(fit) and e.verdict == "determined" else e.verdict,
+            "–" if rejected(fit) and e.verdict == "determined" else verdict_given_law(fit, e),
         )
         for e in fit.estimates
     ]

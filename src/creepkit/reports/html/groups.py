@@ -31,7 +31,7 @@ from creepkit.reports.html.methods_identification import rate_scatter_sentence
 from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.identification_plot import identification_figure
 from creepkit.reports.identification_text import rupture_rows
-from creepkit.reports.judged_readings import judged_readings
+from creepkit.reports.judged_readings import LAW_RATE_MEANING, OWN_RATE_CHI_SQUARE, judged_readings
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.minimum_rate_panel import compared_minimum_rates, exponent_sentence
 from creepkit.reports.prediction_bands import fitted_curves
@@ -92,6 +92,9 @@ def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[B
         blocks.append(
             Paragraph(f"Drawn are the {len(worst)} of {len(with_frames)} tests whose misfit is largest.", "note")
         )
+    blocks.append(
+        Paragraph(f"Figures of tests: measured (dots), identified with 95 % band, and {residual_caption(fit)}.")
+    )
     for k in sorted(worst):
         name = printable(fit.tests[k].name, 120)
         blocks.append(
@@ -99,7 +102,7 @@ def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[B
                 partial(fitted_test_figure, fit, curves, k),
                 f"Test {name}",
                 fitted_test_text(fit, curves, k),
-                f"{name}: measured (dots), identified with 95 % band of the law, and {residual_caption(fit)}.",
+                f"{name}: measured, identified and residuals.",
             )
         )
     return blocks
@@ -129,10 +132,8 @@ def _table_of_tests(fit: Identification) -> Table:
         *("relative squared error", "offset", "rate × law", "weight"),
     )
     caption = (
-        "Tests: reduced chi-square of each, its own rate, rupture life and offset taken out, by which the law is "
-        "judged: over all tests it is that of the findings, 1 is noise alone. Beside it the mean square misfit over "
-        "the squared noise of the same readings with the law's rate for every test: the scatter between tests is in "
-        "it, and no fault of the law. Relative squared error of the first output with the law's rate (sum of squared "
+        f"Tests: {OWN_RATE_CHI_SQUARE}. Beside it the {LAW_RATE_MEANING}. Relative squared error of the first output "
+        "with the law's rate (sum of squared "
         "differences over that about the mean of the test; a dash: the law predicts no value at some of the readings, "
         "as after a rupture that it puts too early), and its offset; the test's own factor on the rate; weight of the "
         "test in the fit (1: as any other, less for one far from the others)"

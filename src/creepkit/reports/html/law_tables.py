@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
+from creepkit.inverse.duration import UNTESTABLE, rests_on_durations
 from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION
 from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
 from creepkit.reports.contents import ExportedFile
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.uncertainty.correlation import Correlation
+    from creepkit.inverse.uncertainty.laplace_approximation import Estimate
     from creepkit.language import CreepLaw
 
 MOST_CORRELATED = 12
@@ -50,14 +52,22 @@ def credible_values(ranking: Ranking | None) -> list[Block]:
             e.name,
             *with_interval(e.value, e.low, e.high, bound_marks(one.fit.law, e)),
             "" if e.unit == "1" else e.unit,
-            LAW_REJECTED if rejected(one.fit) else e.verdict,
+            LAW_REJECTED if rejected(one.fit) else verdict_given_law(one.fit, e),
         )
         for one in ranking.credible
         for e in one.fit.estimates
     ]
     columns = ("law", "weight", "parameter", "value", "95 % interval", "unit", "given this law")
     caption = "Values of every credible law, of weight above 0.05: each interval holds only if its law is right"
-    return [Table(caption, columns, rows, numeric=(1, 3, 4))]
+    untested = [one.fit for one in ranking.credible if rests_on_durations(one.fit.law, one.fit.histories)]
+    said = f"{', '.join(law_title(fit.law) for fit in untested)}: {UNTESTABLE}." if untested else ""
+    return [Table(caption, columns, rows, numeric=(1, 3, 4)), *([Paragraph(said, "note")] if said else [])]
+
+
+def verdict_given_law(fit: Identification, estimate: Estimate) -> str:
+    """What tests say of a parameter given its law; of a law that they do not test, that they do not."""
+    untested = rests_on_durations(fit.law, fit.histories)
+    return f"{estimate.verdict}, but not testable" if untested else estimate.verdict
 
 
 def correlation_table(fit: Identification) -> list[Block]:

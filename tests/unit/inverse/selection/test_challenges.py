@@ -77,7 +77,7 @@ def test_a_share_of_another_law_is_not_excluded_by_a_narrow_range(power_law_narr
     assert found.kind == "sum"
     assert found.subject == "norton+hyperbolic-sine"
     assert found.sentence.startswith(
-        "its sum with hyperbolic-sine, which carries 30 % of the rate, explains them as well (its "
+        "its sum with hyperbolic-sine, tried with 30 % of the rate carried by it, explains them as well (its "
     )
 
 

@@ -54,7 +54,7 @@ def test_the_planted_law_is_singled_out_and_what_constant_loads_allow_beside_it_
     assert ranking.best.law.name == "strain-hardening"
     assert ranking.singled_out
     assert not ranking.decisive
-    assert "its sum with time-hardening, which carries 30 % of the rate," in ranking.verdict
+    assert "its sum with time-hardening, tried with 30 % of the rate carried by it," in ranking.verdict
     assert ranking.laws[0].chi_square == pytest.approx(120 - 3, abs=3 * np.sqrt(2 * 120))
 
 

@@ -51,7 +51,8 @@ def test_a_rate_far_below_1e_8_is_not_taken_for_its_bound() -> None:
     ("value", "interval", "verdict"),
     [
         (0.50, (0.40, 0.60), "determined"),
-        (0.50, (0.33, 0.67), "not determined"),  # 34 % of the bounds
+        (0.50, (0.33, 0.67), "poorly determined"),  # 34 % of the bounds, and by the tests on both sides
+        (0.30, (0.00, 0.34), "not determined"),
         (0.50, (0.00, 1.00), "not determined"),
         (0.90, (0.60, 1.00), "not determined"),
         (0.90, (0.80, 1.00), "bounded on one side only"),

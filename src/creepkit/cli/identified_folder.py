@@ -1,0 +1,106 @@
+"""The folder of `creepkit identify`: it holds the files of one run, which alone writes there until it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from creepkit.errors import FitError
+from creepkit.files.file_names import LAW_SIGNS, numbered_stems
+from creepkit.files.writing import check_folder_target, digest_of, is_foreign
+
+if TYPE_CHECKING:
+    from creepkit.inverse.selection import Ranking
+    from creepkit.language import CreepLaw
+
+LOCK = ".creepkit-running"
+"""The file that a run holds locked."""
+
+
+RANKING_STEM = "ranking"
+
+
+LAW_SUFFIXES, BEST_LAW_SUFFIXES = (".json", ".png"), (".tex", ".py")
+"""Of the files of every law, and of those that the best one has beside them."""
+
+
+@contextmanager
+def identifying_alone(folder: Path, laws: Sequence[CreepLaw]) -> Iterator[None]:
+    """Hold the folder for the files of these laws, from before the work until they are written.
+
+    FitError where another process holds it, or where a file of the former run, or one that is going to be written, is
+    not as creepkit wrote it. A folder that is made for nothing is removed again.
+    """
+    from creepkit.jobs.shard_progress import ShardLock
+
+    _, *stems = law_stems(laws)
+    names = [f"{stem}{suffix}" for stem in stems for suffix in (*LAW_SUFFIXES, *BEST_LAW_SUFFIXES)]
+    check_folder_target(folder, FitError, tuple(dict.fromkeys([*names, *(one.name for one in former_files(folder))])))
+    made = not folder.exists()
+    lock = ShardLock(folder / LOCK)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock.__enter__()
+    except OSError as error:
+        raise FitError(f"{folder}: results cannot be kept there ({error.strerror}); name another folder") from None
+    try:
+        if not lock.held:
+            raise FitError(f"{folder}: another process is writing its results there; wait for it, or name another --to")
+        yield
+    finally:
+        if made and lock.held and [one.name for one in folder.iterdir()] == [LOCK]:
+            lock.remove()
+            with suppress(OSError):
+                folder.rmdir()
+        lock.__exit__(None, None, None)
+
+
+def law_stems(laws: Sequence[CreepLaw]) -> list[str]:
+    """Names of files without suffixes: of the ranking, then of each law."""
+    return numbered_stems([RANKING_STEM, *(law.name for law in laws)], "law", LAW_SIGNS)
+
+
+def former_files(folder: Path) -> list[Path]:
+    """Files of the laws of the ranking that is there, as far as they are that run's; changed ones among them."""
+    from creepkit.inverse.ranking_document import files_of_ranking
+
+    found = []
+    for number, (name, sha256) in enumerate(files_of_ranking(folder / f"{RANKING_STEM}.json").items()):
+        path = folder / name
+        if path.is_file() and not is_foreign(path) and sha256 not in (None, digest_of(path)):
+            continue  # something else of creepkit has written it since
+        suffixes = LAW_SUFFIXES if number else (*LAW_SUFFIXES, *BEST_LAW_SUFFIXES)
+        found += [path.with_suffix(suffix) for suffix in suffixes]
+    return [path for path in found if path.is_file() and not path.is_symlink()]
+
+
+def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
+    """Write JSON and plot of every law, the ranking's plot, and the best law as LaTeX and Python; returns the paths.
+
+    Files of the ranking that was there before are removed where nobody has changed them.
+    """
+    import creepkit as ck
+    from creepkit.inverse.ranking_document import write_ranking_document
+
+    folder.mkdir(parents=True, exist_ok=True)
+    former = former_files(folder)
+    written, weights = [], {}
+    ranking_name, *names = law_stems([entry.fit.law for entry in ranking.laws])
+    for name, entry in zip(names, ranking.laws, strict=True):
+        written.append(entry.fit.save(folder / f"{name}.json"))
+        weights[f"{name}.json"] = entry.weight
+        entry.fit.plot(folder / f"{name}.png")
+        written.append(folder / f"{name}.png")
+    ranking.plot(folder / f"{ranking_name}.png")
+    written.append(folder / f"{ranking_name}.png")
+    for language, suffix in (("latex", ".tex"), ("python", ".py")):
+        path = folder / f"{names[0]}{suffix}"
+        ck.export(ranking, language, to=path)
+        written.append(path)
+    for path in former:
+        if path not in written and not is_foreign(path):
+            path.unlink(missing_ok=True)
+    written.append(write_ranking_document(weights, folder / f"{ranking_name}.json"))
+    return written

@@ -1,0 +1,41 @@
+"""What the intervals of an identification rest on: the weights of the readings, and the form of the law."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from creepkit.reports.stress_exponents import constant_load_sentence
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.settings import IdentificationSettings
+
+
+def interval_basis(fit: Identification) -> list[str]:
+    """What intervals rest on, in sentences without full stops.
+
+    That they hold only with the form of the law is not said of a law that the tests reject: none of its values does.
+    """
+    rejected = fit.adequacy is not None and fit.adequacy.rejects
+    conditional = "" if rejected else constant_load_sentence(fit)
+    return [_weights(fit.settings), *([conditional] if conditional else [])]
+
+
+def _weights(settings: IdentificationSettings) -> str:
+    if settings.weights == "likelihood":
+        return (
+            'the intervals rest on the likelihood (weights "likelihood"): readings count by their estimated noise, so '
+            "that the shape of every curve counts beside the comparison of tests; readings of equal weight "
+            '(weights "noise", the default of one law by itself) give other values and, as a rule, wider intervals'
+        )
+    if settings.weights == "noise":
+        return (
+            'the intervals rest on readings of equal weight (weights "noise") and all the scatter that was estimated, '
+            'with what the law cannot follow; the likelihood (weights "likelihood", by which several laws are '
+            "compared) gives other values and, as a rule, narrower intervals"
+        )
+    weights = settings.weights if isinstance(settings.weights, str) else f"{dict(settings.weights)}"
+    return (
+        f"the intervals rest on weights of the outputs ({weights}), whose relative squared errors are summed, and the "
+        "scatter that was estimated"
+    )
