@@ -10,15 +10,14 @@ import pytest
 
 from creepkit.errors import ExportError
 from creepkit.files.writing import (
-    RECORD,
     check_folder_target,
     check_target,
-    is_foreign,
     overwriting,
     replace_on_success,
     write_bytes,
     write_text,
 )
+from creepkit.files.written_lists import RECORD, is_foreign
 from helpers.command_line import creepkit, one_line
 
 FOREIGN = "creepkit did not write it as it is now"

@@ -8,7 +8,9 @@ import pytest
 
 from creepkit.errors import ExportError, FitError
 from creepkit.files.reading import FileKind, check_readable, read_bytes, read_text
-from creepkit.files.writing import RECORD, remove_temporary_files, replace_on_success, write_if_absent, write_text
+from creepkit.files.temporary_names import temporary_name
+from creepkit.files.writing import remove_temporary_files, replace_on_success, write_if_absent, write_text
+from creepkit.files.written_lists import RECORD
 
 NOTE = FileKind("a note", FitError, "give a note", maximum_bytes=100)
 
@@ -94,6 +96,11 @@ def test_the_first_of_several_writers_decides(tmp_path):
     write_if_absent(tmp_path / "note", "first")
     write_if_absent(tmp_path / "note", "second")
     assert (tmp_path / "note").read_text() == "first"
-    (tmp_path / ".note.0123abcd.part").touch()
+    temporary_name(tmp_path / "note").touch()
+    kept = [".note.0123abcd.part", temporary_name(tmp_path / "note.txt").name]  # a stranger's, and of another file
+    for name in kept:
+        (tmp_path / name).touch()
+    folder = temporary_name(tmp_path / "note")
+    folder.mkdir()
     remove_temporary_files(tmp_path / "note")
-    assert os.listdir(tmp_path) == ["note"]
+    assert sorted(os.listdir(tmp_path)) == sorted([*kept, folder.name, "note"])
