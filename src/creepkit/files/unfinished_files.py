@@ -33,7 +33,9 @@ class ReplacedError(OSError):
 
 def is_own(status: os.stat_result) -> bool:
     """Whether a file is a regular one of our user; of any where a system does not tell users by numbers."""
-    return stat.S_ISREG(status.st_mode) and (not hasattr(os, "geteuid") or status.st_uid == os.geteuid())
+    if hasattr(os, "geteuid") and status.st_uid != os.geteuid():
+        return False
+    return stat.S_ISREG(status.st_mode)
 
 
 class UnfinishedFile:
@@ -58,10 +60,6 @@ class UnfinishedFile:
         with self.stream() as stream:
             stream.truncate()
             stream.write(content)
-
-    def write_text(self, text: str) -> None:
-        """Make this the content, in UTF-8."""
-        self.write_bytes(text.encode("utf-8"))
 
     def flush(self) -> None:
         """Have the content on the disk: a name that is there before it may be of an empty file after a failure."""

@@ -114,7 +114,7 @@ def write_if_absent(path: Path, text: str) -> None:
     """Write a file that the first of several writers decides; OSError when there is no space for it."""
     unfinished = UnfinishedFile(path)
     try:
-        unfinished.write_text(text)
+        unfinished.write_bytes(text.encode("utf-8"))
         with suppress(FileExistsError):  # another process was faster; the caller compares what it wrote
             unfinished.link_to(path)
     finally:

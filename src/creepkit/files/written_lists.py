@@ -1,6 +1,6 @@
 """What creepkit wrote in a folder: a list of contents with their names, sizes, and what they were made from.
 
-RECORD holds for each content a line `SHA256  NAME`, as `sha256sum` prints it, and before it a comment `# SIZE ORIGIN`,
+RECORD holds for each content a line `SHA256  NAME`, as `sha256sum` prints it, and before it a comment `# SIZE` or `# SIZE ORIGIN`,
 which `sha256sum` passes over and lists of before do not have. A file is creepkit's own while its content stands there
 under its name: one that a person made or changed does not. The list is ours when it is a regular file of our user;
 without it nothing is lost: a file is then taken for a foreign one.
@@ -34,7 +34,7 @@ MOST_RECORD_BYTES = 1_000_000
 _RECORD_FILE = FileKind("a list of written files", CreepkitError, "remove it", maximum_bytes=4 * MOST_RECORD_BYTES)
 
 
-_COMMENT = re.compile(rb"# ([0-9]{1,18}) (.*)", re.DOTALL)
+_COMMENT = re.compile(rb"# ([0-9]{1,18})(?: (.*))?", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ def _written(folder: Path) -> dict[str, dict[str, WrittenFile]]:
     rest = WrittenFile()
     for line in lines:
         if comment := _COMMENT.fullmatch(line):
-            rest = WrittenFile(int(comment[1]), os.fsdecode(_unescaped(comment[2])))
+            rest = WrittenFile(int(comment[1]), os.fsdecode(_unescaped(comment[2] or b"")))
             continue
         digest, separator, name = line.lstrip(b"\\").partition(b"  ")
         if separator:
@@ -190,8 +190,15 @@ def _lines(digest: str, name: str, entry: WrittenFile) -> bytes:
     """The lines of a content: with a backslash in front where the name has one, or a line end."""
     plain = os.fsencode(name)
     escaped = _escaped(plain)
-    rest = b"" if entry.size is None else b"# %d %s\n" % (entry.size, _escaped(os.fsencode(entry.origin)))
-    return rest + (b"" if escaped == plain else b"\\") + digest.encode() + b"  " + escaped + b"\n"
+    rest = b"" if entry.size is None else b"# %d %s" % (entry.size, _escaped(os.fsencode(entry.origin)))
+    return (
+        (rest.rstrip() + b"\n" if rest else b"")
+        + (b"" if escaped == plain else b"\\")
+        + digest.encode()
+        + b"  "
+        + escaped
+        + b"\n"
+    )
 
 
 def _escaped(name: bytes) -> bytes:

@@ -126,7 +126,7 @@ def test_what_happens_meanwhile_is_kept_and_so_is_the_result(tmp_path):
 
     def write() -> None:
         with overwriting("beside"), replace_on_success(path, ExportError) as temporary:
-            temporary.write_text("result")
+            temporary.write_bytes(b"result")
             path.write_text("mine")
 
     with pytest.raises(ExportError, match=r"left as it is; the result is .*fit-2\.json"):

@@ -107,7 +107,7 @@ def test_a_failed_writing_leaves_what_was_there(tmp_path):
 
     def fail():
         with replace_on_success(path, ExportError) as temporary:
-            temporary.write_text("half")
+            temporary.write_bytes(b"half")
             raise OSError(28, "full")
 
     with pytest.raises(ExportError, match="No space left on device; free some space and start again"):

@@ -65,9 +65,9 @@ def test_a_name_that_became_another_s_is_refused_at_the_end(change: Callable[...
 
     def write() -> None:
         with replace_on_success(path, ExportError) as unfinished:
-            unfinished.write_text("new")
+            unfinished.write_bytes(b"new")
             change(unfinished.name, secret)
-            unfinished.write_text("newer")
+            unfinished.write_bytes(b"newer")
 
     with pytest.raises(ExportError, match="or put another in its place; choose a folder that nobody else may write to"):
         write()

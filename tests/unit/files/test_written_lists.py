@@ -105,7 +105,7 @@ def test_a_result_beside_another_that_came_meanwhile_is_kept(tmp_path: Path):
 
     def write() -> None:
         with made_from("b"), overwriting("beside"), replace_on_success(path, ExportError) as unfinished:
-            unfinished.write_text("mine")
+            unfinished.write_bytes(b"mine")
             with made_from("a"), overwriting("refuse"):
                 write_text("theirs", path, ExportError)
 

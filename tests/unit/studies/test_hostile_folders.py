@@ -121,5 +121,7 @@ def test_the_names_that_all_patterns_look_at_are_limited(study: Path, monkeypatc
     names = len(os.listdir(study.parent / "data"))
     monkeypatch.setattr(inputs, "MOST_NAMES", 3 * (names + 1) + 3)
     assert len(resolve_paths(file, ("data", "files"), ["data/*.csv"] * 3, None)) == names
-    with pytest.raises(StudyError, match=r"files 4: '.*' and those before it look at more than \d+ names of files; name"):
+    with pytest.raises(
+        StudyError, match=r"files 4: '.*' and those before it look at more than \d+ names of files; name"
+    ):
         resolve_paths(file, ("data", "files"), ["data/*.csv"] * 4, None)
