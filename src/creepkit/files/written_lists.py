@@ -1,9 +1,9 @@
 """What creepkit wrote in a folder: a list of contents with their names, sizes, and what they were made from.
 
-RECORD holds for each content a line `SHA256  NAME`, as `sha256sum` prints it, and before it a comment `# SIZE` or `# SIZE ORIGIN`,
-which `sha256sum` passes over and lists of before do not have. A file is creepkit's own while its content stands there
-under its name: one that a person made or changed does not. The list is ours when it is a regular file of our user;
-without it nothing is lost: a file is then taken for a foreign one.
+RECORD holds for each content a line `SHA256  NAME`, as `sha256sum` prints it, and before it a comment `# SIZE` or
+`# SIZE ORIGIN`, which `sha256sum` passes over and lists of before do not have. A file is creepkit's own while its
+content stands there under its name: one that a person made or changed does not. The list is ours when it is a regular
+file of our user; without it nothing is lost: a file is then taken for a foreign one.
 
 ORIGIN is the path of a file or folder, seen from the folder of the list: of results whose names stand in files, which
 may not choose those of results that were made from others.
@@ -190,15 +190,9 @@ def _lines(digest: str, name: str, entry: WrittenFile) -> bytes:
     """The lines of a content: with a backslash in front where the name has one, or a line end."""
     plain = os.fsencode(name)
     escaped = _escaped(plain)
-    rest = b"" if entry.size is None else b"# %d %s" % (entry.size, _escaped(os.fsencode(entry.origin)))
-    return (
-        (rest.rstrip() + b"\n" if rest else b"")
-        + (b"" if escaped == plain else b"\\")
-        + digest.encode()
-        + b"  "
-        + escaped
-        + b"\n"
-    )
+    origin = b" " + _escaped(os.fsencode(entry.origin)) if entry.origin else b""
+    rest = b"" if entry.size is None else b"# %d%s\n" % (entry.size, origin)
+    return rest + (b"" if escaped == plain else b"\\") + digest.encode() + b"  " + escaped + b"\n"
 
 
 def _escaped(name: bytes) -> bytes:
