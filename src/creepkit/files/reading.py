@@ -153,7 +153,7 @@ def _open_regular(path: Path, kind: FileKind, *, any_size: bool = False) -> int:
     elif _has_holes(descriptor, status):
         problem = (
             f"{path}: nearly all of its {status.st_size / 1e6:g} MB are holes, which are not stored; {kind.advice}, "
-            "or fill them by a copy of it (cp --sparse=never)"
+            "or copy it so that they are (cp --sparse=never)"
         )
     if problem:
         os.close(descriptor)
