@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from creepkit.files.writing import RECORD
+from creepkit.files.written_lists import RECORD
 
 
 def names_in(folder: Path) -> list[str]:

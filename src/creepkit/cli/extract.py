@@ -93,6 +93,7 @@ def command(
     from creepkit.api.extraction import operator_of
     from creepkit.errors import HistoryError
     from creepkit.files.writing import check_folder_target, check_target
+    from creepkit.files.written_lists import made_from
     from creepkit.records import ZERO_CELSIUS
     from creepkit.reports.terminal import ProgressBar
 
@@ -122,7 +123,8 @@ def command(
     for path in sheets:
         check_target(path, HistoryError)
     if to is not None:
-        check_folder_target(to, HistoryError, tuple(path.name for path in files))
+        with made_from(frames):
+            check_folder_target(to, HistoryError, tuple(path.name for path in files))
     histories = []
     for one in found if to is not None else ():  # all of them, before any is written
         if recorded is not None:
@@ -138,7 +140,8 @@ def command(
         histories = [history.replace(elastic=ck.Elastic(E=1e3 * modulus)) for history in histories]
     for history, path in zip(histories, files, strict=False):
         path.parent.mkdir(parents=True, exist_ok=True)
-        ck.write_history(history, path)
+        with made_from(frames):  # names such as D1 are the same for many recordings
+            ck.write_history(history, path)
         typer.echo(f"written: {path}")
 
 

@@ -121,6 +121,7 @@ def _write(histories: list[History], folder: Path) -> list[Path]:
     import creepkit as ck
     from creepkit.files.file_names import file_stem
     from creepkit.files.writing import check_folder_target
+    from creepkit.files.written_lists import made_from
     from creepkit.readers.history_csv import history_text
     from creepkit.reports.figures import make_folder
 
@@ -129,9 +130,25 @@ def _write(histories: list[History], folder: Path) -> list[Path]:
     names = stems if distinct else [f"{number}_{stem}" for number, stem in enumerate(stems, 1)]
     for history in histories:
         history_text(history)  # an error of the last one must not leave the others written
-    check_folder_target(folder, ck.errors.HistoryError, tuple(f"{name}.csv" for name in names))
+    check_folder_target(folder, ck.errors.HistoryError)
+    sources = [_source_file(history.source) for history in histories]
+    paths = [folder / f"{name}.csv" for name in names]
+    for path, source in zip(paths, sources, strict=True):
+        with made_from(source):  # its name stands in that file, which must not choose that of another measurement
+            check_folder_target(folder, ck.errors.HistoryError, (path.name,))
     make_folder(folder, ck.errors.HistoryError)
-    return [ck.write_history(h, folder / f"{name}.csv") for h, name in zip(histories, names, strict=True)]
+    for history, path, source in zip(histories, paths, sources, strict=True):
+        with made_from(source):
+            ck.write_history(history, path)
+    return paths
+
+
+def _source_file(source: str) -> str:
+    """The file of a test: its source without what is said of the place in the file."""
+    path = source
+    while path and not Path(path).exists():
+        path = path.rpartition(" (")[0]
+    return path or source
 
 
 def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:

@@ -80,16 +80,16 @@ def write_hdf5(
     advice : what to do when it cannot be written. force, internal : as of replace_on_success().
     """
     with (
-        replace_on_success(path, error, advice, force=force, internal=internal) as temporary,
-        create_hdf5(temporary) as file,
+        replace_on_success(path, error, advice, force=force, internal=internal) as unfinished,
+        _create_hdf5(unfinished.descriptor) as file,
     ):
         yield file
 
 
 @contextmanager
-def create_hdf5(path: Path) -> Iterator[h5py.File]:
-    """A new file, of a version in which attributes may be long; OSError when there is no space for it."""
-    with FaultTolerantFile(path, "w+") as raw:
+def _create_hdf5(descriptor: int) -> Iterator[h5py.File]:
+    """An empty file, of a version in which attributes may be long; OSError when there is no space for it."""
+    with FaultTolerantFile(descriptor, "w+", closefd=False) as raw:
         try:
             with h5py.File(raw, "w", libver=("v110", "v110")) as file:
                 yield file

@@ -1,7 +1,13 @@
-"""Opening files that a user hands over: regular files only, of limited size, text in UTF-8, one clear error for all."""
+"""Opening files that a user hands over: regular files only, of limited size, text in UTF-8, one clear error for all.
+
+A file with holes (a "sparse" one) may say to be of terabytes and take up nothing: one of which hardly anything is
+stored is refused.
+"""
 
 from __future__ import annotations
 
+import errno
+import hashlib
 import os
 import stat
 from collections.abc import Iterator
@@ -19,6 +25,11 @@ DEFAULT_MAXIMUM_BYTES = 50_000_000
 
 PIECE_BYTES = 1_000_000
 """Bytes that are read at once."""
+
+
+SMALL_BYTES, LEAST_STORED, MOST_PARTS = 1_000_000, 0.01, 10_000
+"""Up to which size a file may consist of holes; the share of a larger one that has to be stored, since compressing file
+systems store no fewer than that of numbers; and the parts between holes that are counted."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +102,17 @@ def open_binary(path: Path, kind: FileKind) -> Iterator[BinaryIO]:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
 
 
+def sha256_of(path: Path, kind: FileKind) -> str:
+    """SHA-256 of the content of a regular file, of at most the bytes that it has when it is opened."""
+    digest = hashlib.sha256()
+    with open_binary(path, kind) as stream:
+        remaining = os.fstat(stream.fileno()).st_size
+        while remaining > 0 and (piece := stream.read(min(remaining, PIECE_BYTES))):
+            digest.update(piece)
+            remaining -= len(piece)
+    return digest.hexdigest()
+
+
 def _read_pieces(stream: BinaryIO, limit: int) -> bytes:
     """At most `limit` bytes; piece by piece, for to ask for all at once would reserve memory for the limit."""
     pieces: list[bytes] = []
@@ -128,10 +150,40 @@ def _open_regular(path: Path, kind: FileKind, *, any_size: bool = False) -> int:
         problem = f"{path}: is no regular file but a device, a pipe or the like; {kind.advice}"
     elif not any_size and status.st_size > kind.most_bytes:
         problem = _too_large(path, kind, status.st_size)
+    elif _has_holes(descriptor, status):
+        problem = (
+            f"{path}: nearly all of its {status.st_size / 1e6:g} MB are holes, which are not stored; {kind.advice}, "
+            "or copy it so that they are (cp --sparse=never)"
+        )
     if problem:
         os.close(descriptor)
         raise kind.error(problem)
     return descriptor
+
+
+def _has_holes(descriptor: int, status: os.stat_result) -> bool:
+    """Whether hardly anything of a large file is stored.
+
+    The blocks that it takes up say so in most cases; those of compressing and of remote file systems may be few or
+    none for other reasons, so that the parts with data are asked for as well.
+    """
+    size, blocks = status.st_size, getattr(status, "st_blocks", None)
+    if size <= SMALL_BYTES or blocks is None or blocks * 512 >= LEAST_STORED * size or not hasattr(os, "SEEK_HOLE"):
+        return False
+    stored, place = 0, 0
+    try:
+        for _ in range(MOST_PARTS):
+            start = os.lseek(descriptor, place, os.SEEK_DATA)
+            place = os.lseek(descriptor, start, os.SEEK_HOLE)
+            stored += place - start
+            if stored >= LEAST_STORED * size or place >= size:
+                break
+    except OSError as error:
+        if error.errno != errno.ENXIO:  # no data behind this place
+            return False  # a file system that does not say
+    finally:
+        os.lseek(descriptor, 0, os.SEEK_SET)
+    return stored < LEAST_STORED * size
 
 
 def _too_large(path: Path, kind: FileKind, size: int) -> str:

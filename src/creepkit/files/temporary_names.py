@@ -47,6 +47,17 @@ def temporary_beginning(path: Path) -> str:
     return f".{name}."
 
 
+def is_temporary(path: Path, of: Path | None = None) -> bool:
+    """Whether a regular file has such a name, whatever process made it. of : the file that it was of."""
+    found = _PATTERN.fullmatch(path.name)
+    if not found or (of is not None and path.name[: found.start(1)] != temporary_beginning(of)):
+        return False
+    try:
+        return stat.S_ISREG(path.lstat().st_mode)
+    except OSError:
+        return False
+
+
 def remove_leftovers(folder: Path) -> None:
     """Remove temporary files whose process is dead."""
     with suppress(OSError), os.scandir(folder) as entries:

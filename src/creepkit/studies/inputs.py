@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from itertools import islice
@@ -14,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from creepkit.errors import StudyError, nearest
-from creepkit.files.reading import FileKind, open_binary
+from creepkit.files.reading import FileKind, check_readable
+from creepkit.files.reading import sha256_of as hash_of_file
 from creepkit.inverse.history_checks import SUSPECT_LABEL, truncated_at_strain
 from creepkit.quality import without_copies
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History
@@ -32,7 +32,8 @@ MOST_FILES = 10_000
 """Of one study."""
 
 
-PIECE = 1 << 20
+MOST_NAMES = 300_000
+"""Names of files that the patterns of one key are compared with."""
 
 
 NOT_STATED = "not stated"
@@ -81,6 +82,7 @@ def resolve_paths(file: StudyFile, key: tuple[str | int, ...], texts: Sequence[s
     root : folder of files that a report carried, in which `..` is written `up`.
     """
     found: dict[Path, None] = {}
+    search = _Search()
     for k, text in enumerate(texts):
         place = (*key, k)
         pattern = plain_path(file, place, text)
@@ -89,7 +91,13 @@ def resolve_paths(file: StudyFile, key: tuple[str | int, ...], texts: Sequence[s
         base, relative = (file.path.parent, pattern) if root is None else (root, PurePosixPath(carried_name(pattern)))
         path = base / relative
         try:
-            matches = [path] if path.exists() else _matches(base, relative)
+            matches = [path] if path.exists() else search.matches(base, relative)
+        except _TooManyNamesError:
+            raise file.error(
+                place,
+                f"'{text}' and those before it look at more than {MOST_NAMES} names of files; name folders in the "
+                "place of patterns",
+            ) from None
         except OSError as error:  # a folder that may not be entered, a name too long
             refused = (
                 "" if error.filename in (None, str(path)) else f", for {_relative(Path(error.filename), base)} cannot"
@@ -103,17 +111,54 @@ def resolve_paths(file: StudyFile, key: tuple[str | int, ...], texts: Sequence[s
     return list(found)
 
 
-def _matches(base: Path, pattern: PurePosixPath) -> list[Path]:
-    """Files and folders that match a pattern; OSError for a folder on the way that cannot be read."""
-    found = [base]
-    for part in pattern.parts:
-        if not set(part) & set("*?["):
-            found = [one / part for one in found if _is_there(one / part)]
-            continue
-        entries = ((one, sorted(os.listdir(one))) for one in found if one.is_dir())
-        matching = (one / name for one, names in entries for name in names if fnmatchcase(name, part))
-        found = list(islice(matching, MOST_FILES + 1))
-    return found if found != [base] else []
+class _TooManyNamesError(Exception):
+    """More names than patterns are compared with."""
+
+
+class _Search:
+    """What matches patterns; each counts the names that it looks at, of which there are MOST_NAMES for all together."""
+
+    def __init__(self) -> None:
+        self.looked_at = 0
+
+    def matches(self, base: Path, pattern: PurePosixPath) -> list[Path]:
+        """Files and folders that match; of folders that are the same one, by links, the first alone.
+
+        OSError for a folder on the way that cannot be read.
+        """
+        found = [base]
+        for part in pattern.parts:
+            if not set(part) & set("*?["):
+                self._count(len(found))
+                found = [one / part for one in found if _is_there(one / part)]
+                continue
+            matching = self._matching((one for one in found if one.is_dir()), part)
+            found = list(_without_other_names(islice(matching, MOST_FILES + 1)))
+        return found if found != [base] else []
+
+    def _matching(self, folders: Iterable[Path], part: str) -> Iterator[Path]:
+        for folder in folders:
+            names = sorted(os.listdir(folder))
+            self._count(1 + len(names))
+            yield from (folder / name for name in names if fnmatchcase(name, part))
+
+    def _count(self, names: int) -> None:
+        self.looked_at += names
+        if self.looked_at > MOST_NAMES:
+            raise _TooManyNamesError
+
+
+def _without_other_names(paths: Iterable[Path]) -> Iterator[Path]:
+    """Paths without those of folders that had another name among them already, by a link."""
+    seen: set[tuple[int, int] | str] = set()
+    for path in paths:
+        if path.is_dir():
+            status = path.stat()
+            place = (status.st_dev, status.st_ino) if status.st_ino else os.path.realpath(path)
+            if place in seen:
+                continue
+            seen.add(place)
+        yield path
 
 
 def _is_there(path: Path) -> bool:
@@ -135,6 +180,8 @@ def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_
                 files[one] = None
             if len(files) > MOST_FILES:
                 raise file.error(("data", "files"), f"they are more than {MOST_FILES} files; name fewer")
+    for one in files:  # of all, before any is read from its beginning to its end
+        check_readable(one, DATA_FILE)
     result = []
     for one in files:
         relative = PurePosixPath(_relative(one, base))
@@ -171,11 +218,7 @@ def _relative(path: Path, base: Path) -> str:
 
 def sha256_of(path: Path) -> str:
     """Of the content of a regular file."""
-    digest = hashlib.sha256()
-    with open_binary(path, DATA_FILE) as stream:
-        while piece := stream.read(PIECE):
-            digest.update(piece)
-    return digest.hexdigest()
+    return hash_of_file(path, DATA_FILE)
 
 
 # ---- tests ---------------------------------------------------------------------------------------------------------

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.files.writing import check_target, is_listed, write_text
+from creepkit.files.writing import check_target, write_text
+from creepkit.files.written_lists import is_listed
 from creepkit.reports.attachments import read_attachments
 from creepkit.studies.documents import ResultFolder, key_of
 from creepkit.studies.execution import StageRecord
@@ -33,7 +34,7 @@ def write_page(
     settings = [hashlib.sha256(file.text.encode()).hexdigest(), hashes, exclusions]
     key = key_of({"kind": "report", "settings": settings, "needs": parts, "versions": versions_of()})
     known = kept.load("report", key)
-    if known is not None and path.is_file() and known == {"sha256": sha256_of(path)}:
+    if known is not None and _is_known(path, known):
         return replace(result, stages=(*result.stages, StageRecord("report", "report", "", "kept", key)), report=path)
     if progress is not None:
         progress("report", 0, 1, "")
@@ -49,6 +50,14 @@ def write_page(
     if progress is not None:
         progress("report", 1, 1, str(path))
     return replace(result, stages=(*result.stages, StageRecord("report", "report", "", "made", key)), report=path)
+
+
+def _is_known(path: Path, known: object) -> bool:
+    """Whether a file is the report that was written; not one that cannot be read or is larger than any."""
+    try:
+        return path.is_file() and known == {"sha256": sha256_of(path)}
+    except StudyError:
+        return False
 
 
 def _shown_sentence(record: StageRecord) -> str:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import StudyError, nearest
-from creepkit.files.writing import check_target, is_foreign
+from creepkit.files.writing import check_target
+from creepkit.files.written_lists import is_foreign, made_from
 from creepkit.reports.attachments import problem_of_name, same_name
 from creepkit.studies import arguments
 from creepkit.studies.camera_stages import CameraStages
@@ -169,7 +170,8 @@ class Study:
         kept = ResultFolder(folder / f"{self.path.stem}.results", overwrite=force)
         with running_alone(kept.folder):
             kept.clear(everything=force)
-            result = self._run(folder, kept, kinds, locked, progress)
+            with made_from(self.path):
+                result = self._run(folder, kept, kinds, locked, progress)
             return replace(result, pruned=kept.prune_fits(result.asked)) if prune else result
 
     def report_contents(self) -> ReportContents:

@@ -1,5 +1,7 @@
 """`creepkit extract`: from exports of a camera to histories, and what it refuses, in one sentence."""
 
+import shutil
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -44,6 +46,24 @@ def test_from_exports_to_a_history_and_a_picture(exports, tmp_path):
     assert history.mean_temperature == pytest.approx(1050.0)
     np.testing.assert_allclose(np.diff(history.times), 60.0)
     assert history.outputs["amplitude"][-1] == pytest.approx(0.3, rel=0.02)
+
+
+def test_other_frames_do_not_replace_what_was_extracted(exports, tmp_path):
+    """Names of test pieces, such as D1, are the same for many recordings."""
+    others = tmp_path / "others"
+    shutil.copytree(exports, others)
+    (others / "frame_019.csv").unlink()
+    words = ("--interval-s", 60, "--load-mpa", 8, "--temperature-c", 776.85, "--rest", "0-9", "--to", tmp_path / "out")
+    for _ in range(2):
+        assert run(exports, *words).exit_code == 0
+    (path,) = (tmp_path / "out").glob("*.csv")
+    before = path.read_bytes()
+    refused = run(others, *words)
+    assert refused.exit_code == 1
+    assert "it is there, and creepkit made it from ../" in refused.stderr
+    assert path.read_bytes() == before
+    assert run(others, *words, "--force").exit_code == 0
+    assert path.read_bytes() != before
 
 
 def test_rings_about_a_given_centre(exports):

@@ -10,15 +10,14 @@ import pytest
 
 from creepkit.errors import ExportError
 from creepkit.files.writing import (
-    RECORD,
     check_folder_target,
     check_target,
-    is_foreign,
     overwriting,
     replace_on_success,
     write_bytes,
     write_text,
 )
+from creepkit.files.written_lists import RECORD, is_foreign
 from helpers.command_line import creepkit, one_line
 
 FOREIGN = "creepkit did not write it as it is now"
@@ -127,7 +126,7 @@ def test_what_happens_meanwhile_is_kept_and_so_is_the_result(tmp_path):
 
     def write() -> None:
         with overwriting("beside"), replace_on_success(path, ExportError) as temporary:
-            temporary.write_text("result")
+            temporary.write_bytes(b"result")
             path.write_text("mine")
 
     with pytest.raises(ExportError, match=r"left as it is; the result is .*fit-2\.json"):

@@ -21,7 +21,7 @@ from pathlib import Path
 from creepkit.errors import CreepkitError
 from creepkit.files.writing import replace_on_success
 with replace_on_success(Path(sys.argv[1]), CreepkitError) as temporary:
-    temporary.write_text("half")
+    temporary.write_bytes(b"half")
     os.kill(os.getpid(), signal.SIGKILL)
 """
 
