@@ -171,6 +171,7 @@ class GenerationJob:
 
 def rows_of_folder(folder: Path) -> int | None:
     """Samples of a shard in a folder that was begun; None where there is none, or none that says so."""
+    check_owner_by_name(folder, DatasetError)
     path = folder / GENERATION_NAME
     document = read_json(path, GENERATION_FILE) if path.is_file() else None
     rows = document.get("rows") if isinstance(document, dict) else None

@@ -31,6 +31,9 @@ LENGTH_BYTES = 8
 MAXIMUM_HEADER_BYTES = 50_000_000
 
 
+MOST_DIMENSIONS = 32
+
+
 TYPES = {
     "BOOL": "?", "U8": "u1", "I8": "i1", "U16": "<u2", "I16": "<i2", "U32": "<u4", "I32": "<i4", "U64": "<u8",
     "I64": "<i8", "F16": "<f2", "F32": "<f4", "F64": "<f8",
@@ -106,11 +109,14 @@ def _places(entries: Mapping[str, Any], size: int) -> dict[str, tuple[np.dtype[A
     """{name: type, shape, first byte} of arrays that lie one behind another and make up `size` bytes together."""
     places, ranges = {}, []
     for name, entry in entries.items():
-        if _of_type(dict, entry).keys() != {"dtype", "shape", "data_offsets"} or entry["dtype"] not in TYPES:
+        if _of_type(dict, entry).keys() != {"dtype", "shape", "data_offsets"}:
             raise _DamagedError
-        dtype, shape = np.dtype(TYPES[entry["dtype"]]), tuple(_counts(entry["shape"]))
-        first, end = (*_counts(entry["data_offsets"]), -1, -1)[:2]
-        if len(shape) > 32 or end - first != math.prod(shape) * dtype.itemsize:
+        numpy_name, offsets = TYPES.get(_of_type(str, entry["dtype"])), _counts(entry["data_offsets"])
+        shape = tuple(_counts(entry["shape"]))
+        if numpy_name is None or len(offsets) != 2 or len(shape) > MOST_DIMENSIONS:
+            raise _DamagedError
+        dtype, (first, end) = np.dtype(numpy_name), offsets
+        if end - first != math.prod(shape) * dtype.itemsize:
             raise _DamagedError
         places[name] = (dtype, shape, first)
         ranges.append((first, end))
