@@ -22,6 +22,7 @@ EXCEPTIONS = {
     "creepkit.cli.failures": "the report of a fault, in a new private folder; and the null device",
     "creepkit.core.compile": "the compiled core, in the folder of the sources",
     "creepkit.jobs.shard_progress": "locks of shards, in the folder of a data set",
+    "creepkit.files.private_copies": "copies of files that others could change, in a private temporary folder",
     "creepkit.files.cache_folders": "the mark of a cache folder of ours",
     "creepkit.kernels.compilation": "compiled laws, in the cache whose owner and permissions were checked",
     "creepkit.reports.figures": "savefig() to the stream of replace_on_success()",

@@ -157,6 +157,24 @@ def test_a_generation_that_is_killed_goes_on_where_it_was(whole, tmp_path, worke
     assert left_behind(tmp_path) == ["merging.lock"]
 
 
+def test_kills_of_all_processes_at_one_sample_change_nothing(whole, tmp_path, caplog):
+    """As a batch system does at its limit, workers first; a run that is not killed has no failures."""
+    to = tmp_path / "a.h5"
+    lock, row = to.with_name("a.h5.parts") / "00000.lock", strong_enough(range(16))
+    for times in range(3):
+        known = b"interrupted %d\n" % row * times + b"%d\n" % row
+        run = started(to, seconds=3.0, workers=1)
+        wait_for(lambda known=known: lock.exists() and lock.read_bytes() == known)
+        workers = children(run.pid)
+        for pid in (*workers, run.pid):
+            os.kill(pid, signal.SIGKILL)
+            time.sleep(0.2)
+        run.communicate()
+    assert_same(run_here(to), whole)
+    assert f"sample {row} was being simulated each of the 3 times that this work was killed" in caplog.text
+    assert "died" not in caplog.text
+
+
 def test_ctrl_c_ends_the_workers_and_counts_no_death(tmp_path):
     to = tmp_path / "a.h5"
     first = started(to, seconds=0.1, workers=1)

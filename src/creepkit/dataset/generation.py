@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.dataset import shards, storage
-from creepkit.dataset.shards import POLL_INTERVAL, GenerationJob, is_complete, merge_shards
+from creepkit.dataset.shards import POLL_INTERVAL, GenerationJob, Waiting, is_complete, merge_shards
 from creepkit.errors import DatasetError
 from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord, ProgressReporter
 from creepkit.jobs.worker_pools import SHARD_ROWS, ParallelExecution, WorkerDeaths, Workers
@@ -86,7 +86,7 @@ def run_until_enough(record: ProgressRecord, workers: Workers, progress: Progres
     """Have shards simulated until there are enough; DatasetError when one cannot be."""
     reporter = ProgressReporter(record, progress)
     locked_elsewhere: dict[int, float] = {}
-    deaths = WorkerDeaths(MOST_WORKER_DEATHS)
+    deaths, waiting = WorkerDeaths(MOST_WORKER_DEATHS), Waiting()
     while record.leading_run() is None:
         due = [number for number, since in locked_elsewhere.items() if time.monotonic() - since > POLL_INTERVAL]
         for number in due[: workers.free_slots]:
@@ -99,9 +99,11 @@ def run_until_enough(record: ProgressRecord, workers: Workers, progress: Progres
             if result.status == "taken":
                 locked_elsewhere[result.number] = time.monotonic()
             elif result.status == "died":
-                _resubmit(result, deaths, workers)
+                _resubmit(result, record, deaths, workers)
             else:
                 _record_result(result, record)
+        only_waiting = record.running == locked_elsewhere.keys()
+        waiting.note([record.job.lock_path(number) for number in locked_elsewhere] if only_waiting else [])
         reporter.report()
 
 
@@ -112,9 +114,10 @@ def _record_result(result: TaskResult, record: ProgressRecord) -> None:
     record.mark_done(result.number, result.accepted)
 
 
-def _resubmit(result: TaskResult, deaths: WorkerDeaths, workers: Workers) -> None:
+def _resubmit(result: TaskResult, record: ProgressRecord, deaths: WorkerDeaths, workers: Workers) -> None:
     """Have a shard done again whose worker died."""
     if not deaths.may_retry(result):
         raise DatasetError(f"shard {result.number}: {deaths.description(result)}")
+    record.job.count_death(result.number)
     _log.warning("a worker process died (%s); its shard %d is simulated again", result.text, result.number)
     workers.submit(result.number)

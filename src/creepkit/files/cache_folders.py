@@ -18,6 +18,7 @@ from functools import cache
 from pathlib import Path
 
 from creepkit.errors import CacheWarning
+from creepkit.files.owners import SharedFolderError, check_private
 
 ENVIRONMENT_VARIABLE = "CREEPKIT_CACHE"
 
@@ -29,13 +30,6 @@ MARKER_FILE = "CACHEDIR.TAG"
 MARKER_TEXT = """Signature: 8a477f597d28d172789f06886806bc55
 # A cache folder of creepkit; it may be deleted at any time. The line above is that of https://bford.info/cachedir/
 """
-
-
-_MOST_LINKS = 40
-
-
-class SharedFolderError(Exception):
-    """Others may have written what would be believed or executed: "/tmp/a can be written by other users"."""
 
 
 def cache_folder(name: str) -> Path | None:
@@ -79,24 +73,6 @@ def cache_environment() -> dict[str, str]:
     return {ENVIRONMENT_VARIABLE: str(_TEMPORARY[0])} if shared else {}
 
 
-def check_private(path: Path) -> None:
-    """Raise SharedFolderError unless a folder and those above it are ours or root's and nobody else can write there.
-
-    OSError where there is no such folder. The folders above may be open to all if they are sticky, as /tmp is.
-    """
-    _check_folders(path, make=False)
-
-
-def check_own(path: Path, status: os.stat_result) -> None:
-    """Raise SharedFolderError unless a file or folder is ours or root's and nobody else can write to it."""
-    if not _has_owners():
-        return
-    if status.st_uid not in (os.geteuid(), 0):
-        raise SharedFolderError(f"{path} belongs to another user")
-    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise SharedFolderError(f"{path} can be written by other users")
-
-
 def is_marked(folder: Path) -> bool:
     """Whether creepkit has made a cache folder, and so may remove what lies in it."""
     with suppress(OSError):
@@ -129,7 +105,7 @@ def _configured_folder() -> Path:
 def _make_private(folder: Path) -> None:
     """Check a folder as `check_private` does, making what is missing of it; mark it where it is new."""
     is_new = not os.path.lexists(folder)
-    _check_folders(folder, make=True)
+    check_private(folder, make=True)
     if is_new:
         with suppress(OSError):  # then nothing is ever removed from it
             write_marker(folder)
@@ -140,58 +116,6 @@ def write_marker(folder: Path) -> None:
     descriptor = os.open(folder / MARKER_FILE, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
         stream.write(MARKER_TEXT)
-
-
-def _check_folders(path: Path, *, make: bool) -> None:
-    """Check each folder from the root down, and each link on the way with what it points to."""
-    if not _has_owners():
-        if make:
-            path.mkdir(parents=True, exist_ok=True)
-        os.stat(path)
-        return
-    current, remaining, links = Path(path.anchor), list(reversed(path.parts[1:])), 0
-    while remaining:
-        part = remaining.pop()
-        if part == os.pardir:
-            current = current.parent
-            continue
-        candidate = current / part
-        status = _status(candidate, make=make)
-        if stat.S_ISLNK(status.st_mode):
-            links += 1
-            if links > _MOST_LINKS:
-                raise SharedFolderError(f"{path} is a chain of links")
-            if status.st_uid not in (os.geteuid(), 0):
-                raise SharedFolderError(f"{candidate} belongs to another user")
-            target = Path(os.readlink(candidate))
-            current = Path(target.anchor) if target.is_absolute() else current
-            remaining.extend(reversed(target.parts[1:] if target.is_absolute() else target.parts))
-            continue
-        if not stat.S_ISDIR(status.st_mode):
-            raise SharedFolderError(f"{candidate} is not a folder")
-        is_sticky = bool(status.st_mode & stat.S_ISVTX) and bool(remaining)
-        if is_sticky and status.st_uid in (os.geteuid(), 0):  # only owners rename or remove what lies there
-            current = candidate
-            continue
-        check_own(candidate, status)
-        current = candidate
-
-
-def _status(folder: Path, *, make: bool) -> os.stat_result:
-    """The status of a folder or link, which is made where it is missing, for its owner alone."""
-    try:
-        return os.lstat(folder)
-    except FileNotFoundError:
-        if not make:
-            raise
-    with suppress(FileExistsError):  # another process was faster
-        os.mkdir(folder, 0o700)
-    return os.lstat(folder)
-
-
-def _has_owners() -> bool:
-    """Whether files have owners and modes that say who can write; on Windows the folder of a user is the user's."""
-    return hasattr(os, "geteuid")
 
 
 # ---- a temporary folder --------------------------------------------------------------------------------------------

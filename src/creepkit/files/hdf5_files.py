@@ -20,7 +20,8 @@ from creepkit.errors import CreepkitError, quoted
 from creepkit.files.hdf5_trial import try_hdf5
 from creepkit.files.hdf5_walk import promises_too_much
 from creepkit.files.limits import how_to_raise, raised
-from creepkit.files.reading import FileKind, check_readable
+from creepkit.files.private_copies import unchanging
+from creepkit.files.reading import FileKind
 from creepkit.files.writing import ADVICE, replace_on_success
 
 MAXIMUM_OBJECTS = 20_000
@@ -33,6 +34,10 @@ MAXIMUM_CHUNK_BYTES = 64_000_000
 
 FILTERS = frozenset({h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF})
 """By which pieces may be stored; others read beyond their memory where a file lies about sizes."""
+
+
+FAILURES = (OSError, RuntimeError, LookupError, ValueError, TypeError, NotImplementedError, RecursionError)
+"""What h5py and whoever reads by it raise of a damaged file."""
 
 
 class FaultTolerantFile(io.FileIO):
@@ -104,20 +109,19 @@ def open_hdf5(path: Path, kind: FileKind, *, bounded: bool = True) -> Iterator[h
     bounded : whether an array that says to be larger than its bytes can be is refused; False where the caller looks at
         the sizes of the arrays that it reads, and leaves others alone.
     """
-    check_readable(path, kind)
-    if not h5py.is_hdf5(path):
-        raise kind.error(f"{path}: not an HDF5 file; {kind.advice}")
-    try_hdf5(path, kind, raised(MAXIMUM_OBJECTS))
-    try:
-        with h5py.File(path, "r") as file:
-            _check_links(file, path, kind, bounded)
-            yield file
-    except MemoryError:
-        raise kind.error(f"{path}: holds more than there is memory for") from None
-    except (OSError, RuntimeError, LookupError, ValueError, TypeError, NotImplementedError, RecursionError) as error:
-        raise kind.error(
-            f"{path}: cannot be read, it seems damaged: {quoted(' '.join(str(error).split()), 300)}"
-        ) from None
+    with unchanging(path, kind) as stored:
+        if not h5py.is_hdf5(stored.path):
+            raise kind.error(f"{path}: not an HDF5 file; {kind.advice}")
+        try_hdf5(path, stored, kind, raised(MAXIMUM_OBJECTS))
+        try:
+            with h5py.File(stored.path, "r") as file:
+                _check_links(file, path, kind, bounded)
+                yield file
+        except MemoryError:
+            raise kind.error(f"{path}: holds more than there is memory for") from None
+        except FAILURES as error:
+            text = " ".join(str(error).replace(str(stored.path), str(path)).split())
+            raise kind.error(f"{path}: cannot be read, it seems damaged: {quoted(text, 300)}") from None
 
 
 def write_names(group: h5py.Group, name: str, words: tuple[str, ...]) -> None:

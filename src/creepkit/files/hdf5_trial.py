@@ -17,6 +17,7 @@ from pathlib import Path
 
 from creepkit.errors import quoted
 from creepkit.files.limits import how_to_raise, raised
+from creepkit.files.private_copies import UnchangingFile
 from creepkit.files.reading import FileKind
 from creepkit.import_path import environment_without_working_folder, options_of_another_interpreter
 
@@ -35,18 +36,20 @@ MOST_REMEMBERED = 100_000
 _PROGRAM = Path(__file__).with_name("hdf5_walk.py")
 
 
-def try_hdf5(path: Path, kind: FileKind, most: int) -> None:
+def try_hdf5(path: Path, stored: UnchangingFile, kind: FileKind, most: int) -> None:
     """Raise the error of `kind` for a file that the HDF5 library cannot read, never ends with, or crashes at.
 
-    most : objects that are looked at. Where no other process can be started, nothing is tried.
+    path : of the file as it is called. stored : of which the content is read. most : objects that are looked at. Where
+    no other process can be started, nothing is tried.
     """
-    state = path.stat()
-    key = (os.path.abspath(path), state.st_size, state.st_mtime_ns, state.st_ino, most)
+    state = stored.path.stat()
+    times = (state.st_mtime_ns, state.st_ctime_ns)
+    key = (stored.digest or (os.path.abspath(path), state.st_size, *times, state.st_ino, state.st_dev), most)
     seconds = raised(CPU_SECONDS + state.st_size // BYTES_PER_SECOND)
     with _trial.lock:
         if key in _trial.read:
             return
-        problem = _trial.problem_with(path, seconds, most)
+        problem = _trial.problem_with(stored.path, seconds, most)
         if problem == "" and len(_trial.read) < MOST_REMEMBERED:
             _trial.read.add(key)
     if problem is None:
@@ -55,7 +58,9 @@ def try_hdf5(path: Path, kind: FileKind, most: int) -> None:
             f"it; it seems damaged; {kind.advice}, or {how_to_raise(4 * seconds, seconds)}"
         )
     if problem:
-        raise kind.error(f"{path}: cannot be read, it seems damaged: {quoted(problem, 300)}")
+        raise kind.error(
+            f"{path}: cannot be read, it seems damaged: {quoted(problem.replace(str(stored.path), str(path)), 300)}"
+        )
 
 
 class _Trial:
@@ -124,3 +129,12 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 _trial = _Trial()
 atexit.register(_trial.close)
+
+
+def _renew_lock() -> None:
+    """In a fork: of the thread that held the lock there is none here."""
+    _trial.lock = threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_renew_lock)

@@ -18,6 +18,7 @@ from typing import BinaryIO
 
 from creepkit.errors import CreepkitError, quoted
 from creepkit.files.limits import how_to_raise, raised
+from creepkit.files.owners import check_owner
 
 DEFAULT_MAXIMUM_BYTES = 50_000_000
 """Bytes; no document of creepkit is near it, and a reader must not load what memory cannot hold."""
@@ -38,13 +39,15 @@ class FileKind:
 
     noun : with its article, as messages name it: "an identification". error : what is raised for a file of this kind.
     advice : what to do about a file that is something else. maximum_bytes : largest size that is read, unless
-    `limits.VARIABLE` allows more.
+    `limits.VARIABLE` allows more. own : whether files of other users are refused, because what lies there counts as
+    work of ours that was begun or finished before.
     """
 
     noun: str
     error: type[CreepkitError]
     advice: str
     maximum_bytes: int = DEFAULT_MAXIMUM_BYTES
+    own: bool = False
 
     @property
     def most_bytes(self) -> int:
@@ -59,9 +62,20 @@ _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY
 def check_readable(path: Path, kind: FileKind) -> None:
     """Raise the error of `kind` unless `path` is a regular file that can be opened and is not too large.
 
-    For files that a library opens by name; all others are opened by `read_bytes` and `read_text`.
+    For files that a library opens by name (see `private_copies`); all others are opened by `read_bytes` and
+    `read_text`.
     """
     os.close(_open_regular(path, kind))
+
+
+@contextmanager
+def opened_regular(path: Path, kind: FileKind) -> Iterator[int]:
+    """The descriptor of a regular file of at most `kind.maximum_bytes`, open for reading."""
+    descriptor = _open_regular(path, kind)
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
 
 
 def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes:
@@ -155,9 +169,14 @@ def _open_regular(path: Path, kind: FileKind, *, any_size: bool = False) -> int:
             f"{path}: nearly all of its {status.st_size / 1e6:g} MB are holes, which are not stored; {kind.advice}, "
             "or copy it so that they are (cp --sparse=never)"
         )
-    if problem:
+    try:
+        if problem:
+            raise kind.error(problem)
+        if kind.own:
+            check_owner(path, status, kind.error)
+    except CreepkitError:
         os.close(descriptor)
-        raise kind.error(problem)
+        raise
     return descriptor
 
 

@@ -71,6 +71,14 @@ class ShardedJob(Job, Protocol):
         """The file of a shard."""
         ...
 
+    def lock_path(self, number: int) -> Path:
+        """The file that is locked while a shard is simulated."""
+        ...
+
+    def count_death(self, number: int) -> None:
+        """Count the death of a worker at the sample that it simulated; where this process goes on."""
+        ...
+
     def accepted_count(self, number: int) -> int | None:
         """How many samples of a shard were accepted; None when it has to be simulated."""
         ...

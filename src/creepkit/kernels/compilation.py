@@ -27,7 +27,8 @@ import numpy as np
 
 from creepkit.arrays import Floats, frozen
 from creepkit.errors import CacheWarning
-from creepkit.files.cache_folders import SharedFolderError, cache_folder, check_own, check_private, is_marked
+from creepkit.files.cache_folders import cache_folder, is_marked
+from creepkit.files.owners import SharedFolderError, check_own, check_private
 from creepkit.kernels.interface import CompiledLaw, Entry
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, expression_source, law_comments
 from creepkit.kernels.llvm_code import Module, add_entry

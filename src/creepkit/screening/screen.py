@@ -14,6 +14,7 @@ from typing import Literal
 
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import FitError, HistoryError
+from creepkit.files.owners import check_owner_by_name
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.settings import IdentificationSettings
@@ -191,6 +192,7 @@ def _stored_result(job: ScreeningJob, number: int) -> AlloyResult | None:
     path = job.path(number)
     if not path.exists():
         return None
+    check_owner_by_name(path, FitError)
     try:
         result = files.read_result(path)
     except FitError as error:

@@ -30,8 +30,9 @@ from creepkit.fem.reduced_order_model import ReducedBasis
 from creepkit.fem.reduced_order_training import TrainingRun, snapshots, train
 from creepkit.fem.simulation import LoadHistory, simulate
 from creepkit.fem.solver import SolverSettings
-from creepkit.files.cache_folders import SharedFolderError, cache_folder, check_own
+from creepkit.files.cache_folders import cache_folder
 from creepkit.files.json_documents import DocumentFormat
+from creepkit.files.owners import SharedFolderError, check_own
 from creepkit.files.reading import FileKind
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
 from creepkit.kernels.interface import CompiledLaw

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from creepkit.errors import CreepkitError, StudyError
+from creepkit.files.owners import check_owner_by_name
 from creepkit.files.record_codec import RecordError, record_to_json
 from creepkit.inverse.kept_fits import COMPUTING, keep_fits
 from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text, series_of_task
@@ -93,7 +94,9 @@ def running_alone(folder: Path) -> Iterator[None]:
             raise StudyError(f"{one}: is a link, and results are kept in a folder of the study's own; remove the link")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = ShardLock(folder / RUNNING_LOCK)
+        for one in (folder, folder / FITS_FOLDER, folder / IDENTIFIED_FOLDER):
+            check_owner_by_name(one, StudyError)
+        lock = ShardLock(folder / RUNNING_LOCK, StudyError)
         lock.__enter__()
     except OSError as error:
         raise StudyError(

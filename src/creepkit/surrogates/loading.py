@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from creepkit.errors import CreepkitError, SurrogateError, nearest, quoted
-from creepkit.files.json_documents import check_keys
+from creepkit.files.json_documents import DocumentFormat, check_keys
 from creepkit.records import Predictor, SupportsReducedOrderModel, known_specimens
 from creepkit.surrogates.recipe import SurrogateMetadata
 from creepkit.surrogates.surrogate import Recipe, Surrogate
-from creepkit.surrogates.weight_files import CODEC, read_weights
+from creepkit.surrogates.weight_files import CODEC, SURROGATE, read_weights
 
 
 def reduced_order_models() -> dict[str, SupportsReducedOrderModel]:
@@ -46,9 +46,9 @@ RECIPE_CLASSES = {"parameter-gru": "creepkit.surrogates.parameter_gru:ParameterG
 """{kind: where its recipe is}; the recipe makes the network that the weights of a file belong to."""
 
 
-def load_surrogate(path: str | Path) -> Surrogate:
+def load_surrogate(path: str | Path, document: DocumentFormat = SURROGATE) -> Surrogate:
     """Return the surrogate in a file; SurrogateError says what is wrong with any other file."""
-    weights, header = read_weights(path)
+    weights, header = read_weights(path, document)
     try:
         problem = check_keys(header, ("kind", "recipe", "metadata"), "its header")
         if problem:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,17 +24,23 @@ from creepkit.surrogates.recipe import Weights
 SURROGATE = DocumentFormat(
     "creepkit-surrogate",
     2,
-    FileKind("a surrogate", SurrogateError, "train again or take a copy", maximum_bytes=2**32),
+    FileKind("a surrogate", SurrogateError, "train again or take a copy", maximum_bytes=2**30),
     remedy="train again",
 )
+"""Eight layers of 2048 units of a GRU take 0.8 GB, and one of the default size 1 MB."""
+
+
+OWN_SURROGATE = replace(SURROGATE, kind=replace(SURROGATE.kind, own=True))
+"""The result of the same training, which is not trained again."""
 
 
 CHECKPOINT = DocumentFormat(
     "creepkit-training-checkpoint",
     1,
-    FileKind("a checkpoint of a training", SurrogateError, "remove it to begin again", maximum_bytes=2**34),
+    FileKind("a checkpoint of a training", SurrogateError, "remove it to begin again", maximum_bytes=2**32, own=True),
     remedy="remove it to begin again",
 )
+"""It holds the weights, the best ones, and two moments of each."""
 
 
 def _registered_specimen(document: Any, source: str) -> Specimen:

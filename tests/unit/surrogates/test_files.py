@@ -1,18 +1,19 @@
 """Files of weights: round trips, and one sentence for each that is damaged, foreign or newer."""
 
 import json
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
-from safetensors.numpy import save_file
+from safetensors.numpy import load_file, save_file
 
 import creepkit as ck
 from creepkit.errors import SurrogateError
 from creepkit.files.written_lists import RECORD
 from creepkit.inverse.composite_predictor import refined_of
 from creepkit.surrogates.loading import load_surrogate, surrogate_by_name
-from creepkit.surrogates.weight_files import read_weights, write_weights
+from creepkit.surrogates.weight_files import SURROGATE, read_weights, write_weights
 
 HEADER = {"kind": "parameter-gru"}
 WEIGHTS = {"a": np.arange(6.0, dtype=np.float32).reshape(2, 3), "b": np.array(3)}
@@ -57,6 +58,92 @@ def test_a_file_that_is_not_a_surrogate_says_why(tmp_path: Path, spoil, told: st
         load_surrogate(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def file_of(entries: object, size: int, metadata: object = None) -> bytes:
+    """A file with this header and so many bytes behind it."""
+    heading = {"creepkit": json.dumps(SURROGATE.heading)} if metadata is None else metadata
+    header = json.dumps({"__metadata__": heading, **entries}).encode()  # type: ignore[dict-item]
+    return len(header).to_bytes(8, "little") + header + bytes(size)
+
+
+def entry(dtype: object = "F32", shape: object = (2, 3), offsets: object = (0, 24)) -> dict[str, object]:
+    return {"dtype": dtype, "shape": shape, "data_offsets": offsets}
+
+
+@pytest.mark.parametrize(
+    ("entries", "size"),
+    [
+        ({"a": entry()}, 23),
+        ({"a": entry()}, 25),
+        ({"a": entry(shape=(2, 4))}, 24),
+        ({"a": entry(offsets=(4, 28))}, 28),
+        ({"a": entry(), "b": entry()}, 24),
+        ({"a": entry(), "b": entry(offsets=(23, 47))}, 47),
+        ({"a": entry(), "b": entry(offsets=(25, 49))}, 49),
+        ({"a": entry(dtype="BF16")}, 12),
+        ({"a": entry(dtype=["F32"])}, 24),
+        ({"a": entry(shape=(-2, -3))}, 24),
+        ({"a": entry(shape=(2.0, 3.0))}, 24),
+        ({"a": entry(shape=(True, 6))}, 24),
+        ({"a": entry(shape="23")}, 24),
+        ({"a": entry(offsets=(24,))}, 24),
+        ({"a": entry(offsets=(0, 24, 48))}, 24),
+        ({"a": entry(shape=(2**62, 2**62, 0), offsets=(0, 0))}, 0),
+        ({"a": entry(shape=(1,) * 100 + (6,))}, 24),
+        ({"a": 1}, 24),
+        ({"a": {**entry(), "more": 1}}, 24),
+    ],
+)  # fmt: skip
+def test_a_header_that_does_not_describe_its_file_is_refused(tmp_path: Path, entries: object, size: int) -> None:
+    path = tmp_path / "m.safetensors"
+    path.write_bytes(file_of({"a": entry()}, 24))
+    assert read_weights(path)[0]["a"].shape == (2, 3)
+    path.write_bytes(file_of(entries, size))
+    with pytest.raises(SurrogateError, match="damaged, or not a safetensors file"):
+        read_weights(path)
+
+
+@pytest.mark.parametrize("metadata", [[], {"creepkit": 1}, "creepkit"])
+def test_metadata_that_are_no_texts_are_refused(tmp_path: Path, metadata: object) -> None:
+    (tmp_path / "m.safetensors").write_bytes(file_of({}, 0, metadata))
+    with pytest.raises(SurrogateError, match="damaged, or not a safetensors file"):
+        read_weights(tmp_path / "m.safetensors")
+
+
+def test_arrays_are_those_of_the_reference_reader(tmp_path: Path) -> None:
+    """The package safetensors reads the same numbers, of every type that NumPy has."""
+    rng = np.random.default_rng(0)
+    types = ("?", "u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f2", "f4", "f8")
+    arrays = {f"of {name}": rng.integers(0, 2, (3, k)).astype(name) for k, name in enumerate(types)}
+    arrays |= {"number": np.array(7.5), "text of ä": rng.normal(size=(2, 1, 4)).astype("f4")}
+    path = write_weights(tmp_path / "m.safetensors", arrays, HEADER)
+    found, expected = read_weights(path)[0], load_file(path)
+    assert found.keys() == expected.keys() == arrays.keys()
+    for name, array in expected.items():
+        assert (
+            (found[name].dtype, found[name].shape)
+            == (array.dtype, array.shape)
+            == (arrays[name].dtype, arrays[name].shape)
+        )
+        np.testing.assert_array_equal(found[name], array)
+        assert found[name].flags.writeable
+        assert found[name].flags.aligned
+
+
+def test_a_large_file_of_no_content_takes_no_memory(tmp_path: Path) -> None:
+    """Of 900 MB, which are on no disk."""
+    path, size = tmp_path / "m.safetensors", 900_000_000
+    with path.open("wb") as file:
+        file.write(file_of({"a": entry("U8", (size,), (0, size))}, 0, {"creepkit": "{}"}))
+        file.truncate(file.tell() + size)
+    tracemalloc.start()
+    try:
+        with pytest.raises(SurrogateError, match="this is not a surrogate that"):
+            read_weights(path)
+        assert tracemalloc.get_traced_memory()[1] < 10_000_000
+    finally:
+        tracemalloc.stop()
 
 
 def test_weights_of_another_program_are_told_apart(tmp_path: Path) -> None:
