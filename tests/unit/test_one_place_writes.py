@@ -18,6 +18,7 @@ WRITING_FUNCTIONS = {
 EXCEPTIONS = {
     "creepkit.files.writing": "the one place",
     "creepkit.cli.failures": "the report of a fault, in a new private folder; and the null device",
+    "creepkit.cli.browser_page": "the page that sends a browser on, in a new private folder",
     "creepkit.core.compile": "the compiled core, in the folder of the sources",
     "creepkit.jobs.shard_progress": "locks of shards, in the folder of a data set",
     "creepkit.files.cache_folders": "the mark of a cache folder of ours",

@@ -103,9 +103,10 @@ def _tests(words: list[str]) -> list[History]:
 def _serve(contents: PageContents, port: int, browser: bool) -> None:
     import sys
     import threading
-    import webbrowser
+    from contextlib import nullcontext
 
     from creepkit.app.server import PageServer
+    from creepkit.cli.browser_page import browser_at
     from creepkit.errors import FitError
 
     try:
@@ -118,8 +119,11 @@ def _serve(contents: PageContents, port: int, browser: bool) -> None:
             typer.echo("Ctrl-C ends it", err=True)
             typer.echo(f"the page: {server.url}")
             sys.stdout.flush()
-            if browser:
-                webbrowser.open(server.url)
-            server.serve_forever()
+            with browser_at(server.url) if browser else nullcontext(True) as opened:
+                if not opened:
+                    typer.echo(
+                        "no private page can be written that opens a browser: open the address yourself", err=True
+                    )
+                server.serve_forever()
         except KeyboardInterrupt:
             typer.echo("ended", err=True)
