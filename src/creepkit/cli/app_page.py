@@ -10,6 +10,7 @@ import typer
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.options import is_file_name, is_law_name
+from creepkit.reports.terminal import tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.app.contents import PageContents, PageSource
@@ -41,7 +42,7 @@ def command(
     network = None if surrogate is None else ck.surrogate(surrogate)
     contents = page_contents(source, tests, specimen=specimen, surrogate=network)
     if to is not None:
-        typer.echo(f"wrote {write_page(contents, to)}")
+        tell_written(write_page(contents, to))
         return
     _serve(contents, port, browser)
 
@@ -116,14 +117,12 @@ def _serve(contents: PageContents, port: int, browser: bool) -> None:
     with server:
         threading.Thread(target=server.answers.prepare, daemon=True).start()
         try:
-            typer.echo("Ctrl-C ends it", err=True)
-            typer.echo(f"the page: {server.url}")
+            tell("Ctrl-C ends it", err=True)
+            tell(f"the page: {server.url}")
             sys.stdout.flush()
             with browser_at(server.url) if browser else nullcontext(True) as opened:
                 if not opened:
-                    typer.echo(
-                        "no private page can be written that opens a browser: open the address yourself", err=True
-                    )
+                    tell("no private page for the browser can be written: open the address yourself", err=True)
                 server.serve_forever()
         except KeyboardInterrupt:
-            typer.echo("ended", err=True)
+            tell("ended", err=True)
