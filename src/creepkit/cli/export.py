@@ -48,11 +48,13 @@ def command(
     """
     import creepkit as ck
     from creepkit.records import ZERO_CELSIUS
+    from creepkit.registry import default_registry
 
     if to == "list":
         for target in ck.available("exporters").values():
             tell(f"{target.name:16} {target.suffix:8} {target.title}")
         return
+    default_registry().exporter(to)  # a target that is misspelt is said first
     law_source = _resolve_source(source)
     elastic = None if modulus_gpa is None else ck.Elastic(E=1e3 * modulus_gpa, nu=poisson)
     text = ck.export(

@@ -16,7 +16,7 @@ from creepkit.arrays import Ints
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import Dialect, split_line
 
-_ROWS, _FEWEST_ROWS = 40, 8
+_ROWS, _FEWEST_ROWS = 40, 12
 """Rows above the last that are looked at, and the fewest that show a form."""
 
 
