@@ -12,6 +12,12 @@ import _signal  # type: ignore[import-not-found]
 import os
 import sys
 
+TYPE_CHECKING = False  # as in typing, which is not imported yet
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from importlib.machinery import ModuleSpec
+    from types import ModuleType
+
 _OPTIONS_WITH_VALUES = "WX"
 
 
@@ -39,19 +45,46 @@ def end_without_traceback_at_ctrl_c() -> None:
 
 
 def leave_settings_of_working_folder_out() -> None:
-    """Import matplotlib where its file of settings lies in the working folder, so that this file is not read.
+    """Have matplotlib, whenever it is first imported, look for its file of settings everywhere but here.
 
-    It would come before the user's own settings, may have LaTeX executed (`text.usetex`), and older versions of
-    matplotlib evaluate parts of it.
+    A file of the working folder would come before the user's own settings, may have LaTeX executed (`text.usetex`),
+    and older versions of matplotlib evaluate parts of it. It may be put there at any time before the import.
     """
-    if not os.path.lexists("matplotlibrc"):
-        return
-    working_folder = os.getcwd()
-    os.chdir(os.path.dirname(os.path.abspath(__file__)))
+    if not any(isinstance(finder, _MatplotlibFinder) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _MatplotlibFinder())
+
+
+_SETTINGS_OF_WORKING_FOLDER = "matplotlibrc"
+"""The name that matplotlib looks for first, relative to the working folder; other places have absolute paths."""
+
+
+class _MatplotlibFinder:
+    """Finds matplotlib where the other finders do, and has it imported as if no settings lay in the working folder.
+
+    Neither the working folder nor what other threads find out of files changes meanwhile.
+    """
+
+    def find_spec(
+        self, fullname: str, path: "Sequence[str] | None" = None, target: "ModuleType | None" = None
+    ) -> "ModuleSpec | None":
+        """Where matplotlib is; None of everything else."""
+        if fullname != "matplotlib":
+            return None
+        others = (finder for finder in list(sys.meta_path) if finder is not self)
+        spec = next(filter(None, (finder.find_spec(fullname, path, target) for finder in others)), None)
+        if spec is not None and spec.loader is not None:
+            execute = spec.loader.exec_module
+            spec.loader.exec_module = lambda module: _execute_without_settings(execute, module)  # type: ignore[method-assign]
+        return spec
+
+
+def _execute_without_settings(execute: "Callable[[ModuleType], None]", module: "ModuleType") -> None:
+    exists = os.path.exists
+    os.path.exists = lambda path: path != _SETTINGS_OF_WORKING_FOLDER and exists(path)
     try:
-        import matplotlib  # noqa: F401
+        execute(module)
     finally:
-        os.chdir(working_folder)
+        os.path.exists = exists
 
 
 def environment_without_working_folder() -> dict[str, str]:

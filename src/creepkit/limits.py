@@ -100,12 +100,16 @@ HOURS = numbers(1e-9, 1e9)
 SECONDS = numbers(0, 1e12, above=True)
 RAMP = numbers(0, 1e12)
 PROBABILITY = numbers(0.5, 0.999999)
-KELVIN = numbers(0, 1e4, above=True)
+HOTTEST = 4500.0
+"""K, above which nothing is solid: hafnium carbonitride, which melts last, does so at about 4300 K."""
+
+
+KELVIN = numbers(0, HOTTEST, above=True)
 """Of a state of a material."""
 
 
 MEGAPASCAL_OF_STATE = numbers(0, 1e5, above=True)
-CELSIUS = numbers(-273.15, 1e5, above=True)
+CELSIUS = numbers(-273.15, HOTTEST - 273.15, above=True)
 KELVIN_DIFFERENCE = numbers(0, 1e5)
 GIGAPASCAL = numbers(0, 1e6, above=True)
 MEGAPASCAL = numbers(0, 1e6)

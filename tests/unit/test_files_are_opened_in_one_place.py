@@ -41,7 +41,7 @@ ALLOWED = {
     "creepkit.cli.demo read_bytes": "example data of the package",
     "creepkit.jobs.worker_process fdopen": "the output of a worker, a pipe to its parent",
     "creepkit.jobs.shard_progress open": "a lock that creepkit makes, written and never read",
-    "creepkit.cli.app_page open": "a page in a browser: webbrowser.open",
+    "creepkit.cli.browser_page open": "the page for a browser that it makes, written and never read",
     "creepkit.registry.plugin_sources read_bytes": "the source of an installed package, to find a hook in it",
     "creepkit.readers.spreadsheet_parts ZipFile": "bytes in memory, read by files.reading",
     "creepkit.readers.spreadsheets load_workbook": "bytes in memory, read by files.reading and checked",

@@ -53,6 +53,53 @@ def test_settings_of_matplotlib_in_the_working_folder_are_left_alone(tmp_path: P
     assert "<svg" in (tmp_path / "bar.svg").read_text()
 
 
+SETTINGS_LATER = """
+import os, sys, threading
+from creepkit.import_path import leave_settings_of_working_folder_out
+leave_settings_of_working_folder_out()
+leave_settings_of_working_folder_out()
+open("matplotlibrc", "w").write("text.usetex: True")
+if {deleted}:
+    os.unlink("matplotlibrc")
+    os.rmdir(os.getcwd())
+outside = set()
+def look():
+    while "matplotlib.figure" not in sys.modules:
+        outside.add(os.path.exists("matplotlibrc.txt"))
+        outside.add(os.path.exists(os.path.abspath(os.sep)))
+exists = os.path.exists
+threading.Thread(target=look, daemon=True).start()
+import matplotlib, matplotlib.figure
+from importlib import resources
+assert os.path.exists is exists
+assert outside == {{False, True}}, outside
+assert resources.files("matplotlib").joinpath("mpl-data").is_dir()
+print(matplotlib.rcParams["text.usetex"], matplotlib.rcParams["lines.linewidth"])
+"""
+
+
+@pytest.mark.parametrize("deleted", [False, True])
+@pytest.mark.parametrize("place", ["MPLCONFIGDIR", "MATPLOTLIBRC", "nowhere"])
+def test_settings_that_appear_after_the_start_are_left_alone_and_the_users_own_hold(
+    tmp_path: Path, place: str, deleted: bool
+) -> None:
+    """A file that is planted between the start and the first import of matplotlib."""
+    own, working = tmp_path / "own", tmp_path / "working"
+    own.mkdir()
+    working.mkdir()
+    (own / "matplotlibrc").write_text("lines.linewidth: 7.25")
+    variables = environment(MPLCONFIGDIR=str(tmp_path / "cache"))
+    variables.pop("MATPLOTLIBRC", None)
+    variables[place] = str(own)
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", SETTINGS_LATER.format(deleted=deleted)],
+        cwd=working, env=variables, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["False", "1.5" if place == "nowhere" else "7.25"]
+
+
 WORKER_OF_A_SCRIPT = """
 import sys
 sys.path[:] = [folder for folder in sys.path if folder]  # this process is not the one that is looked at
@@ -187,11 +234,11 @@ def _starts_processes(module: str) -> bool:
 def test_processes_are_started_in_two_places() -> None:
     """Workers, and what tries HDF5 files with the same care; `worker_pools` waits for workers and ends them.
 
-    `app_page` asks the desktop for its browser, with our address.
+    `browser_page` asks the desktop for its browser, with a page of ours.
     """
     starting = {module for module in source_tree.modules() if _starts_processes(module)}
     in_jobs = {"creepkit.jobs.worker_start", "creepkit.jobs.worker_pools"}
-    assert starting == in_jobs | {"creepkit.files.hdf5_trial", "creepkit.cli.app_page"}
+    assert starting == in_jobs | {"creepkit.files.hdf5_trial", "creepkit.cli.browser_page"}
     pools = source_tree.tree("creepkit.jobs.worker_pools")
     called = {
         node.func.attr

@@ -20,6 +20,7 @@ EXCEPTIONS = {
     "creepkit.files.unfinished_files": "a part of it: a file while it is written, by the descriptor that made it",
     "creepkit.files.written_lists": "a part of it: the list of what was written in a folder",
     "creepkit.cli.failures": "the report of a fault, in a new private folder; and the null device",
+    "creepkit.cli.browser_page": "the page that sends a browser on, in a new private folder",
     "creepkit.core.compile": "the compiled core, in the folder of the sources",
     "creepkit.jobs.shard_progress": "locks of shards, in the folder of a data set",
     "creepkit.files.private_copies": "copies of files that others could change, in a private temporary folder",

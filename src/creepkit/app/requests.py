@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from creepkit.errors import CreepkitError, quoted
+from creepkit.limits import HOTTEST
 
 LARGEST_NUMBER = 1e60
 """In size; coefficients of laws reach 1e-40."""
@@ -40,7 +41,7 @@ class ProgramRequest(_Strict):
     control: Literal["load", "stress"] = "load"
     ramp: Annotated[float, Field(ge=0.0, le=1e12)] = 0.0
     end: Positive
-    temperature: Annotated[float, Field(gt=0.0, lt=1e4)]
+    temperature: Annotated[float, Field(gt=0.0, lt=HOTTEST)]
     modulus: Annotated[float, Field(gt=0.0, le=1e8)] | None = None
     lengths: Annotated[dict[Name, Positive], Field(max_length=50)] = Field(default_factory=dict)
 
@@ -59,7 +60,7 @@ class PredictRequest(_Strict):
     values: Annotated[dict[Name, Number], Field(max_length=200)]
     program: ProgramRequest | None = None
     tests: Annotated[list[Index], Field(max_length=200)] = Field(default_factory=list)
-    rate_temperature: Annotated[float, Field(gt=0.0, lt=1e4)] | None = None
+    rate_temperature: Annotated[float, Field(gt=0.0, lt=HOTTEST)] | None = None
     exact: bool = False
 
 

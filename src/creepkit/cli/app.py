@@ -54,6 +54,7 @@ from creepkit.cli.identification_options import CommandWithDefaults
 from creepkit.cli.interrupts import exit_code, interrupted_sentence, was_interrupted
 from creepkit.errors import CreepkitError, PluginError
 from creepkit.files.writing import FULL
+from creepkit.reports.terminal import printable, tell
 
 
 class CommandGroup(TyperGroup):
@@ -84,6 +85,8 @@ class CommandGroup(TyperGroup):
             raise self._interrupted(ctx, error) from None
         except Exception as error:
             if debug or _is_of_the_command_line(error):
+                if isinstance(getattr(error, "message", None), str):  # it names options and arguments as they came
+                    error.message = printable(error.message)  # type: ignore[attr-defined]
                 raise
             if was_interrupted():
                 raise self._interrupted(ctx, error) from None
@@ -107,7 +110,7 @@ class CommandGroup(TyperGroup):
             added, problems = _plugin_commands(set(self.commands))
             self.commands.update(added)
             for problem in problems if cmd_name not in added else ():
-                typer.echo(f"creepkit: {problem}", err=True)
+                tell(f"creepkit: {problem}", err=True)
         return super().get_command(ctx, cmd_name)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -185,7 +188,7 @@ def _print_version(requested: bool) -> None:
     if requested:
         import creepkit
 
-        typer.echo(f"creepkit {creepkit.__version__}")
+        tell(f"creepkit {creepkit.__version__}")
         raise typer.Exit
 
 
@@ -245,9 +248,7 @@ def _plugin_commands(own_names: set[str], *, listed_only: bool = False) -> tuple
 
 def _ended(sentence: str, code: int) -> typer.Exit:
     """The end of the command, after one line on stderr."""
-    from creepkit.reports.terminal import printable
-
-    say(printable(" ".join(sentence.split())))
+    say(" ".join(sentence.split()))
     return typer.Exit(code)
 
 

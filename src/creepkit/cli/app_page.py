@@ -10,6 +10,7 @@ import typer
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.options import is_file_name, is_law_name
+from creepkit.reports.terminal import tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.app.contents import PageContents, PageSource
@@ -41,7 +42,7 @@ def command(
     network = None if surrogate is None else ck.surrogate(surrogate)
     contents = page_contents(source, tests, specimen=specimen, surrogate=network)
     if to is not None:
-        typer.echo(f"wrote {write_page(contents, to)}")
+        tell_written(write_page(contents, to))
         return
     _serve(contents, port, browser)
 
@@ -103,9 +104,10 @@ def _tests(words: list[str]) -> list[History]:
 def _serve(contents: PageContents, port: int, browser: bool) -> None:
     import sys
     import threading
-    import webbrowser
+    from contextlib import nullcontext
 
     from creepkit.app.server import PageServer
+    from creepkit.cli.browser_page import browser_at
     from creepkit.errors import FitError
 
     try:
@@ -115,11 +117,12 @@ def _serve(contents: PageContents, port: int, browser: bool) -> None:
     with server:
         threading.Thread(target=server.answers.prepare, daemon=True).start()
         try:
-            typer.echo("Ctrl-C ends it", err=True)
-            typer.echo(f"the page: {server.url}")
+            tell("Ctrl-C ends it", err=True)
+            tell(f"the page: {server.url}")
             sys.stdout.flush()
-            if browser:
-                webbrowser.open(server.url)
-            server.serve_forever()
+            with browser_at(server.url) if browser else nullcontext(True) as opened:
+                if not opened:
+                    tell("no private page for the browser can be written: open the address yourself", err=True)
+                server.serve_forever()
         except KeyboardInterrupt:
-            typer.echo("ended", err=True)
+            tell("ended", err=True)

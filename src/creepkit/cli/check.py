@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit.reports.terminal import tell
+
 if TYPE_CHECKING:
     from creepkit.testing import ConformanceReport
 
@@ -23,12 +25,12 @@ def command(
     """Check that laws, specimens, readers, exporters are fit."""
     reports = [report for target in targets for report in _reports_of(target)]
     for report in reports:
-        typer.echo(str(report))
+        tell(report)
     failed = [report for report in reports if not report.passed]
     if failed:
         kinds = sorted({report.kind for report in reports})
         what = f"{kinds[0]}s" if len(kinds) == 1 else "checked"
-        typer.echo(f"creepkit: {len(failed)} of {len(reports)} {what} failed the check", err=True)
+        tell(f"creepkit: {len(failed)} of {len(reports)} {what} failed the check", err=True)
         raise typer.Exit(1)
 
 

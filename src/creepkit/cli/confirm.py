@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.reports.terminal import print_json, print_table
+from creepkit.reports.terminal import print_json, print_table, tell
 
 
 def command(
@@ -34,4 +34,4 @@ def command(
     print_table(
         f"{confirmation.law} by {confirmation.predictor_name}", CONFIRMATION_COLUMNS, confirmation_rows(confirmation)
     )
-    typer.echo(confirmation.verdict)
+    tell(confirmation.verdict)

@@ -9,7 +9,7 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
-from creepkit.reports.terminal import print_json
+from creepkit.reports.terminal import print_json, tell, tell_written
 
 DATA_SET_SUFFIXES = (".h5", ".hdf5")
 """Endings of data sets; everything else is read as measured tests."""
@@ -55,12 +55,12 @@ def _describe_data_set(file: Path, as_json: bool, plots: Path | None, seed: int)
     if as_json:
         print_json(summary(data))
     else:
-        typer.echo(str(data))
+        tell(data)
     if plots is not None:
         from creepkit.reports.dataset import write_dataset_figures
 
         for path in write_dataset_figures(data, plots, seed):
-            typer.echo(f"wrote {path}", err=as_json)
+            tell_written(path, err=as_json)
 
 
 def _check_measured_tests(file: Path, as_json: bool, reader: str | None, activation_energy: float | None) -> None:
@@ -74,4 +74,4 @@ def _check_measured_tests(file: Path, as_json: bool, reader: str | None, activat
     if as_json:
         print_json({**data_quality_to_json(quality), "assumed": assumed.splitlines()})
     else:
-        typer.echo("\n".join(filter(None, (str(quality), assumed))))
+        tell("\n".join(filter(None, (str(quality), assumed))))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from creepkit.cli.declared_options import OutputPath
-from creepkit.reports.terminal import ProgressBar
+from creepkit.reports.terminal import ProgressBar, tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -59,9 +59,9 @@ def command(
         results = [_planted_creep_curves(to)]
     else:
         results = [_measured_creep_curves(to / "creep_curves"), _planted_bulge_test(to / "bulge_test")]
-    typer.echo(f"\ntime: {time.perf_counter() - started:.0f} s")
-    typer.echo(f"results, the best law of each as LaTeX and Python, and the study files' locks: {to}")
-    typer.echo(f"reports: {' '.join(str(result.report) for result in results)}")
+    tell(f"\ntime: {time.perf_counter() - started:.0f} s")
+    tell(f"results, the best law of each as LaTeX and Python, and the study files' locks: {to}")
+    tell(f"reports: {' '.join(str(result.report) for result in results)}")
 
 
 def _write_data(to: Path) -> None:
@@ -76,12 +76,12 @@ def _write_data(to: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         for path in files:
             write_bytes(path.read_bytes(), folder / path.name, HistoryError)
-        typer.echo(f"wrote {folder}: {len(files)} files")
+        tell_written(folder, f": {len(files)} files")
 
 
 def _measured_creep_curves(folder: Path) -> StudyResult:
     """Laws of the CMSX-6 curves, and rupture as the best one has it."""
-    typer.echo(
+    tell(
         "MEASURED: nine creep curves of CMSX-6 at 980 °C, thinned; six tests ruptured, three were stopped\n"
         "(Federal Institute for Materials Research and Testing, doi 10.5281/zenodo.13937986, CC BY 4.0)"
     )
@@ -94,7 +94,7 @@ def _measured_creep_curves(folder: Path) -> StudyResult:
 
 
 def _planted_creep_curves(folder: Path) -> StudyResult:
-    typer.echo("SIMULATED: nine creep curves with noise, 750 to 850 °C")
+    tell("SIMULATED: nine creep curves with noise, 750 to 850 °C")
     result = _run(PLANTED, folder)
     _print_ranking(result.rankings[""])
     _print_truth(PLANTED, result.rankings[""].best)
@@ -107,7 +107,7 @@ def _planted_bulge_test(folder: Path) -> StudyResult:
     (test,) = ck.read_histories(PLANTED_BULGE)
     pressures = " then ".join(dict.fromkeys(f"{value:g}" for value in test.loading.program().values if value > 0))
     hours, height = test.times[-1] / 3600, test.outputs["amplitude"][-1]
-    typer.echo(
+    tell(
         f"\nSIMULATED: a bulge test with camera noise, {pressures} MPa, {test.times.size} frames to {hours:.0f} h,\n"
         f"top raised by {height:.2f} mm; every law is simulated by finite elements"
     )
@@ -146,7 +146,7 @@ def _with_installed_laws(path: Path) -> StudyFile:
     if not missing:
         return file
     packages = " ".join(sorted(set(map(package_with_law, missing))))
-    typer.echo(
+    tell(
         f"without {' and '.join(missing)}, the laws that have tertiary creep: 'pip install {packages}' brings them;\n"
         "Norton's law alone breaks by loss of section, and does not explain these curves"
     )
@@ -167,7 +167,7 @@ def _print_ranking(ranking: Ranking) -> None:
         numbers = f"{value:.3g}", f"{entry.excess:.1f}", f"{entry.weight:.3f}"
         rows.append((fit.law.name, str(len(fit.law.params)), *numbers))
     _print_rows(("law", "parameters", misfit, "BIC - best", "weight"), rows)
-    typer.echo(ranking.verdict)
+    tell(ranking.verdict)
 
 
 def _print_values(fit: Identification) -> None:
@@ -180,7 +180,7 @@ def _print_values(fit: Identification) -> None:
         for e, (low, high) in zip(fit.estimates, marks, strict=True)
     ]
     for start in range(0, len(texts), 3):
-        typer.echo("  " + ", ".join(texts[start : start + 3]))
+        tell("  " + ", ".join(texts[start : start + 3]))
     _print_interval_basis(fit)
 
 
@@ -212,7 +212,7 @@ def _print_truth(folder: Path, fit: Identification) -> None:
     if "rate_scatter" in truth:
         sds = f"{100 * truth['rate_scatter']:.0f} %", f"{100 * fit.noise_model.rate:.0f} %"
         rows.append(("rate between tests", *sds, "", ""))
-    typer.echo(f"the truth: {truth['law']}")
+    tell(f"the truth: {truth['law']}")
     _print_rows(("parameter", "true", "identified", "95 % interval", "inside"), rows)
     _print_interval_basis(fit)
 
@@ -221,11 +221,11 @@ def _print_interval_basis(fit: Identification) -> None:
     from creepkit.reports.interval_basis import interval_basis
 
     for line in interval_basis(fit):
-        typer.echo(f"  {line}")
+        tell(f"  {line}")
 
 
 def _print_rows(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table without rules: one line a row."""
     widths = [max(len(row[k]) for row in (columns, *rows)) for k in range(len(columns))]
     for row in (columns, *rows):
-        typer.echo("  " + "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())
+        tell("  " + "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())

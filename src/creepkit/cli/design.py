@@ -11,7 +11,7 @@ import typer
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.options import parsed_number
-from creepkit.reports.terminal import ProgressBar, print_json
+from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.experiments.design_task import Goal
@@ -109,9 +109,9 @@ def command(
         print_design(result)
     if plot is not None and result.tests:
         result.plot(plot)
-        typer.echo(f"wrote {plot}", err=as_json)
+        tell_written(plot, err=as_json)
     elif plot is not None:
-        typer.echo(f"there is no test to draw: {plot} is not written", err=True)
+        tell(f"there is no test to draw: {plot} is not written", err=True)
 
 
 def parse_goal(text: str | None) -> Goal | None:

@@ -26,7 +26,7 @@ from creepkit.cli.identification_options import (
     surrogate_named,
 )
 from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, parsed_number
-from creepkit.reports.terminal import ProgressBar, print_json
+from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -125,9 +125,9 @@ def command(
 
         print_json(temperature_law_to_json(temperature_law, written))
         return
-    typer.echo(str(temperature_law))
+    tell(temperature_law)
     for path in written:
-        typer.echo(f"wrote {path}")
+        tell_written(path)
 
 
 def parse_forms(texts: Sequence[str] | None) -> dict[str, list[str]] | None:
@@ -174,7 +174,7 @@ def _temperature_law_of(study: TemperatureStudy) -> TemperatureLaw:
     from creepkit.errors import FitError
 
     for note in study.notes:
-        typer.echo(f"note: {note}", err=True)
+        tell(f"note: {note}", err=True)
     if study.temperature_law is None:
         raise FitError(study.notes[-1])
     return study.temperature_law

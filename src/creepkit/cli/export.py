@@ -10,6 +10,7 @@ import typer
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.options import is_file_name
+from creepkit.reports.terminal import put, tell, tell_written
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -47,11 +48,13 @@ def command(
     """
     import creepkit as ck
     from creepkit.records import ZERO_CELSIUS
+    from creepkit.registry import default_registry
 
     if to == "list":
         for target in ck.available("exporters").values():
-            typer.echo(f"{target.name:16} {target.suffix:8} {target.title}")
+            tell(f"{target.name:16} {target.suffix:8} {target.title}")
         return
+    default_registry().exporter(to)  # a target that is misspelt is said first
     law_source = _resolve_source(source)
     elastic = None if modulus_gpa is None else ck.Elastic(E=1e3 * modulus_gpa, nu=poisson)
     text = ck.export(
@@ -61,7 +64,10 @@ def command(
         temperature=None if temperature_c is None else temperature_c + ZERO_CELSIUS,
         to=output,
     )
-    typer.echo(text.rstrip("\n") if output is None else f"wrote {output}")
+    if output is None:
+        put(text.rstrip("\n") + "\n")
+    else:
+        tell_written(output)
 
 
 def _resolve_source(text: str) -> CreepLaw | Identification | LawWithValues:

@@ -12,6 +12,7 @@ import typer
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.options import PAPER_SPECIMEN, parsed_number
+from creepkit.reports.terminal import tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.extraction import Extraction
@@ -117,7 +118,7 @@ def command(
     if names and not center:
         found = [one.replace(name=name) for one, name in zip(found, _names(names, len(found)), strict=True)]
     for one in found:
-        typer.echo(str(one))
+        tell(one)
     sheets = [plot if len(found) == 1 else plot.with_stem(f"{plot.stem}_{one.name}") for one in found] if plot else []
     files = [to / f"{one.name}.csv" for one in found] if to is not None else []
     for path in sheets:
@@ -135,14 +136,14 @@ def command(
             histories.append(one.history_under(load, temperature + ZERO_CELSIUS))
     for one, path in zip(found, sheets, strict=False):
         one.plot(path)
-        typer.echo(f"written: {path}")
+        tell_written(path)
     if modulus is not None:
         histories = [history.replace(elastic=ck.Elastic(E=1e3 * modulus)) for history in histories]
     for history, path in zip(histories, files, strict=False):
         path.parent.mkdir(parents=True, exist_ok=True)
         with made_from(frames):  # names such as D1 are the same for many recordings
             ck.write_history(history, path)
-        typer.echo(f"written: {path}")
+        tell_written(path)
 
 
 def _under_record(one: Extraction, recorded: InstrumentRecord, channels: str | None) -> History:
@@ -154,9 +155,9 @@ def _under_record(one: Extraction, recorded: InstrumentRecord, channels: str | N
     if named is not None and len(named) != 2:
         raise HistoryError(f"--channels is '{channels}'; name two channels of the record: --channels P1,T1")
     under = imposed_on(one, recorded, named)
-    typer.echo(f"  {one.name}: {under.alignment}")
+    tell(f"  {one.name}: {under.alignment}")
     for note in under.notes:
-        typer.echo(f"  {note}")
+        tell(f"  {note}")
     return history_of(one, under)
 
 

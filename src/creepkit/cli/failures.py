@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TextIO
 
 from creepkit.cli.interrupts import exit_code, ignore_signals, interrupted_sentence, was_interrupted
+from creepkit.errors import printable
 
 FAULT, NO_READER = 70, 141
 """Exit codes: EX_SOFTWARE of sysexits.h; and 128 + SIGPIPE, with which the shell reports programs of a closed pipe."""
@@ -133,7 +134,7 @@ def print_warnings_plainly() -> None:
         message: Warning | str, category: type[Warning], filename: str, lineno: int, line: str | None = None
     ) -> str:
         if category.__module__ == "creepkit.errors":
-            return f"creepkit: {' '.join(str(message).split())}\n"
+            return f"creepkit: {printable(' '.join(str(message).split()))}\n"
         return others(message, category, filename, lineno, line)
 
     warnings.formatwarning = formatted
@@ -199,9 +200,9 @@ def _said_interrupted() -> int:
 
 
 def say(sentence: str) -> None:
-    """Write a line on stderr, if it can be written."""
+    """Write a line on stderr, if it can be written; what could steer a terminal as its code."""
     try:
-        sys.stderr.write(f"creepkit: {sentence}\n")
+        sys.stderr.write(f"creepkit: {printable(sentence)}\n")
         sys.stderr.flush()
     except OSError:
         pass

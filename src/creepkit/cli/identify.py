@@ -28,7 +28,7 @@ from creepkit.cli.identification_options import (
 from creepkit.cli.identified_folder import identifying_alone, write_ranking
 from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, penalty_named, search_named
 from creepkit.reports.ranking import print_ranking, ranking_to_json
-from creepkit.reports.terminal import ProgressBar, print_json
+from creepkit.reports.terminal import ProgressBar, print_json, tell
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -148,7 +148,7 @@ def command(
     else:
         print_ranking(ranking, written, len(histories))
     if further:
-        typer.echo(str(ranking.further_tests()), err=as_json)
+        tell(ranking.further_tests(), err=as_json)
 
 
 def _truncate_at_strain(histories: list[History], limit: float) -> list[History]:
@@ -160,7 +160,7 @@ def _truncate_at_strain(histories: list[History], limit: float) -> list[History]
     names = {history.name for history in retained}
     for history in histories:
         if history.name not in names:
-            typer.echo(f"left out: {history.name} has no two frames below a strain of {limit:g}", err=True)
+            tell(f"left out: {history.name} has no two frames below a strain of {limit:g}", err=True)
     if not retained:
         raise FitError(f"no test has two frames below a strain of {limit:g}; raise --up-to")
     return retained
@@ -171,7 +171,7 @@ def _tell_assumptions(histories: list[History]) -> None:
     from creepkit.reports.histories import assumptions_text
 
     for line in assumptions_text(histories).splitlines():
-        typer.echo(f"note: {line}", err=True)
+        tell(f"note: {line}", err=True)
 
 
 def _warn_of_duplicates(histories: list[History]) -> None:
@@ -180,7 +180,7 @@ def _warn_of_duplicates(histories: list[History]) -> None:
     from creepkit.quality.comparison import duplicate_tests
 
     for first, second in duplicate_tests(without_copies(histories)[0]):
-        typer.echo(f"note: {first} and {second} look like one test published twice; both count", err=True)
+        tell(f"note: {first} and {second} look like one test published twice; both count", err=True)
 
 
 def select_laws(laws: Sequence[CreepLaw], histories: list[History], **options: Any) -> Ranking:

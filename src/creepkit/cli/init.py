@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from creepkit.cli.declared_options import OutputPath
+from creepkit.reports.terminal import tell, tell_written
 
 
 def command(
@@ -34,5 +35,5 @@ def command(
     proposal = propose_study(folder, path, reader)
     write_text(proposal.text, path, StudyError)
     for line in proposal.summary:
-        typer.echo(line)
-    typer.echo(f"wrote {path}; look through it, then: creepkit run {path}")
+        tell(line)
+    tell_written(path, f"; look through it, then: creepkit run {path}")

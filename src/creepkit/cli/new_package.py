@@ -14,6 +14,7 @@ import typer
 
 from creepkit.errors import CreepkitError, PluginError
 from creepkit.files.writing import write_text
+from creepkit.reports.terminal import tell
 
 NAME_PATTERN = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 """Names of packages: they become modules and classes as well."""
@@ -87,7 +88,7 @@ def write_plugin(kind: PackageKind, name: str, known: Mapping[str, object], *, o
         )
     if name in known:
         raise kind.error(f"there is a {kind.noun} '{name}' already; choose another name, see {kind.commands}")
-    typer.echo(_write_file(kind, name) if one_file else _write_package(kind, name))
+    tell(_write_file(kind, name) if one_file else _write_package(kind, name))
 
 
 def _write_file(kind: PackageKind, name: str) -> str:

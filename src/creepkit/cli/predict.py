@@ -23,7 +23,7 @@ from creepkit.cli.planned_test import (
     parse_temperature,
     planned_test,
 )
-from creepkit.reports.terminal import ProgressBar, print_json
+from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -115,11 +115,11 @@ def command(
         )
     if plot is not None:
         forecast.plot(plot)
-        typer.echo(f"wrote {plot}", err=True)
+        tell_written(plot, err=True)
     if as_json:
         print_json(forecast_to_json(forecast))
     else:
-        typer.echo(str(forecast))
+        tell(forecast)
 
 
 def _temperature(source: Identification | ModelAverage, texts: list[str] | None) -> float | Program:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from creepkit.cli.declared_options import OutputPath
-from creepkit.reports.terminal import print_json, printable
+from creepkit.reports.terminal import print_json, tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.errors import CreepkitError
@@ -64,15 +64,15 @@ def command(
         counted = f"{without} test{'' if without == 1 else 's'} without frames" if without else ""
         checked = str(quality) if framed else ""
         parts = (report.tables_text(tables), report.histories_text(found), counted, checked)
-        typer.echo("\n".join(part for part in parts if part))
+        tell("\n".join(part for part in parts if part))
     if to is not None:
         for path in _write(found, to):
-            typer.echo(f"wrote {path}", err=as_json)
+            tell_written(path, err=as_json)
     if plot is not None:
         report.histories_figure(found, plot)
-        typer.echo(f"wrote {plot}", err=as_json)
+        tell_written(plot, err=as_json)
     for error in unread:
-        typer.echo(printable(f"not read: {error}"), err=True)
+        tell(f"not read: {error}", err=True)
     if unread:
         raise typer.Exit(1)
 
@@ -196,7 +196,7 @@ def _show_records(records: list[InstrumentRecord], to: Path | None, plot: Path |
     if as_json:
         print_json({"records": [record_to_json(record) for record in records]})
     else:
-        typer.echo("\n".join(str(record) for record in records))
+        tell("\n".join(str(record) for record in records))
     if plot is not None:
         records[0].plot(plot)
-        typer.echo(f"wrote {plot}", err=as_json)
+        tell_written(plot, err=as_json)

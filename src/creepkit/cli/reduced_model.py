@@ -9,6 +9,7 @@ import typer
 
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.options import PAPER_SPECIMEN, parse_numbers
+from creepkit.reports.terminal import tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.records import SupportsTraining
@@ -33,15 +34,15 @@ def command(
     from creepkit.reports.simulation import cubature_figure
 
     predictor = trainable_model(ck.specimen(specimen), geometry or [])
-    typer.echo(predictor.train())
+    tell(predictor.train())
     units = {str(output): output.unit for output in outputs_of(predictor)}
     errors = ", ".join(f"{name} {value:.2g} {units.get(name, '')}".rstrip() for name, value in predictor.error.items())
-    typer.echo(f"error against its finite elements, one standard deviation over runs it was not trained on: {errors}")
+    tell(f"error against its finite elements, one standard deviation over runs it was not trained on: {errors}")
     if picture is not None:
         if not hasattr(predictor, "cubature_model"):
             raise SolveError(f"--picture: the reduced-order model of '{specimen}' has no points to draw; leave it out")
         cubature_figure(predictor.cubature_model(), picture)
-        typer.echo(f"wrote {picture}", err=True)
+        tell_written(picture, err=True)
 
 
 def trainable_model(specimen: Any, geometry: list[str]) -> SupportsTraining:

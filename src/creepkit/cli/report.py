@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from creepkit.cli.declared_options import OutputPath
+from creepkit.reports.terminal import tell_written
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -36,7 +37,7 @@ def command(
 
     histories = ck.read_histories(tests) if tests else []
     written = ck.report([_read(path, histories) for path in results], to, title=title)
-    typer.echo(f"wrote {written}", err=True)
+    tell_written(written, err=True)
 
 
 def _read(path: Path, histories: list[History]) -> Identification | ModelAverage | RuptureAssessment:

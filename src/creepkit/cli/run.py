@@ -9,7 +9,7 @@ import typer
 
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.interrupts import kept_when_interrupted
-from creepkit.reports.terminal import ProgressBar, print_json, print_table, printable
+from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell
 
 if TYPE_CHECKING:
     from creepkit.studies.result import StudyResult
@@ -62,15 +62,15 @@ def command(
             to=target, only=only or None, force=force, locked=locked, prune=prune, progress=progress.tick
         )
     for change in result.changes:
-        typer.echo(printable(f"since the last lock: {change}"), err=True)
+        tell(f"since the last lock: {change}", err=True)
     if prune:
-        typer.echo(f"removed {result.pruned} kept identifications that no stage rests on", err=True)
+        tell(f"removed {result.pruned} kept identifications that no stage rests on", err=True)
     if as_json:
         print_json(result_to_json(result))
     else:
         print_result(result)
     if from_report and not result.changes:
-        typer.echo(f"all numbers are those of {study}", err=as_json)
+        tell(f"all numbers are those of {study}", err=as_json)
     if result.failures:
         first = result.failures[0]
         others = f" ({len(result.failures) - 1} more)" if len(result.failures) > 1 else ""
@@ -81,17 +81,17 @@ def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, tests that lie apart, and where the report is."""
     from creepkit.reports.tests_apart import apart_sentence
 
-    typer.echo(printable(result.title))
+    tell(result.title)
     print_table("", ("stage", "state", ""), [(one.name, one.state, one.sentence) for one in result.stages])
     for exclusion in result.exclusions:
         count = len(exclusion.frames)
         frames = f", {count} frame{'s' if count > 1 else ''}" if count else ""
-        typer.echo(printable(f"left out: {exclusion.test}{frames}: {exclusion.reason}"))
+        tell(f"left out: {exclusion.test}{frames}: {exclusion.reason}")
     for group, ranking in result.rankings.items():
         for sentence in filter(None, (ranking.verdict, apart_sentence(ranking.best))):
-            typer.echo(printable(f"{group}: {sentence}" if group else sentence))
+            tell(f"{group}: {sentence}" if group else sentence)
     if result.report is not None:
-        typer.echo(f"report: {result.report}")
+        tell(f"report: {result.report}")
 
 
 def result_to_json(result: StudyResult) -> dict[str, object]:

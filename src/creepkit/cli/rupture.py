@@ -11,7 +11,7 @@ from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.identification_options import OnlyOption, select_by_label
 from creepkit.cli.options import parsed_integer, parsed_number
-from creepkit.reports.terminal import print_json
+from creepkit.reports.terminal import print_json, tell, tell_written
 
 HOURS_BY_SUFFIX = {"h": 1.0, "d": 24.0, "s": 1.0 / 3600.0, "": 1.0}
 
@@ -79,11 +79,11 @@ def command(
         assessment.plot(plot)
         written.append(plot)
     for path in written:
-        typer.echo(f"wrote {path}", err=True)
+        tell_written(path, err=True)
     if as_json:
         print_json(rupture_to_json(assessment))
     else:
-        typer.echo(str(assessment))
+        tell(assessment)
 
 
 def _hours(text: str) -> float:

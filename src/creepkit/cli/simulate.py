@@ -24,6 +24,7 @@ from creepkit.cli.planned_test import (
     described_test,
     parse_temperature,
 )
+from creepkit.reports.terminal import put, tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
@@ -93,10 +94,10 @@ def command(
     )
     run = replace(run, geometry={**run.geometry, **test.lengths})
     if run.reason:
-        typer.echo(f"the test ended at {run.end_time / 3600:.4g} h: {run.reason}; the history ends there", err=True)
+        tell(f"the test ended at {run.end_time / 3600:.4g} h: {run.reason}; the history ends there", err=True)
     if picture is not None:
         run.section(path=picture)  # type: ignore[attr-defined]
-        typer.echo(f"wrote {picture}", err=True)
+        tell_written(picture, err=True)
     _write_history(run, to)
 
 
@@ -116,10 +117,10 @@ def _write_history(run: History, to: Path | None) -> None:
     from creepkit.readers.history_csv import history_text, write_history
 
     if to is None:
-        typer.echo(history_text(run), nl=False)
+        put(history_text(run))
     else:
         write_history(run, to)
-        typer.echo(f"wrote {to}: {run.times.size} frames to {run.times[-1] / 3600:.4g} h")
+        tell_written(to, f": {run.times.size} frames to {run.times[-1] / 3600:.4g} h")
 
 
 def _frame_times(end: float, points: int | None, every: float | None, specimen: Specimen) -> Floats:

@@ -11,7 +11,7 @@ from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.interrupts import kept_when_interrupted
 from creepkit.cli.options import parsed_integer
-from creepkit.reports.terminal import ProgressBar, print_json, print_table
+from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell_written
 
 
 @kept_when_interrupted("what is trained and the last checkpoint are kept, and the same command goes on from there")
@@ -74,7 +74,7 @@ def command(
         print_json({"trainings": [vars(e) for e in trainings], "picture": str(to / "sweep.png")})
         return
     print_table("", *size_study_rows(trainings))
-    typer.echo(f"wrote {to / 'sweep.png'}")
+    tell_written(to / "sweep.png")
 
 
 def parse_whole_numbers(text: str, option: str) -> tuple[int, ...]:

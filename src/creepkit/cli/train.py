@@ -10,7 +10,7 @@ import typer
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.interrupts import kept_when_interrupted
-from creepkit.reports.terminal import ProgressBar, print_json
+from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.surrogates.parameter_gru import ParameterGru
@@ -86,9 +86,9 @@ def command(
     if as_json:
         print_json({"file": str(to), "metrics": model.metadata.metrics, "pictures": [str(path) for path in plot_files]})
         return
-    typer.echo(f"{model}\n")
+    tell(f"{model}\n")
     for path in (to, *plot_files):
-        typer.echo(f"wrote {path}")
+        tell_written(path)
 
 
 def recipe_with(network_options: dict[str, Any], training_options: dict[str, Any]) -> ParameterGru:

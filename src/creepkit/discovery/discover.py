@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.discovery.combinations import rank_combinations
 from creepkit.discovery.elastic_moduli import FIRST_FRAMES, ModulusEstimates, identify_moduli
-from creepkit.discovery.forms import CONSTANT, CandidateForm, candidate_forms
+from creepkit.discovery.forms import CONSTANT, CandidateForm, candidate_forms, check_form_names
 from creepkit.discovery.refitting import refit
 from creepkit.discovery.regression import IsothermalEstimates, check_temperatures, isothermal_groups
 from creepkit.discovery.temperature_law import TemperatureLaw, temperature_law_from_combinations
@@ -83,8 +84,7 @@ def candidate_forms_of(
 ) -> dict[str, list[CandidateForm]]:
     """{parameter: its candidate forms}, in the law's order."""
     law = estimates.law
-    for name in (*(parameters or ()), *prior, *(forms if isinstance(forms, Mapping) else ())):
-        law.symbol(name)
+    check_form_options(law, forms, prior, parameters)
     coordinates = Coordinates(law, estimates.reference)
     rate_coefficients = {law.names[k] for k in coordinates.coefficients}
     forms_by_parameter = {}
@@ -102,6 +102,17 @@ def candidate_forms_of(
             prior.get(name),
         )
     return forms_by_parameter
+
+
+def check_form_options(
+    law: CreepLaw, forms: Forms | None = None, prior: PriorOdds | None = None, parameters: Sequence[str] | None = None
+) -> None:
+    """Raise an error, before any work, for names of parameters or temperature forms that there are not."""
+    by_parameter = forms if isinstance(forms, Mapping) else {}
+    for name in (*(parameters or ()), *(prior or ()), *by_parameter):
+        law.symbol(name)
+    listed = chain.from_iterable(by_parameter.values()) if by_parameter else forms or ()
+    check_form_names(chain(listed, *(prior or {}).values()))
 
 
 class FormOptions(TypedDict, total=False):
@@ -155,6 +166,7 @@ def temperature_study(
     predictor = CompositePredictor(resolved) if isinstance(resolved, dict) else resolved
     if law.uses(temperature):
         raise FitError(f"law '{law.name}' depends on temperature already; give it without: forms are what is sought")
+    check_form_options(law, **form_options)
     if not tests:
         raise FitError("there are no histories to study")
     settings = settings or IdentificationSettings()

@@ -7,7 +7,7 @@ a regression finds the coefficients, and the functions are named: {name: sympy t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -112,7 +112,8 @@ def candidate_forms(
         counts ARRHENIUS_ODDS times.
     """
     param, registered = law.table[parameter], registry.default_registry().temperature_forms()
-    form_names = _checked_form_names(forms, [CONSTANT, *registered])
+    form_names = [CONSTANT, *registered] if forms is None else list(forms)
+    check_form_names(form_names)
     forms_found = [CandidateForm(CONSTANT, parameter, None, {parameter: sympy.S.One}, {parameter: param})]
     for name in sorted(form_names, key=lambda n: (n != ARRHENIUS, n not in creepkit_temperature_forms(), n)):
         temperature_form = registered[name].value(T_ref) if name != CONSTANT else None
@@ -199,11 +200,12 @@ def _is_duplicate(candidate: CandidateForm, accepted: Sequence[CandidateForm], T
     return False
 
 
-def _checked_form_names(forms: Sequence[str] | None, known: Sequence[str]) -> list[str]:
-    for name in forms or ():
+def check_form_names(names: Iterable[str]) -> None:
+    """FitError for a name of no temperature form that is registered."""
+    known = [CONSTANT, *registry.default_registry().temperature_forms()]
+    for name in names:
         if name not in known:
             raise FitError(f"there is no temperature form '{name}': {nearest(name, known)}")
-    return list(forms) if forms is not None else list(known)
 
 
 def _with_prior_odds(

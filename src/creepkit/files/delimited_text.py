@@ -23,6 +23,12 @@ ERROR_VALUES = ("#REF!", "#DIV/0!", "#N/A", "#VALUE!", "#NAME?", "#NUM!", "#NULL
 """What spreadsheets write for a value that could not be computed or shown; no remark begins so."""
 
 
+MISSING_VALUES = frozenset(
+    ("-", "--", "---", "–", "—", "n.a.", "n.a", "n/a", "na", "n. a.", "n.b.", "n. b.", "n.d.", "k.a.", "k. a.")
+)
+"""What stands for a value that was not measured or not stated, in small letters; nan is a number that was lost."""
+
+
 _BYTE_ORDER_MARKS = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
 
 
@@ -255,6 +261,11 @@ def parts_of_lines(text: str, start: int = 0) -> Iterator[str]:
         start = end + 1
 
 
+def is_missing(text: str) -> bool:
+    """Whether a cell is empty, or holds a mark of what was not measured or not stated."""
+    return not text or (len(text) <= 5 and text.casefold() in MISSING_VALUES)
+
+
 def is_number(text: str, dialect: Dialect) -> bool:
     """Whether a cell is a number."""
     return _NUMBERS[dialect.decimal].fullmatch(text) is not None
@@ -268,7 +279,9 @@ def _number(text: str, decimal: str) -> float:
 def _why_no_number(text: str, dialect: Dialect) -> str:
     shown = quoted(text)
     if not text:
-        return "empty; write a finite number such as 1.5e-3"
+        return "empty; write a finite number such as 1.5e-3, or leave the row out"
+    if is_missing(text):
+        return f"'{shown}', and a value is needed here; write a finite number such as 1.5e-3, or leave the row out"
     if _PADDED.match(text):
         return f"'{shown}', which begins with 0, as where a decimal sign is lost; write it without"
     if _NUMBERS[dialect.decimal].fullmatch(text):

@@ -35,6 +35,7 @@ from creepkit.instruments.record_tables import (
     find_head,
     numbered_lines,
 )
+from creepkit.limits import HOTTEST
 from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
 from creepkit.records.plugin_calls import call_on_file
 
@@ -51,7 +52,7 @@ EARLIEST_UNIX_TIME = 315532800.0
 """s, the beginning of 1980; unix times from then to the next day are believed."""
 
 
-LARGEST_PRESSURE, TEMPERATURES = 1e5, (0.0, 1e4)
+LARGEST_PRESSURE, TEMPERATURES = 1e5, (0.0, HOTTEST)
 """MPa and K beyond which a reading is a fault of the instrument."""
 
 

@@ -3,7 +3,7 @@
 Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one with the
 readings of another, one far from its replicates or from the trend of the others, a modulus off the trend, a first
 frame that is not elastic, strain of loading that nothing states, a strain above 100 %, a record of load or temperature
-that contradicts the stated program.
+that contradicts the stated program, a last number in which the file may have been cut.
 Of the rig: a change of creep rate at one clock time in several tests, a jump of an output without a step of the load.
 """
 
@@ -27,7 +27,7 @@ from creepkit.quality.flags import DataQuality, FlagKind, QualityFlag, frame_ran
 from creepkit.quality.frames import FlaggedFrames, decreasing_frames, outlier_frames, unloading_frames
 from creepkit.quality.loading_strain import unstated_loading_strain
 from creepkit.quality.rig_flags import ACTIVATION_ENERGY, jump_flags, rate_change_flag, record_flags
-from creepkit.records import History, Predictor
+from creepkit.records import CUT_LABEL, History, Predictor
 
 __all__ = [
     "ACTIVATION_ENERGY",
@@ -68,6 +68,7 @@ def check_data_quality(
         ("modulus", modulus_trend_outliers(histories)),
         ("unit", _large_strains(histories)),
     ]
+    results = [[*flags, *_cut_flags(history)] for flags, history in zip(results, histories, strict=True)]
     if specimen is not None:
         test_checks.append(("first frame", first_frame_deviations(histories, specimen)))
     for kind, reasons in test_checks:
@@ -82,6 +83,15 @@ def check_data_quality(
     flags += check_loading_strain(sound)
     flags += check_rig(sound, activation_energy=activation_energy)
     return DataQuality(tuple(flags), len(histories))
+
+
+def _cut_flags(history: History) -> list[QualityFlag]:
+    """That the file of a test may end within its last number."""
+    if CUT_LABEL not in history.labels:
+        return []
+    advice = "compare it with its source; if it is whole, end its last line with a line end"
+    frames = (history.times.size - 1,)
+    return [QualityFlag((history.name,), "cut", frames, history.labels[CUT_LABEL], proposal=advice)]
 
 
 def copy_reason(original: History) -> str:

@@ -25,6 +25,7 @@ FlagKind = Literal[
     "rate change",
     "unreadable",
     "few points",
+    "cut",
     "motion",
     "residual",
     "fit",

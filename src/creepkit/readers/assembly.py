@@ -22,6 +22,7 @@ from creepkit.readers.noise_correlation import read_noise_correlation
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table_rows import NumberRows, cells_of, kept_alike
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, how_to_ignore, read_frames
+from creepkit.readers.unbroken_words import refuse_unbroken
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, outputs_of_test, specimen_of
 
@@ -145,7 +146,7 @@ def assemble_without_frames(
     time = conditions.take_number("rupture")
     end = conditions.take_number("end_time")
     ended = conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
-    _check_end_without_frames(time, end, ended, location)
+    _check_end_without_frames(time, end, ended, conditions.labels, location)
     if not rate_known and time is None and ended != "stopped":
         raise conditions.missing_error(
             "frames, no minimum creep rate and no end of the test",
@@ -178,7 +179,9 @@ def assemble_without_frames(
     return history
 
 
-def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | None, ended: str, location: str) -> None:
+def _check_end_without_frames(
+    time: StatedNumber | None, end: StatedNumber | None, ended: str, labels: Mapping[str, str], location: str
+) -> None:
     """Refuse ends that contradict one another, or say too little."""
     if time is not None and (end is not None or ended == "stopped"):
         other = f"'{end.key}' says when it ended" if end is not None else "the test was stopped"
@@ -187,6 +190,8 @@ def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | Non
         raise HistoryError(f"{location}: the test ruptured, and nothing says when; write rupture_h")
     if ended == "stopped" and end is None:
         raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
+    if time is not None and not ended:
+        refuse_unbroken(labels, time.key, time.location)
 
 
 def _minimum_rate(conditions: StatedConditions) -> tuple[float | None, float | None]:
@@ -338,6 +343,8 @@ def _end_of_test(conditions: StatedConditions, frames: TableFrames, used: Bools)
         raise HistoryError(
             f"{time.location}: the test was stopped, and '{time.key}' says when it ruptured; keep one of them"
         )
+    if time is not None and not ended:
+        refuse_unbroken(conditions.labels, time.key, time.location)
     if time is not None or ended != "ruptured":
         return None if time is None else time.value, ended == "stopped"
     conditions.record_assumption("rupture at the last frame")

@@ -10,6 +10,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect
 from creepkit.readers.column_names import split_written_name
 from creepkit.readers.comment_lines import entry_of, is_comment
+from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.table_limits import refuse_many
 from creepkit.readers.table_rows import NumberRows, TableRow, TextRows, kept_alike, with_columns, without_empty
 from creepkit.readers.text_tables import SourceText, TextTable, check_columns, location_in, some_of
@@ -24,7 +25,7 @@ class CellGrid:
     no comment and not empty. numbers : the rows below the last of `rows`, where they hold numbers alone.
     comments : line, key and entry of each `# key: value` below the first row. positions : the column of the file, from
     0, in which each cell of a row stands, where some were left out. remarks : what was left aside, or read though it
-    was hidden.
+    was hidden. cut : the last number of the file, where the file may have been cut in it.
     """
 
     path: Path
@@ -36,6 +37,7 @@ class CellGrid:
     comments: Sequence[tuple[int, str, SourceText]] = ()
     positions: Sequence[int] = ()
     remarks: tuple[str, ...] = ()
+    cut: CutNumber | None = None
 
     def location(self, line: int) -> str:
         """Where a row stands."""

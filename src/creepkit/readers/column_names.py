@@ -49,6 +49,8 @@ NAME_SYNONYMS: Mapping[str, str] = {
     **{"druck": "pressure", "prüfdruck": "pressure"},
     **dict.fromkeys(("creep strain", "total strain", "engineering strain", "true strain"), "strain"),
     **dict.fromkeys(("logarithmic strain", "dehnung", "kriechdehnung", "gesamtdehnung"), "strain"),
+    **dict.fromkeys(("plastische dehnung", "bleibende dehnung"), "strain"),
+    "anfangsdehnung": "loading_strain",
     **dict.fromkeys(
         ("young's modulus", "youngs modulus", "elastic modulus", "e modul", "elastizitätsmodul"), "modulus"
     ),
@@ -72,6 +74,7 @@ STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
     "engineering strain": ("strain_measure", "engineering"),
     **dict.fromkeys(("total strain", "gesamtdehnung"), ("includes_elastic", "yes")),
     **dict.fromkeys(("creep strain", "kriechdehnung"), ("includes_elastic", "no")),
+    **dict.fromkeys(("plastische dehnung", "bleibende dehnung"), ("includes_elastic", "no")),
 }
 """{name of a column in small letters: key and text of the condition that it states}."""
 

@@ -103,7 +103,8 @@ def entries_above(grid: CellGrid, head: Sequence[TableRow], known: KnownNames) -
             key, *rest = cells
             if is_number(key, grid.dialect):
                 raise HistoryError(
-                    f"{place}: the number {quoted(key)} stands above the names of the columns; remove it"
+                    f"{place}: the number {quoted(key)} stands above the names of the columns, and is that of a column "
+                    "without a name, or has no key before it; name every column of the table, or the condition"
                 )
             if not rest:
                 if known.is_condition(key):

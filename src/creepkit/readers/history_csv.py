@@ -34,11 +34,14 @@ from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import KnownNames
+from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.noise_correlation import noise_correlation_text
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.text_grids import peek_columns, read_head_alone, read_text_grid
+from creepkit.readers.text_tables import TextTable
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (
+    CUT_LABEL,
     UNKNOWN_DURATION,
     History,
     PointLoading,
@@ -121,8 +124,15 @@ def histories_of_tests(
         parts = [f"sheet {grid.sheet}"] * bool(grid.sheet) + [test.name] * bool(test.name)
         source = f"{path} ({', '.join(parts)})" if parts and len(found) > 1 else str(path)
         history = assemble_history(unique, test.entries, test.table, vocabulary, location=grid.place, source=source)
+        if grid.cut is not None and _holds_number(test.table, grid.cut):
+            history = history.replace(labels={**history.labels, CUT_LABEL: str(grid.cut)})
         histories.append(history)
     return histories
+
+
+def _holds_number(table: TextTable, number: CutNumber) -> bool:
+    """Whether the last row of a test ends with this number of the file."""
+    return int(table.lines[-1]) == number.line and number.column in (table.positions or [number.column])
 
 
 @checked

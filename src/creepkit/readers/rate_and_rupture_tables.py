@@ -26,6 +26,7 @@ from creepkit.readers.silent_rows import without_silent_rows
 from creepkit.readers.table_rows import TableRow
 from creepkit.readers.text_grids import peek_columns, read_text_grid
 from creepkit.readers.text_tables import SourceText, TextTable, unknown_text
+from creepkit.readers.unbroken_words import UNBROKEN_WORDS
 from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary, plain_name, split_unit
 from creepkit.records import History
 from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
@@ -77,22 +78,8 @@ QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
 
 TEXTS: Mapping[str, tuple[str, ...]] = {
     "name": (
-        "name",
-        "test",
-        "test id",
-        "test name",
-        "test no",
-        "test number",
-        "id",
-        "no",
-        "sample",
-        "sample id",
-        "specimen id",
-        "specimen no",
-        "specimen name",
-        "probennummer",
-        "versuch",
-        "probe",
+        *("name", "test", "test id", "test name", "test no", "test number", "id", "no", "sample", "sample id"),
+        *("specimen id", "specimen no", "specimen name", "probennummer", "versuch", "probe"),
     ),
     "ended": ("ended", "end", "end of test", "outcome", "status", "state", "result"),
     "alloy": ("alloy", "material", "werkstoff"),
@@ -108,8 +95,8 @@ TEXTS: Mapping[str, tuple[str, ...]] = {
 
 ENDED: Mapping[str, str] = {
     **dict.fromkeys(("ruptured", "rupture", "broken", "failed", "failure", "fractured", "r", "f"), "ruptured"),
-    **dict.fromkeys(("stopped", "runout", "run-out", "run out", "discontinued", "interrupted", "unbroken"), "stopped"),
-    **dict.fromkeys(("censored", "running", "in progress", "unruptured", "not ruptured", "not broken"), "stopped"),
+    **dict.fromkeys(("gebrochen", "bruch"), "ruptured"),
+    **dict.fromkeys(UNBROKEN_WORDS, "stopped"),
 }
 """{word in small letters: how a test ended}."""
 
@@ -355,6 +342,8 @@ def _with_end(cells: Mapping[str, SourceText], location: str) -> dict[str, Sourc
     elif ruptures:
         _check_duration(entries)
         entries = {key: entry for key, entry in entries.items() if _quantity(key) != "end_time"}
+        if ended == "ruptured":  # stated, whatever a remark says
+            entries["ended"] = SourceText("ruptured", location)
     if ended == "stopped":
         entries["ended"] = SourceText("stopped", location)
     return entries

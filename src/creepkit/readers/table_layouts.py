@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from itertools import pairwise
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import is_number
+from creepkit.files.delimited_text import is_missing, is_number
 from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.head_rows import entries_above, entries_of_blocks
@@ -286,7 +286,11 @@ def _table_of_block(grid: CellGrid, rows: Sequence[TableRow], name: str, columns
     """The frames of one test: the rows in which a column of its own holds something, its time in pairs among them."""
     positions, line = list(columns), grid.rows[0].line
     own = with_columns(rows, positions)
-    cut = own if isinstance(own, NumberRows) else kept_alike(own, (row for row in own if any(row.cells[1:])))
+    cut = (
+        own
+        if isinstance(own, NumberRows)
+        else kept_alike(own, (row for row in own if not all(map(is_missing, row.cells[1:]))))
+    )
     if not cut:
         raise HistoryError(
             f"{grid.location(line)}: test '{quoted(name)}' has no rows below the names of its columns; remove it or "
@@ -340,7 +344,9 @@ def _rows_by_test(table: TextTable, entries: Mapping[str, SourceText], known: Kn
         _refuse_twice(own, entries, known)
         kept = [k for k in range(len(table.columns)) if k not in (*stated, *keys[:1])]
         cut = with_columns(rows, kept)
-        empty = [table.columns[k] for k in stated if not rows[0].cells[k] and known.is_condition(table.columns[k])]
+        empty = [
+            table.columns[k] for k in stated if is_missing(rows[0].cells[k]) and known.is_condition(table.columns[k])
+        ]
         assumptions = (*table.assumptions, *map(unknown_text, empty))
         part = replace(table, columns=[table.columns[k] for k in kept], rows=cut, assumptions=assumptions)
         tests.append(TabulatedTest(name, {**entries, **own}, part))
@@ -363,6 +369,6 @@ def _entries_of_columns(
     for k in columns:
         name = table.columns[k]
         key = known.condition(name) if known.is_condition(name) else f"label {name}"
-        if row.cells[k]:
+        if not is_missing(row.cells[k]):
             entries[key] = SourceText(row.cells[k], table.location(row.line), table.dialect.decimal, name)
     return entries

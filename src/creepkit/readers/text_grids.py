@@ -6,7 +6,7 @@ A large table of numbers alone is read as numbers at once; else the cells are ke
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
@@ -27,6 +27,7 @@ from creepkit.files.delimited_text import (
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
 from creepkit.readers.comment_lines import BEFORE_COMMENT, head_entries, is_comment, late_entries, stated_decimal
+from creepkit.readers.cut_files import cut_number
 from creepkit.readers.table_limits import (
     MAXIMUM_CELL,
     MAXIMUM_COLUMNS,
@@ -68,11 +69,12 @@ def read_text_grid(path: Path) -> CellGrid:
     if offset == len(text):
         problem = "holds a header but no table" if any(line.strip() for line in head) else "is empty"
         raise HistoryError(f"{path}: the file {problem}; write a line of columns such as time_s,strain_pct, then rows")
+    grid = None
     if len(text) > _LARGE_TEXT and len(head) < _HEAD_LINES:
-        numbers = _grid_of_numbers(path, text, head, offset)
-        if numbers is not None:
-            return numbers
-    return _grid_of_texts(path, text, head, offset)
+        grid = _grid_of_numbers(path, text, head, offset)
+    if grid is None:
+        grid = _grid_of_texts(path, text, head, offset)
+    return replace(grid, cut=cut_number(text, grid.dialect))
 
 
 def _head_of(path: Path, text: str) -> tuple[list[str], int]:

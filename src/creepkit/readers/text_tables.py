@@ -17,7 +17,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import Dialect, is_number, parse_number, parse_numbers
+from creepkit.files.delimited_text import Dialect, is_missing, is_number, parse_number, parse_numbers
 from creepkit.readers.column_names import NameTable, split_written_name
 from creepkit.readers.table_rows import NumberRows, TableRow, TextRows, cells_by_part
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
@@ -115,11 +115,15 @@ class TextTable:
     def entries(self, row: TableRow) -> dict[str, SourceText]:
         """The cells of one row by column, those left empty excepted."""
         place, decimal = self.location(row.line), self.dialect.decimal
-        return {n: SourceText(cell, place, decimal) for n, cell in zip(self.columns, row.cells, strict=True) if cell}
+        return {
+            n: SourceText(cell, place, decimal)
+            for n, cell in zip(self.columns, row.cells, strict=True)
+            if not is_missing(cell)
+        }
 
     def empty_columns(self, row: TableRow) -> list[str]:
         """The columns whose cell in one row is empty: what they would say of it is unknown."""
-        return [name for name, cell in zip(self.columns, row.cells, strict=True) if not cell]
+        return [name for name, cell in zip(self.columns, row.cells, strict=True) if is_missing(cell)]
 
     def with_rows(self, rows: Sequence[TableRow]) -> TextTable:
         """The same table with other rows."""

@@ -3,7 +3,7 @@
 from creepkit.records.camera_format import CameraFormat
 from creepkit.records.camera_frames import CameraFrame, Frames
 from creepkit.records.clock_alignment import ClockAlignment
-from creepkit.records.history import EVERY_FRAME, UNKNOWN_DURATION, History
+from creepkit.records.history import CUT_LABEL, EVERY_FRAME, UNKNOWN_DURATION, History
 from creepkit.records.instrument_format import InstrumentFormat
 from creepkit.records.instrument_record import Channel, InstrumentRecord
 from creepkit.records.interfaces import (
@@ -89,6 +89,7 @@ from creepkit.records.units import SECONDS_PER_HOUR, ZERO_CELSIUS
 
 __all__ = [
     "COVARIANCE_NUISANCES",
+    "CUT_LABEL",
     "EVERY_FRAME",
     "GENERAL_NUISANCES",
     "PROGRAM_NUISANCES",

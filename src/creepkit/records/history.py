@@ -12,6 +12,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, quoted
+from creepkit.limits import HOTTEST
 from creepkit.records.known_specimens import load_unit
 from creepkit.records.loading import Loading, Program, loading_text
 from creepkit.records.noise_correlations import can_hold_together
@@ -27,6 +28,10 @@ RUPTURE_TIME_TOLERANCE = 0.01
 
 UNKNOWN_DURATION = 1.0
 """s; the one time of a test without frames whose duration nobody stated."""
+
+
+CUT_LABEL = "cut_number"
+"""Label of a test whose file may have been cut within its last number: a sentence, which checks of quality show."""
 
 
 EVERY_FRAME: Bools = frozen([], dtype=bool)
@@ -106,10 +111,10 @@ class History:
         temperatures = (
             self.temperature.values if isinstance(self.temperature, Program) else np.array([float(self.temperature)])
         )
-        possible = (temperatures > 0) & (temperatures < 1e4)
+        possible = (temperatures > 0) & (temperatures < HOTTEST)
         if not possible.all():
             raise HistoryError(
-                f"{origin}: a temperature of {temperatures[~possible][0]:g} K is not above 0 and below 10000 K"
+                f"{origin}: a temperature of {temperatures[~possible][0]:g} K is not above 0 and below {HOTTEST:g} K"
             )
         if not isinstance(self.temperature, Program):
             freeze(self, "temperature", float(self.temperature))

@@ -11,6 +11,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
+from creepkit.limits import HOTTEST
 from creepkit.records.units import UnitConversion, conversions
 
 
@@ -133,7 +134,9 @@ RATE = QuantityKind(
 NUMBER = QuantityKind("number", _NO_UNIT)
 
 
-STRESS = QuantityKind("stress", conversions("MPa", "kPa", "GPa", "Pa", "bar", "ksi", "psi"), low=0.0, high=1e5)
+STRESS = QuantityKind(
+    "stress", conversions("MPa", "kPa", "GPa", "Pa", "bar", "ksi", "psi", "kgf/mm2"), low=0.0, high=1e5
+)
 
 
 SIGNED_STRESS = replace(STRESS, low=-1e5)
@@ -145,7 +148,7 @@ MODULUS = QuantityKind("modulus", conversions("MPa", "GPa", "ksi", "Msi"), 0.0, 
 POISSON = QuantityKind("Poisson's ratio", NUMBER.units, low=-1.0, high=0.5, open_interval=True)
 
 
-TEMPERATURE = QuantityKind("temperature", conversions("K", "C", "F"), low=0.0, high=1e4, open_interval=True)
+TEMPERATURE = QuantityKind("temperature", conversions("K", "C", "F"), low=0.0, high=HOTTEST, open_interval=True)
 
 
 FLAG = QuantityKind("flag", NUMBER.units, low=0.0, high=1.0)

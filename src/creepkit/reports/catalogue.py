@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from creepkit.reports.terminal import print_json, print_table
+from creepkit.reports.terminal import print_json, print_table, tell
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
@@ -23,7 +22,7 @@ def print_laws(registered: Mapping[str, Registered[CreepLaw]], conflicts: Sequen
     rows = [(law.name, law.title, " ".join(law.names)) for law in laws]
     print_table(f"{len(rows)} laws", ("name", "title", "parameters"), rows)
     for sentence in conflicts:
-        print(f"left out: {sentence}", file=sys.stderr)
+        tell(f"left out: {sentence}", err=True)
 
 
 def print_law(law: CreepLaw, entry: Registered[CreepLaw], as_json: bool) -> None:
@@ -31,7 +30,7 @@ def print_law(law: CreepLaw, entry: Registered[CreepLaw], as_json: bool) -> None
     if as_json:
         print_json(_law_to_json(entry))
     else:
-        print(f"{law}\n  from {entry.provenance}\n  LaTeX: {law.latex()}")
+        tell(f"{law}\n  from {entry.provenance}\n  LaTeX: {law.latex()}")
 
 
 def _law_to_json(entry: Registered[CreepLaw]) -> dict[str, Any]:
@@ -89,7 +88,7 @@ def print_specimen(entry: Registered[Specimen], as_json: bool) -> None:
     from creepkit.records import dimensions_of, loads_of, outputs_of  # heavy, and a list of laws needs none of it
 
     specimen = entry.value
-    print(f"{specimen.name}: {specimen.title}\n  from {entry.provenance}")
+    tell(f"{specimen.name}: {specimen.title}\n  from {entry.provenance}")
     outputs = [(o, o.unit, o.long_name, "" if o.noise is None else f"{o.noise:g}") for o in outputs_of(specimen)]
     print_table("outputs", ("name", "unit", "what it is", "noise"), outputs)
     loads = [(load.name, load.unit, load.long_name, _option(load.name)) for load in loads_of(specimen)]
@@ -100,7 +99,7 @@ def print_specimen(entry: Registered[Specimen], as_json: bool) -> None:
     ]
     if lengths:
         print_table("lengths, mm", ("name", "default", "tolerance", "what it is", "option"), lengths)
-    print(f"nuisance parameters: {', '.join(_nuisances_of(specimen))}")
+    tell(f"nuisance parameters: {', '.join(_nuisances_of(specimen))}")
 
 
 def _option(name: str) -> str:
@@ -135,7 +134,7 @@ def print_plugins(plugins: Sequence[Plugin], conflicts: Sequence[str], as_json: 
     rows = [(p.provenance.name, p.provenance.origin, _offers_text(p), _status(p)) for p in plugins]
     print_table(f"{len(rows)} plugins", ("plugin", "from", "offers", "status"), rows)
     for sentence in (*(plugin.problem for plugin in plugins if plugin.problem), *conflicts):
-        print(sentence)
+        tell(sentence)
 
 
 def _plugin_to_json(plugin: Plugin) -> dict[str, Any]:

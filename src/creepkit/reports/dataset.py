@@ -12,7 +12,7 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.dataset.dataset import column_units, design_name, summary, summary_columns
 from creepkit.errors import DatasetError
 from creepkit.reports.figures import empty_figure, make_folder, save_figure, set_range
-from creepkit.reports.terminal import print_json
+from creepkit.reports.terminal import print_json, tell, tell_written
 from creepkit.sampling.specimen_conditions import specimen_conditions
 
 if TYPE_CHECKING:
@@ -206,8 +206,8 @@ def print_dataset(data: Dataset, to: Path, part: str | None, as_json: bool) -> N
     if as_json:
         print_json({**summary(data), "file": str(to), "part": part})
         return
-    print(f"{data}\n")
+    tell(f"{data}\n")
     if part is None:
-        print(f"wrote {to}: {to.stat().st_size / 1e6:.1f} MB; remove {to}.parts when no more samples are wanted")
+        tell_written(to, f": {to.stat().st_size / 1e6:.1f} MB; remove {to}.parts when no more samples are wanted")
     else:
-        print(f"part {part} is done in {to}.parts; the same command without --part merges all parts into {to}")
+        tell(f"part {part} is done in {to}.parts; the same command without --part merges all parts into {to}")

@@ -12,7 +12,7 @@ from creepkit.experiments.planned_design import ALIKE, kind_of_reason, precision
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.records import load_unit
 from creepkit.reports.figures import empty_figure, save_figure, wrapped
-from creepkit.reports.terminal import print_table
+from creepkit.reports.terminal import print_table, tell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -136,7 +136,7 @@ def print_design(design: Design) -> None:
         rows = [_cells(design, test) for test in design.tests[:ROWS]]
         print_table(f"{len(design.tests)} planned tests, goal: {design.goal}", _columns(design), rows)
     order = [order_text(design), cheapest_text(design)] if design.tests else []
-    print("\n".join([design.sentence, *order, *direction_lines(design), *_ending(design)]))
+    tell("\n".join([design.sentence, *order, *direction_lines(design), *_ending(design)]))
 
 
 def design_to_json(design: Design) -> dict[str, object]:

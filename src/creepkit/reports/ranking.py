@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from creepkit.reports.terminal import print_table
+from creepkit.reports.terminal import print_table, tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -69,9 +69,9 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
     print_table(f"{test_count} tests", columns, rows)
     equivalent = [] if ranking.decisive else [f"- {pair}" for pair in equivalents_among_remaining(ranking)]
     failed = [f"- left out: {name}: {reason}" for name, reason in ranking.failed.items()]
-    print("\n".join([ranking.verdict, *equivalent, *failed]) + f"\n\n{ranking.best}\n")
+    tell("\n".join([ranking.verdict, *equivalent, *failed]) + f"\n\n{ranking.best}\n")
     for path in written:
-        print(f"wrote {path}")
+        tell_written(path)
 
 
 def _is_logarithmic(output: str) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import DatasetError
 from creepkit.reports.figures import empty_figure, place_legend_below, save_figure
-from creepkit.reports.terminal import print_json
+from creepkit.reports.terminal import print_json, tell
 from creepkit.sampling.conditions import ROOM_TEMPERATURE
 from creepkit.sampling.criteria import RateLimit
 from creepkit.sampling.domains import Acceptance, SamplingDesign, SamplingDomain
@@ -181,4 +181,4 @@ def print_acceptance(design: SamplingDesign, seed: int, to: Path | None, as_json
         fractions = {"simulated": float(result.kept.mean()), "useful": float(result.useful.mean())}
         print_json({"draws": len(result.draws), "met": criterion_fractions, **fractions, "picture": str(plot_file)})
     else:
-        print(f"{result}\nwrote {plot_file}; nothing was simulated")
+        tell(f"{result}\nwrote {plot_file}; nothing was simulated")

@@ -13,7 +13,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, growing_output, output_named, specimen_of
 from creepkit.reports.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
-from creepkit.reports.terminal import print_json, print_table
+from creepkit.reports.terminal import print_json, print_table, tell
 from creepkit.screening.files import COMPARISON_STRESS, confirmation_text, result_columns
 from creepkit.screening.results import AlloyResult, PredictedOutputs, mean_chi_square, mean_relative_squared_error
 
@@ -298,7 +298,7 @@ def print_screening(plate: ScreeningResult, written: list[Path], as_json: bool) 
         return
     print_table(f"{len(plate.results)} alloys", TABLE_COLUMNS, table_rows(plate))
     for line in (*summary_lines(plate), *(f"wrote {path}" for path in written)):
-        print(line)
+        tell(line)
 
 
 def _plate_to_json(plate: ScreeningResult, written: list[Path]) -> dict[str, Any]:

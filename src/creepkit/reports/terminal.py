@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections.abc import Iterable, Sequence
@@ -15,8 +16,26 @@ from creepkit.jobs.shard_progress import series_of_task
 
 
 def printable(text: str) -> str:
-    """A text for a terminal, of any number of lines, each as messages show it."""
-    return "\n".join(map(errors.printable, text.split("\n")))
+    """A text for a terminal, of any number of lines with tabs, each as messages show it."""
+    return "".join(one if one in ("\n", "\t") else errors.printable(one) for one in re.split("([\n\t])", text))
+
+
+def tell(text: object = "", *, err: bool = False) -> None:
+    """Print a text for people, whatever names of files, tests and laws stand in it, and a line end.
+
+    err : on stderr, as notes beside what a program reads from stdout.
+    """
+    typer.echo(printable(str(text)), err=err)
+
+
+def tell_written(path: object, what: str = "", *, err: bool = False) -> None:
+    """Print that a file or folder was written; what : the rest of the line."""
+    tell(f"wrote {errors.printable(str(path))}{what}", err=err)
+
+
+def put(text: str) -> None:
+    """Print a text that a program reads, or a file would hold: unchanged, and without a line end of its own."""
+    typer.echo(text, nl=False)
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
@@ -25,9 +44,9 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=title, title_justify="left")
+    table = Table(title=Text(printable(title), "table.title") if title else None, title_justify="left")
     for k, column in enumerate(columns):
-        table.add_column(column, overflow="fold", no_wrap=k == 0)
+        table.add_column(Text(printable(column)), overflow="fold", no_wrap=k == 0)
     for row in rows:
         table.add_row(*(Text(printable(cell)) for cell in row))
     console = Console()
@@ -39,7 +58,7 @@ def print_json(value: Any) -> None:
     from creepkit.files.json_documents import json_text
     from creepkit.files.record_codec import record_to_json
 
-    typer.echo(json_text(record_to_json(value)), nl=False)
+    put(json_text(record_to_json(value)))
 
 
 class ProgressBar:
@@ -60,11 +79,11 @@ class ProgressBar:
             from rich.progress import Progress as Bar
 
             columns = (
-                TextColumn("{task.description}"),
+                TextColumn("{task.description}", markup=False),
                 BarColumn(),
                 MofNCompleteColumn(),
                 TimeRemainingColumn(),
-                TextColumn("{task.fields[note]}"),
+                TextColumn("{task.fields[note]}", markup=False),
             )
             self._bar = Bar(*columns, console=Console(stderr=True))
             self._bar.start()
@@ -79,14 +98,15 @@ class ProgressBar:
     def tick(self, task: str, done: int, total: int, note: str = "") -> None:
         """Report that `done` of `total` parts of a task are finished; note : what else there is to say."""
         task, member = series_of_task(task)
-        note = ", ".join(part for part in (member, note) if part)
+        task = errors.printable(task)
+        note = errors.printable(", ".join(part for part in (member, note) if part))
         if self._bar is not None:
             if task not in self._tasks:
                 self._tasks[task] = self._bar.add_task(task, total=total, note=note)
             self._bar.update(self._tasks[task], completed=done, total=total, note=note)
         elif done == total or self._is_due():
             self._last_line = time.monotonic()
-            print(f"{task}: {done} of {total}{note and f' ({note})'}", file=sys.stderr, flush=True)
+            tell(f"{task}: {done} of {total}{note and f' ({note})'}", err=True)
 
     def _is_due(self) -> bool:
         now = time.monotonic()

@@ -14,6 +14,7 @@ from typing import Any, Literal
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.files.owners import check_owner_by_name
 from creepkit.files.record_codec import RecordError, record_to_json
+from creepkit.files.writing import check_folder_target
 from creepkit.inverse.kept_fits import COMPUTING, keep_fits
 from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text, series_of_task
 from creepkit.records import History
@@ -92,6 +93,7 @@ def running_alone(folder: Path) -> Iterator[None]:
     for one in (folder, folder / FITS_FOLDER, folder / IDENTIFIED_FOLDER):
         if one.is_symlink():
             raise StudyError(f"{one}: is a link, and results are kept in a folder of the study's own; remove the link")
+    check_folder_target(folder, StudyError)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for one in (folder, folder / FITS_FOLDER, folder / IDENTIFIED_FOLDER):

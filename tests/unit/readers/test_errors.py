@@ -85,7 +85,7 @@ CASES = {
     ),
     "below absolute zero": (
         "# temperature_C: -300\n# stress_MPa: 60\n" + BODY,
-        "x.csv:1: 'temperature_C' is -300; a temperature must lie above 0 and below 10000 K",
+        "x.csv:1: 'temperature_C' is -300; a temperature must lie above 0 and below 4500 K",
     ),
     "modulus of zero": (HEAD + "# modulus_GPa: 0\n" + BODY, "x.csv:3: 'modulus_GPa' is 0; a modulus must lie above 0"),
     "key twice": (

@@ -69,7 +69,7 @@ def program(*pressures: float) -> RecordedLoading:
             {"times": [0.0]},
             f"{WHERE}: the last time is 0 s, where the load only begins; ask for a time after it",
         ),
-        (HistoryError, {"temperature": -300.0}, f"{WHERE}: a temperature of -300 K is not above 0 and below 10000 K"),
+        (HistoryError, {"temperature": -300.0}, f"{WHERE}: a temperature of -300 K is not above 0 and below 4500 K"),
         (LawError, {"values": {"A": 5e-13}}, "law 'norton' needs a value for n"),
         (
             LawError,
