@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 from creepkit.errors import FitError
 from creepkit.files.file_names import LAW_SIGNS, numbered_stems
-from creepkit.files.writing import check_folder_target, digest_of, is_foreign
+from creepkit.files.reading import sha256_of
+from creepkit.files.writing import check_folder_target
+from creepkit.files.written_lists import is_foreign
 
 if TYPE_CHECKING:
     from creepkit.inverse.selection import Ranking
@@ -64,12 +66,13 @@ def law_stems(laws: Sequence[CreepLaw]) -> list[str]:
 
 def former_files(folder: Path) -> list[Path]:
     """Files of the laws of the ranking that is there, as far as they are that run's; changed ones among them."""
+    from creepkit.inverse.identification_document import IDENTIFICATION
     from creepkit.inverse.ranking_document import files_of_ranking
 
     found = []
     for number, (name, sha256) in enumerate(files_of_ranking(folder / f"{RANKING_STEM}.json").items()):
         path = folder / name
-        if path.is_file() and not is_foreign(path) and sha256 not in (None, digest_of(path)):
+        if path.is_file() and not is_foreign(path) and sha256 not in (None, sha256_of(path, IDENTIFICATION.kind)):
             continue  # something else of creepkit has written it since
         suffixes = LAW_SUFFIXES if number else (*LAW_SUFFIXES, *BEST_LAW_SUFFIXES)
         found += [path.with_suffix(suffix) for suffix in suffixes]

@@ -11,8 +11,7 @@ from typing import Any
 
 from creepkit.errors import FitError, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, read_json, write_json
-from creepkit.files.reading import FileKind
-from creepkit.files.writing import digest_of
+from creepkit.files.reading import FileKind, sha256_of
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json, read_identification
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
@@ -31,7 +30,7 @@ MOST_LAWS = 100
 
 def write_ranking_document(weights: Mapping[str, float], path: Path) -> Path:
     """Write the ranking; weights : {file of an identification, which is there beside it: weight}."""
-    digests = {name: digest_of(path.parent / name) for name in weights}
+    digests = {name: sha256_of(path.parent / name, IDENTIFICATION.kind) for name in weights}
     return write_json(ranking_to_document(weights, digests), path, RANKING.kind)
 
 
@@ -106,7 +105,7 @@ def _fit_of_law(path: Path, name: str, sha256: Any) -> Identification:
         fit = read_identification(path.parent / name)
     except FitError as error:
         raise FitError(f"{path} names {name}: {error}") from None
-    if sha256 is not None and digest_of(path.parent / name) != sha256:
+    if sha256 is not None and sha256_of(path.parent / name, IDENTIFICATION.kind) != sha256:
         raise FitError(
             f"{path}: {name} is not the file that this ranking was made with: it has been changed, or written by "
             f"another run; {RANKING.remedy}"
