@@ -40,21 +40,16 @@ if TYPE_CHECKING:
 def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
     """Write JSON and plot of every law, the ranking's plot, and the best law as LaTeX and Python; returns the paths."""
     import creepkit as ck
-    from creepkit.files.file_names import LAW_SIGNS, numbered_stems
-    from creepkit.inverse.ranking_document import write_ranking_document
+    from creepkit.inverse.ranking_document import stems_of_laws
 
     folder.mkdir(parents=True, exist_ok=True)
-    written, weights = [], {}
-    ranking_name, *names = numbered_stems(
-        ["ranking", *(entry.fit.law.name for entry in ranking.laws)], "law", LAW_SIGNS
-    )
+    ranking_file, names = ranking.save(folder / "ranking.json"), stems_of_laws(ranking)
+    written = []
     for name, entry in zip(names, ranking.laws, strict=True):
-        written.append(entry.fit.save(folder / f"{name}.json"))
-        weights[f"{name}.json"] = entry.weight
         entry.fit.plot(folder / f"{name}.png")
-        written.append(folder / f"{name}.png")
-    ranking.plot(folder / f"{ranking_name}.png")
-    written += [folder / f"{ranking_name}.png", write_ranking_document(weights, folder / f"{ranking_name}.json")]
+        written += [folder / f"{name}.json", folder / f"{name}.png"]
+    ranking.plot(ranking_file.with_suffix(".png"))
+    written += [ranking_file.with_suffix(".png"), ranking_file]
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
         path = folder / f"{names[0]}{suffix}"
         ck.export(ranking, language, to=path)
