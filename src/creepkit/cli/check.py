@@ -47,8 +47,18 @@ def _reports_of(target: str) -> list[ConformanceReport]:
     except CreepkitError as error:
         if is_plugin_file_name(target):
             return check_plugin(registry.default_registry().load_file(target))
+        if Path(target).is_dir():
+            raise PluginError(f"{target} is a folder; {_file_in(Path(target))}") from None
         if Path(target).is_file():
             raise PluginError(
                 f"{error}; the file {target} is not executed, for only names that end in .py are those of files"
             ) from None
         raise
+
+
+def _file_in(folder: Path) -> str:
+    """What to write in the place of a folder, in words."""
+    found = [path for path in sorted(folder.glob("*.py")) if b"hookimpl" in path.read_bytes()]
+    if not found:
+        return "name the file of the plugin in it, which ends in .py"
+    return f"name the file in it: creepkit check {' '.join(str(path) for path in found[:3])}"

@@ -190,11 +190,15 @@ class Registry:
         if name in clashes:
             raise PluginError(clashes[name])
         package = package_with_law(name) if kind is plugin_sources.LAW else ""
-        broken = sum(bool(plugin.problem) for plugin in self.plugins())
-        hint = f"; {broken} plugin(s) could not be loaded, see 'creepkit plugins'" if broken else ""
+        hint = self.broken_hint()
         if package:
             raise kind.error(f"there is no law '{name}'; package {package} has it: pip install {package}{hint}")
         raise kind.error(f"there is no {kind.label} '{name}': {nearest(name, known)}{hint}")
+
+    def broken_hint(self) -> str:
+        """How many plugins could not be loaded, as the end of a sentence; "" where all were."""
+        broken = sum(bool(plugin.problem) for plugin in self.plugins())
+        return f"; {broken} plugin(s) could not be loaded, see 'creepkit plugins'" if broken else ""
 
     # ---- where it comes from ---------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -25,6 +26,7 @@ from creepkit.records import (
     remember_specimen,
 )
 from creepkit.registry import Plugin, default_registry
+from creepkit.registry.plugin_registry import package_with_law
 from creepkit.testing import (
     camera_checks,
     exporter_checks,
@@ -265,8 +267,8 @@ def check_plugin(plugin: Plugin) -> list[ConformanceReport]:
 
 
 def check_named(name: str) -> list[ConformanceReport]:
-    """Run the kits of whatever is registered under a name; LawError with the nearest name where nothing is."""
-    registry = default_registry()
+    """Run the kits of whatever is registered under a name; PluginError with the nearest name where nothing is."""
+    registry, forms = default_registry(), default_registry().temperature_forms()
     offered: dict[str, Mapping[str, Any]] = {
         "law": registry.laws(),
         "specimen": registry.specimens(),
@@ -276,10 +278,18 @@ def check_named(name: str) -> list[ConformanceReport]:
         "instrument format": registry.instruments(),
     }
     reports = [_KITS[kind](known[name].value) for kind, known in offered.items() if name in known]
-    forms = registry.temperature_forms()
     if name in forms:
         reports.append(check_temperature_form(name, forms[name].value))
-    return reports or [check_law(registry.law(name))]
+    if not reports:
+        if package_with_law(name):
+            registry.law(name)  # says which package has it
+        clashes = [sentence for sentence in registry.conflicts() if f"'{name}' is offered twice" in sentence]
+        known = sorted({one for names in (*offered.values(), forms) for one in names})
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.55)
+        kinds = f"{', '.join(offered)} or temperature form"
+        advice = f"did you mean '{near[0]}'?" if near else "'creepkit laws', 'creepkit specimens' and so on list them"
+        raise PluginError(clashes[0] if clashes else f"no {kinds} is called '{name}'; {advice}{registry.broken_hint()}")
+    return reports
 
 
 def _report(

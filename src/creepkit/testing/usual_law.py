@@ -35,6 +35,7 @@ def law_of_check(predictor: Any, law: CreepLaw | str | None, history: History) -
             lambda: predict_with(predictor, warm, warm.to_internal(warm.values(values_warm)), [history])
         )
     except CreepkitError:  # a closed form of Norton's law alone
+        predict_with(predictor, norton, norton.to_internal(norton.values(values)), [history])  # says why it cannot
         return norton, values
     return warm, values_warm
 
