@@ -19,9 +19,15 @@ def command(
             help="Plugin files, or names of laws, specimens, readers, camera formats or exporters.",
         ),
     ],
+    example: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Example file or folder for a reader; may be given several times."),
+    ] = None,
 ) -> None:
     """Check that laws, specimens, readers, exporters are fit."""
     reports = [report for target in targets for report in _reports_of(target)]
+    if example:
+        reports = _with_examples(reports, example)
     for report in reports:
         typer.echo(str(report))
     failed = [report for report in reports if not report.passed]
@@ -54,6 +60,20 @@ def _reports_of(target: str) -> list[ConformanceReport]:
                 f"{error}; the file {target} is not executed, for only names that end in .py are those of files"
             ) from None
         raise
+
+
+def _with_examples(reports: list[ConformanceReport], examples: list[Path]) -> list[ConformanceReport]:
+    """The reports, of each reader one for each of its example files."""
+    from creepkit.errors import PluginError
+    from creepkit.testing import check_reader
+
+    if not any(report.kind == "reader" for report in reports):
+        raise PluginError("--example is for readers, and none is checked; leave it out")
+    return [
+        one
+        for report in reports
+        for one in ([check_reader(report.subject, path) for path in examples] if report.kind == "reader" else [report])
+    ]
 
 
 def _file_in(folder: Path) -> str:

@@ -98,7 +98,9 @@ def check_example(case: ReaderCase) -> Iterator[ConformanceCheck]:
     """An example of the author's is accepted, and its histories are equal after writing as CSV and reading."""
     path, reader = case.path, case.reader
     if path is None:
-        yield ConformanceCheck("example file", True, "none given; check_reader(reader, path) checks what it reads")
+        yield ConformanceCheck(
+            "example file", True, "not checked: no example file; --example FILE, or check_reader(reader, path)"
+        )
         return
     if not accepts_path(reader, path):
         yield ConformanceCheck("example file", False, f"{path} is not accepted by accepts(); recognise it there")
