@@ -14,6 +14,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import ExportError, HistoryError, SolveError
 from creepkit.records import typical_history
+from creepkit.registry import default_registry
 from creepkit.testing import ConformanceReport
 from helpers.command_line import creepkit, one_line
 from helpers.steady_rate_predictor import Steady
@@ -362,4 +363,12 @@ def test_a_reader_of_a_loaded_file_is_itself_and_its_examples_are_read(tmp_path:
     told = creepkit("check", str(file), "--example", str(tmp_path / "test.krp"))
     assert told.exit_code == 1
     assert "returned a History; it must return a list of histories" in told.stdout
+    file.write_text(file.read_text().replace("ck.History(", "[ck.History(").replace("1073.0)", "1073.0)]"))
+    default_registry.cache_clear()
+    assert creepkit("check", str(file), "--example", str(tmp_path / "test.krp")).exit_code == 0
+    file.write_text(file.read_text().replace("{'strain'", "{'strian'"))
+    default_registry.cache_clear()
+    told = creepkit("check", str(file), "--example", str(tmp_path / "test.krp"))
+    assert "a uniaxial specimen shows no 'strian'; did you mean 'strain'?" in told.stdout
+    default_registry.cache_clear()
     assert "--example is for readers" in one_line(creepkit("check", "norton", "--example", str(file)))
