@@ -18,7 +18,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
 from creepkit.annotation_checks import MOST_LEVELS, Check, check_of, is_finite_number, is_nested_deep, names_of_module
-from creepkit.errors import ArgumentError, quoted_value
+from creepkit.errors import ArgumentError, nearest, quoted_value
 
 Anything = TypeVar("Anything", bound=Callable[..., Any])
 Annotations = Iterator[tuple[str, Any, Mapping[str, Any]]]
@@ -122,6 +122,8 @@ class _Arguments:
             check = checks.get(argument)
             if check is not None and not check.accepts(value):
                 args = (*args[:k], self._converted(value, check, argument), *args[k + 1 :])
+        if not self.keywords and not self.named.issuperset(kwargs):
+            self._refuse_unknown(next(argument for argument in kwargs if argument not in self.named))
         for argument, value in kwargs.items():
             check = checks.get(argument)
             if check is None and argument not in self.named:
@@ -129,6 +131,13 @@ class _Arguments:
             if check is not None and not check.accepts(value):
                 kwargs[argument] = self._converted(value, check, argument)
         return args
+
+    def _refuse_unknown(self, argument: str) -> None:
+        """ArgumentError, with the nearest name, for an argument that there is not."""
+        known = [name for name in self.named if name not in ("self", "cls")]
+        error = ArgumentError(f"{self.name}() takes no argument '{argument}'; {nearest(argument, known)}")
+        error.argument = argument
+        raise error
 
     def check_depth(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
         """ArgumentError for an argument of lists in lists that no function of Python can print."""

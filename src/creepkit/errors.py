@@ -118,6 +118,10 @@ class StudyError(CreepkitError):
     """A study file, or what it asks for, is not well formed; or its results cannot be kept."""
 
 
+POWER_REMEDY = "write ** for powers"
+"""For ^, which sympy takes for the exclusive or."""
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return `` Did you mean 'x'?`` when a known word lies near, else the list of what is known."""
     known = sorted(known)

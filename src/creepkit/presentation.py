@@ -61,6 +61,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
     "Ranking": {
         "text": "creepkit.reports.ranking:ranking_text",
         "plot": "creepkit.reports.ranking_plot:ranking_figure",
+        "save": "creepkit.inverse.ranking_document:write_ranking",
         "forecast": "creepkit.forecasts.forecast:forecast",
         "further_tests": "creepkit.experiments.design:further_tests",
     },

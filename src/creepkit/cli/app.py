@@ -220,8 +220,10 @@ def _load_plugin_files(files: list[Path] | None) -> None:
     if files:
         from creepkit import registry
 
-        for file in files:
-            registry.default_registry().load_file(file)
+        known = registry.default_registry()
+        for plugin in [known.load_file(file) for file in files]:
+            for sentence in known.replaced(plugin):
+                typer.echo(f"creepkit: {sentence}", err=True)
 
 
 def _plugin_commands(own_names: set[str], *, listed_only: bool = False) -> tuple[dict[str, Any], list[str]]:

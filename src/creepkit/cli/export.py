@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
-from creepkit.cli.options import is_file_name
+from creepkit.cli.law_sources import law_source, merged_values
 from creepkit.reports.terminal import put, tell, tell_written
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from creepkit.inverse.identification import Identification
-    from creepkit.language import CreepLaw
-    from creepkit.records import LawWithValues
 
 
 def command(
@@ -55,10 +48,10 @@ def command(
             tell(f"{target.name:16} {target.suffix:8} {target.title}")
         return
     default_registry().exporter(to)  # a target that is misspelt is said first
-    law_source = _resolve_source(source)
+    chosen = law_source(source)
     elastic = None if modulus_gpa is None else ck.Elastic(E=1e3 * modulus_gpa, nu=poisson)
     text = ck.export(
-        ck.law_with_values(law_source, _merged_values(law_source, value), elastic=elastic, name=name),
+        ck.law_with_values(chosen, merged_values(chosen, value), elastic=elastic, name=name),
         to,
         units={"stress": stress_unit, "time": time_unit},
         temperature=None if temperature_c is None else temperature_c + ZERO_CELSIUS,
@@ -68,29 +61,3 @@ def command(
         put(text.rstrip("\n") + "\n")
     else:
         tell_written(output)
-
-
-def _resolve_source(text: str) -> CreepLaw | Identification | LawWithValues:
-    """A law by name, or what a file holds."""
-    import creepkit as ck
-
-    if is_file_name(text):
-        from creepkit.exporters.law_files import read_law_file
-
-        return read_law_file(text)
-    return ck.law(text)
-
-
-def _merged_values(
-    law_source: CreepLaw | Identification | LawWithValues, assignments: list[str] | None
-) -> dict[str, float] | None:
-    """The values of the source with those given in their place; None for a source's own."""
-    from creepkit.cli.options import parse_numbers
-
-    given_values = parse_numbers(assignments or [], "--set", "n=5.2")
-    source_values: Mapping[str, float] | None = (
-        getattr(law_source, "values", None) if hasattr(law_source, "law") else None
-    )
-    if source_values is None:
-        return given_values
-    return {**source_values, **given_values} if given_values else None

@@ -85,19 +85,15 @@ def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
     Files of the ranking that was there before are removed where nobody has changed them.
     """
     import creepkit as ck
-    from creepkit.inverse.ranking_document import write_ranking_document
 
     folder.mkdir(parents=True, exist_ok=True)
     former = former_files(folder)
-    written, weights = [], {}
     ranking_name, *names = law_stems([entry.fit.law for entry in ranking.laws])
-    for name, entry in zip(names, ranking.laws, strict=True):
-        written.append(entry.fit.save(folder / f"{name}.json"))
-        weights[f"{name}.json"] = entry.weight
-        entry.fit.plot(folder / f"{name}.png")
-        written.append(folder / f"{name}.png")
+    written = [ranking.save(folder / f"{ranking_name}.json"), folder / f"{ranking_name}.png"]
     ranking.plot(folder / f"{ranking_name}.png")
-    written.append(folder / f"{ranking_name}.png")
+    for name, entry in zip(names, ranking.laws, strict=True):
+        entry.fit.plot(folder / f"{name}.png")
+        written += [folder / f"{name}.json", folder / f"{name}.png"]
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
         path = folder / f"{names[0]}{suffix}"
         ck.export(ranking, language, to=path)
@@ -105,5 +101,4 @@ def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
     for path in former:
         if path not in written and not is_foreign(path):
             path.unlink(missing_ok=True)
-    written.append(write_ranking_document(weights, folder / f"{ranking_name}.json"))
     return written

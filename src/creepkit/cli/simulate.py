@@ -11,7 +11,7 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
-from creepkit.cli.options import parse_numbers
+from creepkit.cli.law_sources import law_source, merged_values
 from creepkit.cli.planned_test import (
     ControlOption,
     GeometryOption,
@@ -38,9 +38,13 @@ DEFAULT_FRAMES = 200
 
 def command(
     ctx: typer.Context,
-    law: Annotated[str, typer.Argument(metavar="LAW", help="Name of a law.")],
-    value: Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="A parameter's value.")],
+    law: Annotated[
+        str, typer.Argument(metavar="LAW|RESULT.json", help="A law's name, an exported JSON, or an identification.")
+    ],
     end_h: Annotated[float, typer.Option(help="End of the test, h."), limits.HOURS],
+    value: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter's value, given or changed.")
+    ] = None,
     specimen: Annotated[
         str | None,
         typer.Option(help="bulge, point, relaxation, uniaxial or a plugin's; by default one that takes the load."),
@@ -75,7 +79,9 @@ def command(
     from creepkit.errors import SolveError
     from creepkit.language import Elastic
 
-    chosen = ck.law(law)
+    source = law_source(law)
+    valued = ck.law_with_values(source, merged_values(source, value))
+    chosen = valued.law
     test = described_test(
         TestOptions(end_h, specimen, stress, strain, pressure, modulus_gpa, geometry, control, ramp, ctx)
     )
@@ -85,7 +91,7 @@ def command(
     run = ck.simulate(
         chosen,
         test.specimen.replace(**test.lengths) if test.lengths else test.specimen,  # type: ignore[attr-defined]
-        parse_numbers(value, "--set", "n=5.2"),
+        valued.values,
         loading=test.loading,
         times=times,
         temperature=_temperature_of(chosen, temperature_c),

@@ -7,14 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import FitError, quoted
+from creepkit.files.file_names import LAW_SIGNS, numbered_stems
 from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, read_json, write_json
 from creepkit.files.reading import FileKind, sha256_of
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json, read_identification
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+
+if TYPE_CHECKING:
+    from creepkit.inverse.selection import Ranking
 
 RANKING = DocumentFormat(
     "creepkit-ranking",
@@ -26,6 +30,20 @@ RANKING = DocumentFormat(
 
 MOST_LAWS = 100
 """In a ranking's file."""
+
+
+def stems_of_laws(ranking: Ranking, stem: str = "ranking") -> list[str]:
+    """Names of the laws' files beside the ranking's, without suffix, best law first; stem : of the ranking's file."""
+    return numbered_stems([stem, *(entry.fit.law.name for entry in ranking.laws)], "law", LAW_SIGNS)[1:]
+
+
+def write_ranking(ranking: Ranking, path: str | Path) -> Path:
+    """Write the ranking, and the identification of each law into a file beside it; returns the ranking's path."""
+    path = Path(path)
+    weights = {}
+    for stem, entry in zip(stems_of_laws(ranking, path.stem), ranking.laws, strict=True):
+        weights[entry.fit.save(path.parent / f"{stem}.json").name] = entry.weight
+    return write_ranking_document(weights, path)
 
 
 def write_ranking_document(weights: Mapping[str, float], path: Path) -> Path:

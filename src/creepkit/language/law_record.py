@@ -21,10 +21,10 @@ import sympy
 from sympy.logic.boolalg import Boolean, BooleanAtom
 
 from creepkit.arrays import ArrayLike, Bools, Floats
-from creepkit.errors import LawError, nearest, quoted
+from creepkit.errors import POWER_REMEDY, LawError, nearest, quoted
 from creepkit.language.expression_cost import check_cost
 from creepkit.language.expression_trees import evaluate_multiprecision
-from creepkit.language.symbols import POINT_VARIABLES, Param, State
+from creepkit.language.symbols import POINT_VARIABLES, Param, State, SymbolTuple
 
 
 def validate_law(law: LawRecord) -> None:
@@ -70,11 +70,15 @@ def _check_names_and_titles(law: LawRecord) -> None:
 
 def _check_tables(law: LawRecord, origin: str) -> None:
     for symbol, param in law.params.items():
+        if isinstance(symbol, SymbolTuple):
+            symbol.refuse()
         if not isinstance(symbol, sympy.Symbol):
             raise LawError(f"{origin}: the parameter table must be keyed by symbols, found {symbol!r}")
         if not isinstance(param, Param):
             raise LawError(f"{origin}, parameter '{symbol}': found {type(param).__name__}, write Param(...)")
     for symbol, state in law.states.items():
+        if isinstance(symbol, SymbolTuple):
+            symbol.refuse()
         if not isinstance(symbol, sympy.Symbol) or not isinstance(state, State):
             raise LawError(f"{origin}: states must be written as {{symbol: State(...)}}, found {symbol!r}: {state!r}")
 
@@ -98,6 +102,8 @@ def _check_expressions(law: LawRecord, origin: str) -> None:
     rates: dict[str, Any] = {f"term '{label}'": expression for label, expression in law.terms.items()}
     rates |= {f"rate of state '{symbol}'": state.rate for symbol, state in law.states.items()}
     for position, expression in rates.items():
+        if isinstance(expression, sympy.Basic) and expression.has(sympy.Xor):
+            raise LawError(f"{origin}, {position}: ^ is no power in Python; {POWER_REMEDY}")
         if not isinstance(expression, sympy.Expr) or expression.has(sympy.zoo, sympy.nan, sympy.oo, sympy.I):
             raise LawError(f"{origin}, {position}: the expression {expression} is not finite and real")
         if any(abs(number) > _LARGEST_NUMBER for number in expression.atoms(sympy.Number)):
@@ -119,7 +125,10 @@ def _check_symbols(law: LawRecord, origin: str) -> None:
     unknown = sorted(str(s) for s in used - declared)
     if unknown:
         allowed = ", ".join(sorted(str(s) for s in declared))
-        raise LawError(f"{origin}: unknown symbol {', '.join(unknown)} in a rate; declared are {allowed}")
+        raise LawError(
+            f"{origin}: unknown symbol {', '.join(unknown)} in a rate; declared are {allowed}; "
+            f"add {'it' if len(unknown) == 1 else 'them'} to params=, or to states="
+        )
     unused = sorted(str(s) for s in set(law.params) - used)
     if unused:
         raise LawError(f"{origin}: parameter {', '.join(unused)} is declared but not used in any term")

@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import sympy
+from sympy.core.sympify import converter
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import LawError
@@ -55,19 +56,52 @@ LATEX_SYMBOLS = {
 }
 
 
+class SymbolTuple(tuple[sympy.Symbol, ...]):
+    """The symbols of parameters() or states(); where they are taken for one symbol, the error says how to unpack them.
+
+    maker : the function that gave them.
+    """
+
+    maker = "parameters"
+
+    def refuse(self, _: object = None) -> Any:
+        """LawError that says how to unpack them."""
+        names = " ".join(symbol.name for symbol in self)
+        targets = ", ".join(symbol.name for symbol in self) if len(self) > 1 else f"({names},)"
+        raise LawError(f'{self.maker}("{names}") is a tuple of {len(self)}; write {targets} = {self.maker}("{names}")')
+
+    def __add__(self, other: Any) -> Any:
+        return super().__add__(other) if isinstance(other, tuple) else self.refuse()
+
+    __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = refuse
+    __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = refuse
+
+
+converter[SymbolTuple] = SymbolTuple.refuse  # as an argument of a function of sympy, which takes tuples
+
+
+class _StateTuple(SymbolTuple):
+    maker = "states"
+
+
 @checked
 def parameters(names: str) -> tuple[sympy.Symbol, ...]:
     """Return one plain real symbol for each name in `names`, always as a tuple.
 
     >>> A, n = parameters("A n")
+    >>> (B,) = parameters("B")
     """
-    return tuple(sympy.Symbol(name, real=True) for name in names.replace(",", " ").split())
+    return SymbolTuple(_symbols(names))
+
+
+def _symbols(names: str) -> list[sympy.Symbol]:
+    return [sympy.Symbol(name, real=True) for name in names.replace(",", " ").split()]
 
 
 @checked
 def states(names: str) -> tuple[sympy.Symbol, ...]:
-    """Return the symbols of internal variables, named in `names`, as a tuple."""
-    return parameters(names)
+    """Return the symbols of internal variables, named in `names`, as a tuple: (damage,) = states("damage")."""
+    return _StateTuple(_symbols(names))
 
 
 ParameterScale = Literal["linear", "log"]

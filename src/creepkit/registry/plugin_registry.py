@@ -114,6 +114,16 @@ class Registry:
             for conflict in _merged_contributions(kind, self.plugins())[1].values()
         )
 
+    def replaced(self, plugin: Plugin) -> tuple[str, ...]:
+        """One sentence for each name that a plugin file offers in the place of an installed plugin."""
+        return tuple(
+            f"the {kind} '{name}' is that of {plugin.provenance}, in place of {other.provenance}"
+            for kind, offered in plugin.contributions.items()
+            for name in offered
+            for other in self.plugins()
+            if name in other.contributions.get(kind, {}) and _replaces(plugin.provenance, other.provenance)
+        )
+
     def laws(self) -> dict[str, Registered[CreepLaw]]:
         """Return {name: registered law}."""
         return self._all(plugin_sources.LAW)
@@ -190,11 +200,15 @@ class Registry:
         if name in clashes:
             raise PluginError(clashes[name])
         package = package_with_law(name) if kind is plugin_sources.LAW else ""
-        broken = sum(bool(plugin.problem) for plugin in self.plugins())
-        hint = f"; {broken} plugin(s) could not be loaded, see 'creepkit plugins'" if broken else ""
+        hint = self.broken_hint()
         if package:
             raise kind.error(f"there is no law '{name}'; package {package} has it: pip install {package}{hint}")
         raise kind.error(f"there is no {kind.label} '{name}': {nearest(name, known)}{hint}")
+
+    def broken_hint(self) -> str:
+        """How many plugins could not be loaded, as the end of a sentence; "" where all were."""
+        broken = sum(bool(plugin.problem) for plugin in self.plugins())
+        return f"; {broken} plugin(s) could not be loaded, see 'creepkit plugins'" if broken else ""
 
     # ---- where it comes from ---------------------------------------------------------------------------------------
 
@@ -333,6 +347,12 @@ def load_plugin_file(path: str) -> None:
         default_registry().load_file(path)
 
 
+def _replaces(file: Provenance, installed: Provenance) -> bool:
+    """Whether a file that the user names stands in for an installed plugin, which is not creepkit's own."""
+    is_file = Path(file.origin).is_absolute()
+    return is_file and not Path(installed.origin).is_absolute() and not installed.origin.startswith("creepkit ")
+
+
 def _merged_contributions(
     kind: ContributionKind, plugins: Iterable[Plugin]
 ) -> tuple[dict[str, Registered[Any]], dict[str, str]]:
@@ -341,11 +361,13 @@ def _merged_contributions(
     conflicts: dict[str, str] = {}
     for plugin in plugins:
         for name, value in plugin.contributions.get(kind.label, {}).items():
-            if name in results:
+            if name in results and _replaces(plugin.provenance, results[name].provenance):
+                results[name] = Registered(value, plugin.provenance)
+            elif name in results and not _replaces(results[name].provenance, plugin.provenance):
                 providers = f"{results[name].provenance} and by {plugin.provenance}"
                 conflicts[name] = (
                     f"the {kind.label} '{name}' is offered twice, by {providers}; rename one or uninstall it"
                 )
-            else:
+            elif name not in results:
                 results[name] = Registered(value, plugin.provenance)
     return {name: one for name, one in results.items() if name not in conflicts}, conflicts

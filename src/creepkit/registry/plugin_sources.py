@@ -23,7 +23,17 @@ from typing import Any
 import pluggy
 
 from creepkit import hookspecs
-from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, nearest, quoted
+from creepkit.errors import (
+    POWER_REMEDY,
+    CreepkitError,
+    ExportError,
+    HistoryError,
+    LawError,
+    PluginError,
+    SolveError,
+    nearest,
+    quoted,
+)
 
 ENTRY_POINT_GROUP = "creepkit"
 
@@ -144,7 +154,8 @@ def error_text(error: BaseException) -> str:
         return f"{type(error).__name__}: {error.msg} ({error.filename}, line {error.lineno})"
     description = " ".join(str(error).split()) or "no message"
     if not isinstance(error, CreepkitError):
-        description = f"{type(error).__name__}: {description}"
+        of_power = isinstance(error, TypeError) and ("for ^:" in description or "'Xor'" in description)
+        description = f"{type(error).__name__}: {description}{f'; {POWER_REMEDY}' if of_power else ''}"
     location = _source_location(error)
     return f"{description} ({location})" if location else description
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -139,7 +139,8 @@ class PerTest(TestPiece, ABC):
         missing = [name for name in self.outputs if name not in found.outputs]
         if missing:
             raise SolveError(
-                f"{self._place(values, history)}: one() gave no '{missing[0]}'; it gives {', '.join(self.outputs)}"
+                f"{self._place(values, history)}: one() gave {_listed(found.outputs)}; it must give "
+                f"{_listed(self.outputs)}"
             )
         rows = []
         for name in self.outputs:
@@ -170,3 +171,7 @@ class PerTest(TestPiece, ABC):
     def _place(self, values: Mapping[str, float], history: History) -> str:
         text = ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
         return f"specimen '{self.name}', test '{history.name}' with {text}"
+
+
+def _listed(names: Iterable[object]) -> str:
+    return quoted(" and ".join(f"'{name}'" for name in names) or "no output", 200)

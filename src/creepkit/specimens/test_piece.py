@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+import inspect
 from collections.abc import Mapping
 from dataclasses import Field, field, replace
 from typing import Any, Self
@@ -43,6 +45,16 @@ class TestPiece:
     __test__ = False  # not a test case, whatever its name says to pytest
 
     name: str
+
+    def __new__(cls, *args: Any, **kwargs: Any) -> Self:
+        """SolveError, with its signature, where a method that a subclass has to write is missing."""
+        for method in sorted(getattr(cls, "__abstractmethods__", ())):
+            own = [name for name, value in vars(cls).items() if inspect.isfunction(value)]
+            near = difflib.get_close_matches(method, own, n=1, cutoff=0.55)
+            arguments = ", ".join(inspect.signature(getattr(cls, method)).parameters)
+            meant = f"; is {near[0]}() meant?" if near else ""
+            raise SolveError(f"{cls.__name__} has no {method}(); write a method {method}({arguments}){meant}")
+        return super().__new__(cls)
 
     @property
     def dimensions(self) -> tuple[Dimension, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,7 +14,6 @@ from creepkit import limits
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, quoted
 from creepkit.kernels.lowering import lower
-from creepkit.language import arrhenius
 from creepkit.language.law import CreepLaw
 from creepkit.records import (
     CameraFormat,
@@ -23,10 +23,10 @@ from creepkit.records import (
     Predictor,
     Reader,
     Specimen,
-    predict_with,
     remember_specimen,
 )
 from creepkit.registry import Plugin, default_registry
+from creepkit.registry.plugin_registry import package_with_law
 from creepkit.testing import (
     camera_checks,
     exporter_checks,
@@ -36,6 +36,7 @@ from creepkit.testing import (
     law_declarations,
     predictor_checks,
     reader_checks,
+    specimen_behaviour,
     specimen_checks,
 )
 from creepkit.testing.camera_checks import CameraFormatCase
@@ -45,6 +46,7 @@ from creepkit.testing.reader_checks import ReaderCase
 from creepkit.testing.reports import ConformanceCheck, ConformanceReport, findings
 from creepkit.testing.sample_points import LawSamples, draw_samples
 from creepkit.testing.temperature_form_checks import TemperatureFormCase
+from creepkit.testing.usual_law import law_of_check
 
 _FEWEST_SAMPLES = 8
 """Samples at which the constraints must hold for a verdict to mean something."""
@@ -131,7 +133,10 @@ def check_specimen(
     checks = {
         "outputs": predictor_checks.check_outputs,
         "reference stress": specimen_checks.check_reference_stress,
+        "frozen": specimen_behaviour.check_frozen,
         "loads": specimen_checks.check_loads,
+        "steps of a load": specimen_behaviour.check_load_steps,
+        "other laws": specimen_behaviour.check_other_laws,
         **_PREDICTOR_CHECKS,
         "lengths": specimen_checks.check_dimensions,
     }
@@ -262,8 +267,8 @@ def check_plugin(plugin: Plugin) -> list[ConformanceReport]:
 
 
 def check_named(name: str) -> list[ConformanceReport]:
-    """Run the kits of whatever is registered under a name; LawError with the nearest name where nothing is."""
-    registry = default_registry()
+    """Run the kits of whatever is registered under a name; PluginError with the nearest name where nothing is."""
+    registry, forms = default_registry(), default_registry().temperature_forms()
     offered: dict[str, Mapping[str, Any]] = {
         "law": registry.laws(),
         "specimen": registry.specimens(),
@@ -273,10 +278,18 @@ def check_named(name: str) -> list[ConformanceReport]:
         "instrument format": registry.instruments(),
     }
     reports = [_KITS[kind](known[name].value) for kind, known in offered.items() if name in known]
-    forms = registry.temperature_forms()
     if name in forms:
         reports.append(check_temperature_form(name, forms[name].value))
-    return reports or [check_law(registry.law(name))]
+    if not reports:
+        if package_with_law(name):
+            registry.law(name)  # says which package has it
+        clashes = [sentence for sentence in registry.conflicts() if f"'{name}' is offered twice" in sentence]
+        known = sorted({one for names in (*offered.values(), forms) for one in names})
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.55)
+        kinds = f"{', '.join(offered)} or temperature form"
+        advice = f"did you mean '{near[0]}'?" if near else "'creepkit laws', 'creepkit specimens' and so on list them"
+        raise PluginError(clashes[0] if clashes else f"no {kinds} is called '{name}'; {advice}{registry.broken_hint()}")
+    return reports
 
 
 def _report(
@@ -305,40 +318,10 @@ def _case(
         tests = list(histories) if histories is not None else default_histories(predictor)
         if len(tests) == 1:
             tests = [*tests, tests[0].replace(name=f"{tests[0].name}, shorter", times=tests[0].times[:-1], outputs={})]
-        chosen, usual = _law_of_check(predictor, law, tests[0])
+        chosen, usual = law_of_check(predictor, law, tests[0])
         given = values or usual
         cases.append(PredictorCase(predictor, chosen, chosen.to_internal(chosen.values(given)), tests, kind))
         yield ConformanceCheck("a planned test", True, ", ".join(test.name for test in tests))
 
     found = findings("a planned test", made)
     return (cases[0] if cases else None), found[-1]
-
-
-def _law_of_check(predictor: Any, law: CreepLaw | str | None, history: History) -> tuple[CreepLaw, Mapping[str, float]]:
-    """The law that a predictor is checked with, and values of it: Norton's, with temperature if the predictor can."""
-    norton = default_registry().law("norton")
-    if law is not None:
-        chosen = default_registry().law(law) if isinstance(law, str) else law
-        return chosen, chosen.center()
-    values = _norton_values(predictor, history)
-    warm = norton.times(arrhenius(T_ref=1050.0))
-    try:
-        predict_with(predictor, warm, warm.to_internal(warm.values(values)), [history])
-    except CreepkitError:  # a closed form of Norton's law alone
-        return norton, {name: values[name] for name in norton.names}
-    return warm, values
-
-
-TYPICAL_STRAIN = 0.005
-
-
-def _norton_values(predictor: Any, history: History) -> dict[str, float]:
-    """Of Norton's law with n = 4: a creep strain of half a per cent at the end of a test."""
-    record = getattr(predictor, "specimen", predictor)
-    level = 100.0
-    if hasattr(record, "reference_stress"):
-        found = float(np.max(record.reference_stress(history), initial=0.0))
-        level = found if 0.0 < found < np.inf else level
-    rate = TYPICAL_STRAIN / float(history.times[-1]) / level**4
-    change = 1.0 / 1050.0 - 1.0 / history.mean_temperature
-    return {"A": float(rate * np.exp(-3e5 / 8.314462618 * change)), "n": 4.0, "Q": 3e5}

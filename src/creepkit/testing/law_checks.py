@@ -51,7 +51,11 @@ def check_declarations(law: CreepLaw, _: LawSamples) -> Iterator[ConformanceChec
         else f"{len(law.params)} parameters"
     )
     yield ConformanceCheck("declared equals used", not undeclared, description)
-    missing = [what for what, there in (("title", law.title.strip()), ("references", law.references)) if not there]
+    stated = {
+        "title, such as title='Norton power law'": law.title.strip(),
+        "references, such as references=('Norton (1929), The Creep of Steel at High Temperatures',)": law.references,
+    }
+    missing = [what for what, there in stated.items() if not there]
     missing += [f"unit of {name}" for name, param in law.table.items() if not param.unit]
     yield ConformanceCheck(
         "title, references, units", not missing, f"missing {', '.join(missing)}" if missing else "present"
@@ -76,10 +80,11 @@ def check_signs(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck
     for point, theta in zip(samples.points, samples.theta, strict=True):
         for label, value in zip(law.terms, exact.terms(point, theta), strict=True):
             if not (mpmath.im(value) == 0 and value >= 0):
-                description = f"term '{label}' is {mpmath.nstr(value, 4)} 1/s at {point_text(law, point)}"
-                yield ConformanceCheck(
-                    "no term is negative", False, f"{description}; say in constraints where the law holds"
+                remedy = (
+                    "say in constraints where the law holds, constraints=(stress > s0,), or use Max(stress - s0, 0)"
                 )
+                description = f"term '{label}' is {mpmath.nstr(value, 4)} 1/s at {point_text(law, point)}"
+                yield ConformanceCheck("no term is negative", False, f"{description}; {remedy}")
                 return
     yield ConformanceCheck("no term is negative", True, f"{len(samples)} points")
 

@@ -30,7 +30,9 @@ def check_name(law: CreepLaw, _: LawSamples) -> Iterator[ConformanceCheck]:
         detail = f"'{law.name}' is not in small letters and digits joined by hyphens, such as my-law; rename it"
         yield ConformanceCheck("name", False, detail)
         return
-    for plugin in default_registry().plugins():
+    registered = default_registry().laws().get(law.name)  # a file stands in for an installed plugin
+    plugins = () if registered is not None and registered.value == law else default_registry().plugins()
+    for plugin in plugins:
         other = plugin.contributions.get("law", {}).get(law.name)
         if other is not None and other != law:
             yield ConformanceCheck(

@@ -81,6 +81,7 @@ class PredictorCase:
         nuisances: Mapping[str, Floats] | None = None,
         sensitivities: bool = False,
         using: Any = None,
+        law: CreepLaw | None = None,
     ) -> Prediction:
         """A prediction that was checked for shape.
 
@@ -88,7 +89,7 @@ class PredictorCase:
         """
         return predict_with(
             self.predictor if using is None else using,
-            self.law,
+            self.law if law is None else law,
             self.theta if theta is None else theta,
             self.histories if histories is None else histories,
             nuisances=nuisances,

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, nearest
 from creepkit.readers.history_csv import HISTORY_CSV, write_history
-from creepkit.records import History, Reader, accepts_path, histories_in, known_specimens
+from creepkit.records import History, Reader, accepts_path, histories_in, known_specimens, outputs_of
 from creepkit.testing.reports import ConformanceCheck
 
 FOREIGN_FILES: dict[str, bytes] = {
@@ -98,7 +98,9 @@ def check_example(case: ReaderCase) -> Iterator[ConformanceCheck]:
     """An example of the author's is accepted, and its histories are equal after writing as CSV and reading."""
     path, reader = case.path, case.reader
     if path is None:
-        yield ConformanceCheck("example file", True, "none given; check_reader(reader, path) checks what it reads")
+        yield ConformanceCheck(
+            "example file", True, "not checked: no example file; --example FILE, or check_reader(reader, path)"
+        )
         return
     if not accepts_path(reader, path):
         yield ConformanceCheck("example file", False, f"{path} is not accepted by accepts(); recognise it there")
@@ -121,7 +123,19 @@ def check_example(case: ReaderCase) -> Iterator[ConformanceCheck]:
     foreign = sorted({h.specimen for h in found} - set(known))
     detail = f"'{foreign[0]}' is not registered; known are {', '.join(sorted(known))}" if foreign else "registered"
     yield ConformanceCheck("specimens", not foreign, detail)
+    yield _known_outputs([history for history in found if history.specimen in known])
     yield _round_trip(found)
+
+
+def _known_outputs(histories: list[History]) -> ConformanceCheck:
+    """Outputs are those of the specimen that a history names."""
+    for history in histories:
+        names = [str(name) for name in outputs_of(known_specimens()[history.specimen])]
+        unknown = [name for name in history.outputs if name not in names]
+        if unknown:
+            detail = f"test '{history.name}': a {history.specimen} specimen shows no '{unknown[0]}'"
+            return ConformanceCheck("outputs", False, f"{detail}; {nearest(unknown[0], names)}")
+    return ConformanceCheck("outputs", True, "those of the specimens")
 
 
 def _round_trip(histories: list[History]) -> ConformanceCheck:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -42,11 +44,18 @@ def check_record_name(subject: Any, kind: str) -> Iterator[ConformanceCheck]:
         return
     for plugin in default_registry().plugins():
         other = plugin.contributions.get(kind, {}).get(name)
-        if other is not None and type(other) is not type(subject):
+        if other is not None and not _same_class(type(other), type(subject)):
             detail = f"'{name}' is taken, by {plugin.provenance}; give the {kind} another name"
             yield ConformanceCheck("name", False, detail)
             return
     yield ConformanceCheck("name and title", True, f"{name}: {title}")
+
+
+def _same_class(first: type, second: type) -> bool:
+    """Whether two classes are one, or one of them is the other loaded from the same file as a plugin."""
+    files = [getattr(sys.modules.get(one.__module__), "__file__", None) for one in (first, second)]
+    same_file = None not in files and os.path.realpath(str(files[0])) == os.path.realpath(str(files[1]))
+    return first is second or (first.__qualname__ == second.__qualname__ and same_file)
 
 
 def check_loads(case: PredictorCase) -> Iterator[ConformanceCheck]:

@@ -18,7 +18,7 @@ READ = {
     ("generate", "to"), ("train", "to"),  # see OutputPath("resumed")
 }  # fmt: skip
 
-INPUTS = {"surrogate", "times", "record", "compositions", "plugin"}
+INPUTS = {"surrogate", "times", "record", "compositions", "plugin", "example"}
 """Options that name files to read."""
 
 

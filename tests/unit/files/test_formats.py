@@ -5,12 +5,14 @@ import json
 import tomllib
 from pathlib import Path
 
+import h5py
 import jsonschema
 import pytest
 
 import creepkit as ck
 from creepkit.exporters.law_files import read_law_file
 from creepkit.language.law_codec import law_from_json
+from creepkit.studies.lock import read_lock
 from helpers.paths import ROOT
 
 FORMATS = ROOT / "tests" / "data" / "formats"
@@ -66,10 +68,30 @@ def test_a_document_of_a_later_version_is_refused(tmp_path) -> None:
         ck.load(tmp_path / "fit.json")
 
 
-def test_the_schemas_are_current() -> None:
-    specification = importlib.util.spec_from_file_location("schemas", ROOT / "docs" / "schemas.py")
+@pytest.mark.parametrize("version", VERSIONS)
+def test_plates_and_locks_are_of_a_version_that_is_read(version) -> None:
+    with h5py.File(FORMATS / version / "plate.h5") as file:
+        assert (file.attrs["format"], file["alloys/0000"].attrs["law"]) == ("creepkit-plate", "norton")
+    lock = read_lock(FORMATS / version / "study.lock")
+    assert {stage["state"] for stage in lock["stages"].values()} == {"done"}
+
+
+def test_every_kind_of_file_is_made_by_the_program_that_is_to_make_the_next_version(tmp_path) -> None:
+    program(FORMATS / "make.py").make(tmp_path / "next")
+    made = {path.name for path in (tmp_path / "next").glob("[!.]*")}
+    assert made == {path.name for path in (FORMATS / ck.__version__).iterdir()} | {"norton.json"}  # of the ranking
+    assert ck.load_ranking(tmp_path / "next" / "ranking.json").fits[0].law.name == "norton"
+
+
+def program(path: Path):
+    specification = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
+    return module
+
+
+def test_the_schemas_are_current() -> None:
+    module = program(ROOT / "docs" / "schemas.py")
     current = {name: module.text_of(one) for name, one in module.schemas().items()}
     assert current == {path.name: path.read_text(encoding="utf-8") for path in SCHEMAS.iterdir()}, (
         "run 'python docs/schemas.py'"

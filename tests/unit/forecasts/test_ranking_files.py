@@ -1,6 +1,7 @@
 """Files of identifications and rankings from which forecasts are made; and what is refused of them."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.ranking_document import read_fit_or_ranking, write_ranking_document
+from creepkit.inverse.selection.ranking import ranking_from_scores
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from helpers.rupture_tests import BAR
 
@@ -31,6 +33,18 @@ def test_a_ranking_has_a_file(fit, tmp_path):
     source = read_fit_or_ranking(tmp_path / "ranking.json")
     assert isinstance(source, ModelAverage)
     assert source.fits[0].values == fit.values
+
+
+def test_a_ranking_saves_its_laws_beside_itself(fit, tmp_path):
+    other = replace(fit, law=replace(fit.law, name="ranking"))  # a law of the name of the file itself
+    ranking = ranking_from_scores([fit, other], np.array([0.0, 2.0]), "bic", independent_frames=60.0)
+    path = ranking.save(tmp_path / "ranking.json")
+    assert path == tmp_path / "ranking.json"
+    found = ck.load_ranking(path)
+    assert [one.law.name for one in found.fits] == ["norton", "ranking"]
+    weight = 1.0 / (1.0 + np.exp(-1.0))  # of a law whose criterion is lower by 2
+    assert found.weights == pytest.approx([weight, 1.0 - weight])
+    assert {file.name for file in tmp_path.glob("[!.]*")} == {"ranking.json", "norton.json", "ranking-2.json"}
 
 
 @pytest.mark.parametrize(

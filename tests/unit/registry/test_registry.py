@@ -173,26 +173,48 @@ def test_asking_for_the_registry_imports_no_plugin(install: Write) -> None:
 # ---- what can be wrong ---------------------------------------------------------------------------------------------
 
 
-def test_two_plugins_with_one_name_are_both_named(install: Write, write: Write) -> None:
+@pytest.mark.parametrize("file_first", [True, False])
+def test_a_file_stands_in_for_an_installed_plugin(file_first: bool, install: Write, write: Write) -> None:
     install("first-pack", LAW.format(name="same"))
-    file = write("second", LAW.format(name="same"))
+    file, registry = write("second", LAW.format(name="same")), Registry()
+    if not file_first:
+        registry.laws()
+    plugin = registry.load_file(file)
+
+    assert registry.laws()["same"].provenance == plugin.provenance
+    assert registry.conflicts() == ()
+    (notice,) = registry.replaced(plugin)
+    assert notice.endswith("in place of plugin 'mine' (first-pack 1.2)")
+
+
+def test_a_file_never_stands_in_for_a_law_of_creepkit(write: Write) -> None:
     registry = Registry()
-    registry.load_file(file)
+    registry.load_file(write("mine", LAW.format(name="norton")))
+
+    with pytest.raises(PluginError, match="the law 'norton' is offered twice"):
+        registry.law("norton")
+
+
+def test_two_plugins_with_one_name_are_both_named(write: Write) -> None:
+    files = [write(name, LAW.format(name="same")) for name in ("first", "second")]
+    registry = Registry()
+    for file in files:
+        registry.load_file(file)
 
     with pytest.raises(PluginError) as caught:
         registry.law("same")
 
     told = str(caught.value)
     assert "the law 'same' is offered twice" in told
-    assert "plugin 'mine' (first-pack 1.2)" in told
-    assert f"plugin 'second' ({file.resolve()})" in told
+    for file in files:
+        assert f"plugin '{file.stem}' ({file.resolve()})" in told
     assert registry.conflicts() == (told,)
 
 
-def test_a_clash_takes_no_other_law_down(install: Write, write: Write) -> None:
-    install("first-pack", LAW.format(name="same"))
+def test_a_clash_takes_no_other_law_down(install: Write) -> None:
+    for name in ("first-pack", "second-pack"):
+        install(name, LAW.format(name="same"))
     registry = Registry()
-    registry.load_file(write("second", LAW.format(name="same")))
 
     assert registry.law("norton").name == "norton"
     assert "same" not in registry.laws()

@@ -106,7 +106,7 @@ def test_an_early_end_and_values_without_a_solution_are_results():
     ("given", "sentence"),
     [
         (lambda h: {"strain": h.times[:3]}, r"one\(\) gave 'strain' of shape \(3,\); the test has 20 times"),
-        (lambda h: {"strian": h.times}, r"one\(\) gave no 'strain'"),
+        (lambda h: {"strian": h.times}, r"one\(\) gave 'strian'; it must give 'strain'"),
         (lambda h: {"strain": np.nan * h.times}, r"no finite 'strain' at some time and no end"),
         (lambda h: {"strain": h.times / h.missing}, r"AttributeError: .*missing.* \(.*test_per_test.py:\d+\)"),
     ],

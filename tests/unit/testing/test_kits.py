@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,7 +14,9 @@ import pytest
 import creepkit as ck
 from creepkit.errors import ExportError, HistoryError, SolveError
 from creepkit.records import typical_history
+from creepkit.registry import default_registry
 from creepkit.testing import ConformanceReport
+from helpers.command_line import creepkit, one_line
 from helpers.steady_rate_predictor import Steady
 
 
@@ -336,3 +340,35 @@ def test_an_exporter_of_a_few_lines_conforms() -> None:
 )
 def test_a_wrong_exporter_is_caught_and_told(exporter: Table, said: str) -> None:
     assert said in failures(ck.check_exporter(exporter))
+
+
+def test_a_reader_of_a_loaded_file_is_itself_and_its_examples_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "krp_format.py"
+    file.write_text(
+        "import creepkit as ck\n\n\nclass Krp:\n    name, title = 'krp', 'one history, not in a list'\n\n"
+        "    def accepts(self, path):\n        return path.suffix == '.krp'\n\n"
+        "    def read(self, path):\n"
+        "        return ck.History('h', [0.0, 1.0], {'strain': [0.0, 1.0]}, ck.constant_stress(100.0), 1073.0)\n\n\n"
+        "@ck.hookimpl\ndef creepkit_readers():\n    return [Krp()]\n"
+    )
+    (tmp_path / "test.krp").write_text("x")
+    specification = importlib.util.spec_from_file_location("krp_by_hand", file)
+    module = importlib.util.module_from_spec(specification)
+    sys.modules["krp_by_hand"] = module
+    specification.loader.exec_module(module)
+    ck.load_plugin(file)
+
+    assert "is taken" not in str(ck.check_reader(module.Krp()))
+    assert "ok   example file: not checked: no example file" in str(ck.check_reader(module.Krp()))
+    told = creepkit("check", str(file), "--example", str(tmp_path / "test.krp"))
+    assert told.exit_code == 1
+    assert "returned a History; it must return a list of histories" in told.stdout
+    file.write_text(file.read_text().replace("ck.History(", "[ck.History(").replace("1073.0)", "1073.0)]"))
+    default_registry.cache_clear()
+    assert creepkit("check", str(file), "--example", str(tmp_path / "test.krp")).exit_code == 0
+    file.write_text(file.read_text().replace("{'strain'", "{'strian'"))
+    default_registry.cache_clear()
+    told = creepkit("check", str(file), "--example", str(tmp_path / "test.krp"))
+    assert "a uniaxial specimen shows no 'strian'; did you mean 'strain'?" in told.stdout
+    default_registry.cache_clear()
+    assert "--example is for readers" in one_line(creepkit("check", "norton", "--example", str(file)))

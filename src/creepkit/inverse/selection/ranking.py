@@ -137,6 +137,10 @@ class Ranking(Presentable):
         """A Design: variations of the tests, by how well they would separate the remaining laws (some seconds)."""
         return present(self, "further_tests")
 
+    def save(self, path: str | Path) -> Path:
+        """Write the ranking as JSON, and each law's identification as LAW.json beside it; load_ranking() reads them."""
+        return present(self, "save", Path(path))
+
     def plot(self, path: str | Path | None = None) -> Figure:
         """Misfits and weights of the laws, and the curves of the credible ones; written to `path` when given."""
         return present(self, "plot", path)
