@@ -223,7 +223,7 @@ def _load_plugin_files(files: list[Path] | None) -> None:
         known = registry.default_registry()
         for plugin in [known.load_file(file) for file in files]:
             for sentence in known.replaced(plugin):
-                typer.echo(f"creepkit: {sentence}", err=True)
+                tell(f"creepkit: {sentence}", err=True)
 
 
 def _plugin_commands(own_names: set[str], *, listed_only: bool = False) -> tuple[dict[str, Any], list[str]]:

@@ -104,6 +104,7 @@ def candidate_forms_of(
     return forms_by_parameter
 
 
+@checked
 def check_form_options(
     law: CreepLaw, forms: Forms | None = None, prior: PriorOdds | None = None, parameters: Sequence[str] | None = None
 ) -> None:

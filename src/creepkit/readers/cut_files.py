@@ -84,7 +84,7 @@ def _digits(cells: Sequence[str], decimal: str) -> list[Ints]:
     if first is not None and kept and all(one[3] is not None for one in kept):
         return [np.array([-1 if one[3] is None else 2 * len(one[3]) for one in (first, *kept)])]
     kept = [one for one in kept if one[3] is None]  # small numbers alone may have exponents
-    if first is None or first[3] is not None or 2 * len(kept) < len(cells) - 1:
+    if first is None or first[3] is not None or not kept or 2 * len(kept) < len(cells) - 1:
         return []
     decimals = np.array([len(one[2] or "") for one in (first, *kept)])
     significant = np.array([len((one[1] + (one[2] or "")).lstrip("0")) for one in (first, *kept)])

@@ -11,7 +11,7 @@ import importlib.util
 import os
 import sys
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -34,6 +34,7 @@ from creepkit.errors import (
     nearest,
     quoted,
 )
+from creepkit.registry.contribution_texts import missing_members, remedy, type_text
 
 ENTRY_POINT_GROUP = "creepkit"
 
@@ -205,20 +206,20 @@ class ContributionKind:
         """Return [(name, object)] of what a hook returned; PluginError when it is not what the hook promises."""
         if not isinstance(returned, Sequence) or isinstance(returned, str):
             raise PluginError(
-                f"must return a list of {self.record_name} records, found {_type_text(returned)}{_remedy(returned)}"
+                f"must return a list of {self.record_name} records, found {type_text(returned)}{remedy(returned)}"
             )
         required: Any = getattr(import_module(self.record_module), self.record_name) if returned else object
         contribution: Any
         for contribution in returned:
             if isinstance(contribution, type):
                 raise PluginError(
-                    f"must return a list of {self.record_name} records, found {_type_text(contribution)} in it; "
+                    f"must return a list of {self.record_name} records, found {type_text(contribution)} in it; "
                     f"return an instance, {contribution.__name__}()"
                 )
             if not isinstance(contribution, required):
-                missing = _missing_members(contribution, required)
+                missing = missing_members(contribution, required)
                 raise PluginError(
-                    f"must return a list of {self.record_name} records, found {_type_text(contribution)} in it{missing}"
+                    f"must return a list of {self.record_name} records, found {type_text(contribution)} in it{missing}"
                 )
             if not (isinstance(contribution.name, str) and contribution.name.strip()):
                 raise PluginError(
@@ -233,10 +234,10 @@ class TemperatureFormKind(ContributionKind):
     def named_contributions(self, returned: Any) -> list[tuple[str, Any]]:
         """Return [(name, function of T_ref)]."""
         if not isinstance(returned, Mapping):
-            raise PluginError(f"must return {{name: function of T_ref}}, found {_type_text(returned)}")
+            raise PluginError(f"must return {{name: function of T_ref}}, found {type_text(returned)}")
         for name, form in returned.items():
             if not callable(form):
-                raise PluginError(f"must return {{name: function of T_ref}}, found {_type_text(form)} for '{name}'")
+                raise PluginError(f"must return {{name: function of T_ref}}, found {type_text(form)} for '{name}'")
         return list(returned.items())
 
 
@@ -380,26 +381,3 @@ def hook_location(function: Any) -> str:
     """Where a function of a plugin is written, as the end of a sentence; "" where that is not known."""
     code = getattr(function, "__code__", None)
     return f" ({code.co_filename}, line {code.co_firstlineno})" if code is not None else ""
-
-
-def _missing_members(contribution: object, required: type) -> str:
-    """What an object lacks of an interface, as the end of a sentence."""
-    members = sorted(getattr(required, "__protocol_attrs__", ())) or [
-        name for one in required.__mro__ for name in vars(one) if getattr(one, "_is_protocol", False) and name[0] != "_"
-    ]
-    missing = [name for name in members if not hasattr(contribution, name)]
-    return f"; it has no {', '.join(missing)}" if missing else ""
-
-
-def _remedy(returned: Any) -> str:
-    """What to do about something that is no list, as the end of a sentence."""
-    if returned is None:
-        return "; add a return statement"
-    if isinstance(returned, Iterator):
-        return "; return list(...) of it"
-    return "; put it into a list" if hasattr(returned, "name") else ""
-
-
-def _type_text(thing: Any) -> str:
-    """Name something unexpected: a class by its own name, else by its type."""
-    return f"the class {thing.__name__}" if isinstance(thing, type) else quoted(f"{type(thing).__name__} {thing!r}", 80)

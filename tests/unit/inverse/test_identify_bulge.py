@@ -231,7 +231,7 @@ def test_text_says_what_a_bulge_test_needs(fit):
     text = str(fit)
     assert "ln strain" not in text
     assert "amplitude: relative squared error" in text
-    assert "reduced chi-square" in text
+    assert "mean square misfit over noise²" in text
     assert "test_03" in text
     assert "thickness, mm" in text
 

@@ -130,7 +130,7 @@ loadings = st.one_of(
     times=st.lists(st.floats(0, 1e12), min_size=2, max_size=5, unique=True).map(sorted),
     strain=st.lists(values, min_size=5, max_size=5),
     loading=loadings,
-    temperature=st.floats(1e-3, 9999) | st.floats(1e-3, 9999).map(Program.constant),
+    temperature=st.floats(1e-3, 4499) | st.floats(1e-3, 4499).map(Program.constant),
     name=words.filter(bool),
     labels=st.dictionaries(words.filter(lambda key: key and ":" not in key), words, max_size=3),
 )
