@@ -36,8 +36,21 @@ from measured import Page, arguments, progress
 
 import creepkit as ck
 
-CLOCK = ("created", "date", "seconds", "time_s", "duration", "elapsed", "cpu", "started", "ended", "wall", "when")
-"""Parts of names under which documents say when they were made and how long that took."""
+CLOCK = (
+    "created",
+    "date",
+    "seconds",
+    "time_s",
+    "duration",
+    "elapsed",
+    "cpu",
+    "started",
+    "ended",
+    "wall",
+    "when",
+    "sha256",
+)
+"""Parts of names under which documents say when they were made, how long that took, and the hash of one that does."""
 
 LEFT_BEHIND = (".part", ".tmp")
 FAULTS = ("other result", "failed", "left behind")
