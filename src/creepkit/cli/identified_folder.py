@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.errors import FitError
-from creepkit.files.file_names import LAW_SIGNS, numbered_stems
 from creepkit.files.reading import sha256_of
 from creepkit.files.writing import check_folder_target
 from creepkit.files.written_lists import is_foreign
@@ -35,13 +34,14 @@ def identifying_alone(folder: Path, laws: Sequence[CreepLaw]) -> Iterator[None]:
     FitError where another process holds it, or where a file of the former run, or one that is going to be written, is
     not as creepkit wrote it. A folder that is made for nothing is removed again.
     """
+    from creepkit.inverse.ranking_document import stems_of_laws
     from creepkit.jobs.shard_progress import ShardLock
 
-    _, *stems = law_stems(laws)
+    stems = stems_of_laws(laws, RANKING_STEM)
     names = [f"{stem}{suffix}" for stem in stems for suffix in (*LAW_SUFFIXES, *BEST_LAW_SUFFIXES)]
     check_folder_target(folder, FitError, tuple(dict.fromkeys([*names, *(one.name for one in former_files(folder))])))
     made = not folder.exists()
-    lock = ShardLock(folder / LOCK)
+    lock = ShardLock(folder / LOCK, FitError)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock.__enter__()
@@ -57,11 +57,6 @@ def identifying_alone(folder: Path, laws: Sequence[CreepLaw]) -> Iterator[None]:
             with suppress(OSError):
                 folder.rmdir()
         lock.__exit__(None, None, None)
-
-
-def law_stems(laws: Sequence[CreepLaw]) -> list[str]:
-    """Names of files without suffixes: of the ranking, then of each law."""
-    return numbered_stems([RANKING_STEM, *(law.name for law in laws)], "law", LAW_SIGNS)
 
 
 def former_files(folder: Path) -> list[Path]:
@@ -85,12 +80,13 @@ def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
     Files of the ranking that was there before are removed where nobody has changed them.
     """
     import creepkit as ck
+    from creepkit.inverse.ranking_document import stems_of_laws
 
     folder.mkdir(parents=True, exist_ok=True)
     former = former_files(folder)
-    ranking_name, *names = law_stems([entry.fit.law for entry in ranking.laws])
-    written = [ranking.save(folder / f"{ranking_name}.json"), folder / f"{ranking_name}.png"]
-    ranking.plot(folder / f"{ranking_name}.png")
+    names = stems_of_laws((entry.fit.law for entry in ranking.laws), RANKING_STEM)
+    written = [ranking.save(folder / f"{RANKING_STEM}.json"), folder / f"{RANKING_STEM}.png"]
+    ranking.plot(folder / f"{RANKING_STEM}.png")
     for name, entry in zip(names, ranking.laws, strict=True):
         entry.fit.plot(folder / f"{name}.png")
         written += [folder / f"{name}.json", folder / f"{name}.png"]

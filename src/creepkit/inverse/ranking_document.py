@@ -5,7 +5,7 @@ It states the SHA-256 of each of these files: one that another run has written s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 
 if TYPE_CHECKING:
     from creepkit.inverse.selection import Ranking
+    from creepkit.language import CreepLaw
 
 RANKING = DocumentFormat(
     "creepkit-ranking",
@@ -32,16 +33,16 @@ MOST_LAWS = 100
 """In a ranking's file."""
 
 
-def stems_of_laws(ranking: Ranking, stem: str = "ranking") -> list[str]:
-    """Names of the laws' files beside the ranking's, without suffix, best law first; stem : of the ranking's file."""
-    return numbered_stems([stem, *(entry.fit.law.name for entry in ranking.laws)], "law", LAW_SIGNS)[1:]
+def stems_of_laws(laws: Iterable[CreepLaw], stem: str) -> list[str]:
+    """Names of the laws' files beside the ranking's, without suffix; stem : of the ranking's file."""
+    return numbered_stems([stem, *(law.name for law in laws)], "law", LAW_SIGNS)[1:]
 
 
 def write_ranking(ranking: Ranking, path: str | Path) -> Path:
     """Write the ranking, and the identification of each law into a file beside it; returns the ranking's path."""
     path = Path(path)
     weights = {}
-    for stem, entry in zip(stems_of_laws(ranking, path.stem), ranking.laws, strict=True):
+    for stem, entry in zip(stems_of_laws((one.fit.law for one in ranking.laws), path.stem), ranking.laws, strict=True):
         weights[entry.fit.save(path.parent / f"{stem}.json").name] = entry.weight
     return write_ranking_document(weights, path)
 
