@@ -22,6 +22,7 @@ from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.readers.assembly import assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
 from creepkit.readers.column_names import NameTable, split_written_name, unit_suffix, words_of
+from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.silent_rows import without_silent_rows
 from creepkit.readers.table_rows import TableRow
 from creepkit.readers.text_grids import peek_columns, read_text_grid
@@ -141,12 +142,13 @@ class RowPerTestReader:
         """Return one history a row, in the order of the rows; of a spreadsheet those of all its tables of tests."""
         places: dict[str, str] = {}
         histories = []
-        for table in _tables(path, self.vocabulary.ignored):
+        for table, cut in _tables(path, self.vocabulary.ignored):
             keys = _keys(table)
             if self.vocabulary.ignored:
                 table = without_silent_rows(table, [_quantity(key) for key in keys])
             for row in table.rows:
-                history, place = self._history(table, row, keys), table.location(row.line)
+                of_row = cut if cut is not None and cut.line == row.line else None
+                history, place = self._history(table, row, keys, of_row), table.location(row.line)
                 if history.name in places:
                     raise HistoryError(
                         f"{place}: test '{history.name}' already stands in {places[history.name]}; give each row its "
@@ -156,13 +158,19 @@ class RowPerTestReader:
                 histories.append(history)
         return histories
 
-    def _history(self, table: TextTable, row: TableRow, keys: Sequence[str]) -> History:
+    def _history(self, table: TextTable, row: TableRow, keys: Sequence[str], cut: CutNumber | None) -> History:
+        """The test of a row. cut : the number with which it ends, where the file may have been cut there."""
         location = table.location(row.line)
         written = table.entries(row).items()
         cells = {keys[table.columns.index(name)]: replace(_with_point(entry), key=name) for name, entry in written}
         entries = {**table.header, **_with_end(cells, location)}
         empty = [_quantity(keys[table.columns.index(name)]) for name in table.empty_columns(row)]
         assumptions = (*table.assumptions, *filter(None, (_assumed_of_empty(one, entries) for one in empty)))
+        if cut is not None:
+            assumptions += (
+                f"{cut.text} in line {cut.line} is whole (the file ends there without a line end and with fewer digits "
+                "than the numbers above have)",
+            )
         if assumptions and "label assumed" not in entries:
             entries["label assumed"] = SourceText(", ".join(assumptions), location)
         name = f"{table.sheet or table.path.stem} {row.line}"
@@ -194,15 +202,20 @@ def _grids(path: Path) -> list[CellGrid]:
     return read_sheets(path)
 
 
-def _tables(path: Path, ignored: Collection[str]) -> list[TextTable]:
-    """The tables of tests in a file; ignored : columns that are left out."""
+def _tables(path: Path, ignored: Collection[str]) -> list[tuple[TextTable, CutNumber | None]]:
+    """The tables of tests in a file, each with the number in which it may have been cut.
+
+    ignored : columns that are left out.
+    """
     grids = [grid for grid in _grids(path) if not grid.sheet or _is_test_table(grid.rows[0].cells)]
-    return [replace(table_of(without_ignored(grid, 0, ignored)), assumptions=grid.remarks) for grid in grids]
+    return [
+        (replace(table_of(without_ignored(grid, 0, ignored)), assumptions=grid.remarks), grid.cut) for grid in grids
+    ]
 
 
 def columns_of_tests(path: Path, ignored: Collection[str]) -> list[tuple[Sequence[str], int]]:
     """Names of columns, and number of rows, of each table of tests in a file."""
-    return [(table.columns, len(table.rows)) for table in _tables(path, ignored)]
+    return [(table.columns, len(table.rows)) for table, _ in _tables(path, ignored)]
 
 
 def _is_test_table(names: Sequence[str]) -> bool:

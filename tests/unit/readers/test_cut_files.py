@@ -91,3 +91,19 @@ def test_the_note_is_kept_in_a_file_of_creepkits_own(tmp_path):
     path.write_text(BARS[0].read_text().rstrip("\n")[:-4])
     (history,) = ck.read_histories([path])
     assert _kinds(ck.write_history(history, tmp_path / "written.csv")) == _kinds(path)
+
+
+@pytest.mark.parametrize("lost", [0, 4, 5, 6])
+def test_the_last_test_of_a_table_of_rates(lost, tmp_path):
+    """A rate that lost its exponent lies millions of times from the others; it is said whence it may come."""
+    rows = [f"A{k},{90 + k},750,{2.1e-6 * 1.03**k:.3e}" for k in range(30)]
+    path = tmp_path / "rates.csv"
+    text = "test,stress_MPa,temperature_C,min creep rate (1/h)\n" + "\n".join(rows)
+    path.write_text(text[: len(text) - lost])
+    *others, last = ck.read_histories([path])
+    assumed = [history.labels["assumed"] for history in others]
+    assert not any("is whole" in one for one in assumed)
+    written = path.read_text().rpartition(",")[2]
+    assert (f"{written} in line 31 is whole" in last.labels["assumed"]) == (lost > 0)
+    said = " ".join(creepkit("read", str(path)).stdout.split())
+    assert ("fewer digits than the numbers above have" in said) == (lost > 0)
