@@ -27,6 +27,9 @@ CPU_WHEELS := https://download.pytorch.org/whl/cpu
 # Two threads of torch on one busy core are far slower than one; pytest runs two workers instead.
 export OMP_NUM_THREADS := 1
 
+# Seconds after which a test that waits for something fails, and shows where it waits; the slowest takes a fifth of them.
+export PYTEST_TIMEOUT := 300
+
 # What 'make sanitize' runs: the tests of packages that call the core, and of finite elements against closed forms.
 SANITIZED_TESTS := tests/unit/core tests/unit/fem tests/unit/specimens $(wildcard tests/verification/test_fem_*.py)
 
@@ -48,7 +51,7 @@ sanitize: core
 	$(BIN)/python src/core/compile.py --sanitize
 	@CREEPKIT_CORE=$(CURDIR)/build/sanitize/libcreepkit_core.so ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1 \
 	    LD_PRELOAD="$$($(CXX) -print-file-name=libasan.so) $$($(CXX) -print-file-name=libstdc++.so)" \
-	    $(BIN)/python -m pytest -q -n 2 $(PYTEST_OPTIONS) $(SANITIZED_TESTS)
+	    $(BIN)/python -m pytest -q -n 2 -m 'not long_when_sanitized' $(PYTEST_OPTIONS) $(SANITIZED_TESTS)
 
 demo: core
 	$(BIN)/creepkit demo --to demo

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -28,6 +27,7 @@ def tree(module: str) -> ast.Module:
     return ast.parse(modules()[module].read_text(encoding="utf-8"))
 
 
+@cache
 def imported_modules(module: str) -> set[str]:
     """The modules of creepkit that one imports anywhere: in functions and for type checking too."""
     names = set()
@@ -69,22 +69,25 @@ def import_cycles() -> list[list[str]]:
     return cycles
 
 
-def public_classes(base: str | None = None) -> Iterator[tuple[str, str]]:
+@cache
+def public_classes(base: str | None = None) -> tuple[tuple[str, str], ...]:
     """(name, module) of every class without a leading underscore; those that name `base` as a base, where given."""
-    for module in modules():
-        for node in ast.walk(tree(module)):
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                bases = {b.id for b in node.bases if isinstance(b, ast.Name)}
-                if base is None or base in bases:
-                    yield node.name, module
+    return tuple(
+        (node.name, module)
+        for module in modules()
+        for node in ast.walk(tree(module))
+        if isinstance(node, ast.ClassDef)
+        and not node.name.startswith("_")
+        and (base is None or base in {b.id for b in node.bases if isinstance(b, ast.Name)})
+    )
 
 
-def functions() -> Iterator[tuple[str, ast.FunctionDef]]:
+@cache
+def functions() -> tuple[tuple[str, ast.FunctionDef], ...]:
     """(module, definition) of every function and method."""
-    for module in modules():
-        for node in ast.walk(tree(module)):
-            if isinstance(node, ast.FunctionDef):
-                yield module, node
+    return tuple(
+        (module, node) for module in modules() for node in ast.walk(tree(module)) if isinstance(node, ast.FunctionDef)
+    )
 
 
 def parameter_count(function: ast.FunctionDef) -> int:

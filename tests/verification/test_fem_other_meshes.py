@@ -78,6 +78,7 @@ def test_calculix_decks_largest_stress(deck) -> None:
     np.testing.assert_allclose(largest[-5:], table["max_vonMises_ip_MPa"][-5:], rtol=5e-3)
 
 
+@pytest.mark.long_when_sanitized
 def test_the_mesh_of_the_paper() -> None:
     """2117 elements, made eight-node ones, against the structured mesh at 5, 50 and 300 s of Norton creep.
 

@@ -13,10 +13,16 @@ import pytest
 import creepkit as ck
 from creepkit.cli.demo import PLANTED_BULGE
 from helpers.planted_datasets import bars
+from helpers.running_programs import running
 
-PROGRAM = (
-    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from creepkit.cli import main; main()"
+HEEDING = (
+    "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    "for name in ('SIGTERM', 'SIGHUP'): signal.signal(getattr(signal, name), signal.SIG_DFL)\n"
 )
+"""A run of the tests in the background of a shell, or under nohup, has switched off what these tests send."""
+
+
+CALLED = "from creepkit.cli import main; main()"
 DEADLINE = 120.0
 """s in which a command must begin its work, and end when it is told to."""
 
@@ -77,8 +83,8 @@ def started(process, folder):
 )
 def test_an_interrupt_is_one_line_and_leaves_nothing_half_written(command, sent, said, tmp_path):
     (tmp_path / "out").mkdir()
-    words = [sys.executable, "-c", PROGRAM, *map(str, words_of(command, tmp_path))]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
+    words = [sys.executable, "-c", f"{HEEDING}{CALLED}", *map(str, words_of(command, tmp_path))]
+    with running(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path) as process:
         started(process, tmp_path)
         process.send_signal(sent)
         _, stderr = process.communicate(timeout=DEADLINE)
@@ -94,12 +100,9 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_half_written(command, sent,
 
 def ended(program):
     """Exit code and stderr of a Python program that runs the command line."""
-    words = [sys.executable, "-c", f"import os, signal\nimport creepkit.cli.app as app\n{program}"]
+    words = [sys.executable, "-c", f"{HEEDING}import os\nimport creepkit.cli.app as app\n{program}"]
     run = subprocess.run(words, timeout=DEADLINE, capture_output=True, text=True, check=False)
     return run.returncode, run.stderr
-
-
-CALLED = "from creepkit.cli import main; main()"
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="signals are those of POSIX")
@@ -188,6 +191,7 @@ def test_streams_that_cannot_be_written():
 def test_ctrl_c_while_the_package_is_imported_prints_no_traceback(tmp_path):
     (tmp_path / "lazy_loader.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
-    words = [sys.executable, "-m", "creepkit", "laws"]
+    heeding = f"{HEEDING}import os, sys\nos.execv(sys.executable, [sys.executable, '-m', 'creepkit', 'laws'])"
+    words = [sys.executable, "-c", heeding]
     run = subprocess.run(words, env=environment, timeout=DEADLINE, capture_output=True, text=True, check=False)
     assert (run.returncode, run.stdout, run.stderr) == (-signal.SIGINT, "", "")

@@ -12,6 +12,7 @@ import pytest
 
 import creepkit as ck
 from helpers.command_line import creepkit, one_line
+from helpers.running_programs import running
 from helpers.source_tree import PACKAGE
 
 BARS = ck.example_data("planted creep curves")
@@ -66,15 +67,12 @@ def test_a_port_that_is_taken(tmp_path):
 def test_it_prints_its_address_and_ctrl_c_ends_it():
     words = [sys.executable, "-c", PROGRAM, "app", "norton", "--no-browser"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])}
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment) as process:
-        try:
-            ready, _, _ = select.select([process.stdout], [], [], 120.0)
-            line = process.stdout.readline() if ready else ""
-            assert re.fullmatch(r"the page: http://127\.0\.0\.1:\d+/[\w-]{32}/\n", line)
-            process.send_signal(signal.SIGINT)
-            rest, errors = process.communicate(timeout=60)
-        finally:
-            process.kill()
+    with running(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as process:
+        ready, _, _ = select.select([process.stdout], [], [], 120.0)
+        line = process.stdout.readline() if ready else ""
+        assert re.fullmatch(r"the page: http://127\.0\.0\.1:\d+/[\w-]{32}/\n", line)
+        process.send_signal(signal.SIGINT)
+        rest, errors = process.communicate(timeout=60)
     assert process.returncode == 0
     assert rest == ""
     assert errors.splitlines() == ["Ctrl-C ends it", "ended"]

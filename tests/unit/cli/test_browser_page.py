@@ -15,6 +15,7 @@ from urllib.request import url2pathname
 import pytest
 
 from creepkit.cli import browser_page
+from helpers.running_programs import running
 from helpers.source_tree import PACKAGE
 
 URL = "http://127.0.0.1:8000/a-token_of-24-bytes/"
@@ -85,21 +86,19 @@ def test_no_process_has_the_token_among_its_arguments(home, tmp_path):
     browser.chmod(0o700)
     program = "from creepkit.cli import main; main()"
     environment = {**os.environ, "BROWSER": str(browser), "PYTHONPATH": str(PACKAGE.parent)}
-    with subprocess.Popen(
-        [sys.executable, "-c", program, "app", "norton"], stdout=subprocess.PIPE, text=True, env=environment
-    ) as process:
-        try:
-            line = process.stdout.readline()
-            token = urlparse(line.split()[-1]).path.strip("/")
-            deadline = time.monotonic() + 60
-            while not (got.exists() and got.stat().st_size) and time.monotonic() < deadline:
-                time.sleep(0.05)
-            assert len(token) == 32
-            assert token not in seen.read_text()
-            assert b"norton" in got.read_bytes().lower()
-            assert b"norton" in urllib.request.urlopen(line.split()[-1]).read().lower()  # the printed address holds
-            assert list(home.glob("creepkit-app-*"))
-        finally:
-            process.terminate()
-            process.wait(60)
+    words = [sys.executable, "-c", program, "app", "norton"]
+    with running(words, stdout=subprocess.PIPE, env=environment) as process:
+        line = process.stdout.readline()
+        address = line.split()[-1]
+        token = urlparse(address).path.strip("/")
+        deadline = time.monotonic() + 60
+        while not (got.exists() and got.stat().st_size) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert len(token) == 32
+        assert token not in seen.read_text()
+        assert b"norton" in got.read_bytes().lower()
+        assert b"norton" in urllib.request.urlopen(address, timeout=60).read().lower()  # the printed address holds
+        assert list(home.glob("creepkit-app-*"))
+        process.terminate()
+        assert process.wait(60) == 0
     assert not list(home.glob("creepkit-app-*"))

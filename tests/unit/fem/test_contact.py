@@ -44,6 +44,7 @@ class BallOnBlock(ck.Axisymmetric):
 
 
 @pytest.mark.parametrize("force", [1000.0, 8000.0])
+@pytest.mark.long_when_sanitized
 def test_a_ball_on_a_block_comes_nearer_as_hertz_says(force: float) -> None:
     """K. L. Johnson, Contact Mechanics, 1985, (4.23), less what a half space moves 100 mm below: F/(pi E* 100 mm)."""
     block = BallOnBlock(refinement=2.0, resolution=1e-6, tolerance=1e-3)
@@ -80,6 +81,7 @@ def test_the_tangent_of_contact_is_that_of_differences() -> None:
     assert np.abs(tangent[:-1, -1]).max() > 0.0
 
 
+@pytest.mark.long_when_sanitized
 def test_a_body_leaves_when_its_force_does() -> None:
     """Unloaded, the elastic block is as at first: the ball, then free, has moved back up."""
     steps = ck.load_steps("force", [(0.0, 1000.0), (100.0, 0.0), (200.0, 1000.0)])

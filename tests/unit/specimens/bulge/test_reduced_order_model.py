@@ -108,6 +108,7 @@ def test_thickness() -> None:
     np.testing.assert_allclose(base.sensitivities.surface[:, :, -1], difference, atol=1e-6 * np.abs(difference).max())
 
 
+@pytest.mark.long_when_sanitized
 def test_another_dimple_and_its_mesh_from_files() -> None:
     """A plate with a fillet, meshed and as a mesh from elsewhere, within one per cent: nothing knows the dimple."""
     fillet = Bulge(geometry=DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",)), threads=1, tolerance=1e-4)
@@ -123,6 +124,7 @@ def with_top(specimen: Bulge):
     return specimen.geometry.mesh(1.0)
 
 
+@pytest.mark.long_when_sanitized
 def test_stated_error_enters_the_covariance_and_the_specimen_corrects_it() -> None:
     errors = prediction_errors_of(REDUCED)
     assert set(errors) == set(SPECIMEN.optional_outputs)
@@ -147,6 +149,7 @@ def test_unknown_nuisances_are_refused() -> None:
                         nuisances={"colour": np.array([[1.0]])})  # fmt: skip
 
 
+@pytest.mark.long_when_sanitized
 def test_fewer_modes_err_more() -> None:
     creep, values = CASES["combined"]
     theta = creep.to_internal(values)
