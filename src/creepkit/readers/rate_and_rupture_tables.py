@@ -147,8 +147,7 @@ class RowPerTestReader:
             if self.vocabulary.ignored:
                 table = without_silent_rows(table, [_quantity(key) for key in keys])
             for row in table.rows:
-                of_row = cut if cut is not None and cut.line == row.line else None
-                history, place = self._history(table, row, keys, of_row), table.location(row.line)
+                history, place = self._history(table, row, keys, cut), table.location(row.line)
                 if history.name in places:
                     raise HistoryError(
                         f"{place}: test '{history.name}' already stands in {places[history.name]}; give each row its "
@@ -159,14 +158,14 @@ class RowPerTestReader:
         return histories
 
     def _history(self, table: TextTable, row: TableRow, keys: Sequence[str], cut: CutNumber | None) -> History:
-        """The test of a row. cut : the number with which it ends, where the file may have been cut there."""
+        """The test of a row. cut : the number in which the file may have been cut."""
         location = table.location(row.line)
         written = table.entries(row).items()
         cells = {keys[table.columns.index(name)]: replace(_with_point(entry), key=name) for name, entry in written}
         entries = {**table.header, **_with_end(cells, location)}
         empty = [_quantity(keys[table.columns.index(name)]) for name in table.empty_columns(row)]
         assumptions = (*table.assumptions, *filter(None, (_assumed_of_empty(one, entries) for one in empty)))
-        if cut is not None:
+        if cut is not None and cut.line == row.line:
             assumptions += (
                 f"{cut.text} in line {cut.line} is whole (the file ends there without a line end and with fewer digits "
                 "than the numbers above have)",
