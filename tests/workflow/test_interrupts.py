@@ -17,7 +17,7 @@ from helpers.running_programs import running
 
 HEEDING = (
     "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    "for name in ('SIGTERM', 'SIGHUP'): signal.signal(getattr(signal, name), signal.SIG_DFL)\n"
+    "for name in {'SIGTERM', 'SIGHUP'} & set(dir(signal)): signal.signal(getattr(signal, name), signal.SIG_DFL)\n"
 )
 """A run of the tests in the background of a shell, or under nohup, has switched off what these tests send."""
 
