@@ -24,7 +24,6 @@ OWN_OPENERS = frozenset(("read_text", "read_bytes"))
 
 
 ALLOWED = {
-    "creepkit.annotation_checks read_text": "sources of the package",
     "creepkit.app.page read_text": "files of the package",
     "creepkit.app.runtime_files read_text": "files of the package",
     "creepkit.exporters.creep_subroutine read_text": "templates of the package",

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 from creepkit import registry
 from creepkit.checked_arguments import checked
 from creepkit.errors import ExportError, FitError, nearest, quoted
+from creepkit.inverse.search.global_search import GlobalSearch
+from creepkit.inverse.settings import OutputWeights
+from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
 from creepkit.records import History, LawWithValues, Nuisance, Predictor, Units, dimension_named, exported_text
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictors
 
@@ -18,10 +21,8 @@ if TYPE_CHECKING:
     from creepkit.discovery.temperature_law import TemperatureLaw
     from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.search.global_search import GlobalSearch
     from creepkit.inverse.selection import Ranking
-    from creepkit.inverse.settings import IdentificationSettings, OutputWeights
-    from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
+    from creepkit.inverse.settings import IdentificationSettings
     from creepkit.language import CreepLaw, Elastic
 
 
