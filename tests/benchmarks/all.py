@@ -4,6 +4,7 @@
     python tests/benchmarks/all.py NAME ... [--write]         run the commands of some, one after another
     python tests/benchmarks/all.py everything [--write]       run all that need no further file or program
     python tests/benchmarks/all.py --short [NAME ...]         run the short forms, as .ci/run does, of all that have one
+    python tests/benchmarks/all.py --nightly                  run the whole commands of those, as .ci/nightly does
 
 With --write every program writes its tables to docs/measured. Commands run from the root of the project.
 """
@@ -130,10 +131,12 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="programs to run, or 'everything'; none: list them")
     parser.add_argument("--write", action="store_true", help="write the tables to docs/measured")
     parser.add_argument("--short", action="store_true", help="the short forms, whose tables are not written")
+    parser.add_argument("--nightly", action="store_true", help="the commands of programs with a short form")
     options = parser.parse_args()
-    names = options.names
-    if options.short:
-        with_short = [name for name, benchmark in BENCHMARKS.items() if benchmark.short]
+    names, with_short = options.names, [name for name, benchmark in BENCHMARKS.items() if benchmark.short]
+    if options.nightly:
+        names = with_short
+    elif options.short:
         if options.write or not set(names) <= set(with_short):
             parser.error(f"--short goes without --write, and with {', '.join(with_short)}")
         names = names or with_short
