@@ -9,6 +9,8 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
+import numpy as np
+
 from creepkit.errors import CreepkitError
 from creepkit.fem import simulation
 from creepkit.integration import batch_integration
@@ -56,11 +58,11 @@ def _constants() -> dict[str, Any]:
     """Numbers and words that the core's callers bring along: the method of integration, settings, endings."""
     settings = IntegrationSettings()
     tolerance = {"tolerance": SEARCH_TOLERANCE, "newton": 1e-3 * SEARCH_TOLERANCE, "growth": SEARCH_GROWTH}
-    numbers = [array.ravel().tolist() for array in (SDIRK4.a, SDIRK4.c, SDIRK4.error, SDIRK4.dense)]
+    numbers = np.concatenate([SDIRK4.a, SDIRK4.c, SDIRK4.error, SDIRK4.dense], axis=None).tolist()
     return {
         "bar": {
             "settings": {name: getattr(settings, name) for name, *_ in SettingsStructure._fields_},
-            "tableau": {"sizes": [*SDIRK4.dense.shape, SDIRK4.error_order], "numbers": sum(numbers, [])},
+            "tableau": {"sizes": [*SDIRK4.dense.shape, SDIRK4.error_order], "numbers": numbers},
             "endings": _endings(batch_integration.REASONS, batch_integration.STATUS),
         },
         "body": {
