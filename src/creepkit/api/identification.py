@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal
 from creepkit import registry
 from creepkit.checked_arguments import checked
 from creepkit.errors import ExportError, FitError, quoted
+from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
 from creepkit.options import takes_options
 from creepkit.records import History, LawWithValues, Predictor, Units, exported_text
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictors
@@ -20,9 +22,7 @@ if TYPE_CHECKING:
     from creepkit.discovery.temperature_law import TemperatureLaw
     from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.search.global_search import GlobalSearch
     from creepkit.inverse.selection import Ranking
-    from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
     from creepkit.language import CreepLaw, Elastic
 
 
