@@ -107,9 +107,9 @@ from .records.prediction import Status as Status
 from .records.specimen_record import Dimension as Dimension
 from .records.specimen_record import Load as Load
 from .records.specimen_record import Output as Output
-from .registry.arguments import read_frames as read_frames
-from .registry.arguments import read_histories as read_histories
-from .registry.arguments import read_record as read_record
+from .registry.reading import read_frames as read_frames
+from .registry.reading import read_histories as read_histories
+from .registry.reading import read_record as read_record
 from .rupture_assessment.assess import rupture as rupture
 from .rupture_assessment.assessment import RuptureSettings as RuptureSettings
 from .sampling.conditions import TimeGrid as TimeGrid

@@ -11,6 +11,7 @@ from creepkit.files.json_documents import DocumentFormat, check_heading, check_k
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.files.writing import write_text
+from creepkit.hookspecs import hookimpl
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import Exporter, LawWithValues, exported_text
@@ -109,3 +110,9 @@ def write_export(source: LawWithValues, exporter: Exporter, destination: str | P
     """
     text, path = exported_text(exporter, source), Path(destination)
     return write_text(text, path, ExportError, force=force)
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporter of this module."""
+    return [JsonExporter()]

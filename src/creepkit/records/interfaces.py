@@ -41,7 +41,10 @@ class Reader(Protocol):
 
 @runtime_checkable
 class Exporter(Protocol):
-    """Writes a law with its values as text: to read, or for another program."""
+    """Writes a law with its values as text: to read, or for another program.
+
+    Optional attribute: `serves`, other words that users ask for it by, such as ("umat",).
+    """
 
     @property
     def name(self) -> str:
