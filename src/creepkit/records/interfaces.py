@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from creepkit.arrays import Floats
-from creepkit.records.history import History
-from creepkit.records.prediction import NuisanceValues, Prediction
-
 if TYPE_CHECKING:
+    from creepkit.arrays import Floats
     from creepkit.language.law import CreepLaw
+    from creepkit.records.history import History
     from creepkit.records.law_with_values import LawWithValues
+    from creepkit.records.prediction import NuisanceValues, Prediction
     from creepkit.records.surface_observation import SurfaceObservation, SurfacePoints, SurfaceRegion
 
 

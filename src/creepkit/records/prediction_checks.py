@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.errors import SolveError
 from creepkit.records.history import History
-from creepkit.records.known_specimens import outputs_of_tests
+from creepkit.records.specimen_lookup import outputs_of_tests
 from creepkit.records.prediction import Prediction, Status
 
 _REAL, _WHOLE, _NUMERIC = "f", "iu", "fiu"

@@ -29,6 +29,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import CodeType, ModuleType
 
+import creepkit
 from creepkit.errors import POWER_REMEDY, CreepkitError, PluginError
 
 GROUP_PREFIX = "creepkit."
@@ -66,8 +67,10 @@ class InstalledModule:
 
     @cached_property
     def provenance(self) -> Provenance:
-        """Distribution with version, and the name of the first entry point; metadata are read when this is asked."""
+        """Distribution with version, and the name of the first entry point; others' metadata are read when asked for."""
         entry = self.entries[0]
+        if self.is_own:
+            return Provenance(f"creepkit {creepkit.__version__}", entry.name)
         origin = f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else "unknown distribution"
         return Provenance(origin, entry.name)
 

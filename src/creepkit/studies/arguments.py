@@ -323,7 +323,7 @@ def rigs_of_study(file: StudyFile, rigs: Sequence[Rig], predictor: object) -> li
 
 def tolerances_of(file: StudyFile, number: int) -> dict[str, float]:
     """{kind: standard deviation} of a forecast, in the unit of the nuisance parameter of that kind."""
-    from creepkit.records.known_specimens import all_dimensions
+    from creepkit.records.specimen_lookup import all_dimensions
     from creepkit.records.prediction import GENERAL_NUISANCES
 
     known = [*GENERAL_NUISANCES, *all_dimensions()]
