@@ -3,9 +3,7 @@
 from . import errors as errors
 from .api.extraction import extract as extract
 from .api.identification import confirm as confirm
-from .api.identification import export as export
 from .api.identification import identify as identify
-from .api.identification import law_with_values as law_with_values
 from .api.identification import moduli as moduli
 from .api.identification import rank as rank
 from .api.identification import select as select
@@ -32,6 +30,8 @@ from .discovery.discover import group_by_temperature as group_by_temperature
 from .discovery.discover import temperature_study as temperature_study
 from .experiments.design import design as design
 from .experiments.rig import Rig as Rig
+from .exporters.exporting import export as export
+from .exporters.exporting import law_with_values as law_with_values
 from .fem.mesh_files import read_mesh as read_mesh
 from .fem.section import Section as Section
 from .files.writing import overwriting as overwriting

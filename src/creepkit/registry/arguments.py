@@ -4,23 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from creepkit.errors import FitError, LawError, SolveError, quoted
+from creepkit.errors import FitError, SolveError, quoted
 from creepkit.records import History, Predictor, Specimen, known_specimens, remember_specimen
 from creepkit.registry.plugin_registry import default_registry
-
-if TYPE_CHECKING:
-    from creepkit.language.law import CreepLaw
-
-
-def resolve_law(law: CreepLaw | str) -> CreepLaw:
-    """The law itself, or the one of that name; "norton+strain-hardening" names the sum of two."""
-    if isinstance(law, str):
-        return default_registry().law(law)
-    if not hasattr(law, "terms"):
-        raise LawError(f"a creep law or its name is needed, found {type(law).__name__}")
-    return law
 
 
 def specimen_by_name(name: str) -> Specimen:

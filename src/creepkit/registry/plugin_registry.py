@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import pluggy
 
 from creepkit import hookspecs
-from creepkit.errors import PluginError, nearest
+from creepkit.errors import LawError, PluginError, nearest
 from creepkit.registry import contributions, plugin_sources
 from creepkit.registry.contributions import ContributionKind
 from creepkit.registry.plugin_sources import PluginFile, Provenance, Source, name_key
@@ -314,6 +314,15 @@ def default_registry() -> Registry:
 
 
 default_registry()  # made with the module, while there is one thread
+
+
+def resolve_law(law: CreepLaw | str) -> CreepLaw:
+    """The law itself, or the one of that name; "norton+strain-hardening" names the sum of two."""
+    if isinstance(law, str):
+        return default_registry().law(law)
+    if not hasattr(law, "terms"):
+        raise LawError(f"a creep law or its name is needed, found {type(law).__name__}")
+    return law
 
 
 def loaded_plugin_files() -> list[str]:

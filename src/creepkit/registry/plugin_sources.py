@@ -67,7 +67,7 @@ class InstalledModule:
 
     @cached_property
     def provenance(self) -> Provenance:
-        """Distribution with version, and the name of the first entry point; others' metadata are read when asked for."""
+        """Distribution with version, and the name of the first entry point; metadata are read when asked."""
         entry = self.entries[0]
         if self.is_own:
             return Provenance(f"creepkit {creepkit.__version__}", entry.name)
