@@ -213,7 +213,7 @@ def compiled_core(root: Path, library: Path) -> bool:
     return linked.returncode == 0
 
 
-def pytest_run(root: Path, paths: list[str], seconds: float, environment: dict[str, str], *options: str) -> int | None:
+def tests_run(root: Path, paths: list[str], seconds: float, environment: dict[str, str], *options: str) -> int | None:
     """Run tests of the copy and return pytest's exit code; None where the limit of time ended them."""
     set_up = {"PYTHONPATH": os.pathsep.join([str(root / "src"), str(Path(__file__).parent)]), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "pytest", "-q", "-p", "mutations", "-p", "no:cacheprovider", *options, *paths]
@@ -250,7 +250,7 @@ def probed(root: Path, package: str, mutations: list[Mutation], folder: Path) ->
     if package == "core":
         environment["CREEPKIT_CORE"] = str(folder / "libcreepkit_core.so")
     try:
-        pytest_run(root, existing(root, TESTS[package]), 3600, environment, "-m", "not long_when_sanitized")
+        tests_run(root, existing(root, TESTS[package]), 3600, environment, "-m", "not long_when_sanitized")
     finally:
         for path, (source, status) in originals.items():
             path.write_text(source, encoding="utf-8")
@@ -345,7 +345,7 @@ def verdict(root: Path, mutation: Mutation, tests: list[str], seconds: float, fo
             if not compiled_core(root, folder / "libcreepkit_core.so"):
                 return "not compiled"
         files = sorted({name.partition("::")[0] for name in tests})
-        code = pytest_run(root, files, seconds, environment, "-x")
+        code = tests_run(root, files, seconds, environment, "-x")
     finally:
         path.write_text(original, encoding="utf-8")
         if mutation.package != "core":  # what was compiled of it is older than the file again
