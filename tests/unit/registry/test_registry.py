@@ -409,9 +409,7 @@ def test_a_missing_law_says_that_plugins_bring_more(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_word_for_several_targets_is_answered_by_those_that_serve_it() -> None:
-    with pytest.raises(
-        ExportError, match="choose one of those that serve it: abaqus, calculix, mfront"
-    ):
+    with pytest.raises(ExportError, match="choose one of those that serve it: abaqus, calculix, mfront"):
         Registry().exporter("UMAT")
     assert Registry().exporter("tex").name == "latex"
 
