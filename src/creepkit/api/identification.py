@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
+from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
 from creepkit.options import takes_options
 from creepkit.records import History, Predictor
 from creepkit.registry import resolve_law
@@ -18,9 +20,7 @@ if TYPE_CHECKING:
     from creepkit.discovery.elastic_moduli import ModulusEstimates
     from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.search.global_search import GlobalSearch
     from creepkit.inverse.selection import Ranking
-    from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
     from creepkit.language import CreepLaw
 
 
