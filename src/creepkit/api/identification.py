@@ -1,46 +1,30 @@
-"""Identification and selection of laws, their confirmation by simulation, and their export."""
+"""Identification and selection of laws, and their confirmation by simulation."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal
 
-from creepkit import registry
 from creepkit.checked_arguments import checked
-from creepkit.errors import ExportError, FitError, nearest, quoted
-from creepkit.records import History, LawWithValues, Nuisance, Predictor, Units, dimension_named, exported_text
-from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictors
+from creepkit.errors import FitError, quoted
+from creepkit.inverse.search.global_search import GlobalSearch
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
+from creepkit.options import takes_options
+from creepkit.records import History, Predictor
+from creepkit.registry import resolve_law
+from creepkit.registry.arguments import check_histories, resolve_predictors
 
 if TYPE_CHECKING:
     from creepkit.discovery.elastic_moduli import ModulusEstimates
-    from creepkit.discovery.temperature_law import TemperatureLaw
     from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.search.global_search import GlobalSearch
     from creepkit.inverse.selection import Ranking
-    from creepkit.inverse.settings import IdentificationSettings, OutputWeights
-    from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
-    from creepkit.language import CreepLaw, Elastic
+    from creepkit.language import CreepLaw
 
 
-class SettingChanges(TypedDict, total=False):
-    """Fields of IdentificationSettings that a call may change by name."""
-
-    starts: int
-    sobol_points: int
-    frames: int
-    seed: int
-    loss: str
-    nuisances: Sequence[Nuisance | str] | Nuisance | str | None
-    weights: OutputWeights
-    test_loss: str
-    further_laws: int
-    suspect_frames: Literal["exclude", "keep"]
-    rupture_times: Literal["auto", "use", "ignore"]
-
-
+@takes_options(IdentificationSettings)
 @checked
 def identify(
     law: CreepLaw | str,
@@ -52,7 +36,7 @@ def identify(
     through: Predictor | Literal["auto"] | None = "auto",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    **changes: Unpack[SettingChanges],
+    **changes: Any,
 ) -> Identification:
     """Identify the parameters of a law from all histories at once, with 95 % intervals.
 
@@ -65,18 +49,17 @@ def identify(
         values and intervals; "auto" takes the reduced-order model of `using` where that states its own error.
         A surrogate that does not know the class of the law is replaced by its specimen, and a note says so.
     settings : what is minimised, nuisance parameters, starts, seed, frames, robust losses, and whether suspect frames
-        are left out; see IdentificationSettings. changes : single fields of it by name:
+        are left out. changes : single fields of it, see IdentificationSettings:
         starts=4, nuisances=["offset", Nuisance("rate", sd=0.1)], weights="likelihood".
     """
     from creepkit.inverse.composite_predictor import through_for_law
     from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
     from creepkit.inverse.identify import identify as run
     from creepkit.inverse.nuisance_parameters import check_nuisance_tests
-    from creepkit.inverse.settings import IdentificationSettings
     from creepkit.inverse.sparsity.term_selection import identify_sparse
 
     law, predictor = resolve_law(law), resolve_predictors(using, check_histories(histories))
-    settings = change_settings(settings or IdentificationSettings(), changes, predictor)
+    settings = (settings or IdentificationSettings()).changed(changes, predictor)
     histories, left_out = sound_tests(check_histories(histories), settings)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     surrogate = _resolve_through(through, predictor)
@@ -98,6 +81,7 @@ def identify(
     return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
 
 
+@takes_options(IdentificationSettings, weights="likelihood")
 @checked
 def select(
     laws: Sequence[CreepLaw | str],
@@ -109,7 +93,7 @@ def select(
     by: Literal["bic", "aicc", "hold-out"] = "bic",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    **changes: Unpack[SettingChanges],
+    **changes: Any,
 ) -> Ranking:
     """Identify several laws from the same histories by likelihood, and rank them by how well they explain these.
 
@@ -122,10 +106,9 @@ def select(
     from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
     from creepkit.inverse.nuisance_parameters import check_nuisance_tests
     from creepkit.inverse.selection.select import select as run
-    from creepkit.inverse.settings import IdentificationSettings
 
     predictor = resolve_predictors(using, check_histories(histories))
-    settings = change_settings(settings or IdentificationSettings(), changes, predictor)
+    settings = (settings or IdentificationSettings()).changed(changes, predictor)
     if changes.get("weights") not in (None, "likelihood"):
         raise FitError(
             f"select() compares laws by their likelihood, found weights={changes['weights']!r}; leave weights out, or "
@@ -198,40 +181,6 @@ def confirm(
     return run(fit, histories, used if len(used) > 1 else next(iter(used.values())))
 
 
-def change_settings(
-    settings: IdentificationSettings,
-    changes: SettingChanges,
-    predictor: Predictor | Mapping[str, Predictor] | None = None,
-) -> IdentificationSettings:
-    """The settings with fields changed by name; nuisances=None leaves those of `settings`.
-
-    A nuisance that is a name alone has its prior as usual; that of a length is the tolerance that its specimen states.
-
-    With another number of starts the number of Sobol points that are screened follows, unless it is given too.
-    """
-    known = [field.name for field in fields(settings)]
-    given: dict[str, Any] = {name: value for name, value in changes.items() if value is not None}
-    for name in given:
-        if name not in known:
-            raise FitError(f"settings of an identification have no '{name}'; {nearest(name, known)}")
-    if "nuisances" in given:
-        listed: Any = given["nuisances"]
-        listed = [listed] if isinstance(listed, str | Nuisance) else listed
-        given["nuisances"] = tuple(_nuisance_named(one, predictor) if isinstance(one, str) else one for one in listed)
-    if "starts" in given:  # eight points a start, a power of two, and at least 64
-        points = max(64, 1 << (8 * max(int(given["starts"]), 1) - 1).bit_length())
-        given.setdefault("sobol_points", points)
-    return replace(settings, **given)
-
-
-def _nuisance_named(kind: str, predictor: Predictor | Mapping[str, Predictor] | None) -> Nuisance:
-    """The nuisance of this name; of a length with the tolerance of its specimen, the largest where several have it."""
-    predictors = [*predictor.values()] if isinstance(predictor, Mapping) else [predictor]
-    lengths = [length for p in predictors if (length := dimension_named(p, kind)) is not None]
-    sd = max((length.tolerance * length.default for length in lengths), default=0.0)
-    return Nuisance(kind, sd=sd) if sd > 0.0 else Nuisance(kind)
-
-
 def _resolve_through(
     through: Predictor | Literal["auto"] | None, predictor: Predictor | Mapping[str, Predictor]
 ) -> Predictor | None:
@@ -246,89 +195,3 @@ def _resolve_through(
         )
     reduced = None if isinstance(predictor, Mapping) else reduced_order_model_of(predictor)
     return reduced if reduced is not None and prediction_errors_of(reduced) else None
-
-
-@checked
-def export(
-    source: CreepLaw | Identification | Ranking | TemperatureLaw | LawWithValues | str,
-    target: str,
-    values: Mapping[str, float] | None = None,
-    *,
-    units: Units | Mapping[str, str] | None = None,
-    temperature: float | None = None,
-    name: str = "",
-    to: str | Path | None = None,
-    force: bool = False,
-) -> str:
-    """Return a law with its values as text for a target (latex, python, abaqus ...), and write it to a file if asked.
-
-    source : a law, which needs `values` {parameter: value}, or an identification or a temperature law, whose intervals
-        and range of validity become comments, or a ranking, whose best law is written with the verdict on it, or the
-        record of law_with_values(), which may have elastic constants and notes as well.
-    target : one of `available("exporters")`. units : of stress and time in the text, Units("Pa", "h") or
-        {"stress": "Pa"}.
-    temperature : K, puts a number in the place of the temperature, for targets that know none.
-    name : what the target calls the law. to, force : the file to write, and whether one that exists may be replaced.
-
-    ExportError, with the reason, when the target cannot express the law.
-    """
-    from creepkit.exporters.law_files import write_export
-
-    exporter = registry.default_registry().exporter(target)
-    record = law_with_values(source, values, name=name)
-    if units is not None:
-        record = record.replace(units=_resolve_units(units))
-    if temperature is not None:
-        record = record.replace(notes=(*record.notes, f"taken at a temperature of {temperature:g} K")).at(temperature)
-    if to is not None:
-        write_export(record, exporter, to, force=force)
-    return exported_text(exporter, record)
-
-
-@checked
-def law_with_values(
-    source: CreepLaw | Identification | Ranking | TemperatureLaw | LawWithValues | str,
-    values: Mapping[str, float] | None = None,
-    *,
-    elastic: Elastic | None = None,
-    name: str = "",
-    notes: Sequence[str] = (),
-) -> LawWithValues:
-    """Return a law with its values and what goes with them into every export.
-
-    source, values, name : as export() takes them; notes say which values were set by hand in the place of others.
-    elastic : E in MPa, and nu, for targets that state them. notes : lines that become comments.
-    """
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection import Ranking
-
-    resolved: Any = getattr(source, "valued", source)  # a temperature law has one
-    verdict = ""
-    if isinstance(resolved, Ranking):
-        verdict, resolved = resolved.verdict if len(resolved.laws) > 1 else "", resolved.best
-    if isinstance(resolved, Identification):
-        from creepkit.reports.identification_text import identification_comments
-
-        resolved = LawWithValues(
-            resolved.law, resolved.values, tuple(identification_comments(resolved, verdict)), ranges=resolved.ranges
-        )
-    if not isinstance(resolved, LawWithValues):
-        return LawWithValues(resolve_law(resolved), values or {}, tuple(notes), elastic=elastic, name=name)
-    record = resolved if values is None else resolved.replace(values=values)
-    changed = [
-        f"{parameter} = {value:.8g} was set by hand, in place of {resolved.values[parameter]:.8g}"
-        for parameter, value in record.values.items()
-        if value != resolved.values[parameter]
-    ]
-    return record.replace(
-        notes=(*resolved.notes, *changed, *notes), elastic=elastic or record.elastic, name=name or record.name
-    )
-
-
-def _resolve_units(units: Units | Mapping[str, str]) -> Units:
-    if isinstance(units, Units):
-        return units
-    unknown = sorted({*units} - {"stress", "time"})
-    if unknown:
-        raise ExportError(f"units have no '{unknown[0]}'; write units={{'stress': 'Pa', 'time': 'h'}}")
-    return Units(**units)

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from creepkit.app.contents import PageSource
 from creepkit.checked_arguments import checked
 from creepkit.errors import ExportError
 from creepkit.files.writing import check_target, write_text
 
 if TYPE_CHECKING:
-    from creepkit.app.contents import PageContents, PageSource
+    from creepkit.app.contents import PageContents
     from creepkit.records import History
 
 

@@ -50,7 +50,7 @@ from creepkit.cli import (
 from creepkit.cli.declared_options import checked
 from creepkit.cli.described_test import TestCommand
 from creepkit.cli.failures import NO_READER, failure_sentence, output_sentence, say
-from creepkit.cli.identification_options import CommandWithDefaults
+from creepkit.cli.given_options import CheckedCommand
 from creepkit.cli.interrupts import exit_code, interrupted_sentence, was_interrupted
 from creepkit.errors import CreepkitError, PluginError
 from creepkit.files.writing import FULL
@@ -121,7 +121,7 @@ class CommandGroup(TyperGroup):
             failed: tuple[str, ...] = ()
         except PluginError as error:
             failed = (str(error),)
-        added, problems = _plugin_commands(set(self.commands), listed_only=True)
+        added, problems = _plugin_commands(set(self.commands))
         shown = {name: command for name, command in sorted(added.items()) if not command.hidden}
         if shown:
             limit = formatter.width - 6 - max(map(len, shown))
@@ -181,7 +181,7 @@ TEST_COMMANDS = ("simulate", "predict")
 
 
 for name, command in COMMANDS.items():
-    app.command(name, cls=TestCommand if name in TEST_COMMANDS else CommandWithDefaults)(checked(command))
+    app.command(name, cls=TestCommand if name in TEST_COMMANDS else CheckedCommand)(checked(command))
 
 
 def _print_version(requested: bool) -> None:
@@ -226,13 +226,13 @@ def _load_plugin_files(files: list[Path] | None) -> None:
                 tell(f"creepkit: {sentence}", err=True)
 
 
-def _plugin_commands(own_names: set[str], *, listed_only: bool = False) -> tuple[dict[str, Any], list[str]]:
+def _plugin_commands(own_names: set[str]) -> tuple[dict[str, Any], list[str]]:
     """Return {name: command} of what plugins add, and a sentence for each plugin or command that cannot be used."""
     from creepkit import registry
 
     added: dict[str, Any] = {}
     problems: list[str] = []
-    for plugin, app in registry.default_registry().command_lines(listed_only=listed_only):
+    for plugin, app in registry.default_registry().command_lines():
         try:
             commands = typer.main.get_group(app).commands
         except Exception as error:  # of the signature of somebody else's command

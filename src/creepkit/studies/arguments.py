@@ -217,7 +217,6 @@ def _unit_of_kind(kind: str) -> str:
 def settings_of(file: StudyFile) -> IdentificationSettings:
     """Settings of every identification: the defaults with what the study changes."""
     import creepkit as ck
-    from creepkit.api.identification import change_settings
 
     model, changes = file.model, {"seed": file.model.study.seed, "suspect_frames": file.model.data.suspect_frames}
     base = ck.IdentificationSettings()
@@ -227,13 +226,13 @@ def settings_of(file: StudyFile) -> IdentificationSettings:
             value = getattr(part, name)
             if value is not None:
                 with file.at("identification", name):
-                    change_settings(base, {name: value})  # type: ignore[misc]
+                    base.changed({name: value})
                 changes[name] = value
         changes["nuisances"] = nuisances_of(file)  # type: ignore[assignment]
     if model.selection is not None and model.selection.further_laws is not None:
         changes["further_laws"] = model.selection.further_laws
     with file.at("identification"):
-        return change_settings(base, changes)  # type: ignore[arg-type]
+        return base.changed(changes)
 
 
 def steps_of(steps: Sequence[Step]) -> list[tuple[float, float]]:
@@ -323,8 +322,8 @@ def rigs_of_study(file: StudyFile, rigs: Sequence[Rig], predictor: object) -> li
 
 def tolerances_of(file: StudyFile, number: int) -> dict[str, float]:
     """{kind: standard deviation} of a forecast, in the unit of the nuisance parameter of that kind."""
-    from creepkit.records.known_specimens import all_dimensions
     from creepkit.records.prediction import GENERAL_NUISANCES
+    from creepkit.records.specimen_lookup import all_dimensions
 
     known = [*GENERAL_NUISANCES, *all_dimensions()]
     spelt = {f"{kind}_{unit}" if (unit := _unit_of_kind(kind)) else kind: kind for kind in known}
