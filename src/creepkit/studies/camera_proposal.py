@@ -13,7 +13,7 @@ import numpy as np
 from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import CreepkitError
 from creepkit.registry.arguments import frame_files, read_frames, read_record
-from creepkit.studies.toml_text import CITATION_LINE, comment, quoted, quoted_list, study_part
+from creepkit.studies.proposed_tables import comment, quoted
 
 if TYPE_CHECKING:
     from creepkit.records import Frames, InstrumentRecord
@@ -150,19 +150,3 @@ def _camera_lines(
         ]
         lines += ["# temperature_C = 800"]
     return [*lines, "# modulus_GPa = 150  # a specimen of finite elements needs it", '# names = ["D1"]', ""]
-
-
-def text_of_cameras(folder: Path, cameras: CameraProposal, names: Sequence[str]) -> str:
-    """A study whose tests are all of cameras: what they hold is known when it has been extracted.
-
-    names : of candidate laws, those of them that are installed.
-    """
-    import creepkit as ck
-
-    laws = [name for name in names if name in ck.available("laws")]
-    identification = ["# The tests are not known before the frames are extracted.", "[identification]"]
-    identification += [f"laws = {quoted_list(laws)}  # creepkit laws lists all", "", "[selection]", 'by = "bic"']
-    report = ["[report]", 'file = "report.html"', "attach_MB = 3  # data files up to this size in all are put into it"]
-    data = ["# [data]", CITATION_LINE]
-    parts = [study_part(folder), list(cameras.lines), data, identification, report]
-    return "\n\n".join("\n".join(lines) for lines in parts) + "\n"

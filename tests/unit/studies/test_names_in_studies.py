@@ -25,7 +25,7 @@ BASE = '[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["norton"]\n'
     [
         ('[data]\nfiles = ["*.csv"]\nreader = "cvs"\n', 3, "did you mean 'csv'"),
         ('[data]\nfiles = ["none/*.csv"]\n', 2, "none/*.csv"),
-        ('[data]\nfiles = [\n "*.csv",\n "/etc/passwd"]\n', 4, "absolute"),
+        ('[data]\nfiles = [\n "*.csv",\n "/etc/passwd"]\n', 2, "absolute"),
         ('[data]\nfiles = ["~/x.csv"]\n', 2, "absolute"),
         (BASE.replace("norton", "nortn"), 4, "did you mean 'norton'"),
         (BASE + "fix = { nn = 5 }\n", 5, "no law has a parameter 'nn'"),
