@@ -1,24 +1,18 @@
 """Systems other than Linux, as far as Linux can stand in for them: what a system lacks is taken away here."""
 
 import ast
-import errno
-import itertools
 import ntpath
 import os
 import subprocess
 import sys
-from pathlib import Path, PureWindowsPath
+from pathlib import PureWindowsPath
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import creepkit as ck
-from creepkit.errors import HistoryError
-from creepkit.files import locking
 from creepkit.files.file_names import DEVICE_NAMES, file_stem, hashed_stem, numbered_stems
-from creepkit.files.writing import write_text
-from creepkit.jobs.shard_progress import ShardLock
 from helpers import source_tree
 from helpers.paths import ROOT
 
@@ -142,88 +136,6 @@ def test_it_works_without_the_modules_that_windows_lacks(absent, tmp_path) -> No
     assert (tmp_path / "set.h5").is_file()
 
 
-class BytesLocked:
-    """msvcrt.locking: bytes at the place of a descriptor; one holder, who may be this process as well."""
-
-    LK_NBLCK = 2
-
-    def __init__(self) -> None:
-        self.held: dict[tuple[int, int], int] = {}
-
-    def locking(self, file: int, mode: int, count: int) -> None:
-        assert (mode, count) == (self.LK_NBLCK, 1)
-        place = os.fstat(file).st_ino, os.lseek(file, 0, os.SEEK_CUR)
-        if self.held.setdefault(place, file) != file:
-            raise OSError(errno.EACCES, "Permission denied")
-
-
-def test_locks_of_windows_keep_the_content_readable_and_the_second_out(tmp_path, monkeypatch) -> None:
-    system = BytesLocked()
-    monkeypatch.setattr(locking, "fcntl", None)
-    monkeypatch.setattr(locking, "msvcrt", system)
-    with ShardLock(tmp_path / "1.lock") as first, ShardLock(tmp_path / "1.lock") as second:
-        assert first.held
-        assert not second.held
-        first.record_start(7)
-        assert (tmp_path / "1.lock").read_bytes() == b"7\n"
-    assert [place for _, place in system.held] == [locking.LOCKED_BYTE]
-    assert (tmp_path / "1.lock").stat().st_size == 0
-
-
-def test_a_lock_file_that_cannot_go_while_it_is_open_goes_later(tmp_path, monkeypatch) -> None:
-    unlink, lock = Path.unlink, ShardLock(tmp_path / "1.lock")
-    open_files = {tmp_path / "1.lock"}
-
-    def as_on_windows(path, missing_ok=False):
-        if path in open_files:
-            raise PermissionError(errno.EACCES, "Permission denied", str(path))
-        unlink(path, missing_ok=missing_ok)
-
-    monkeypatch.setattr(Path, "unlink", as_on_windows)
-    close = os.close
-    monkeypatch.setattr(os, "close", lambda file: (open_files.clear(), close(file))[1])
-    with lock:
-        lock.remove()
-        assert (tmp_path / "1.lock").exists()
-    assert not (tmp_path / "1.lock").exists()
-
-
-def test_without_locks_of_any_kind_work_goes_on(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(locking, "fcntl", None)
-    monkeypatch.setattr(locking, "msvcrt", None)
-    with ShardLock(tmp_path / "1.lock") as lock:
-        assert lock.held
-
-
-def held_by_another_program(path, refusals):
-    """os.replace as Windows has it while a program holds the file of this name; refusals : how often it is asked."""
-    replace, asked = os.replace, itertools.count()
-
-    def as_on_windows(source, target):
-        if Path(target) == path and next(asked) < refusals:
-            raise PermissionError(errno.EACCES, "Access is denied", str(target))
-        replace(source, target)
-
-    return as_on_windows
-
-
-def test_a_file_that_a_scanner_reads_is_replaced_a_moment_later(tmp_path, monkeypatch) -> None:
-    path = write_text("old", tmp_path / "a.csv", HistoryError)
-    monkeypatch.setattr(os, "replace", held_by_another_program(path, 2))
-    write_text("new", path, HistoryError)
-    assert path.read_text() == "new"
-
-
-def test_a_result_whose_file_stays_open_in_a_spreadsheet_is_kept_beside_it(tmp_path, monkeypatch) -> None:
-    path = write_text("old", tmp_path / "a.csv", HistoryError)
-    monkeypatch.setattr(os, "replace", held_by_another_program(path, 99))
-    with pytest.raises(HistoryError, match=r"another program holds it.*the result is .*a-2"):
-        write_text("new", path, HistoryError)
-    assert path.read_text() == "old"
-    assert (tmp_path / "a-2.csv").read_text() == "new"
-    assert sorted(one.name for one in tmp_path.iterdir()) == [".creepkit-written", "a-2.csv", "a.csv"]
-
-
 # ---- names of files ------------------------------------------------------------------------------------------------
 
 
@@ -248,34 +160,6 @@ def test_names_differ_by_more_than_case(texts) -> None:
     assert len({name.casefold() for name in names}) == len(texts)
     hashed = [hashed_stem(text, others=texts) for text in dict.fromkeys(texts)]
     assert len({name.casefold() for name in hashed}) == len(hashed)
-
-
-@pytest.mark.parametrize("name", ["CON", "nul", "Aux", "COM1", "lpt9", "con.1", "PRN.2024"])
-def test_names_of_devices_are_changed(name) -> None:
-    assert not is_savable(name + ".csv")
-    assert is_savable(file_stem(name) + ".csv")
-
-
-def test_tests_of_difficult_names_are_written_apart(tmp_path) -> None:
-    from creepkit.cli.read import _write
-
-    history = ck.read_histories(ck.example_data("planted creep curves"))[0]
-    from dataclasses import replace
-
-    names = ["CON", "bar A", "bar a", "Prüfling 3", "a/b:c"]
-    paths = _write([replace(history, name=name) for name in names], tmp_path / "out")
-    assert len({path.name.casefold() for path in paths}) == len(names)
-    assert all(is_savable(path.name) for path in paths)
-    assert len(list((tmp_path / "out").glob("*.csv"))) == len(names)
-
-
-def test_long_paths_are_written_and_read(tmp_path) -> None:
-    folder = tmp_path.joinpath(*itertools.repeat("f" * 60, 8))  # beyond the 260 signs of old Windows
-    folder.mkdir(parents=True)
-    run = ck.read_histories(ck.example_data("planted creep curves"))[0]
-    path = ck.write_history(run, folder / f"{'n' * 80}.csv")
-    assert len(str(path)) > 500
-    assert ck.read_histories(path)[0].times.size == run.times.size
 
 
 # ---- terminals -----------------------------------------------------------------------------------------------------
@@ -363,11 +247,6 @@ def cluster(tmp_path):
 
 
 USES = {"excel": spreadsheet, "mcmc": posterior, "cluster": cluster}
-
-
-def test_every_extra_is_tried() -> None:
-    """But for plugins, whose laws are asked for in unit/cli/test_missing_laws.py."""
-    assert USES.keys() | {"plugins"} == extras().keys()
 
 
 @pytest.mark.parametrize("extra", sorted(USES))

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from creepkit.dataset import storage
 from helpers.dataset_runs import ROWS, assert_same, left_behind, run, run_here, shards_of, whole_of
 from helpers.planted_sampling import Deadly, Planted, Strong, Visible, strain, stress_of
 
@@ -74,11 +73,6 @@ def test_parts_of_a_job_array_become_one_file(whole, tmp_path):
     made = {path: path.stat().st_mtime_ns for path in shards_of(to)}
     assert_same(run_here(to), whole)
     assert made.items() <= {path: path.stat().st_mtime_ns for path in shards_of(to)}.items()
-
-
-def test_nothing_is_left_behind(tmp_path):
-    run_here(tmp_path / "a.h5")
-    assert left_behind(tmp_path) == ["merging.lock"]
 
 
 # ---- deaths --------------------------------------------------------------------------------------------------------
@@ -157,24 +151,6 @@ def test_a_generation_that_is_killed_goes_on_where_it_was(whole, tmp_path, worke
     assert left_behind(tmp_path) == ["merging.lock"]
 
 
-def test_kills_of_all_processes_at_one_sample_change_nothing(whole, tmp_path, caplog):
-    """As a batch system does at its limit, workers first; a run that is not killed has no failures."""
-    to = tmp_path / "a.h5"
-    lock, row = to.with_name("a.h5.parts") / "00000.lock", strong_enough(range(16))
-    for times in range(3):
-        known = b"interrupted %d\n" % row * times + b"%d\n" % row
-        run = started(to, seconds=3.0, workers=1)
-        wait_for(lambda known=known: lock.exists() and lock.read_bytes() == known)
-        workers = children(run.pid)
-        for pid in (*workers, run.pid):
-            os.kill(pid, signal.SIGKILL)
-            time.sleep(0.2)
-        run.communicate()
-    assert_same(run_here(to), whole)
-    assert f"sample {row} was being simulated each of the 3 times that this work was killed" in caplog.text
-    assert "died" not in caplog.text
-
-
 def test_ctrl_c_ends_the_workers_and_counts_no_death(tmp_path):
     to = tmp_path / "a.h5"
     first = started(to, seconds=0.1, workers=1)
@@ -194,17 +170,6 @@ def test_a_lock_of_the_dead_does_not_block(whole, tmp_path):
     (parts / "00000.lock").write_text("3\n")
     (parts / "00001.lock").write_bytes(b"\xff\x00garbage")
     assert_same(run_here(to), whole)
-
-
-def test_two_generations_in_one_folder_share_the_work(whole, tmp_path):
-    to, log = tmp_path / "a.h5", tmp_path / "log"
-    both = [started(to, log, seconds=0.02, workers=1) for _ in range(2)]
-    assert [process.communicate()[1] for process in both] == ["", ""]
-    data = storage.read_dataset(to)
-    assert_same(data, whole)
-    made = [storage.read_dataset(path) for path in shards_of(to)]
-    assert log.stat().st_size == sum((part.status >= 0).sum() for part in made)
-    assert len(made) <= len(data) // ROWS + 2
 
 
 # ---- a cluster -----------------------------------------------------------------------------------------------------

@@ -3,15 +3,13 @@
 import os
 import re
 import resource
-from dataclasses import dataclass
 
 import h5py
 import pytest
 
 from creepkit.dataset import storage
 from creepkit.errors import DatasetError
-from helpers.dataset_runs import ROWS, assert_same, left_behind, run, run_here, shards_of, whole_of
-from helpers.other_users import HAS_OWNERS, give_to_another_user
+from helpers.dataset_runs import ROWS, assert_same, left_behind, run_here, shards_of, whole_of
 from helpers.planted_sampling import Planted, Raising
 
 
@@ -19,9 +17,6 @@ from helpers.planted_sampling import Planted, Raising
 def whole(tmp_path_factory):
     """The data set as it is when nothing goes wrong."""
     return whole_of(tmp_path_factory)
-
-
-PLANTED = ("generation.json", "00001.h5", "00001.lock", "merging.lock")
 
 
 # ---- files that are in the way -------------------------------------------------------------------------------------
@@ -48,39 +43,6 @@ def test_a_shard_of_another_data_set_is_not_counted(whole, tmp_path, caplog):
     (tmp_path / "a.h5.parts" / "00000.h5").write_bytes(shards_of(other)[0].read_bytes())
     assert_same(run_here(tmp_path / "a.h5"), whole)
     assert "a shard of another data set; it is simulated again" in caplog.text
-
-
-@HAS_OWNERS
-@pytest.mark.parametrize("name", ["a.h5", "a.h5.parts", *(f"a.h5.parts/{name}" for name in PLANTED)])
-def test_what_another_user_planted_is_no_work_of_ours(tmp_path, monkeypatch, name):
-    run_here(tmp_path / "a.h5")
-    if name != "a.h5":
-        (tmp_path / "a.h5").unlink()
-    planted = tmp_path / name
-    if planted.suffix == ".lock":
-        planted.with_suffix(".h5").unlink(missing_ok=True)
-        planted.touch()
-    give_to_another_user(planted, monkeypatch)
-    with pytest.raises(
-        DatasetError, match=rf"{re.escape(name)}: belongs to another user \(mallory\), .*; remove it, or"
-    ):
-        run_here(tmp_path / "a.h5")
-    if name == "a.h5":
-        assert storage.read_dataset(tmp_path / name).provenance["seed"] == 0, "read where that is asked for"
-
-
-@pytest.mark.parametrize(
-    ("change", "difference"),
-    [
-        ({"seed": 1}, "there and here seed is 0 and 1"),
-        ({"design": Planted(low=60.0)}, "there and here design.low is 50.0 and 60.0"),
-        ({"shard_rows": 32}, "there and here rows is 16 and 32"),
-    ],
-)
-def test_a_folder_of_another_data_set_is_refused(tmp_path, change, difference):
-    run_here(tmp_path / "a.h5", part=(1, 1))
-    with pytest.raises(DatasetError, match=rf"a\.h5\.parts: holds shards of another data set \({difference}\)"):
-        run_here(tmp_path / "a.h5", **change)
 
 
 def test_a_target_that_is_something_else_is_refused_before_any_work(tmp_path, whole):
@@ -139,27 +101,6 @@ def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
 # ---- what cannot be asked for --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("how", "message"),
-    [
-        ({"samples": 0}, "samples is 0; allowed are whole numbers from 1 to"),
-        ({"samples": 2.5}, "samples is 2.5; allowed are whole numbers from 1 to"),
-        ({"seed": 1.5}, "seed is 1.5; allowed are whole numbers from zero on"),
-        ({"seed": -1}, "seed is -1; allowed"),
-        ({"samples": None}, "say either how many accepted samples"),
-        ({"draws": 5}, "say either how many accepted samples"),
-        ({"workers": 0}, "workers is 0; allowed are whole numbers from 1 to 1024"),
-        ({"part": (3, 2)}, "part 3/2 is none; allowed are 1/N to N/N"),
-        ({"cluster": "scheduler"}, "'scheduler' is no address of a dask scheduler; write tcp://host:port"),
-        ({"cluster": "tcp://127.0.0.1:9"}, "no dask scheduler answers at tcp://127.0.0.1:9"),
-    ],
-)
-def test_what_cannot_be_asked_for(tmp_path, how, message, monkeypatch):
-    monkeypatch.setattr("creepkit.jobs.worker_pools.CONNECT_TIMEOUT", 0.5)
-    with pytest.raises(DatasetError, match=message):
-        run(tmp_path / "a.h5", **how)
-
-
 def test_a_design_of_which_nothing_is_accepted_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr("creepkit.jobs.shard_progress.MOST_DRAWS_WITHOUT_ACCEPTED", 64)
     with pytest.raises(
@@ -171,27 +112,3 @@ def test_a_design_of_which_nothing_is_accepted_is_given_up(tmp_path, monkeypatch
 def test_a_design_of_which_everything_fails_is_given_up(tmp_path):
     with pytest.raises(DatasetError, match="the first 8 simulations all failed: ZeroDivisionError"):
         run_here(tmp_path / "a.h5", Planted((Raising(),)))
-
-
-@dataclass(frozen=True)
-class Unthought(Planted):
-    """A design whose author did not think of every row."""
-
-    def draw(self, first, count, seed):
-        raise IndexError("row 3 of\n2")
-
-
-def test_a_design_that_cannot_be_drawn_is_said(tmp_path):
-    with pytest.raises(DatasetError, match="shard 0 cannot be simulated: IndexError: row 3 of 2"):
-        run_here(tmp_path / "a.h5", Unthought())
-
-
-def test_a_file_without_a_name(tmp_path):
-    with pytest.raises(DatasetError, match="'' is no name of a file; name the HDF5 file to write"):
-        run_here("")
-
-
-def test_workers_that_cannot_start_are_said(tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONHOME", str(tmp_path))
-    with pytest.raises(DatasetError, match="a worker process ended as it started"):
-        run(tmp_path / "a.h5")

@@ -83,21 +83,6 @@ def test_values_without_a_counterpart_are_refused(given: str, m: float, said: st
 
 
 @pytest.mark.parametrize(
-    ("values", "given", "said"),
-    [
-        ({"A": 1e-15, "n": 4.0}, "norton-bailey-time", "the values are those of A, n; give A, n and m"),
-        ({**TEXTBOOK, "Q": 3e5}, "norton-bailey-time", "the values are those of A, Q, m, n; give A, n and m"),
-        ({**TEXTBOOK, "A": 0.0}, "norton-bailey-time", "A must be positive and all of them finite"),
-        ({**TEXTBOOK, "n": np.nan}, "norton-bailey-time", "n = nan, m = 0.4; A must be positive and all of them"),
-        (TEXTBOOK, "norton-baily-time", "no notation 'norton-baily-time' .* did you mean 'norton-bailey-time'"),
-    ],
-)
-def test_what_is_no_set_of_values_is_refused(values: dict[str, float], given: str, said: str) -> None:
-    with pytest.raises(LawError, match=said):
-        convert(values, given, "strain-hardening")
-
-
-@pytest.mark.parametrize(
     ("A", "m", "given", "wanted"),
     [
         (1e-13, 0.01, "norton-bailey-time", "strain-hardening"),  # 1e-13^100
@@ -110,13 +95,6 @@ def test_a_coefficient_beyond_double_precision_is_refused(A: float, m: float, gi
     """A becomes A^(1/m), or A^(1/(1-m)): never a silent zero."""
     with pytest.raises(LawError, match="A is not between 1e-300 and 1e300; stay in the notation"):
         convert({"A": A, "n": 4.0, "m": m}, given, wanted)
-
-
-def test_an_unknown_target_or_unit_is_refused() -> None:
-    with pytest.raises(LawError, match="no notation 'ansys' of Norton-Bailey creep: known: norton-bailey-rate"):
-        convert(TEXTBOOK, "norton-bailey-time", "ansys")
-    with pytest.raises(LawError, match="no unit of time 'hours': known: d, h, min, s"):
-        per_second(TEXTBOOK, "norton-bailey-time", "hours")
 
 
 def test_the_example_of_the_readme() -> None:

@@ -1,14 +1,9 @@
 """discover() and refit() from creep curves to an ordinary law, on a closed-form predictor and on one dimple."""
 
-import json
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import creepkit as ck
-from creepkit.cli.app import app
 from creepkit.discovery.discover import discover, group_by_temperature, isothermal_tests, temperature_study
 from creepkit.discovery.refitting import refit
 from creepkit.errors import FitError
@@ -19,10 +14,8 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.kernels import lower
 from creepkit.language import Elastic, arrhenius, linear, temperature
 from creepkit.laws.norton import NORTON
-from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import PressureJump, Program
 from helpers.steady_rate_predictor import Steady, planted
-from helpers.written_files import names_in
 
 T_REF = 1023.15
 TRUE = NORTON.with_temperature(n=linear(T_REF)).times(arrhenius(T_REF))
@@ -87,22 +80,6 @@ def test_the_law_is_an_ordinary_one(trend, tmp_path):
         now = {name: float(v[0]) for name, v in trend.parameters_at(T).items()}
         assert float(lower(NORTON, "numpy").rate(now, stress=80.0)) == pytest.approx(expected, rel=1e-9)
     assert "valid between 973 and 1083 K" in ck.export(trend.valued, "latex")
-
-
-def test_text_file_and_plot(trend, tmp_path):
-    text = str(trend)
-    assert "A  arrhenius" in text
-    assert "prior odds" in text
-    assert "5 temperatures, 973 to 1083 K, and valid between them" in text
-    data = json.loads(trend.save(tmp_path / "trend.json").read_text())
-    assert data["format"] == "creepkit-temperature-law"
-    assert data["plausible_forms"]["n"][0]["name"] == "linear"
-    assert data["fit"]["format"] == "creepkit-identification"
-    figure = trend.plot(tmp_path / "trend.png")
-    assert [axes.get_xlabel() for axes in figure.axes] == ["temperature, K"] * 2
-    assert (tmp_path / "trend.png").stat().st_size > 10_000
-    with pytest.raises(FitError, match="choose a file in a folder that exists"):
-        trend.save(tmp_path / "none" / "trend.json")
 
 
 def test_parameters_that_may_not_depend_on_temperature(alone):
@@ -177,38 +154,6 @@ def test_a_form_is_where_it_should_be_at_its_reference_temperature():
 # ---- the command ---------------------------------------------------------------------------------------------------
 
 
-def test_the_command_on_saved_identifications(alone, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for k, fit in enumerate(alone):
-        fit.save(tmp_path / f"{k}.json")
-    files = [f"{k}.json" for k in range(len(alone))]
-    forms = ["--form", "A=arrhenius", "--form", "n=constant,linear", "--prior", "n:linear=2"]
-    told = CliRunner().invoke(app, ["discover", *files, *forms, "--json", "--to", "out"])
-    assert told.exit_code == 0, told.output
-    answer = json.loads(told.stdout)
-    assert answer["forms"] == {"A": "arrhenius", "n": "linear"}
-    assert answer["judged_by"] == "points"
-    names = {"temperature.json", "temperature.png", "law.tex", "law.py"}
-    assert {*names_in(tmp_path / "out")} == names
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (["--form", "n"], "--form n is not known; write n=constant,linear"),
-        (["--form", "q=linear"], "has no parameter 'q'"),
-        (["--prior", "A:arrhenius=much"], "write A:arrhenius=10"),
-    ],
-)
-def test_the_command_says_what_is_wrong(alone, tmp_path, monkeypatch, given, said):
-    monkeypatch.chdir(tmp_path)
-    for k, fit in enumerate(alone):
-        fit.save(tmp_path / f"{k}.json")
-    told = CliRunner().invoke(app, ["discover", *(f"{k}.json" for k in range(len(alone))), *given])
-    assert told.exit_code == 1
-    assert said in told.stderr
-
-
 # ---- what cannot be known ------------------------------------------------------------------------------------------
 
 
@@ -223,22 +168,6 @@ def test_one_temperature_says_what_it_cannot(tests, alone):
 def test_two_temperatures_have_no_form(alone):
     with pytest.raises(FitError, match="at 973 and 1000 K alone: two temperatures give an activation energy but no"):
         discover(alone[:2])
-
-
-def test_identifications_that_do_not_belong_together(alone, tests):
-    other = identify(STRAIN_HARDENING, tests[:3], Steady(), settings=QUICK)
-    with pytest.raises(FitError, match="are of 'norton' and of 'strain-hardening'; give those of one law"):
-        discover([*alone, other])
-    warm = identify(NORTON.times(arrhenius()), tests[:6], Steady(), settings=QUICK)
-    with pytest.raises(FitError, match="depends on temperature already"):
-        discover([warm, *alone])
-    joint = identify(NORTON, tests[:6], Steady(), settings=QUICK)
-    with pytest.raises(FitError, match="spans 973 to 1000 K; identify each temperature alone"):
-        discover([joint, *alone])
-    with pytest.raises(FitError, match="takes a list of identifications"):
-        discover(alone[0])
-    with pytest.raises(FitError, match="give using="):
-        discover([replace(fit, predictor=None) for fit in alone], forms=FEW, histories=tests)
 
 
 def test_a_form_that_cannot_be_refitted_is_told(trend, tests, monkeypatch):

@@ -173,13 +173,6 @@ def test_forms_that_span_the_same_are_one():
     assert {"linear", "inverse"}.isdisjoint(names)
 
 
-def test_names_that_are_no_forms():
-    with pytest.raises(FitError, match="there is no temperature form 'linaer'"):
-        candidate_forms(NORTON, "n", False, T_REF, NINE, ("linaer",))
-    with pytest.raises(FitError, match="none of the forms arrhenius suits parameter 'n'"):
-        candidate_forms(NORTON, "n", False, T_REF, NINE, ("arrhenius",))
-
-
 PLUGIN = """
 from sympy import Symbol
 from creepkit.language import Param, TemperatureForm, hookimpl, temperature

@@ -165,30 +165,3 @@ def test_several_dimples_are_named_by_rows(dimple):
     assert given.name == "E5"
     assert given.center_given
     np.testing.assert_allclose(given.outputs["amplitude"][8:], short.truth()[8:, 0], atol=4e-3)
-
-
-def test_what_cannot_be_extracted(frames, dimple):
-    still = Dimple(dimple.times[:12], dimple.radii, 0.0 * dimple.rise[:12], 0.0 * dimple.widening[:12])
-    with pytest.raises(
-        HistoryError, match=r"frames 'virtual': no dome of about 7\.5 mm radius stands out of the noise"
-    ):
-        ck.extract(CAMERA.frames(still))
-    with pytest.raises(HistoryError, match="their times are not known, or do not rise"):
-        ck.extract(replace(frames, times=np.full(len(frames), np.nan)))
-    with pytest.raises(HistoryError, match="specimen 'uniaxial' does not say how cameras see its surface"):
-        ck.extract(frames, "uniaxial")
-    with pytest.raises(HistoryError, match=r"D1: only 0 points of the clamped plate lie between 10 and 15 mm"):
-        ck.extract(VirtualCamera(points=600).frames(dimple), centers=[(12.0, -7.0)])
-    with pytest.raises(HistoryError, match=r"centre of D1 is \(1\.0,\); give x and y in mm"):
-        ck.extract(frames, centers=[(1.0,)])
-    with pytest.raises(ck.errors.SolveError, match="not observed as 'profile 0-7.5 mm', which is of profiles"):
-        ck.extract(frames, operator="profile 0-7.5 mm")
-
-
-def test_the_contact_sheet_and_the_text(extraction):
-    figure = extraction.plot()
-    titles = [axes.get_title() for part in figure.subfigs for axes in part.axes]
-    assert any(title.startswith("amplitude in mm") for title in titles)
-    text = str(extraction)
-    assert "48 of 48 frames used, field 0-7.5 mm" in text
-    assert "smoothing of subsets of 1.2 mm taken out" in text

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from functools import cache
 from itertools import product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import geometry_derivative
 from creepkit.fem.reduced_order_model import ReducedBasis, ReducedOrderModel, full_basis, mode_gradients
@@ -23,7 +20,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.records import Program, Status
 from creepkit.specimens import reduced_order_training
 from creepkit.specimens.reduced_order_training import power_law_runs, trained_basis
-from helpers.fem_cases import FREE, STILL, block, course, left_of, lowered, mesh_of
+from helpers.fem_cases import FREE, STILL, block, left_of, lowered, mesh_of
 from helpers.literature_laws import RATE, damage, number, omega
 
 TIGHT = SolverSettings(newton=1e-12, **FREE)
@@ -209,31 +206,6 @@ def test_a_trained_model_is_near_its_finite_elements(tmp_path, monkeypatch) -> N
     assert np.abs(found - exact).max() < 5e-3 * np.abs(exact).max()
 
 
-def test_a_kept_basis_that_is_not_sound_is_absent(tmp_path) -> None:
-    """What a file must hold, whoever wrote it: modes of the mesh, points of it, once each, and positive factors."""
-    path, sound = tmp_path / "basis.safetensors", few()
-    for change in (
-        {"modes": sound.modes[:0]},
-        {"modes": sound.modes[:, :-1]},
-        {"modes": np.where(sound.modes == sound.modes.max(), np.nan, sound.modes)},
-        {"points": np.where(sound.points == sound.points[0], sound.points[1], sound.points)},
-        {"points": sound.points + TUBE.weights.size},
-        {"points": sound.points - TUBE.weights.size},
-        {"points": sound.points.astype(float)},
-        {"factors": -sound.factors},
-        {"factors": 0.0 * sound.factors},
-        {"factors": np.inf * sound.factors},
-        {"factors": sound.factors[:-1]},
-    ):
-        changed = SimpleNamespace(modes=sound.modes, points=sound.points, factors=sound.factors)
-        vars(changed).update(change)
-        reduced_order_training._keep(changed, path)
-        assert path.is_file()
-        assert reduced_order_training._read(path, TUBE) is None, change
-    reduced_order_training._keep(sound, path)
-    np.testing.assert_array_equal(reduced_order_training._read(path, TUBE).modes, sound.modes)
-
-
 def test_a_kept_basis_that_was_changed_is_trained_and_written_anew(tmp_path, monkeypatch) -> None:
     """A changed byte of a mode leaves a readable file of finite numbers; its checksum tells."""
     monkeypatch.setenv("CREEPKIT_CACHE", str(tmp_path))
@@ -254,24 +226,6 @@ def test_a_kept_basis_that_was_changed_is_trained_and_written_anew(tmp_path, mon
     assert modes in content
     path.write_bytes(content.replace(modes, modes[:-8] + np.float64(0.5).tobytes()))
     assert [trainings(), trainings()] == [2, 2]
-
-
-def test_no_permission_to_look_means_no_basis(tmp_path, monkeypatch) -> None:
-    def refuse(*arguments: object, **options: object) -> None:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(os, "open", refuse)
-    monkeypatch.setattr(os, "stat", refuse)
-    assert reduced_order_training._read(tmp_path / "basis.safetensors", TUBE) is None
-
-
-def test_what_it_cannot_do_is_refused() -> None:
-    other = finite_element_model(mesh_of(block([1.0, 2.0], [0.0, 1.0]), z=[0]))
-    with pytest.raises(SolveError, match="train a reduced-order model for it"):
-        ReducedOrderModel(other, few())
-    moving = course(1.0, 10.0, 1e5, pattern=np.zeros(TUBE.nodes.shape))
-    with pytest.raises(SolveError, match="does not move held nodes"):
-        made_by(ReducedOrderModel(TUBE, few()), NORTON, STILL, moving)
 
 
 def test_gradients_of_modes_are_those_of_a_linear_field() -> None:

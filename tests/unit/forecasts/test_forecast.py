@@ -1,8 +1,5 @@
 """Forecasts of Norton bars, whose curves, times and their distributions are closed forms; and what is refused."""
 
-import json
-import re
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +12,6 @@ from creepkit.forecasts.draws import law_draws
 from creepkit.forecasts.forecast import forecast
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.records import Status
-from creepkit.reports.forecast import forecast_to_json
 from helpers.rupture_tests import BAR
 
 TIMES = np.geomspace(3.6e3, 3.6e5, 40)
@@ -277,17 +273,6 @@ def test_a_test_of_another_heat_than_all_that_were_fitted_has_the_usual_scatter(
     assert np.log(result["b"].times[0].high / result["b"].times[0].low) > 1.0
 
 
-def test_a_saved_identification_forecasts_the_same(fit, tmp_path):
-    plan = bar("plan", 105.0, noise=0.0)
-    loaded = ck.load(fit.save(tmp_path / "fit.json"))
-    assert forecast_to_json(loaded.forecast(plan, using=BAR)) == forecast_to_json(fit.forecast(plan, using=BAR))
-
-
-def test_extrapolation_is_said_by_how_much(fit):
-    one = fit.forecast(bar("plan", 60.0, noise=0.0)).tests[0]
-    assert "stress 60 MPa (the tests cover 80 to 120 MPa; 1.33 times beyond)" in one.extrapolation
-
-
 def test_over_laws_the_doubt_about_the_law_is_part_of_the_band(tests):
     laws = ("norton", "hyperbolic-sine")
     fits = tuple(
@@ -337,36 +322,3 @@ def test_a_dimple_is_forecast_from_bars_with_the_tolerance_of_its_thickness(fit)
 def test_nonsense_is_refused(fit, options, sentence):
     with pytest.raises(FitError, match=sentence):
         fit.forecast(bar("plan", 100.0, noise=0.0), **options)
-
-
-def test_celsius_is_refused_and_may_be_insisted_on(fit):
-    plan = bar("plan", 100.0, noise=0.0).replace(temperature=800.0)
-    assert fit.forecast(plan).tests[0].extrapolation.endswith("temperatures are in K: is 800 °C meant, 1073.15 K?")
-    with pytest.raises(FitError, match=r"temperature 800 K lies 273 K below .* if 800 °C is meant, give 1073.15"):
-        fit.rate(100.0, 800.0)
-    with pytest.raises(FitError, match="temperatures are in K"):
-        fit.rupture_time(100.0, 800.0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        fit.rate(100.0, 800.0, warn=False)
-
-
-def test_an_identification_without_scatter_says_so(fit):
-    with pytest.raises(FitError, match=r"says nothing of the scatter between tests, .*identify again"):
-        replace(fit, rate_scatter=None).forecast(bar("plan", 100.0, noise=0.0))
-
-
-def test_text_json_and_picture(fit, tmp_path):
-    result = fit.forecast([bar("another", 95.0, seed=5), bar("plan", 130.0, noise=0.0)])
-    text = str(result)
-    assert "strain 0.01:" in text
-    assert "measured: strain 100 % of the frames in the band and the whole curve in the wider one" in text
-    inside, beyond = text.split("plan: ")
-    assert "stress" not in inside.partition("extrapolated: ")[2]  # 95 MPa lies between the tests, which lasted 100 h
-    assert re.search(r"strain 0.01 after [2-9][0-9]{2} h \(the longest test: 100 h\)", inside)
-    assert "extrapolated: stress 130 MPa" in beyond
-    json.dumps(forecast_to_json(result), allow_nan=False)
-    result.plot(tmp_path / "forecast.png")
-    assert (tmp_path / "forecast.png").stat().st_size > 10_000
-    with pytest.raises(FitError, match="there is no forecast of a test 'x'"):
-        result["x"]

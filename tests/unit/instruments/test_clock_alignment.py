@@ -100,21 +100,3 @@ def test_the_alignment_by_hand_of_dimple_d1_is_met() -> None:
     found = ck.align_clocks(record, "D1: Press.", frames / 1e3, apex, drift=0.0, search=(-20.0, 40.0))
     assert found.lag == pytest.approx(9.99, abs=0.2)
     assert found.lag_interval[1] - found.lag_interval[0] < 0.4
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"record": None}, "align_clocks.. takes a record and the name of a channel, found NoneType and 'p'"),
-        ({"channel": 3}, "takes a record and the name of a channel, found InstrumentRecord and 3"),
-        ({"frame_times": ["a"]}, "frame_times and displacement must be arrays of numbers"),
-        ({"search": "ab"}, "search is 'ab'; give the least and the largest lag"),
-        ({"drift": None}, "drift is None; give a number"),
-    ],
-)
-def test_arguments_of_other_types(changes: dict[str, object], message: str) -> None:
-    times = np.arange(20.0)
-    record = ck.InstrumentRecord("r", times, {"p": ck.Channel("p", "pressure", times, "gauge", "MPa")})
-    given = {"record": record, "channel": "p", "frame_times": times, "displacement": times**2} | changes
-    with pytest.raises(HistoryError, match=message):
-        ck.align_clocks(**given)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import random
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +10,6 @@ import pytest
 import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.instruments.column_heads import split_head
-from creepkit.instruments.reading_options import ReadingOptions, RecordOptions
 from helpers.instrument_samples import samples
 from helpers.paths import SHARED, needs_shared_data
 
@@ -193,34 +190,6 @@ def test_what_cannot_be_read_is_said_in_one_sentence(
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", sorted(FILES))
-def test_damaged_files_are_read_or_refused_in_one_sentence(tmp_path: Path, name: str) -> None:
-    draw = random.Random(name)
-    messages: list[str] = []
-    for _ in range(40):
-        content = bytearray(FILES[name])
-        for _ in range(draw.choice((1, 3, 10))):
-            place = draw.randrange(len(content))
-            kind = draw.randrange(4)
-            if kind == 0:
-                content[place] = draw.randrange(256)
-            elif kind == 1:
-                del content[place : place + draw.choice((1, 40, 400))]
-            elif kind == 2:
-                content[place:place] = draw.choice((b'"', b",", b"\n", b"nan", b"1e999", b"99:99", b"2/30/2025", b"\0"))
-            else:
-                start = draw.randrange(len(content))
-                content[place:place] = content[start : start + 60]
-            content = content or bytearray(b" ")
-        try:
-            record = ck.read_record(written(tmp_path, bytes(content), name))
-        except HistoryError as error:
-            messages.append(str(error))
-        else:
-            assert (np.diff(record.times) > 0).all()
-    assert not any("\n" in message for message in messages)
-
-
 @pytest.mark.parametrize(
     ("names", "reference"),
     [
@@ -242,13 +211,6 @@ def test_whether_a_pressure_is_absolute_stands_in_its_unit_or_its_name(
 def test_a_row_of_units_that_says_more_than_the_names(tmp_path: Path) -> None:
     record = ck.read_record(written(tmp_path, "time_s,p [bar],T (upper)\ns,barg,K\n0,1,800\n1,2,800\n"))
     assert [(c.reference, c.quantity) for c in record.channels.values()] == [("gauge", "pressure"), ("", "temperature")]
-
-
-@pytest.mark.parametrize(("order", "day"), [("year first", "2025-08-18"), ("day first", "2018-08-25")])
-def test_years_of_two_digits(tmp_path: Path, order: str, day: str) -> None:
-    content = "time,p_bar\n25-08-18 00:00,1\n25-08-18 00:01,2\n"
-    record = ck.read_record(written(tmp_path, content), date_order=order, time_zone="+00:00")
-    assert record.start == np.datetime64(day).astype("datetime64[s]").astype(float)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
@@ -291,34 +253,3 @@ def test_units_that_are_nearly_known_are_not_taken_in_silence(tmp_path: Path) ->
     assert "p: taken for numbers without a unit; if 'psgi' means psi, write psi into the head" in text
     assert "V: numbers in 'rpm', which is not converted" in text
     assert not any(note.startswith(("valve", "T_set")) for note in record.notes)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"title": None}, "title is None; give a text"),
-        ({"missing": [3]}, "missing is .3.; give a tuple of texts"),
-        ({"required": "P"}, "required is 'P'; give a tuple of texts"),
-        ({"units": {"P": 3}}, "units is {'P': 3}; give {text: text}"),
-        ({"required": ("(a+)+$",)}, "repeats what it repeats already"),
-    ],
-)
-def test_a_declaration_of_an_instrument_checks_itself(changes: dict[str, object], message: str) -> None:
-    with pytest.raises(HistoryError, match=f"instrument format 'lab': .*{message}"):
-        ck.InstrumentFormat(**{"name": "lab", "title": "a logger", **changes})
-
-
-def test_long_names_are_not_matched() -> None:
-    declared = ck.InstrumentFormat("lab", "a logger", required=("a*a*b",), units={"a*": "bar"})
-    assert not declared.accepts(["a" * 100_000])
-    assert (declared.unit_of("a" * 100_000), declared.unit_of("aa")) == ("", "bar")
-
-
-@pytest.mark.parametrize("options", [{"format": []}, {"missing": [3]}])
-def test_options_of_other_types(tmp_path: Path, options: dict[str, object]) -> None:
-    with pytest.raises(HistoryError, match=r"(format|missing) is \[3?\]; give"):
-        ck.read_record(written(tmp_path, "time_s,p_bar\n0,1\n"), **options)
-
-
-def test_keywords_are_the_options() -> None:
-    assert [*RecordOptions.__annotations__] == [one.name for one in fields(ReadingOptions)]

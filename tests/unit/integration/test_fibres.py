@@ -6,7 +6,6 @@ from scipy.integrate import solve_ivp
 
 import creepkit as ck
 from creepkit import kernels
-from creepkit.errors import SolveError
 from creepkit.integration import (
     FibreInput,
     FibreModel,
@@ -317,16 +316,3 @@ def test_tangents_of_a_step_are_derivatives_of_its_stresses(name):
     assert np.all(found.tangent[[0, -1]] < found.tangent[1])
     again = step_fibres(law, theta, strain, found.state, interval=(2e4, 4e4), temperature=1000.0, modulus=E)
     assert abs(again.stress[-1]) < abs(found.stress[-1])
-
-
-def test_what_does_not_fit_is_refused_in_words():
-    model = FibreModel.section(*rectangle(2))
-    with pytest.raises(SolveError, match="modes has shape .* it needs"):
-        FibreModel(model.stress, model.strain, model.modes[:-1], model.projection, model.observed)
-    with pytest.raises(SolveError, match="1 programs of loads; its model needs 2"):
-        FibreTest(model, (Program.constant(0.0),), **CONSTANT, times=np.ones(1))
-    with pytest.raises(SolveError, match="needs fibres at two places"):
-        FibreModel.section([1.0], [1.0])
-    law, theta = norton(2.0)
-    with pytest.raises(SolveError, match="must increase"):
-        step_fibres(law, theta, [1e-4], FibreState.virgin(law, 1), (1.0, 1.0), temperature=1000.0, modulus=E)

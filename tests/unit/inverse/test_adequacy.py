@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, f
 
-from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
 from creepkit.inverse.chi_square_test import adequacy_of
 from creepkit.inverse.frame_noise import frame_noise
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, KnownNoise, chance_of_larger
-from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
@@ -240,30 +238,6 @@ def test_without_any_noise_nothing_can_be_judged():
 
 # ---- sentences ---------------------------------------------------------------------------------------------------
 
-AMPLITUDE = OutputAdequacy("amplitude", 40, 1.5e-3, "stated", 7.2, 1e-9, 3.7e-3)
-WIDTH = OutputAdequacy("width", 40, 0.02, "estimated", 1.0, 0.4, 0.0)
-WHERE = LargestDeviation("D3", "amplitude", 5400.0, -4.1e-3, 2.7)
-
-
-def test_the_sentence_of_a_discrepancy_says_how_much_where_and_what_would_help():
-    found = Adequacy("leaves a discrepancy", (WIDTH, AMPLITUDE), 4.1, 77.0, 3e-9, 0.3, WHERE, ("thickness",))
-    assert str(found) == (
-        "leaves 0.0037 mm of amplitude (2.5 times its stated noise) unexplained (reduced chi-square 4.1 with "
-        "77 degrees of freedom, p = 3e-09 adjusted for 3 comparisons (Bonferroni)); "
-        "most in amplitude of 'D3' about 1.5 h, where it lies 0.0041 mm below what was measured; it would "
-        "explain them with thickness, which nobody modelled"
-    )
-    assert "p < 1e-12" in str(replace(found, p_value=0.0))
-    with pytest.raises(KeyError):
-        found["shape"]
-
-
-def test_what_cannot_be_judged_says_which_column_states_the_noise():
-    unknown = Adequacy("cannot be judged", (), np.nan, 0.0, np.nan, np.nan, None)
-    assert "such as amplitude_sd, in Python" in str(replace(unknown, not_judged=("amplitude", "rupture")))
-    assert "minimum_rate_sd_1/s" in str(replace(unknown, not_judged=("minimum_rate", "rupture")))
-    assert "_sd" not in str(replace(unknown, not_judged=("rupture",)))
-
 
 def test_noise_from_few_frames_says_what_chi_square_a_right_law_has():
     """The mean of F is nu / (nu - 2), with nu a fifth of 40 frames a test."""
@@ -281,29 +255,6 @@ def test_outputs_that_only_together_are_beyond_chance_have_left_something(stated
     left = [a for a in found if not a.explains]
     assert left
     assert all(a.discrepancy_in_noises > 0 for a in left)
-
-
-def test_the_sentence_of_a_law_that_explains():
-    found = Adequacy("explains", (AMPLITUDE, WIDTH), 1.04, 77.0, 0.38, float("nan"), WHERE)
-    judged_text = (
-        "is not contradicted by the tests at their stated and estimated noise: reduced chi-square 1.04 with 77 degrees "
-        "of freedom"
-    )
-    assert str(found) == f"{judged_text}, p = 0.38 adjusted for 3 comparisons (Bonferroni)"
-    whole = replace(found, p_value=1.0, smallest_p_value=0.35, critical_chi_square=1.51)
-    assert str(whole) == (
-        f"{judged_text} (critical value 1.51), smallest p = 0.35, p = 1 adjusted for 3 comparisons (Bonferroni)"
-    )
-    assert whole.verdict_text == "not contradicted (p = 1)"
-    assert str(replace(found, outputs=(AMPLITUDE,), rate_scatter=1e-4)).endswith("degrees of freedom, p = 0.38")
-    assert "(no scatter of rates between tests was detected)" in str(replace(found, rate_scatter=1e-4))
-    assert "(rates of tests scatter by 2.3 %)" in str(replace(found, rate_scatter=0.023))
-
-
-def test_what_is_left_is_said_without_powers_of_ten():
-    left = Adequacy("leaves a discrepancy", (replace(AMPLITUDE, chi_square=1e4 + 1.0),), 1e4, 77.0, 0.0, 0.3, WHERE)
-    assert left.verdict_text == "contradicted: leaves 100 noises"
-    assert "(100 times its stated noise)" in str(left)
 
 
 @pytest.mark.parametrize("freedom", [[np.inf, np.inf], [8.0], [8.0, 8.0, 12.0], [np.inf, 8.0]])

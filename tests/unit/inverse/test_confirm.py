@@ -1,6 +1,5 @@
 """The simulation of an identified law beside its tests: differences of known size, and the sentence for each case."""
 
-import json
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,13 +7,10 @@ import pytest
 from scipy.stats import chi2, f
 
 import creepkit as ck
-from creepkit.errors import FitError
 from creepkit.inverse.confirmation import Confirmation, ConfirmedTest, _confirmed_output, confirm, outside_domain
 from creepkit.inverse.identification_document import read_identification
-from creepkit.readers.history_csv import write_history
 from creepkit.records import Status
 from creepkit.records.history import EVERY_FRAME
-from helpers.command_line import creepkit, one_line
 from helpers.planted_alloys import bars
 
 BAR = ck.specimen("uniaxial")
@@ -66,11 +62,6 @@ def test_a_surrogate_that_is_far_off_is_not_believed(fit):
     assert told.verdict.endswith("identify again with using= this specimen")
 
 
-def test_a_law_that_follows_no_test_is_said_whoever_predicts_it(fit):
-    tight = [h.replace(standard_deviation={"strain": SD / 1e4}) for h in TESTS]
-    assert "confirmed, but the law does not follow the tests: chi-square" in confirm(fit, tight, BAR).verdict
-
-
 @pytest.mark.parametrize(
     ("status", "words"),
     [(Status.RUPTURED, "the specimen bursts at 3600 s"), (Status.NOT_CONVERGED, "the simulation stops at 3600 s")],
@@ -101,25 +92,6 @@ def test_other_tests_are_predicted_without_a_misfit_of_the_fit(fit):
     told = confirm(replace(fit, predictor=None), others, {"uniaxial": BAR})
     assert told.tests[0].outputs[0].fit_errors is None
     assert np.isnan(told.noise_ratio)
-
-
-def test_it_takes_tests(fit):
-    with pytest.raises(FitError, match="law 'norton': there are no tests to confirm it with"):
-        confirm(fit, [], BAR)
-
-
-def test_confirm_command(fit, tmp_path):
-    path = fit.save(tmp_path / "fit.json")
-    for history in TESTS:
-        write_history(history, tmp_path / f"{history.name}.csv")
-    told = creepkit("confirm", str(path), str(tmp_path / "*.csv"))
-    assert told.exit_code == 0
-    assert "norton by uniaxial" in told.stdout
-    answer = json.loads(creepkit("confirm", str(path), str(tmp_path / "*.csv"), "--json").stdout)
-    assert answer["tests"][0]["outputs"][0]["rms_difference"] == 0.0  # by the same specimen
-    assert {t["name"] for t in answer["tests"]} == {h.name for h in TESTS}
-    refused = creepkit("confirm", str(tmp_path / "none.json"), str(tmp_path / "*.csv"))
-    assert "there is no such file" in one_line(refused)
 
 
 # ---- the uncertainty of the noise itself ---------------------------------------------------------------------------

@@ -8,7 +8,6 @@ import pytest
 
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.defect_correction import (
-    NumericalError,
     correct_defect,
     difference_of_predictors,
     shift_of_values,
@@ -212,11 +211,6 @@ def test_a_test_that_the_exact_predictor_does_not_finish_is_not_corrected():
     assert np.abs(corrected.correction[1:]).max() == pytest.approx(0.02, rel=0.01)
 
 
-def test_a_predictor_without_a_more_exact_one_stays():
-    problem, x = problem_of(Coarse())
-    assert correct_defect(problem, x) == (problem, None)
-
-
 def test_of_several_predictors_those_are_refined_that_can_be():
     both = CompositePredictor({"uniaxial": Refinable(), "other": EXACT})
     tests = [h.replace(specimen="other") if k == 2 else h for k, h in enumerate(measured())]
@@ -248,11 +242,3 @@ def test_a_cheaper_predictor_agrees_where_it_is_corrected():
     mask = problem.observations.output_index == 0
     share = problem.observations.times / problem.observations.times.max(axis=1, keepdims=True)
     np.testing.assert_allclose(difference[mask], -0.02 * np.sin(2.5 * share[mask]), atol=1e-10)
-
-
-def test_the_sentence_has_units():
-    error = NumericalError("surrogate", "bulge", {"amplitude": 5.5e-4, "strain": 1e-5}, 0.37, 0.21)
-    assert error.sentence == (
-        "at the optimum surrogate differs from bulge by 0.00055 mm in amplitude, 1e-05 in strain (rms; at most 0.37 "
-        "noises); this is corrected, and would have moved values by up to 0.21 of their standard deviations"
-    )

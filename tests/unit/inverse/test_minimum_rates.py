@@ -12,7 +12,7 @@ from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
-from creepkit.records import UNKNOWN_DURATION, History, Nuisance, PressureJump, StressSteps, constant_stress
+from creepkit.records import UNKNOWN_DURATION, History, Nuisance, constant_stress
 from creepkit.specimens.uniaxial import Uniaxial
 from helpers.literature_laws import EQUATIONS
 from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, rate_table, whole_life_table
@@ -238,17 +238,3 @@ def test_rates_of_unknown_duration_do_not_judge_hardening():
 
 
 # ---- bad input ----------------------------------------------------------------------------------------------------
-
-
-def test_what_cannot_be_compared_is_refused():
-    nothing = History("plan", np.array([1e5]), {}, constant_stress(80.0), 1000.0)
-    with pytest.raises(FitError, match="'plan' has no frames, no minimum rate and no known end"):
-        ck.identify(NORTON, [nothing])
-    steps = stated().replace(loading=StressSteps(((0.0, 80.0), (1e5, 100.0))))
-    with pytest.raises(FitError, match=r"a load that changes from 80 to 100 MPa; give each load a test of its own"):
-        ck.identify(NORTON, [steps, *(stated(s).replace(name=f"{s}") for s in (60.0, 90.0, 100.0))])
-    with pytest.raises(FitError, match="has 2 parameters and the histories only 1 frames, minimum rates and rupture"):
-        ck.identify(NORTON, [stated()])
-    dimple = History("dimple", np.array([1.0]), {}, PressureJump(1.0, 1.2, 1e4), 1000.0, "bulge", minimum_rate=1e-9)
-    with pytest.raises(FitError, match=r"predicted where the leading output is a strain; of specimen 'bulge' its lead"):
-        ck.identify(NORTON, [dimple.replace(name=str(k)) for k in range(3)])

@@ -1,9 +1,7 @@
 """Nuisances of implausible size: a planted jump of an output and a planted temperature weaken what is said of a law."""
 
-import numpy as np
 import pytest
 
-from creepkit.inverse.identification_document import read_identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection.ranking import rank
 from creepkit.inverse.settings import IdentificationSettings
@@ -66,10 +64,3 @@ def test_no_answer_is_decisive_with_such_an_offset():
     assert not ranking.decisive
     assert "only with an offset of 0.3 mm" in ranking.verdict
     assert "only with a large offset" in ranking_text(ranking)
-
-
-def test_it_survives_a_document(tmp_path):
-    fit, _ = fitted(0.3)
-    again = read_identification(fit.save(tmp_path / "fit.json"))
-    assert again.adequacy.implausible == fit.adequacy.implausible
-    assert np.isfinite(again.adequacy.implausible[0].share)

@@ -8,14 +8,11 @@ import pytest
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import CompositePredictor, predict, predict_with_sensitivities
 from creepkit.inverse.identification import IdentificationSettings
-from creepkit.inverse.identification_document import identification_to_json, read_identification
 from creepkit.inverse.identify import identify, refit
-from creepkit.inverse.nuisance_parameters import check_nuisance_tests
-from creepkit.inverse.settings import default_nuisances
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.records import History, Nuisance, PressureJump, constant_strain, constant_stress
+from creepkit.records import History, Nuisance, PressureJump, constant_stress
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.uniaxial import Uniaxial
 
@@ -139,15 +136,6 @@ def test_derivatives_of_finite_elements_are_those_of_differences(key):
     np.testing.assert_allclose(found, expected, atol=5e-3 * np.abs(expected).max())
 
 
-def test_finite_elements_differentiate_programs_themselves():
-    test = History("one", np.array([3600.0, 10800.0]), {}, PressureJump(8.0, 8.0, 9000.0), 1040.0, "bulge",
-                   elastic=Elastic(100e3))  # fmt: skip
-    values = {"temperature step@8250": np.array([[-5.0]]), "rate drift": np.array([[0.1]])}
-    found = predict(Bulge(refinement=0.5), LAW, THETA[None], [test], nuisances=values, sensitivities=True)
-    assert set(found.nuisance_jacobian) == set(values)
-    assert found.jacobian.shape[-1] == 3
-
-
 # ---- identification ----------------------------------------------------------------------------------------------
 
 NAMES = tuple(f"bar_{k}" for k in range(6))
@@ -184,11 +172,6 @@ def test_planted_steps_of_two_groups_are_found(fit):
     assert "temperature step@8250 of bar_4 and 1 more, K: -2" in str(fit)
 
 
-def test_a_fit_without_the_step_is_worse(fit):
-    plain = identify(LAW, planted(), BAR, settings=replace(QUICK, nuisances=()))
-    assert plain.rms > 5 * fit.rms
-
-
 def test_other_tests_are_predicted_with_the_step_of_their_group(fit):
     """A stranger has none; a named one has its group's, also where it is held out."""
     tests = planted()
@@ -200,15 +183,6 @@ def test_other_tests_are_predicted_with_the_step_of_their_group(fit):
     assert value == without_last.nuisances[1].value != 0.0
     without_group = refit(fit, tests[:4])
     assert without_group.nuisance_values([tests[5]])["temperature step@8250"][0, 0] == 0.0
-
-
-def test_round_trip_through_json(fit, tmp_path):
-    again = read_identification(fit.save(tmp_path / "fit.json"))
-    assert identification_to_json(again) == identification_to_json(fit)
-    assert again.settings.nuisances == GROUPS
-    assert [n.key for n in again.nuisances] == [n.key for n in fit.nuisances]
-    attached = again.with_histories(planted(), BAR)
-    np.testing.assert_array_equal(attached.predict().values, fit.predict().values)
 
 
 def test_a_prior_holds_a_step_that_the_tests_do_not_show(fit):
@@ -251,37 +225,4 @@ def test_nuisances_that_do_the_same_are_named_or_refused():
         identify(LAW, planted(), BAR, settings=replace(QUICK, nuisances=free))
 
 
-def test_nuisances_that_differ_are_not_named(fit):
-    assert not any("cannot be told apart" in note for note in fit.notes)
-
-
 # ---- settings ----------------------------------------------------------------------------------------------------
-
-
-def test_groups_must_not_overlap_and_must_exist():
-    with pytest.raises(FitError, match="'temperature step@8250' is given twice; give one"):
-        IdentificationSettings(nuisances=(GROUPS[0], replace(GROUPS[1], tests=("bar_3",))))
-    IdentificationSettings(nuisances=(GROUPS[0], replace(GROUPS[0], start=9000.0)))
-    with pytest.raises(FitError, match="nuisance 'thickness' belongs to every test; leave out tests="):
-        IdentificationSettings(nuisances=(Nuisance("thickness", tests=("bar_3",)),))
-    with pytest.raises(
-        FitError, match="nuisance 'temperature step@8250': there is no test 'bar_8'; did you mean 'bar_"
-    ):
-        check_nuisance_tests((replace(GROUPS[0], tests=("bar_8",)),), NAMES)
-
-
-def test_the_defaults_and_further_ones():
-    usual = IdentificationSettings().nuisances
-    thickness = Nuisance("thickness", mean=0.49, sd=0.03)
-    assert default_nuisances() == usual
-    assert default_nuisances(thickness, without=["rate"]) == (usual[0], thickness)
-    assert default_nuisances(Nuisance("rate", sd=0.2)) == (usual[0], Nuisance("rate", sd=0.2))
-    with pytest.raises(FitError, match="'rat' is no default nuisance that could be left out; did you mean 'rate'"):
-        default_nuisances(without=["rat"])
-
-
-def test_a_load_step_needs_a_load():
-    relaxing = bar("one").replace(loading=constant_strain(0.002))
-    settings = replace(QUICK, nuisances=(Nuisance("load step", "all", sd=0.1, start=START),))
-    with pytest.raises(FitError, match="nothing"):
-        identify(LAW, [relaxing.replace(outputs={"strain": np.linspace(0, 1e-3, 24)})], BAR, settings=settings)

@@ -1,12 +1,10 @@
 """Whole-life identification: planted damage laws, rupture times with intervals, tests that were stopped."""
 
-import pickle
-
 import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import FitError, FitWarning, HistoryError
+from creepkit.errors import FitWarning
 from creepkit.inverse.composite_predictor import CompositePredictor, predict_to_rupture
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.cross_validation import cross_validate, times_to_rupture
@@ -16,7 +14,7 @@ from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
-from creepkit.records import History, Nuisance, constant_strain, constant_stress
+from creepkit.records import History, constant_strain, constant_stress
 from creepkit.specimens.relaxation import Relaxation
 from helpers.literature_laws import EQUATIONS
 from helpers.rupture_tests import BAR, OMEGA, campaign
@@ -207,22 +205,6 @@ def test_bars_are_followed_to_rupture_beside_tests_that_are_not():
     assert entries.followed_to_rupture.tolist() == [True, False, True]
 
 
-def test_how_a_test_ended_survives_pickling():
-    """Campaigns send histories to other processes."""
-    for end in ({"rupture_time": 12.5}, {"unruptured": True}, {}):
-        bar = History("bar", np.array([1.0, 10.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0, **end)
-        back = pickle.loads(pickle.dumps(bar))
-        assert (back.rupture_time, back.unruptured, back.end_known) == (bar.rupture_time, bar.unruptured, bool(end))
-
-
-def test_percent_taken_for_strain_shows_in_tests_followed_to_their_end_as_well():
-    tests = campaign(NORTON, {"A": 1e-14, "n": 4.0}, [60, 80, 110], 1)
-    percent = [h.replace(outputs={"strain": 100 * h.outputs["strain"]}) for h in tests]
-    for wrong, given in ((True, percent), (False, tests)):
-        fit = ck.identify(NORTON, given, using=BAR, starts=2, frames=8)
-        assert any("a column in percent must say so" in note for note in fit.notes) == wrong
-
-
 def test_a_plan_is_followed_to_its_rupture_however_short_it_is():
     """Ends 300 to 10^4 times beyond the last time given, as where a law is far from a test: late, and not never."""
     values = {"A": 1e-14, "n": 4.0}
@@ -233,38 +215,3 @@ def test_a_plan_is_followed_to_its_rupture_however_short_it_is():
 
 
 # ---- bad input ----------------------------------------------------------------------------------------------------
-
-
-def test_explicit_nuisances_are_refused_beside_whole_lives():
-    law, values = PLANTED["Kachanov-Rabotnov"]
-    tests = campaign(law, values, [60, 80, 110], 1)
-    with pytest.raises(
-        FitError, match="nuisance 'temperature' cannot be fitted beside tests that are followed to their"
-    ):
-        ck.identify(law, tests, using=BAR, nuisances=[Nuisance("temperature", sd=2.0)])
-
-
-@pytest.mark.parametrize(
-    ("end", "said"),
-    [
-        ({"rupture_time": -1.0}, "a rupture time of -1 s is not a finite time above zero"),
-        ({"rupture_time": np.inf}, "a rupture time of inf s is not"),
-        ({"rupture_time": 9.0}, "a used frame at 10 s lies after the rupture at 9 s"),
-        (
-            {"rupture_time": 10.0, "unruptured": True},
-            "it ruptured at 10 s and was stopped unruptured; keep one of them",
-        ),
-    ],
-)
-def test_ends_that_cannot_be(end, said):
-    with pytest.raises(HistoryError, match=said):
-        History("bar", np.array([1.0, 10.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0, **end)
-
-
-def test_a_rupture_time_is_asked_of_tensile_stresses():
-    values = {"A": 1e-14, "n": 4.0}
-    fit = ck.identify(NORTON, campaign(NORTON, values, [60, 80, 110], 1), using=BAR, starts=2, frames=10)
-    with pytest.raises(FitError, match="a stress that is not above zero"):
-        fit.rupture_time(-10.0)
-    with pytest.raises(FitError, match="control is 'displacement'; allowed are load and stress"):
-        fit.rupture_time(10.0, control="displacement")

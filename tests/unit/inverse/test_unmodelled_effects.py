@@ -1,6 +1,6 @@
 """Unmodelled effects: each against a simulation, or an identification, in which it is there."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.unmodelled_effect import DRIFT, UnmodelledEffect, unmodelled_note
+from creepkit.inverse.unmodelled_effect import DRIFT, unmodelled_note
 from creepkit.inverse.unmodelled_effects import (
     OFFSET_IN_NOISES,
     USUAL_DRIFT,
@@ -224,19 +224,6 @@ def test_the_effect_of_thickness_is_that_of_other_simulations():
     np.testing.assert_allclose(found, expected, atol=0.03 * np.abs(expected).max())
 
 
-@dataclass(frozen=True)
-class Toleranced(Steady):
-    """States a tolerance of a length that it does not know as a nuisance parameter."""
-
-    tolerances = {"thickness": 0.02}  # noqa: RUF012
-
-
-def test_a_predictor_that_does_not_know_a_length_has_no_effect_of_it():
-    tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(60.0, 1000.0), (80.0, 1000.0)], seed=0, noise=1e-5)
-    fit = identify(NORTON, tests, Toleranced(), settings=SETTINGS)
-    assert "thickness" not in {e.kind for e in fit.unmodelled}
-
-
 # ---- likeness of hardening ----------------------------------------------------------------------------------------
 
 
@@ -286,22 +273,3 @@ def test_an_effect_in_the_covariance_is_a_rank_of_one_in_each_test():
     np.testing.assert_allclose(found, np.broadcast_to(np.eye(len(expected[0])), found.shape), atol=1e-5)
     again = with_random_effects(with_both, [effects[DRIFT]])
     assert again.residuals.random_effect_sensitivities.shape[-1] == 3
-
-
-def test_sentences_name_what_would_change_the_rate_by_more_than_a_hundredth():
-    thickness = UnmodelledEffect("thickness", 0.01, "mm", 0.083, tests=5)
-    offset = UnmodelledEffect("offset of amplitude", 4.5e-3, "mm", 0.012, tests=5)
-    drift = UnmodelledEffect(DRIFT, 5.0, "K over a test", 0.072, tests=6, activation_energy=316e3)
-    loads = UnmodelledEffect("load", 1.0, "%", -0.04, common=True, tests=5)
-    small = replace(offset, rate_change=-0.004)
-    assert unmodelled_note([thickness, offset, drift, loads, small]) == (
-        "the intervals do not include what no nuisance parameter models; the rate amid the tests would move: by 8.3 % "
-        "(one standard deviation) with independent errors of 0.01 mm in the thickness of each of the 5 tests; by 1.2 % "
-        "(one standard deviation) with independent offsets of 0.0045 mm in the amplitude of each of the 5 tests; by "
-        "7.2 % (one standard deviation) with independent linear drifts of the temperature, 5 K over each of the 6 "
-        "tests, taking an activation energy of 316 kJ/mol; by -3.9 % with loads 1 % above those stated, in all 5 tests",
-    )
-    assert unmodelled_note([]) == ()
-    assert unmodelled_note([small]) == ()
-    single = replace(drift, tests=1, rate_change=0.6)
-    assert single.sentence.startswith("by a factor of 1.8 with a linear drift of 5 K over the test, taking")

@@ -1,18 +1,13 @@
 """What happened in several tests at one time: planted steps of the furnace, jumps of a camera, and clean plates."""
 
-import json
-
 import numpy as np
 import pytest
 
-import creepkit as ck
-from creepkit.errors import HistoryError
 from creepkit.quality import check_data_quality
 from creepkit.quality.rig_flags import temperature_step
 from creepkit.quality.smooth_curve import smooth_curve
 from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, PressureJump
-from creepkit.reports.data_quality import data_quality_to_json
 from helpers.paths import SHARED, needs_shared_data
 
 TIMES = 150.0 * np.arange(1, 97)
@@ -121,19 +116,3 @@ def test_inconel_625_slows_at_8250_s():
 def test_no_common_change_in_creep_machines(folder):
     """Their tests ran on machines and clocks of their own."""
     assert not events(read_histories(SHARED / folder, creepkit_readers()))
-
-
-def test_text_and_json_of_the_findings():
-    rng = np.random.default_rng(8)
-    quality = ck.check_data_quality([dimple(rng, k, event=9000.0, factor=0.4) for k in range(2, 8)])
-    assert "1 flag in 6 tests" in str(quality)
-    assert "rate change: at " in str(quality)
-    (entry,) = json.loads(json.dumps(data_quality_to_json(quality)))["flags"]
-    assert entry["rate_factors"].keys() == entry["temperature_steps"].keys() == set(entry["tests"])
-    assert str(ck.check_data_quality([dimple(rng, 2)])) == "nothing suspect in 1 test"
-    twice = ck.check_data_quality(
-        [dimple(rng, k, event=9000.0, factor=0.4) for k in range(2, 8)], activation_energy=2e5
-    )
-    assert "200 kJ/mol" in str(twice)
-    with pytest.raises(HistoryError, match="an activation energy of -1 J/mol is not above zero"):
-        ck.check_data_quality([], activation_energy=-1.0)

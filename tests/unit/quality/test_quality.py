@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-import creepkit as ck
-from creepkit.errors import HistoryError
 from creepkit.language import Elastic
 from creepkit.quality import FRAME_FLAG_KINDS, check_data_quality, exclude_suspect_frames
 from creepkit.readers.reading import creepkit_readers, read_histories
@@ -263,22 +261,6 @@ def test_a_first_frame_off_the_elastic_one(offset, word):
 
 
 # ---- use -----------------------------------------------------------------------------------------------------------
-
-
-def test_the_door():
-    test = bulge(np.random.default_rng(15))
-    assert not list(ck.check_data_quality([test]))
-    (same,) = ck.exclude_suspect_frames([test])
-    assert same is test
-
-
-def test_kinds_that_cannot_be_marked():
-    with pytest.raises(
-        HistoryError, match="'replicate'; that kind questions a whole test; the kinds of frames are unloading"
-    ):
-        exclude_suspect_frames([], kinds=["replicate"])
-    with pytest.raises(HistoryError, match="frames cannot be marked for 'colour'; the kinds of frames are"):
-        exclude_suspect_frames([], kinds=["colour"])
 
 
 def test_histories_with_next_to_nothing():

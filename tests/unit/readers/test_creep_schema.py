@@ -40,11 +40,6 @@ def test_a_folder_gives_each_test_once_and_the_series_alone_says_the_same(tmp_pa
     assert alone.labels["assumed"] == "control load"
 
 
-def test_the_first_files_are_in_the_code_page_of_windows(tmp_path: Path):
-    (test,) = ck.read_histories(write(tmp_path, document(), encoding="cp1252"))
-    assert test.times.size == 4
-
-
 @pytest.mark.parametrize(
     ("name", "at_start"), [("Percentage plastic extension", 0.07), ("Percentage extension", 0.251)]
 )
@@ -57,13 +52,6 @@ def test_extensions_that_hold_the_loading_strain(tmp_path: Path, name: str, at_s
     (test,) = ck.read_histories(write(tmp_path, document(), series.replace("Percentage creep extension", name)))
     np.testing.assert_allclose(test.outputs["strain"], [0.0, 1.25e-4, 2.125e-3, 0.025125], atol=1e-12)
     assert "subtracted" in test.labels["assumed"]
-
-
-def test_versions_differ_in_capitals(tmp_path: Path):
-    text = json.dumps(document()).replace("AdditionalMetadata", "additionalMetadata").replace("TestInfo", "testInfo")
-    path = write(tmp_path, {})
-    path.write_text(text)
-    assert ck.read_histories(path)[0].condition == "950 °C, 152.5 MPa"
 
 
 def test_a_stopped_test(tmp_path: Path):

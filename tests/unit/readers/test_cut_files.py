@@ -29,16 +29,6 @@ def test_a_file_cut_at_each_place_of_its_last_number(path, tmp_path):
         assert "cut" not in _kinds(cut)
 
 
-def test_the_command_says_the_value_and_its_line_and_reads_the_file(tmp_path):
-    path = tmp_path / "cut.csv"
-    path.write_text(BARS[0].read_text().rstrip("\n")[:-4])
-    result = creepkit("read", str(path))
-    line, value = path.read_text().count("\n") + 1, path.read_text().rpartition(",")[2]
-    assert result.exit_code == 0, result.stderr
-    assert f"cut within its last number, {value} in line {line}" in " ".join(result.stdout.split())
-    assert "nothing suspect" not in result.stdout
-
-
 FORMS = {
     "fixed": lambda x: f"{x:.4f}",
     "shortest": lambda x: repr(float(np.round(x, 6))),
@@ -64,16 +54,6 @@ def test_honest_files_without_a_last_line_end_are_left_alone(form, rows):
     assert named <= 0.005 * trials
 
 
-@pytest.mark.parametrize("form", ["fixed", "exponents"])
-def test_forms_of_one_length_show_each_digit_that_is_lost(form):
-    lines = [f"{k},{FORMS[form](0.5 + 0.013 * k)}" for k in range(50)]
-    text = "time_h,strain_pct\n" + "\n".join(lines)
-    assert cut_number(text, Dialect()) is None
-    for lost in (1, 2, 3):
-        found = cut_number(text[:-lost], Dialect())
-        assert (found.line, found.column, found.text) == (51, 1, lines[-1].split(",")[1][:-lost])
-
-
 def test_decimal_commas_and_one_column_a_test(tmp_path):
     """The note is that of the test whose column is the last."""
     rows = [f"{k}\t0,{1000 + 17 * k}\t0,{2000 + 19 * k}" for k in range(30)]
@@ -84,13 +64,6 @@ def test_decimal_commas_and_one_column_a_test(tmp_path):
     )
     flags = ck.check_data_quality(ck.read_histories([path]))
     assert [flag.tests for flag in flags if flag.kind == "cut"] == [("B2",)]
-
-
-def test_the_note_is_kept_in_a_file_of_creepkits_own(tmp_path):
-    path = tmp_path / "cut.csv"
-    path.write_text(BARS[0].read_text().rstrip("\n")[:-4])
-    (history,) = ck.read_histories([path])
-    assert _kinds(ck.write_history(history, tmp_path / "written.csv")) == _kinds(path)
 
 
 @pytest.mark.parametrize("lost", [0, 4, 5, 6])

@@ -56,21 +56,6 @@ def test_one_file_a_test_in_the_order_of_the_index(tmp_path):
     assert first.source == str(made / "B_creep.csv")
 
 
-def test_any_file_of_the_folder_leads_to_it(tmp_path):
-    made = folder(tmp_path, files())
-    assert all(INDEXED_FILES.accepts(made / name) for name in ("", "index.csv", "A_creep.csv"))
-    assert [history.name for history in INDEXED_FILES.read(made / "index.csv")] == ["B", "A"]
-    assert [history.name for history in INDEXED_FILES.read(made / "A_creep.csv")] == ["A"]
-    assert not INDEXED_TABLE.accepts(made)
-    (made / "notes.csv").write_text("x\n1\n")
-    assert not INDEXED_FILES.accepts(made / "notes.csv")
-
-
-def test_alloy_from_the_index(tmp_path):
-    index = "test,temperature_C,stress_MPa,alloy\nA,980,230,CMSX-6\nB,980,140,CMSX-6\n"
-    assert {history.alloy for history in INDEXED_FILES.read(folder(tmp_path, files(index)))} == {"CMSX-6"}
-
-
 def test_another_laboratory_is_a_declaration(tmp_path):
     layout = IndexedFolderReader(
         name="lab",
@@ -131,12 +116,6 @@ def test_key_cannot_lead_out_of_the_folder(tmp_path):
     index = "test,temperature_C,stress_MPa\nA,980,230\nB,980,140\n../A,980,1\n"
     with pytest.raises(HistoryError, match=r"index.csv:4: test '../A' has no file"):
         INDEXED_FILES.read(folder(tmp_path, files(index)))
-
-
-def test_missing_thermocouple(tmp_path):
-    frames = "time_h,creep_extension_pct,T_top_C,T_mid_C\n0,0,980,981\n2,0.5,980,981\n"
-    with pytest.raises(HistoryError, match=r"B_creep.csv:1: missing column 'T_bot_C'; found: time_h, creep_ext"):
-        INDEXED_FILES.read(folder(tmp_path, files(frames=frames)))
 
 
 def test_what_an_empty_cell_of_the_index_leaves_unknown_is_said(tmp_path):

@@ -1,15 +1,11 @@
 """Tables of tests, one row a test, and heads without frames: what they say, what they refuse, what reads back."""
 
-import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 import creepkit as ck
 from creepkit.errors import HistoryError
-from creepkit.readers.history_csv import write_history
-from creepkit.readers.rate_and_rupture_tables import TEST_TABLE, key_of_column
-from creepkit.records import UNKNOWN_DURATION, History, constant_stress
+from creepkit.readers.rate_and_rupture_tables import key_of_column
+from creepkit.records import UNKNOWN_DURATION, constant_stress
 
 TABLE = """# alloy: Alloy X
 # control: stress
@@ -134,66 +130,6 @@ def test_a_head_without_frames(tmp_path):
         read(tmp_path, "# temperature_C: 700\n# stress_MPa: 100\n")
     with pytest.raises(HistoryError, match=r"'minimum_rate_sd_1/h' stands there without a minimum_rate; give both"):
         read(tmp_path, text.replace("# minimum_rate_%/h: 1e-4\n", "# rupture_h: 5\n"))
-
-
-@pytest.mark.parametrize(
-    "known",
-    [
-        {"times": [1.0], "minimum_rate": 1.25e-9},
-        {"times": [3e6], "minimum_rate": 1.25e-9, "minimum_rate_sd": 3e-11},
-        {"times": [3e6], "rupture_time": 3e6},
-        {"times": [3e6], "unruptured": True, "minimum_rate": 2e-9},
-    ],
-)
-def test_a_test_without_frames_reads_back(tmp_path, known):
-    times = np.array(known.pop("times"))
-    test = History("A1", times, {}, constant_stress(80.0), 1000.0, labels={"heat": "X7"}, **known)
-    (back,) = ck.read_histories(write_history(test, tmp_path / "A1.csv"))
-    for name in ("name", "minimum_rate", "minimum_rate_sd", "rupture_time", "unruptured", "loading", "temperature"):
-        assert getattr(back, name) == getattr(test, name)
-    np.testing.assert_array_equal(back.times, test.times)
-    assert back.labels["heat"] == "X7"
-
-
-def test_a_rate_beside_frames_reads_back(tmp_path):
-    test = History("A1", np.array([1.0, 2.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0, minimum_rate=2e-9)
-    assert ck.read_histories(write_history(test, tmp_path / "A1.csv"))[0].minimum_rate == 2e-9
-
-
-def test_a_plan_is_not_written_as_a_measurement(tmp_path):
-    plan = History("A1", np.array([1.0, 2.0]), {}, constant_stress(80.0), 1000.0)
-    with pytest.raises(HistoryError, match="has no outputs and no minimum rate and no known end; it cannot be written"):
-        write_history(plan, tmp_path / "A1.csv")
-
-
-PIECES = (
-    *("", "A1", "120", "-1", "0", "nan", ">", ">1e4", ">>5", "1e400", "stopped", "ruptured", "%", "\x00", '"', "#"),
-    *("stress_MPa", "stress", "T_C", "t_r (h)", "min creep rate (1/h)", "rupture", "ended", "label x", "1,5"),
-)
-
-
-@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    st.lists(st.tuples(st.integers(0, 3), st.integers(0, 6), st.sampled_from(PIECES)), min_size=1, max_size=4),
-    st.sampled_from((",", ";", "\t")),
-)
-def test_mutated_tables_give_tests_or_one_sentence(tmp_path, changes, delimiter):
-    rows = [line.split(",") for line in TABLE.splitlines()[2:]]
-    for row, column, piece in changes:
-        rows[row][column] = piece
-    path = tmp_path / "t.csv"
-    path.write_text("# control: stress\n" + "\n".join(delimiter.join(row) for row in rows), encoding="utf-8")
-    try:
-        found = TEST_TABLE.read(path)
-    except HistoryError as error:
-        said, found = str(error), []
-    else:
-        said = ""
-    assert bool(found) != (str(path) in said)
-    assert "\n" not in said
-    for history in found:
-        assert history.minimum_rate is not None or history.end_known
-        assert history.minimum_rate is None or history.minimum_rate > 0
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Which reader gets which file, and what tests are called when they come together."""
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import pytest
 from creepkit.errors import HistoryError
 from creepkit.quality.comparison import duplicate_tests
 from creepkit.readers.reading import creepkit_readers, read_histories
-from creepkit.records import History, Program, constant_stress
+from creepkit.records import History, constant_stress
 
 READERS = creepkit_readers()
 TEST = "# temperature_C: 850\n# stress_MPa: 60\ntime_s,strain_1\n0,0\n1,0.1\n"
@@ -82,13 +81,6 @@ def test_general_reader_yields_to_another_one(tests_in_folders):
     assert names(tests_in_folders / "two", [*READERS, Always("lab")]) == ["lab a"]
 
 
-def test_named_reader_is_used(tests_in_folders):
-    readers = [*READERS, Always("lab")]
-    assert names(tests_in_folders / "two", readers, reader="csv") == ["a"]
-    with pytest.raises(HistoryError, match="no reader is called 'cvs'; did you mean 'csv'"):
-        read_histories(tests_in_folders, readers, reader="cvs")
-
-
 def test_two_readers_for_one_file_are_told(tests_in_folders):
     with pytest.raises(HistoryError, match=r"a.csv: the readers 'lab' and 'other' both accept it; say which one"):
         read_histories(tests_in_folders / "two", [*READERS, Always("lab"), Always("other")])
@@ -119,32 +111,3 @@ def planned(name: str, end: float = 1e6, strain: float = 0.4, stress: float = 25
 def test_test_published_twice_is_found():
     records = [planned("a"), planned("b", stress=26.0), planned("c", end=1e6 + 0.7), planned("d", strain=0.40001)]
     assert duplicate_tests(records) == [("a", "c"), ("a", "d"), ("c", "d")]
-
-
-@pytest.mark.parametrize(
-    "other",
-    [
-        planned("b", end=1.001e6),
-        planned("b", strain=0.41),
-        planned("b", stress=26.0),
-        planned("b", temperature=1223.15),
-        planned("b", temperature=Program([0, 1], [1173.15, 1174])),
-    ],
-)
-def test_like_tests_are_no_duplicates(other):
-    assert duplicate_tests([planned("a"), other]) == []
-
-
-def test_what_is_no_file_is_one_sentence(tmp_path: Path) -> None:
-    """A pipe, a link to nothing, and a pattern that finds such a link alone."""
-    os.mkfifo(tmp_path / "pipe.csv")
-    (tmp_path / "link.csv").symlink_to(tmp_path / "nothing.csv")
-
-    with pytest.raises(
-        HistoryError, match=r"pipe.csv: is no regular file but a device, a pipe or the like; name a file"
-    ):
-        read_histories(tmp_path / "pipe.csv", READERS)
-    with pytest.raises(HistoryError, match=r"link.csv: is a link to .*nothing.csv, which does not exist"):
-        read_histories(tmp_path / "link.csv", READERS)
-    with pytest.raises(HistoryError, match="no file matches it as a pattern"):
-        read_histories(tmp_path / "li*.csv", READERS)

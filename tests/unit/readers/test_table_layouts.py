@@ -143,12 +143,6 @@ def test_two_tests_side_by_side(read, layout: str):
     assert first.source.endswith("x.csv (A1)")
 
 
-def test_pairs_of_different_length(read):
-    text = "# temperature_C: 850\nA1;;A2;\nStress (MPa);60;Stress (MPa);80\nTime (h);Strain (%);Time (h);Strain (%)\n"
-    first, second = read(text + "0;0;0;0\n1;0,5;1;0,7\n2;0,9;;\n")
-    assert (first.times.size, second.times.size) == (3, 2)
-
-
 def test_one_value_for_all_tests_is_told(read):
     text = "Stress (MPa);60;80\nTemperature (°C);850;\nTime (h);A1 strain (%);A2 strain (%)\n0;0;0\n1;0,5;0,7\n"
     first, second = read(text)
@@ -239,11 +233,6 @@ def test_what_is_asked_for(read, case: str):
     assert "\n" not in str(caught.value)
 
 
-def test_the_decimal_sign_may_be_stated(read):
-    (history,) = read(HEAD + "# decimal: comma\ntime_h;strain_pct\n1,000;0\n1,234;2,345\n")
-    assert history.times.tolist() == [3600.0, 1.234 * 3600.0]
-
-
 def test_a_canonical_file_that_a_spreadsheet_saved(read):
     text = (
         '# temperature_C: 850;\n"# stress_steps: 0 s 60.5 MPa; 1 h 70 MPa";\n# label note: a, b;\ntime_h;strain_pct\n'
@@ -272,13 +261,6 @@ def test_large_tables_read_as_small_ones_do(read):
     rows[7000] = "6999,1e9\n"
     with pytest.raises(HistoryError, match="x.csv:7004: 'time_h' is"):
         read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("6999,1e9", "-1,7"))
-
-
-def test_text_files_are_tables_where_they_name_a_time(tmp_path: Path):
-    (tmp_path / "a.txt").write_text("Time (h)\tStrain (%)\n0\t0\n")
-    (tmp_path / "readme.txt").write_text("Time and again, this was measured.\n")
-    assert HISTORY_CSV.accepts(tmp_path / "a.txt")
-    assert not HISTORY_CSV.accepts(tmp_path / "readme.txt")
 
 
 def test_what_empty_cells_of_conditions_leave_unknown_is_said(tmp_path):

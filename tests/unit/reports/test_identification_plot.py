@@ -9,7 +9,7 @@ from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
-from creepkit.reports.condition_colours import MOST_GROUPS, MOST_IN_GROUP, ColourScale, condition_groups
+from creepkit.reports.condition_colours import MOST_GROUPS, MOST_IN_GROUP, condition_groups
 from creepkit.reports.curve_of_test import curve_of_test
 from creepkit.reports.figures import LARGEST_PIXELS, RESOLUTION
 from creepkit.reports.prediction_bands import fitted_curves
@@ -47,25 +47,6 @@ def test_a_few_tests_have_curves_residuals_and_rates_with_units(few, tmp_path):
     assert (tmp_path / "fit.png").stat().st_size > 10_000
 
 
-def test_each_test_is_named_with_its_load_and_temperature(few):
-    (legend,) = few.plot().legends
-    assert [text.get_text() for text in legend.get_texts()] == [
-        f"{h.name}: {h.loading.program().values[0]:g} MPa, {h.temperature - 273.15:.0f} °C" for h in few.histories
-    ]
-
-
-def test_no_legend_lies_on_a_panel(few):
-    figure = few.plot()
-    figure.canvas.draw()
-    legends = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
-    assert len(legends) == 2
-    for legend in legends:
-        box = legend.get_window_extent()
-        for axes in figure.axes:
-            shared = box.intersection(box, axes.get_window_extent())
-            assert shared is None or shared.width < 2 or shared.height < 2
-
-
 def test_written_labels_do_not_overlap(few, many):
     for fit in (few, many):
         figure = fit.plot()
@@ -100,12 +81,6 @@ def test_84_tests_have_a_panel_for_each_temperature_and_fit_on_a_page(many):
     assert len(dots) == 84
 
 
-def test_panels_of_groups_have_the_same_axes(many):
-    panels = [axes for axes in many.plot().axes if axes.get_title().endswith("14 tests")]
-    assert len({axes.get_xlim() for axes in panels}) == 1
-    assert len({axes.get_ylim() for axes in panels}) == 1
-
-
 @pytest.mark.parametrize("temperatures", [1, 6, 30])
 def test_groups_hold_every_test_once_and_are_few(temperatures):
     conditions = [(s, T) for T in 1000.0 + 20.0 * np.arange(temperatures) for s in np.geomspace(40, 200, 40)]
@@ -115,22 +90,3 @@ def test_groups_hold_every_test_once_and_are_few(temperatures):
     assert len(groups) <= MOST_GROUPS
     if temperatures == 1:
         assert max(len(members) for _, members in groups) <= MOST_IN_GROUP
-
-
-def test_an_identification_without_adequacy_is_drawn_and_one_with_says_so(few):
-    assert few.plot().get_suptitle().splitlines()[0].endswith("9 tests")
-    object.__setattr__(few, "adequacy", "explains the tests to their noise")
-    try:
-        assert few.plot().get_suptitle().endswith("\nexplains the tests to their noise")
-    finally:
-        object.__delattr__(few, "adequacy")
-
-
-def test_a_colour_scale_spans_the_conditions():
-    scale = ColourScale("stress, MPa", np.array([10.0, 100.0]), logarithmic=True)
-    assert scale(10.0) == scale.colours[0] != scale(np.sqrt(1000.0)) != scale(100.0)
-
-
-def test_a_single_test_is_drawn():
-    tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(50.0, 1050.0)], seed=2, noise=1e-5)
-    assert identify(NORTON, tests, Steady(), settings=QUICK).plot().get_suptitle().splitlines()[0].endswith(": 1 test")

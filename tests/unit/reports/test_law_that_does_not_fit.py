@@ -5,14 +5,11 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-import pytest
-
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
 from creepkit.reports.contents import ReportContents, ReportGroup
 from creepkit.reports.html import report_html
-from creepkit.reports.html.elements import sentence
 from creepkit.reports.identification_text import identification_comments
 from creepkit.reports.tests_apart import tests_apart as far_tests
 from helpers.steady_rate_predictor import Steady, planted
@@ -68,17 +65,3 @@ def test_nothing_is_derived_from_a_law_that_does_not_fit() -> None:
     assert "a unit that was misread" in text
     assert not [line for line in comments if line.endswith("determined")]
     assert [line for line in comments if line.endswith("if the law held, which the tests reject")]
-
-
-@pytest.mark.parametrize(
-    ("text", "printed"),
-    [
-        ("m is a parameter", "m is a parameter."),
-        ("C_f and C_s are two", "C_f and C_s are two."),
-        ("norton*arrhenius is a law", "norton*arrhenius is a law."),
-        ("a drift of 5 K", "A drift of 5 K."),
-        ("the law fits", "The law fits."),
-    ],
-)
-def test_names_are_never_capitalised(text: str, printed: str) -> None:
-    assert sentence(text) == printed

@@ -240,22 +240,6 @@ def test_what_cannot_be_assessed_is_refused(arguments, message):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"degrees": ()}, "degrees are"),
-        ({"distribution": "normal"}, "allowed are lognormal, weibull"),
-        ({"criterion": "aic"}, "allowed are bic and aicc"),
-        ({"level": 1.0}, "give a probability"),
-        ({"fixed": {"larson-miller": {"Q": 1.0}}}, "those that may be given: C"),
-        ({"fixed": {"larson": {"C": 1.0}}}, "did you mean 'larson-miller'"),
-    ],
-)
-def test_settings_are_checked(settings, message):
-    with pytest.raises(FitError, match=message):
-        ck.RuptureSettings(**settings)
-
-
 def test_tests_that_cannot_be_assessed_are_named():
     good = planted(larson_miller, count=20)
     stepped = good[0].replace(name="stepped", loading=ck.StressSteps(((0.0, 50.0), (3600.0, 60.0))))

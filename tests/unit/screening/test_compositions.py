@@ -65,10 +65,3 @@ def test_what_is_wrong_with_a_table_is_said_with_its_line(tmp_path, text, messag
     with pytest.raises(HistoryError) as caught:
         read_compositions(written(tmp_path, text))
     assert message in str(caught.value)
-
-
-def test_an_alloy_that_the_table_lacks_is_named():
-    told = Compositions({"alloy 1": {"Fe": 100.0}}, "table.csv").missing(["alloy 1", "aloy 1"])
-    assert told == (
-        "table.csv: no alloy 'aloy 1', whose class stays unknown; did you mean 'alloy 1'? (known: alloy 1)",
-    )

@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import SolveError
 from creepkit.integration.tensor_point import proportional_loading
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.language import CreepLaw, mean_stress, principal_stress, stress
 from creepkit.laws.norton import NORTON
-from creepkit.readers.history_csv import write_history
-from creepkit.records import History, PointLoading, Program, Specimen, Status
-from creepkit.specimens.material_point import OUTPUTS, MaterialPoint, PointRun, creepkit_specimens
+from creepkit.records import History, PointLoading, Program, Status
+from creepkit.specimens.material_point import MaterialPoint, PointRun
 from helpers.kachanov_law import A, kachanov, n
 
 E, NU = 1.6e5, 0.3
@@ -33,14 +31,6 @@ def plan(loading, times=TIMES, **changes) -> History:
 def shown(loading, law=NORTON, values=VALUES, specimen=FINE, **changes):
     found = specimen.predict(law, law.to_internal(values), [plan(loading, **changes)])
     return {name: found.of(0)[:, k] for k, name in enumerate(found.outputs)}
-
-
-def test_it_is_a_specimen_that_the_registry_knows():
-    (found,) = creepkit_specimens()
-    assert isinstance(found, Specimen)
-    assert ck.specimen("point") == found
-    assert found.outputs == OUTPUTS
-    assert found.replace(tolerance=1e-7) == MaterialPoint(tolerance=1e-7)
 
 
 def test_equal_biaxial_tension_creeps_as_its_equivalent_stress_says():
@@ -197,32 +187,6 @@ def test_creep_under_stresses_needs_no_elastic_data():
     run = ck.simulate(NORTON, "point", VALUES, loading=PointLoading(stress={"12": 40}), times=TIMES)
     np.testing.assert_allclose(run.equivalent, 1e-14 * 9 * 40.0**4 * TIMES, rtol=1e-9)
     assert np.isnan(run.total_strain).all()
-
-
-def test_a_history_of_a_point_survives_its_file(tmp_path):
-    loading = PointLoading(stress={"11": 60, "12": [(0.0, 0.0), (5e3, -40.0)]}, strain={"33": 0.0})
-    run = ck.simulate(NORTON, "point", VALUES, loading=loading, times=TIMES, elastic=STEEL)
-    (again,) = ck.read_histories(write_history(run, tmp_path / "point.csv"))
-    assert (again.specimen, again.loading, again.elastic) == ("point", loading, STEEL)
-    assert {name: v.tolist() for name, v in again.outputs.items()} == {n: v.tolist() for n, v in run.outputs.items()}
-    assert again.condition == "20 °C, 11 60 MPa, 12 0 to -40 MPa, strain 33 0"
-
-
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda: PointLoading(), "needs a stress or a strain of some component"),
-        (lambda: PointLoading(stress={"21": 1.0}), "no component '21' to load; allowed are 11, 22, 33, 12, 23, 13"),
-        (lambda: PointLoading(stress={"11": 1.0}, strain={"11": 0.0}), "component 11 has both a stress and a strain"),
-        (lambda: MaterialPoint(tolerance=1.0), "allowed are 1e-10 to 1e-2"),
-        (lambda: MaterialPoint(max_steps=np.inf), "max_steps is inf; allowed are whole numbers, 10 to 10 000 000"),
-        (lambda: shown(ck.constant_stress(100.0)), r'loaded by components, found stress; use PointLoading\(stress='),
-        (lambda: shown(PointLoading(strain={"11": 1e-3}), elastic=None), "needs elastic data; set elastic="),
-    ],
-)  # fmt: skip
-def test_what_makes_no_sense_is_refused(make, said):
-    with pytest.raises(SolveError, match=said):
-        make()
 
 
 def test_programmes_are_taken_as_they_are():

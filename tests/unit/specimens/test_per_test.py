@@ -75,14 +75,6 @@ def test_planted_values_are_found_from_data_of_another_solver(using):
     assert fit.values["n"] == pytest.approx(4.0, rel=1e-3)
 
 
-def test_it_simulates_and_forecasts():
-    run = ck.simulate(NORTON, Bar(), TRUTH, loading=ck.constant_stress(80.0, "stress"), times=TIMES)
-    np.testing.assert_allclose(run.outputs["strain"], 1e-16 * 80.0**4 * TIMES, rtol=1e-12)
-    fit = ck.identify(NORTON, planted(), Bar(), starts=1, nuisances=[ck.Nuisance("rate", sd=0.1)])
-    one = fit.forecast(plans(70.0)).tests[0].outputs["strain"]
-    assert one.band.low[-1] < 1e-16 * 70.0**4 * TIMES[-1] < one.band.high[-1]
-
-
 class Ends(Bar):
     def one(self, law, values, history, nuisances):
         strain = np.asarray(super().one(law, values, history, nuisances)["strain"])
@@ -120,11 +112,6 @@ def test_an_author_is_told_which_test_values_and_line(given, sentence):
         SolveError, match=f"specimen 'closed-form-bar', test 'bar 60' with A = 1e-16, n = 4: .*{sentence}"
     ):
         Wrong().predict(NORTON, NORTON.to_internal(TRUTH), plans(60.0))
-
-
-def test_a_nuisance_that_one_does_not_take_is_refused():
-    with pytest.raises(SolveError, match="specimen 'awk' does not know the nuisance 'thickness'"):
-        Awk().predict(NORTON, NORTON.to_internal(TRUTH), plans(60.0), nuisances={"thickness": np.array([[0.5]])})
 
 
 def test_differences_leave_a_coefficient_off_that_is_off():

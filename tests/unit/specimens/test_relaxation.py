@@ -5,12 +5,10 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import SolveError
-from creepkit.language import wachtman
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.readers.history_csv import write_history
-from creepkit.records import History, Program, RecordedLoading, Specimen, Status, StrainSteps
-from creepkit.specimens.relaxation import Relaxation, creepkit_specimens
+from creepkit.records import History, Program, RecordedLoading, Status, StrainSteps
+from creepkit.specimens.relaxation import Relaxation
 from creepkit.specimens.uniaxial import Uniaxial
 
 E, START, N = 1.6e5, 180.0, 5.0
@@ -32,12 +30,6 @@ def held(strain=START / E, times=TIMES, **changes) -> History:
 
 def stress(*histories, values=VALUES, law=NORTON, **more):
     return TIGHT.predict(law, law.to_internal(values), histories, **more)
-
-
-def test_it_is_a_specimen_that_the_registry_knows():
-    (found,) = creepkit_specimens()
-    assert isinstance(found, Specimen)
-    assert (ck.specimen("relaxation"), found.outputs) == (found, ("stress",))
 
 
 def test_norton_relaxes_as_its_closed_form_does_and_so_do_its_derivatives():
@@ -133,59 +125,6 @@ def test_a_bar_that_begins_in_compression_is_not_complete():
     assert prediction.end_times[0, 0] == 0.0
     with pytest.raises(SolveError, match="a compressed bar needs the specimen point"):
         TIGHT.run(NORTON, VALUES, plan)
-
-
-def test_no_frame_shows_a_bar_in_compression():
-    down = StrainSteps(((0, START / E), (1e4, 0.0)))
-    run = ck.simulate(NORTON, TIGHT, VALUES, loading=down, times=[0.0, 1e3, 1e4, 2e4], elastic=ck.Elastic(E))
-    assert "compress" in run.reason
-    assert run.times.tolist() == [0.0, 1e3]
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"loading": ck.constant_stress(100.0)}, "loaded by strain, found stress; use StrainSteps or constant_strain"),
-        ({"elastic": None}, "a relaxation specimen under prescribed strain needs elastic data; set elastic="),
-        (
-            {"elastic": ck.Elastic(wachtman(2e5, 60.0, 300.0)), "temperature": Program.steps([(0, 900), (9, 1000)])},
-            "the modulus changes from .* with the temperature of the test",
-        ),
-    ],
-)
-def test_what_cannot_be_relaxed_is_said(changes, said):
-    with pytest.raises(SolveError, match=said):
-        stress(held(**changes))
-
-
-def test_a_strain_on_the_uniaxial_specimen_is_sent_here():
-    with pytest.raises(SolveError, match="loaded by stress, found strain; use the specimen relaxation"):
-        Uniaxial().predict(NORTON, NORTON.to_internal(VALUES), [held()])
-
-
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda: StrainSteps(((1.0, 0.1),)), "must start at time 0"),
-        (lambda: ck.constant_strain(2.0), r"from 0 to 1 in every step, found \[2.0\]"),
-        (
-            lambda: StrainSteps(((0, 0.1), (5, 0.2)), ramp=6.0),
-            "ramp is 6 s; it must not be negative nor outlast a step",
-        ),
-    ],
-)
-def test_strains_that_make_no_sense_are_refused(make, said):
-    with pytest.raises(SolveError, match=said):
-        make()
-
-
-def test_a_history_of_relaxation_survives_its_file(tmp_path):
-    loading = StrainSteps(((0, 1e-3), (600, 1.2e-3)))
-    run = ck.simulate(NORTON, TIGHT, VALUES, loading=loading, times=[0, 100, 900], elastic=ck.Elastic(E))
-    (again,) = ck.read_histories(write_history(run, tmp_path / "held.csv"))
-    assert (again.specimen, again.loading, again.elastic) == ("relaxation", loading, ck.Elastic(E))
-    assert again.outputs["stress"].tolist() == run.outputs["stress"].tolist()
-    assert again.condition == "20 °C, strain 0.001 to 0.0012"
 
 
 def noisy(plan, specimen, output, noise, rng):

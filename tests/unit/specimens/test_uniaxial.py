@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import LawError, SolveError
 from creepkit.language import Elastic, arrhenius, wachtman
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.records import History, PressureJump, Program, Specimen, Status, StressSteps, constant_stress
+from creepkit.records import History, Program, Status, StressSteps, constant_stress
 from creepkit.specimens.bar import elastic_strain
-from creepkit.specimens.uniaxial import Uniaxial, creepkit_specimens
+from creepkit.specimens.uniaxial import Uniaxial
 
 TIMES = np.array([0.0, 10.0, 100.0, 1000.0])
 VALUES = {"A": 1e-13, "n": 4.0}
@@ -26,13 +25,6 @@ def history(**changes) -> History:
 
 def predicted(*histories: History, values=VALUES, **kwargs):
     return Uniaxial(tolerance=1e-9).predict(NORTON, NORTON.to_internal(values), histories, **kwargs)
-
-
-def test_it_is_a_specimen_and_comes_through_the_hook() -> None:
-    (found,) = creepkit_specimens()
-    assert isinstance(found, Specimen)
-    assert (found.name, found.outputs) == ("uniaxial", ("strain",))
-    assert found.replace(tolerance=1e-7) == Uniaxial(tolerance=1e-7)
 
 
 def test_predictions_are_padded_to_the_longest_test() -> None:
@@ -49,10 +41,6 @@ def test_predictions_are_padded_to_the_longest_test() -> None:
     assert np.isnan(result.values[:, 1, 2:]).all()
     np.testing.assert_allclose(result.jacobian[0, 0, :, 0, 0], RATE * TIMES, rtol=1e-9)
     np.testing.assert_allclose(result.jacobian[0, 0, :, 0, 1], RATE * TIMES * np.log(100), rtol=1e-9)
-
-
-def test_no_histories_give_an_empty_prediction() -> None:
-    assert predicted().values.shape == (1, 0, 0, 1)
 
 
 def test_engineering_strain_and_constant_load() -> None:
@@ -153,50 +141,3 @@ def test_tolerance_tightens_the_answer() -> None:
     assert errors[0] < 1e-3
     assert errors[1] < 1e-5
     assert errors[2] < 1e-7
-
-
-@pytest.mark.parametrize(
-    ("fields", "said"),
-    [
-        ({"tolerance": 0.5}, "tolerance is 0.5; allowed are 1e-13 to 1e-2"),
-        ({"strain_limit": -1.0}, "strain_limit is -1; allowed is above 0, up to 10"),
-        ({"max_steps": 3}, "max_steps is 3; allowed are 10 to 10 000 000"),
-        ({"max_steps": 1e3 + 0.5}, "max_steps is 1000.5; allowed are whole numbers, 10 to 10 000 000"),
-        ({"max_steps": np.inf}, "max_steps is inf; allowed are whole numbers, 10 to 10 000 000"),
-        ({"max_steps": "9"}, "max_steps is '9'; allowed are whole numbers"),
-        ({"tolerance": np.nan}, "tolerance is nan; allowed are finite numbers, 1e-13 to 1e-2"),
-    ],
-)
-def test_settings_out_of_range_are_refused(fields, said: str) -> None:
-    with pytest.raises(SolveError, match=said):
-        Uniaxial(**fields)
-
-
-def test_pressure_does_not_load_a_bar() -> None:
-    pressed = history(loading=PressureJump(8.0, 10.0, 14400.0), source="bulge.csv")
-    with pytest.raises(SolveError, match="bulge.csv: a uniaxial specimen is loaded by stress, found pressure"):
-        predicted(pressed)
-
-
-def test_elastic_strain_needs_elastic_data() -> None:
-    with pytest.raises(SolveError, match="includes the elastic part, but no elastic data are given; set elastic="):
-        predicted(history(includes_elastic=True))
-
-
-def test_a_missing_value_is_named() -> None:
-    with pytest.raises(LawError, match="needs a value for n"):
-        ck.simulate(NORTON, Uniaxial(), {"A": 1e-13}, loading=constant_stress(100.0), times=TIMES)
-
-
-def test_an_early_end_names_values_outside_their_bounds_and_a_modulus_in_gpa() -> None:
-    import creepkit as ck
-
-    times = np.linspace(1.0, 7200.0, 10)
-    with pytest.raises(SolveError, match="; n = 40 lies outside its bounds, 1 to 8$"):
-        ck.simulate("norton", "uniaxial", {"A": 1e-16, "n": 40.0}, loading=constant_stress(100.0), times=times)
-    soft = ck.simulate(
-        "norton", "bulge", {"A": 1e-16, "n": 5.0}, loading=ck.PressureJump(8, 10, 3600), times=times,
-        temperature=1073.0, elastic=ck.Elastic(E=150.0),
-    )  # fmt: skip
-    assert soft.reason.endswith("; E is 150 MPa (write 150000 if GPa were meant)")
-    assert soft.labels["ended"] == soft.reason

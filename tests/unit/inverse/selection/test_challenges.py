@@ -16,7 +16,6 @@ from creepkit.inverse.selection.challenges import (
     FittedLaw,
     ShareResidual,
     _chi_square,
-    _comparison_text,
     _least_chi_square,
     altered_laws,
     challenges_of,
@@ -137,14 +136,6 @@ def test_values_by_equal_weights_are_judged_where_their_own_chi_square_is_least(
     least = _chi_square(best.problem, best.x)
     assert least < _chi_square(best.problem, fit.x)
     assert _least_chi_square(best, best.problem, fit.x + 0.05)[0] == pytest.approx(least, abs=0.02)
-
-
-def test_what_fits_better_is_said_to_fit_better():
-    """3.84 is 95 % of chi-square with one degree of freedom: beyond it, two laws do not explain tests equally well."""
-    assert _comparison_text(-48.6) == "fits better (its chi-square is 48.6 lower)"
-    assert _comparison_text(-1.2) == "explains them as well (its chi-square is 1.2 lower)"
-    assert _comparison_text(2.0) == "explains them as well (its chi-square is 2.0 higher)"
-    assert _comparison_text(-0.01) == "explains them as well (its chi-square is the same)"
 
 
 # ---- thresholds --------------------------------------------------------------------------------------------------

@@ -12,7 +12,6 @@ from creepkit.errors import FitError
 from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.selection import rank
 from creepkit.inverse.selection.select import _richer_laws, reductions, sums_of_two
-from creepkit.jobs.shard_progress import series_of_task
 from creepkit.language import Param, arrhenius, strain, temperature, time
 from creepkit.records import History, Program
 
@@ -40,13 +39,6 @@ def measured(law, values, stresses=(60.0, 85.0, 120.0), seed=0):
 def ranking():
     tests = measured("strain-hardening", {"A": 5e-16, "n": 4.0, "m": -0.4})
     return ck.select(LAWS, tests, "uniaxial", nuisances=[], starts=4, progress=lambda *one: SAID.append(one))
-
-
-def test_progress_names_the_law_that_is_fitted(ranking):
-    assert SAID[0] == ("law 1 of 4: Norton power law (PL)", 0, 4)
-    assert SAID[7] == ("law 4 of 4: Hyperbolic-sine law (HS)", 4, 4)
-    assert series_of_task(SAID[7][0]) == ("law", "4 of 4: Hyperbolic-sine law (HS)")
-    assert series_of_task("quality") == ("quality", "")
 
 
 def test_the_planted_law_is_singled_out_and_what_constant_loads_allow_beside_it_is_named(ranking):

@@ -1,22 +1,11 @@
 """Penalties on contributions: where they are smallest, and that least squares sees what they are."""
 
-import re
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import approx_fprime
 
-from creepkit.errors import FitError
-from creepkit.inverse.sparsity.penalties import (
-    L2,
-    GroupL2,
-    PenalisedTerms,
-    Sqrt,
-    Subsets,
-    check_penalty,
-    switchable_exponents,
-)
+from creepkit.inverse.sparsity.penalties import L2, GroupL2, PenalisedTerms, Sqrt, switchable_exponents
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from helpers.term_contributions import bar, contributions, internal
@@ -124,20 +113,3 @@ def test_a_law_without_such_exponents_is_penalised_too():
     own = contributions(law, [bar(40.0)])
     u = own.coordinates.u(internal(law, A_1=2e-13, n_1=3.0, A_2=1e-16, n_2=5.0))
     assert PenalisedTerms(own, Sqrt(), 1.0).residuals(u).shape == (3,)
-
-
-@pytest.mark.parametrize(("strength", "told"), [(-1.0, "-1"), (np.nan, "nan"), ("strong", "strong")])
-def test_a_strength_is_a_number_or_auto(strength, told):
-    with pytest.raises(FitError, match=told):
-        L2(strength)
-    assert Sqrt("auto").strength == "auto"
-
-
-@pytest.mark.parametrize(
-    ("penalty", "told"), [(L2, "penalty is L2; write L2()"), ("L2", "penalty is 'L2'"), (3.0, "3.0")]
-)
-def test_a_penalty_is_a_record(penalty, told):
-    with pytest.raises(FitError, match=re.escape(told)):
-        check_penalty(penalty)
-    for good in (*EVERY, Subsets()):
-        check_penalty(good)

@@ -8,7 +8,6 @@ import pytest
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from creepkit.errors import FitError
 from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution, ModelAverage, rate_band
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
@@ -84,13 +83,6 @@ def test_a_ranking_is_a_mixture_of_its_laws(fit):
     assert rate_band(ranking, [60.0], 1000.0, temperature_uncertainty=0.0).low == pytest.approx(found.rate([60.0])[1])
 
 
-def test_weights_must_make_sense(fit):
-    with pytest.raises(FitError, match="as many laws as weights"):
-        ModelAverage((fit,), (0.5, 0.5))
-    with pytest.raises(FitError, match="must not be negative"):
-        ModelAverage((fit,), (-1.0,))
-
-
 @pytest.fixture(scope="module")
 def warm(fit):
     """Norton times Arrhenius, Q = 300 kJ/mol known exactly: only the temperature is uncertain."""
@@ -122,24 +114,3 @@ def test_a_law_without_temperature_cannot_know(fit):
     found = rate_band(fit, [40.0, 60.0], 1000.0)
     assert found.low == pytest.approx(found.parameter_band[0])
     assert "without a temperature in the law norton the band cannot hold what 10 K do" in found.notes[0]
-
-
-def test_temperatures_beyond_the_tests_are_said(warm):
-    (told,) = rate_band(warm, [40.0], 1100.0).notes
-    assert told == "827 °C lies 50 K outside the tests"
-    one = replace(warm, ranges={**warm.ranges, "temperature": (1000.0, 1000.0)})
-    assert "not determined by them" in rate_band(one, [40.0], 1000.0).notes[0]
-
-
-def test_bad_bands_are_refused(fit):
-    with pytest.raises(FitError, match="finite uncertainty that is not negative"):
-        rate_band(fit, [40.0], 1000.0, temperature_uncertainty=-1.0)
-    with pytest.raises(FitError, match="allowed are 'uniform' and 'normal'"):
-        rate_band(fit, [40.0], 1000.0, temperature_distribution="square")
-    with pytest.raises(FitError, match="above zero"):
-        rate_band(fit, [0.0], 1000.0)
-
-
-def test_bands_are_drawn(warm, tmp_path):
-    rate_band(warm, np.geomspace(30, 80, 9), 1000.0).plot(tmp_path / "band.svg")
-    assert (tmp_path / "band.svg").stat().st_size > 5000

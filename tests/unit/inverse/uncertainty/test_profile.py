@@ -116,16 +116,3 @@ def test_an_interval_cut_by_a_bound_is_open_on_that_side(tests):
     found = profile(known_scatter(short, tests, SD), "n")
     assert found.high is None
     assert found.low == pytest.approx(profile(known_scatter(NORTON, tests, SD), "n").low, abs=0.02)
-
-
-def test_a_quantity_that_nothing_moves_is_refused(fit):
-    still = DerivedQuantity("pi", "1", "linear", lambda c: lambda u: np.full(u.shape[:-1], np.pi))
-    with pytest.raises(FitError, match="pi does not depend on any parameter"):
-        profile(fit, still)
-
-
-def test_its_plot_is_written(fit, tmp_path):
-    profile(fit, "A").plot(tmp_path / "a.png")
-    assert (tmp_path / "a.png").stat().st_size > 5000
-    with pytest.raises(FitError, match="is no format of pictures"):
-        profile(fit, "n").plot(tmp_path / "a.nonsense")

@@ -1,14 +1,11 @@
 """Scatter of rates: balanced designs, where REML is the analysis of variance (Searle et al. (1992), chapter 4)."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
 import creepkit as ck
 from creepkit.inverse.uncertainty.rate_scatter import FLAT_BELOW, USUAL_SD, RateScatter
-from creepkit.inverse.uncertainty.stored_rate_scatter import problem_with
 from helpers.rupture_tests import BAR
 
 
@@ -28,25 +25,6 @@ def scatter_of(log_factor, variance=0.0, heats=(), known=None):
         gradient=np.zeros(1),
         known=known,
     )
-
-
-@pytest.mark.parametrize(
-    ("change", "problem"),
-    [
-        ({}, ""),
-        ({"weight": np.full(3, 1e13)}, "weight holds numbers that are too large"),
-        ({"weight": np.zeros(3)}, "a variance is negative, or a weight not above zero"),
-        ({"variance": np.full(3, -1.0)}, "a variance is negative, or a weight not above zero"),
-        ({"design": np.full((3, 1), np.nan)}, "design holds numbers that are too large"),
-        ({"log_factor": np.zeros(2)}, r"log_factor has the shape (2,), not (3,)"),
-        ({"precision": np.full((1, 1), -1.0)}, "precision is not symmetric and positive semi-definite"),
-        ({"tests": ("a", "b", "c")}, "its tests are not those of the identification"),
-        ({"known": -1.0}, "known is -1, which is no standard deviation"),
-    ],
-)
-def test_a_stored_record_of_hostile_numbers_is_refused(change, problem):
-    scatter = scatter_of([0.1, 0.2, 0.3])
-    assert problem_with(dataclasses.replace(scatter, **change), scatter.tests, 1) == problem
 
 
 def test_without_heats_the_restricted_likelihood_is_largest_at_the_sample_variance():
@@ -106,12 +84,6 @@ def test_many_tests_overrule_the_prior():
     posterior = scatter_of(z).posterior
     assert np.sqrt(posterior.mean_square("test")) == pytest.approx(z.std(ddof=1), rel=0.01)
     assert (1.0 / (posterior.weight**2).sum()) > 10  # nodes within the posterior distribution, not one of them
-
-
-def test_a_given_standard_deviation_is_taken():
-    posterior = scatter_of([0.1, -0.3, 0.2], known=0.07).posterior
-    assert posterior.sd.tolist() == [[0.07]]
-    assert posterior.weight.tolist() == [1.0]
 
 
 def bars(count, scatter, seed, noise=2e-6):

@@ -1,6 +1,5 @@
 """Samples of the posterior against closed forms."""
 
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.posterior import Posterior, sample_posterior
@@ -120,30 +118,3 @@ def test_nuisances_are_integrated_out(tests):
     y = np.concatenate([h.outputs["amplitude"] - h.times / 1e5 for h in tests])
     left = [y - rows @ u for u in points]
     assert up - down == pytest.approx(left[0] @ inverse @ left[0] - left[1] @ inverse @ left[1], rel=1e-4)
-
-
-def test_a_seed_repeats_the_draws(fit):
-    first, again = (sample_posterior(fit, walkers=8, steps=20, seed=5) for _ in range(2))
-    assert np.array_equal(first.chain, again.chain)
-    assert not np.array_equal(first.chain, sample_posterior(fit, walkers=8, steps=20, seed=6).chain)
-
-
-def test_a_short_chain_says_so(fit):
-    found = sample_posterior(fit, walkers=8, steps=20, seed=5)
-    assert not found.converged
-    assert "not converged" in found.notes[0]
-    assert "not converged" in str(found)
-
-
-def test_what_cannot_be_sampled_is_refused(fit, monkeypatch):
-    with pytest.raises(FitError, match="at least 6 walkers"):
-        sample_posterior(fit, walkers=4)
-    monkeypatch.setitem(sys.modules, "emcee", None)
-    with pytest.raises(FitError, match=r"needs emcee, which is not installed: pip install 'creepkit\[mcmc\]'"):
-        sample_posterior(fit)
-
-
-def test_pairs_are_drawn(samples, tmp_path):
-    figure = samples.plot(tmp_path / "pairs.png")
-    assert (tmp_path / "pairs.png").stat().st_size > 5000
-    assert len([axes for axes in figure.axes if axes.get_visible()]) == 3

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from creepkit.errors import FitError, SolveError
+from creepkit.errors import FitError
 from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.records import SurfacePoints
 from creepkit.specimens.bulge.camera_points import observe_surface, surface_center
@@ -92,11 +92,6 @@ def test_eight_parameters_as_those_of_the_paper():
     assert paper_parameters(0.4, 2.5, 2.8, 2.2, offset=-0.02).amplitude == pytest.approx(0.38)
     with pytest.raises(FitError, match=r"no bulge has sigma_x = -1\.0"):
         paper_parameters(0.4, -1.0, 2.7, 2.2)
-
-
-def test_operators_that_points_have_not():
-    with pytest.raises(SolveError, match="not observed as 'profile 0-7.5 mm'"):
-        observe_surface(grid(0.5), "profile 0-7.5 mm")
 
 
 @needs_shared_data

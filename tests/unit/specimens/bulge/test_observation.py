@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from creepkit.errors import SolveError
 from creepkit.specimens.bulge.observation import Observation
 from helpers.bulge_profiles import FINE, LOOKED_AT, NODES, bell, cross, plates, profile_with_apex, richardson, table
 from helpers.paths import needs_shared_data
@@ -78,11 +77,6 @@ def test_both_forms_are_one_for_p_of_two():
         np.testing.assert_allclose(other, [[0.66, 3.7, 2.0]], rtol=1e-11)
 
 
-def test_the_defaults_of_the_field_are_dense_enough():
-    dense, usual = (Observation("field", 7.5, points).observe(NODES, plates(NODES)) for points in (600, None))
-    np.testing.assert_allclose(usual, dense, atol=1e-4, rtol=0)
-
-
 # Frames: at rest, noisy, hopeless
 
 
@@ -99,10 +93,6 @@ def test_a_frame_at_rest_has_no_amplitude_and_the_shape_of_the_next():
         # D is homogeneous of degree one: its derivative along the profile itself is D
         np.testing.assert_allclose(slopes[0, 0] @ moving[0], one[0], rtol=1e-10)
         assert not slopes[[0, 1, 4, 6], 1:].any()
-
-
-def test_rest_alone_has_no_shape():
-    np.testing.assert_array_equal(Observation().observe(NODES, np.zeros((2, 41))), [[0.0, np.nan, np.nan]] * 2)
 
 
 HOPELESS = {
@@ -237,42 +227,3 @@ def test_the_two_forms_part_on_a_real_profile():
 
 
 # The operator as text
-
-
-@pytest.mark.parametrize(
-    ("operator", "text"),
-    [
-        (Observation(), "profile 0-7.5 mm"),
-        (Observation("field", 5), "field 0-5 mm"),
-        (Observation("field", 4.123456789, 30), "field 0-4.123456789 mm, 30 radii"),
-    ],
-)
-def test_text_and_back(operator, text):
-    assert str(operator) == text
-    assert Observation.from_text(text) == operator
-
-
-@pytest.mark.parametrize("text", ["", "profile", "profile 7.5 mm", "profile 0-x mm", "field 1-5 mm", "field 0-5"])
-def test_text_that_is_no_operator(text):
-    with pytest.raises(SolveError, match=r"is not understood; write a form and a window, as in 'profile 0-7.5 mm'"):
-        Observation.from_text(text)
-
-
-def test_impossible_operators():
-    with pytest.raises(SolveError, match="no form is called 'profil'; did you mean 'profile'?"):
-        Observation.from_text("profil 0-5 mm")
-    for window in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(SolveError, match="window is .*; allowed is a length of 0.001 to 10000 mm"):
-            Observation(window=window)
-    with pytest.raises(SolveError, match="window is '5'; allowed"):
-        Observation(window="5")
-    for points in (3, 20.5, 10**6, np.nan, "20"):
-        with pytest.raises(SolveError, match="points is .*; allowed are whole numbers, 8 to 2000"):
-            Observation(points=points)
-
-
-def test_a_window_beyond_the_surface():
-    with pytest.raises(SolveError, match="window reaches from 0 to 12 mm, but the observed surface from 0 to 10 mm"):
-        Observation(window=12.0).observe(NODES, plates(NODES))
-    with pytest.raises(SolveError, match=r"shape \(6, 39\); expected \(frames, 41\)"):
-        Observation().observe(NODES, plates(NODES)[:, 1:-1])

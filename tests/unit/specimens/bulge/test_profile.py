@@ -1,9 +1,7 @@
 """Displacement at any radius, between the nodes of the top."""
 
 import numpy as np
-import pytest
 
-from creepkit.errors import SolveError
 from creepkit.fem.surface_interpolation import surface_interpolation
 
 
@@ -21,19 +19,3 @@ def test_interpolation_follows_the_element_where_its_middle_node_is_off():
         shapes = np.array([c * (c - 1) / 2, 1 - c * c, c * (c + 1) / 2])
         np.testing.assert_allclose(surface_interpolation(nodes, [shapes @ nodes])[0], shapes, atol=1e-13)
     assert first < middle < last
-
-
-@pytest.mark.parametrize(
-    ("nodes", "wanted", "message"),
-    [
-        ([0, 1, 2], [0.5, 2.5], "no displacement is known at a radius of 2.5 mm; .* from 0 to 2 mm"),
-        ([0, 1, 2], [-0.1], "at a radius of -0.1 mm"),
-        ([0, 1, 2], [np.nan], "at a radius of nan mm"),
-        ([0, 1], [0.5], "corner and middle nodes in turn, an odd number"),
-        ([0, 2, 1], [0.5], "increasing outwards"),
-        ([0, 0.2, 2], [0.5], "node 1 .* at a radius of 0.2 mm, is not in the middle half of its side"),
-    ],
-)
-def test_interpolation_refuses(nodes, wanted, message):
-    with pytest.raises(SolveError, match=message):
-        surface_interpolation(nodes, wanted)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import finite_element_model
 from creepkit.fem.mesh import geometry_derivative
 from creepkit.fem.reduced_order_model import ReducedOrderModel
@@ -20,7 +19,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.records import History, PressureJump, Status
 from creepkit.specimens.bulge.finite_elements import solver_settings
 from creepkit.specimens.bulge.geometry import DimpleGeometry
-from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel, nominal_geometry
+from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
 from creepkit.specimens.bulge.setup import set_up_test
 from creepkit.specimens.bulge.specimen import Bulge
 from helpers.fem_cases import lowered
@@ -130,23 +129,6 @@ def test_stated_error_enters_the_covariance_and_the_specimen_corrects_it() -> No
     assert set(errors) == set(SPECIMEN.optional_outputs)
     assert 1e-5 < errors["amplitude"] < 0.01
     assert refined_of(REDUCED) == SPECIMEN.refined()
-
-
-def test_test_pieces_share_a_basis() -> None:
-    """Within a tenth of the thickness and two per cent of other lengths; where these do not fit, each has its own."""
-    own = DimpleGeometry()
-    assert nominal_geometry(own, own.replace(apex_thickness=0.53)) == own
-    assert nominal_geometry(own, own.replace(outer_radius=10.15)) == own
-    thick = nominal_geometry(own, own.replace(apex_thickness=0.6))
-    assert thick.apex_thickness == pytest.approx(0.625)
-    tall = own.replace(roof_axial=3.45)
-    assert nominal_geometry(own, tall).roof_axial == pytest.approx(3.45, rel=0.025)
-
-
-def test_unknown_nuisances_are_refused() -> None:
-    with pytest.raises(SolveError, match="nuisance"):
-        REDUCED.predict(NORTON, NORTON.to_internal({"A": 1e-13, "n": 4.0}), [history()],
-                        nuisances={"colour": np.array([[1.0]])})  # fmt: skip
 
 
 @pytest.mark.long_when_sanitized
