@@ -224,7 +224,7 @@ def _nuisance(file: StudyFile, number: int, part: NuisanceTable) -> Nuisance:
     place = ("identification", "nuisances", number)
     with file.at(*place, "kind"):
         Nuisance(part.kind, start=1.0 if part.kind.endswith("step") else 0.0)
-    values: dict[str, float] = {}
+    values: dict[str, Any] = {}
     for key in ("mean", "sd", "mean_mm", "sd_mm", "mean_K", "sd_K"):
         name, _, unit = key.partition("_")
         if getattr(part, key) is None:
@@ -274,7 +274,7 @@ def goal_of(file: StudyFile) -> Goal | None:
     part = file.model.design
     assert part is not None
     place = stated(part, stress="at_stress_MPa", T="at_temperature_C")
-    if part.goal not in ("rate", "exponent"):
+    if part.goal is None or part.goal == "law" or part.goal == "parameters":
         if place:
             name = "at_stress_MPa" if "stress" in place else "at_temperature_C"
             raise file.error(("design", name), 'belongs to the goals "rate" and "exponent"; leave it out')

@@ -58,7 +58,7 @@ def _loading_to_json(loading: Loading) -> dict[str, Any]:
 
 
 def _loading_from_json(data: Any, source: str) -> Loading:
-    kind = LOADINGS.get(data.get("kind")) if isinstance(data, dict) else None
+    kind = LOADINGS.get(str(data.get("kind"))) if isinstance(data, dict) else None
     if kind is None:
         raise RecordError("its kind of loading is not known")
     loading: Loading = PLAIN.from_json(kind, {name: value for name, value in data.items() if name != "kind"})

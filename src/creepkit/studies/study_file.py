@@ -227,7 +227,7 @@ def _syntax_error(message: str, text: str) -> str:
 
 def _sentence(path: Path, error: ValidationError, lines: Mapping[KeyPath, int]) -> str:
     """The first mistake in the order of the file; first unknown keys, for they make others look missing."""
-    found = [{**one, "loc": tuple(part for part in one["loc"] if part != "[key]")} for one in error.errors()]
+    found: list[Any] = [{**one, "loc": tuple(part for part in one["loc"] if part != "[key]")} for one in error.errors()]
     first = min(found, key=lambda one: (one["type"] != "extra_forbidden", line_of(one["loc"], lines)))
     more = len(found) - 1
     others = f" ({more} more mistake{'s' if more > 1 else ''} in the file)" if more else ""
