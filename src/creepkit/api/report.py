@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from creepkit.api.identification import export, law_with_values, rank
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, ReportError
+from creepkit.reports.contents import ReportSource
 
 if TYPE_CHECKING:
     from creepkit.discovery.discover import TemperatureStudy
@@ -24,30 +25,14 @@ if TYPE_CHECKING:
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.records import History
-    from creepkit.reports.contents import (
-        Exclusion,
-        ExportedFile,
-        ReportContents,
-        ReportGroup,
-        ReportProvenance,
-        ReportSource,
-    )
+    from creepkit.reports.contents import Exclusion, ExportedFile, ReportContents, ReportGroup, ReportProvenance
     from creepkit.rupture_assessment.assessment import RuptureAssessment
     from creepkit.screening.results import AlloyResult, ScreeningResult
 
-    Reported: TypeAlias = (
-        Identification
-        | Ranking
-        | ModelAverage
-        | AlloyResult
-        | ScreeningResult
-        | TemperatureStudy
-        | TemperatureLaw
-        | Forecast
-        | Design
-        | RuptureAssessment
-        | Extraction
-    )
+Reported: TypeAlias = (
+    "Identification | Ranking | ModelAverage | AlloyResult | ScreeningResult | TemperatureStudy | TemperatureLaw "
+    "| Forecast | Design | RuptureAssessment | Extraction"
+)
 
 EXPORT_TARGETS = ("json", "python", "latex", "abaqus")
 """Of the best law of each material, to download."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from creepkit.errors import SurrogateError, nearest, quoted
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.language import temperature
+from creepkit.options import values_of_table
 from creepkit.readers.vocabulary import split_unit
 from creepkit.records import (
     SECONDS_PER_HOUR,
@@ -199,7 +200,6 @@ def specimen_of_study(file: StudyFile) -> Specimen:
 def settings_of(file: StudyFile) -> IdentificationSettings:
     """Settings of every identification: the defaults with what the study changes."""
     import creepkit as ck
-    from creepkit.api.identification import change_settings
     from creepkit.inverse.settings import default_nuisances
 
     model, base = file.model, ck.IdentificationSettings()
@@ -208,16 +208,16 @@ def settings_of(file: StudyFile) -> IdentificationSettings:
         changes |= stated(model.selection, "further_laws")
     if model.identification is not None:
         part, place = model.identification, "identification"
-        changes |= stated(part, "starts", "frames", "loss", "test_loss", "weights", "rupture_times")
+        changes |= values_of_table(ck.IdentificationSettings, part) | {"nuisances": None}
         for name, value in changes.items():
             with file.at(place, name):
-                change_settings(base, {name: value})  # type: ignore[misc]
+                base.changed({name: value})
         if part.nuisances or part.without_nuisances:
             further = [_nuisance(file, k, one) for k, one in enumerate(part.nuisances)]
             with file.at(place, "without_nuisances" if part.without_nuisances else "nuisances"):
                 changes["nuisances"] = default_nuisances(*further, without=part.without_nuisances)
     with file.at("identification"):
-        return change_settings(base, changes)  # type: ignore[arg-type]
+        return base.changed(changes)
 
 
 def _nuisance(file: StudyFile, number: int, part: NuisanceTable) -> Nuisance:

@@ -11,6 +11,8 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic_core import PydanticCustomError
 
 from creepkit.api.searches import PenaltyName, SearchName
+from creepkit.inverse.settings import IdentificationSettings, OutputWeights
+from creepkit.options import table_of
 
 MOST_ITEMS = 1000
 """In a list of a study file."""
@@ -210,7 +212,15 @@ class NuisanceTable(Table):
     sd_K: Positive | None = None
 
 
-class IdentificationTable(Table):
+WEIGHTS = {OutputWeights: Annotated[Any, BeforeValidator(_output_weights)]}
+ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws")
+"""Settings of identifications whose keys stand in tables of their own, or in [study], [data] and [selection]."""
+
+
+_IdentificationKeys = table_of(IdentificationSettings, Table, types=WEIGHTS, without=ELSEWHERE)
+
+
+class IdentificationTable(_IdentificationKeys, Table):  # type: ignore[misc]
     """[identification]: candidate laws and how each is fitted, for every group of tests."""
 
     laws: Annotated[SomeTexts, BeforeValidator(_one_or_more)]
@@ -221,12 +231,6 @@ class IdentificationTable(Table):
     bounds: dict[Text, Bounds] = {}
     nuisances: Annotated[list[NuisanceTable], Field(max_length=50)] = []
     without_nuisances: Texts = []
-    starts: Annotated[int, Field(ge=1, le=1000)] | None = None
-    frames: Annotated[int, Field(ge=2, le=100_000)] | None = None
-    weights: Annotated[Any, BeforeValidator(_output_weights)] = None
-    loss: Text | None = None
-    test_loss: Text | None = None
-    rupture_times: Literal["auto", "use", "ignore"] | None = None
     search: SearchName = "multi-start"
     penalty: PenaltyName | None = None
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.errors import FitError
 from creepkit.inverse.cross_validation import cross_validate, times_to_strain
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify, refit
@@ -53,12 +52,6 @@ def test_rate_band_contains_the_truth(fit):
     assert ((low < rate) & (rate < high)).all()
 
 
-def test_local_exponent_of_a_power_law_is_its_exponent(fit):
-    n, low, high = fit.local_exponent(50.0, 1050.0)
-    assert float(n) == pytest.approx(fit.values["n"], rel=1e-6)
-    assert low < n < high
-
-
 def test_one_stress_leaves_the_exponent_undetermined():
     tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(50.0, 1050.0)] * 4, seed=2, rate=0.1, noise=1e-5)
     fit = identify(NORTON, tests, Steady(), settings=QUICK)
@@ -101,18 +94,6 @@ def test_leaving_conditions_out_predicts_each_once(fit, tests):
     assert sorted(found.names) == sorted(h.name for h in tests)
     assert len(folds.folds) == 9
     assert found.spread < 0.4
-
-
-def test_bounds_that_exclude_the_data_are_reported():
-    """Bounds of A a factor 1e6 below the truth: the answer lies at a bound and says so."""
-    import dataclasses
-
-    A, n = NORTON.params
-    narrow = dataclasses.replace(NORTON.params[A], bounds=(1e-40, 1e-30))
-    law = dataclasses.replace(NORTON, params={A: narrow, n: dataclasses.replace(NORTON.params[n], bounds=(1, 5))})
-    tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1050.0) for s in (30, 50, 80)], seed=3, noise=1e-5)
-    with pytest.raises(FitError, match="bounds"):
-        identify(law, tests, Steady(), settings=QUICK)
 
 
 def test_a_given_offset_prior_is_used(tests):
@@ -165,38 +146,3 @@ def test_scatter_of_rates_is_found_when_the_coefficient_is_fixed():
     fit = identify(NORTON.fix(A=1e-14), tests, Steady(), settings=QUICK)
     assert fit.noise_model.rate < 0.02
     assert fit.values["n"] == pytest.approx(4.0, abs=1e-3)
-
-
-@pytest.mark.parametrize("fixed", [{"A_1": 1e-16, "A_2": 1e-17}, {"A_1": 1e-16, "n_1": 5.0}])
-def test_sums_with_fixed_parts_are_identified(fixed):
-    law = (NORTON + NORTON).fix(**fixed)
-    tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1050.0) for s in (30, 50, 80)], seed=3, noise=1e-5)
-    assert np.isfinite(identify(law, tests, Steady(), settings=QUICK).rms)
-
-
-def test_fits_to_different_frames_are_not_ranked(fit, tests):
-    short = identify(LAW, [h.up_to("strain", 0.01) for h in tests], Steady(), settings=QUICK)
-    with pytest.raises(FitError, match="cannot be ranked"):
-        rank([fit, short])
-
-
-def test_refit_keeps_the_nuisances(tests):
-    plain = identify(LAW, tests, Steady(), settings=replace(QUICK, nuisances=()))
-    again = refit(plain, tests[:-1])
-    assert again.noise_model.rate == again.noise_model["strain"].offset == 0.0
-
-
-def test_attaching_histories_goes_by_name(fit, tests):
-    assert [h.name for h in fit.with_histories(tests[::-1], Steady()).histories] == [h.name for h in tests]
-    with pytest.raises(FitError, match="not among the histories"):
-        fit.with_histories(tests[:1], Steady())
-
-
-def test_noise_of_a_smooth_sparse_curve_is_small():
-    """Primary creep t^0.1 without noise at 12 frames even in ln t: under 0.1 % of the end strain is taken for noise."""
-    from creepkit.inverse.frame_noise import frame_noise
-    from creepkit.records import History, constant_stress
-
-    times = np.geomspace(1e2, 1e6, 12)
-    curve = History("smooth", times, {"strain": 0.01 * (times / 1e6) ** 0.1}, constant_stress(100.0), 1000.0)
-    assert frame_noise(curve, "strain") < 1e-5
