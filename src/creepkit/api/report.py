@@ -10,9 +10,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from creepkit.api.identification import export, law_with_values, rank
+from creepkit.api.identification import rank
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, ReportError
+from creepkit.exporters.exporting import export, law_with_values
 from creepkit.reports.contents import ReportSource
 
 if TYPE_CHECKING:
@@ -289,7 +290,7 @@ def _commands(group: ReportGroup, histories: Sequence[History]) -> Iterator[str]
     """Lines of Python that repeat an identification, where names and settings alone determine it."""
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.settings import IdentificationSettings
-    from creepkit.registry.arguments import resolve_law
+    from creepkit.registry import resolve_law
     from creepkit.reports.html.findings import findings_of
 
     found = findings_of(group)

@@ -14,7 +14,8 @@ from creepkit.errors import DatasetError, SolveError, SurrogateError
 from creepkit.jobs.shard_progress import ProgressCallback
 from creepkit.language import symbols
 from creepkit.records import History, Loading, Predictor, Program, Specimen, Status, call_of_plugin, predict_with
-from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictor
+from creepkit.registry import resolve_law
+from creepkit.registry.arguments import check_histories, resolve_predictor
 from creepkit.sampling.domains import SamplingDesign
 from creepkit.specimens.run import Run, Runnable, run_from_outputs, unusual_values, with_explanation
 from creepkit.surrogates.surrogate import Recipe

@@ -256,8 +256,8 @@ def targets_of(file: StudyFile, number: int) -> dict[str, list[float]]:
 
 def tolerances_of(file: StudyFile, number: int) -> dict[str, float]:
     """{kind: standard deviation} of a forecast, in the unit of the nuisance parameter of that kind."""
-    from creepkit.records.known_specimens import all_dimensions
     from creepkit.records.prediction import GENERAL_NUISANCES
+    from creepkit.records.specimen_lookup import all_dimensions
 
     kinds = {f"{kind}_{_unit_of_kind(kind)}".rstrip("_"): kind for kind in (*GENERAL_NUISANCES, *all_dimensions())}
     given = file.model.forecast[number].tolerances

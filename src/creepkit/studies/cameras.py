@@ -25,7 +25,7 @@ from creepkit.instruments.imposed import Imposed
 from creepkit.inverse.fingerprints import predictor_fingerprint
 from creepkit.language import Elastic
 from creepkit.records import Frames, History, Loading, Specimen, SupportsSurfaceObservation, loads_of
-from creepkit.registry.arguments import frame_files
+from creepkit.registry.reading import frame_files
 from creepkit.reports.contents import Exclusion
 from creepkit.studies import arguments
 from creepkit.studies.inputs import InputFile

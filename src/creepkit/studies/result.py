@@ -80,17 +80,13 @@ class StudyResult:
 
     def __repr__(self) -> str:
         """Stages by their states, the verdict on each group, and where the report is."""
-        states = Counter(one.state for one in self.stages)
-        counted = ", ".join(f"{count} {state}" for state, count in states.items()) or "none"
+        counted = ", ".join(f"{n} {state}" for state, n in Counter(one.state for one in self.stages).items()) or "none"
         verdicts = [f"{name}: {one.verdict}" if name else one.verdict for name, one in self.rankings.items()]
         if len(verdicts) > MOST_VERDICTS:
             verdicts[MOST_VERDICTS:] = [f"and {len(verdicts) - MOST_VERDICTS} more groups"]
-        lines = [
-            f"StudyResult '{self.title}': {len(self.histories)} tests; stages: {counted}",
-            *verdicts,
-            *(f"failed: {one.stage}: {one.sentence}" for one in self.failures),
-            f"report: {self.report or 'none'}",
-        ]
+        failed = [f"failed: {one.stage}: {one.sentence}" for one in self.failures]
+        head = f"StudyResult '{self.title}': {len(self.histories)} tests; stages: {counted}"
+        lines = [head, *verdicts, *failed, f"report: {self.report or 'none'}"]
         return "\n  ".join(line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 1]}…" for line in lines)
 
     @property
