@@ -3,14 +3,17 @@
 import importlib.util
 import json
 import re
+import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import creepkit as ck
 from creepkit.cli.app import app
-from creepkit.cli.demo import PLANTED
+from creepkit.cli.demo import PLANTED, PLANTED_BULGE
+from helpers.paths import EXAMPLES
 
 CURVES = sorted(str(p) for p in PLANTED.glob("*.csv"))
 
@@ -112,3 +115,39 @@ def test_demo_identifies_measured_curves_then_the_law_of_a_virtual_bulge_test(tm
     again = creepkit("run", path, "--to", tmp_path / "again", "--only", "quality")
     assert again.exit_code == 0, again.output
     assert "all numbers are those of" in again.stdout
+
+
+def test_the_virtual_bulge_test_is_what_its_script_makes(tmp_path):
+    """To a third of its noise: the solver may change within its tolerance."""
+    script = EXAMPLES / "00_make_a_virtual_bulge_test.py"
+    runpy.run_path(str(script))["main"](tmp_path)
+    (made,), (shipped,) = (ck.read_histories(folder / "virtual_bulge_test.csv") for folder in (tmp_path, PLANTED_BULGE))
+    for name, noise in (("amplitude", 1.5e-3), ("width", 0.02), ("shape", 0.02)):
+        assert made.outputs[name] == pytest.approx(shipped.outputs[name], abs=noise / 3)
+    assert (tmp_path / "truth.json").read_text() == (PLANTED_BULGE / "truth.json").read_text()
+
+
+def test_a_cut_forgets_how_every_test_ended():
+    """A stopped test that never came to the strain of the cut must not be the only one judged by its end."""
+    from creepkit.cli.identify import _truncate_at_strain
+
+    times = np.linspace(3600, 36000, 5)
+    tests = [
+        ck.History(
+            name=name,
+            times=times,
+            outputs={"strain": np.linspace(0.01, end, 5)},
+            loading=ck.constant_stress(100),
+            temperature=1000.0,
+            unruptured=True,
+        )
+        for name, end in (("far", 0.1), ("near", 0.03))
+    ]
+    assert [(h.rupture_time, h.unruptured) for h in _truncate_at_strain(tests, 0.05)] == [(None, False)] * 2
+
+
+def test_laws_are_ranked_by_likelihood_and_further_tests_are_told(tmp_path):
+    words = ("--law", "norton", "--law", "hyperbolic-sine", "--further-tests", "--starts", 1, "--no-sums")
+    result = creepkit("identify", *CURVES[:3], *words, "--to", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "BIC - best" in result.stdout

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.inverse.cross_validation import cross_validate, times_to_strain
+from creepkit.inverse.cross_validation import cross_validate, measured_time_to_strain, times_to_strain
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify, refit
 from creepkit.inverse.selection import rank
@@ -50,6 +50,12 @@ def test_rate_band_contains_the_truth(fit):
     truth = TRUTH["A"] * stress ** TRUTH["n"] * np.exp(-TRUTH["Q"] / 8.314462618 * (1 / 1050 - 1 / 1073.15))
     assert ((low < truth) & (truth < high)).all()
     assert ((low < rate) & (rate < high)).all()
+
+
+def test_local_exponent_of_a_power_law_is_its_exponent(fit):
+    n, low, high = fit.local_exponent(50.0, 1050.0)
+    assert float(n) == pytest.approx(fit.values["n"], rel=1e-6)
+    assert low < n < high
 
 
 def test_one_stress_leaves_the_exponent_undetermined():
@@ -146,3 +152,40 @@ def test_scatter_of_rates_is_found_when_the_coefficient_is_fixed():
     fit = identify(NORTON.fix(A=1e-14), tests, Steady(), settings=QUICK)
     assert fit.noise_model.rate < 0.02
     assert fit.values["n"] == pytest.approx(4.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("fixed", [{"A_1": 1e-16, "A_2": 1e-17}, {"A_1": 1e-16, "n_1": 5.0}])
+def test_sums_with_fixed_parts_are_identified(fixed):
+    law = (NORTON + NORTON).fix(**fixed)
+    tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1050.0) for s in (30, 50, 80)], seed=3, noise=1e-5)
+    assert np.isfinite(identify(law, tests, Steady(), settings=QUICK).rms)
+
+
+def test_refit_keeps_the_nuisances(tests):
+    plain = identify(LAW, tests, Steady(), settings=replace(QUICK, nuisances=()))
+    again = refit(plain, tests[:-1])
+    assert again.noise_model.rate == again.noise_model["strain"].offset == 0.0
+
+
+def test_noise_of_a_smooth_sparse_curve_is_small():
+    """Primary creep t^0.1 without noise at 12 frames even in ln t: under 0.1 % of the end strain is taken for noise."""
+    from creepkit.inverse.frame_noise import frame_noise
+    from creepkit.records import History, constant_stress
+
+    times = np.geomspace(1e2, 1e6, 12)
+    curve = History("smooth", times, {"strain": 0.01 * (times / 1e6) ** 0.1}, constant_stress(100.0), 1000.0)
+    assert frame_noise(curve, "strain") < 1e-5
+
+
+def test_every_seed_reaches_the_same_minimum(tests, fit):
+    other = identify(
+        LAW, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20, seed=11)
+    )
+    assert (np.abs(other.u - fit.u) < 0.05 * np.sqrt(np.diag(fit.covariance))).all()
+
+
+def test_measured_time_interpolates(tests):
+    test = tests[0]
+    t = measured_time_to_strain(test, 0.01)
+    assert np.interp(t, test.times, test.outputs["strain"]) == pytest.approx(0.01, rel=1e-9)
+    assert measured_time_to_strain(test, 1.0) is None

@@ -9,6 +9,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import SolveError
+from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.records import Status
 from creepkit.specimens.per_test import OneTest, PerTest
 
@@ -113,6 +114,13 @@ def test_an_author_is_told_which_test_values_and_line(given, sentence):
         Wrong().predict(NORTON, NORTON.to_internal(TRUTH), plans(60.0))
 
 
+def test_differences_leave_a_coefficient_off_that_is_off():
+    """-inf has no neighbours: its derivative is zero, and nothing is warned of."""
+    theta = NORTON.to_internal({"A": 0.0, "n": 4.0})
+    found = predict_with_sensitivities(Bar(), NORTON, theta[0], plans(60.0), {})
+    np.testing.assert_array_equal(found.jacobian, np.zeros_like(found.jacobian))
+
+
 @dataclass(frozen=True)
 class Wire(PerTest):
     """A wire that hangs under a weight, of a length and a diameter."""
@@ -162,3 +170,11 @@ def test_a_diameter_is_found_as_a_nuisance_parameter():
     assert "mm" in str(fit)
     for estimate, truth in zip(fit.nuisances, diameters, strict=True):
         assert abs(estimate.value - truth) < 3.0 * estimate.sd
+
+
+def test_it_simulates_and_forecasts():
+    run = ck.simulate(NORTON, Bar(), TRUTH, loading=ck.constant_stress(80.0, "stress"), times=TIMES)
+    np.testing.assert_allclose(run.outputs["strain"], 1e-16 * 80.0**4 * TIMES, rtol=1e-12)
+    fit = ck.identify(NORTON, planted(), Bar(), starts=1, nuisances=[ck.Nuisance("rate", sd=0.1)])
+    one = fit.forecast(plans(70.0)).tests[0].outputs["strain"]
+    assert one.band.low[-1] < 1e-16 * 70.0**4 * TIMES[-1] < one.band.high[-1]

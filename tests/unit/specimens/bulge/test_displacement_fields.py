@@ -25,6 +25,7 @@ def test_planted_field_is_recovered(D):
     assert fit.points == 2500
 
 
+@pytest.mark.nightly
 def test_standard_errors_of_a_field_are_its_scatter():
     x, y = pixels(30)
     truth, noise = np.array([0.35, 3.6, 2.3, 0.7, -0.4]), np.random.default_rng(8).normal(size=(150, 30, 30))
@@ -34,6 +35,15 @@ def test_standard_errors_of_a_field_are_its_scatter():
     scores = (values - truth) / [f.standard_errors for f in fits]
     np.testing.assert_allclose(scores.std(axis=0), 1.0, atol=0.2)  # 150 draws know a deviation to 6 %
     np.testing.assert_allclose([f.residual_sd for f in fits], 0.02, rtol=0.15)
+
+
+def test_lost_and_wild_points():
+    x, y = pixels()
+    surface = cross(x - 0.7, y + 0.4, 0.35, 3.6, 2.3)
+    surface[3, 4], surface[9:12, 9] = 2.0, np.nan
+    fit = fit_field(x, y, surface)
+    assert fit.points == 2497
+    np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], [0.35, 3.6, 2.3], rtol=0.005)
 
 
 @needs_shared_data
