@@ -234,11 +234,11 @@ def _starts_processes(module: str) -> bool:
 def test_processes_are_started_in_two_places() -> None:
     """Workers, and what tries HDF5 files with the same care; `worker_pools` waits for workers and ends them.
 
-    `browser_page` asks the desktop for its browser, with a page of ours.
+    `app_page` asks the desktop for its browser, with a page of ours.
     """
     starting = {module for module in source_tree.modules() if _starts_processes(module)}
     in_jobs = {"creepkit.jobs.worker_start", "creepkit.jobs.worker_pools"}
-    assert starting == in_jobs | {"creepkit.files.hdf5_trial", "creepkit.cli.browser_page"}
+    assert starting == in_jobs | {"creepkit.files.hdf5_trial", "creepkit.cli.app_page"}
     pools = source_tree.tree("creepkit.jobs.worker_pools")
     called = {
         node.func.attr

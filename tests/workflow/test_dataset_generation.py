@@ -91,6 +91,7 @@ def test_a_worker_that_is_killed_is_replaced(whole, tmp_path, caplog):
     assert "a worker process died (signal SIGKILL); its shard 1 is simulated again" in caplog.text
 
 
+@pytest.mark.nightly
 def test_a_sample_that_kills_its_worker_each_time_fails(whole, tmp_path):
     row = strong_enough(range(20, 32))
     deadly = Deadly(stress_of(row))
@@ -133,6 +134,7 @@ def wait_for(what, seconds=60.0):
 
 
 @pytest.mark.parametrize("workers_too", [True, False])
+@pytest.mark.nightly
 def test_a_generation_that_is_killed_goes_on_where_it_was(whole, tmp_path, workers_too):
     to, log = tmp_path / "a.h5", tmp_path / "log"
     first = started(to, log, seconds=0.03, workers=1)
@@ -151,6 +153,7 @@ def test_a_generation_that_is_killed_goes_on_where_it_was(whole, tmp_path, worke
     assert left_behind(tmp_path) == ["merging.lock"]
 
 
+@pytest.mark.nightly
 def test_ctrl_c_ends_the_workers_and_counts_no_death(tmp_path):
     to = tmp_path / "a.h5"
     first = started(to, seconds=0.1, workers=1)
@@ -175,6 +178,7 @@ def test_a_lock_of_the_dead_does_not_block(whole, tmp_path):
 # ---- a cluster -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_a_dask_cluster_makes_the_same_data_set(whole, tmp_path):
     from distributed import LocalCluster
 

@@ -200,6 +200,7 @@ def test_what_tests_share_is_at_its_estimate_in_forecast_and_score():
     assert np.log(one.outputs["strain"].band.high[-1] / one.outputs["strain"].band.low[-1]) < 0.4
 
 
+@pytest.mark.nightly
 def test_p_values_of_tests_like_the_fitted_ones_are_uniform(fit):
     """Over 60 tests from the true law: P(p < 0.2) is 0.2 give or take 0.05, and none is below 1e-4."""
     rng = np.random.default_rng(21)
@@ -242,6 +243,7 @@ def test_a_broken_test_is_not_scored_by_its_life_where_no_life_was_fitted(fit):
     assert fit.forecast(broken).tests[0].score.p_value > 1e-3
 
 
+@pytest.mark.nightly
 def test_curves_with_noise_of_their_own_lie_inside(fit):
     """Stated noise ten times that of the fitted tests: 40 whole curves inside at 0.95, give or take 0.035."""
     made = []

@@ -147,6 +147,7 @@ def test_a_damaged_answer_is_worked_out_again(tmp_path, caplog):
     assert "X.json: this is not the result of an alloy that creepkit wrote" in caplog.text
 
 
+@pytest.mark.nightly
 def test_workers_find_what_this_process_finds_and_one_that_dies_costs_one_alloy():
     deadly = [h.replace(specimen="deadly") for h in bars("D")]
     apart = screened([*deadly, *TWO[:3]], using={"uniaxial": specimen("uniaxial"), "deadly": Deadly()}, workers=2)

@@ -108,6 +108,7 @@ def test_thickness() -> None:
 
 
 @pytest.mark.long_when_sanitized
+@pytest.mark.nightly
 def test_another_dimple_and_its_mesh_from_files() -> None:
     """A plate with a fillet, meshed and as a mesh from elsewhere, within one per cent: nothing knows the dimple."""
     fillet = Bulge(geometry=DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",)), threads=1, tolerance=1e-4)
@@ -132,6 +133,7 @@ def test_stated_error_enters_the_covariance_and_the_specimen_corrects_it() -> No
 
 
 @pytest.mark.long_when_sanitized
+@pytest.mark.nightly
 def test_fewer_modes_err_more() -> None:
     creep, values = CASES["combined"]
     theta = creep.to_internal(values)
