@@ -17,17 +17,13 @@ WRITING_FUNCTIONS = {
 
 EXCEPTIONS = {
     "creepkit.files.writing": "the one place",
-    "creepkit.files.unfinished_files": "a part of it: a file while it is written, by the descriptor that made it",
-    "creepkit.files.written_lists": "a part of it: the list of what was written in a folder",
+    "creepkit.files.locking": "files that are locked, and hold nothing",
     "creepkit.cli.failures": "the report of a fault, in a new private folder; and the null device",
     "creepkit.cli.browser_page": "the page that sends a browser on, in a new private folder",
     "creepkit.core.compile": "the compiled core, in the folder of the sources",
-    "creepkit.jobs.shard_progress": "locks of shards, in the folder of a data set",
-    "creepkit.files.private_copies": "copies of files that others could change, in a private temporary folder",
-    "creepkit.files.cache_folders": "the mark of a cache folder of ours",
     "creepkit.kernels.compilation": "compiled laws, in the cache whose owner and permissions were checked",
-    "creepkit.reports.figures": "savefig() to the stream of replace_on_success()",
-    "creepkit.files.hdf5_files": "HDF5 to the descriptor of replace_on_success()",
+    "creepkit.reports.figures": "savefig() to the temporary name of replace_on_success()",
+    "creepkit.files.hdf5_files": "HDF5 to the temporary name of replace_on_success()",
     "creepkit.testing.reader_checks": "samples for readers, in a temporary folder",
     "creepkit.testing.camera_checks": "samples for camera formats, in a temporary folder",
 }

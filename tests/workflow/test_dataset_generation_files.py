@@ -11,7 +11,6 @@ import pytest
 from creepkit.dataset import storage
 from creepkit.errors import DatasetError
 from helpers.dataset_runs import ROWS, assert_same, left_behind, run, run_here, shards_of, whole_of
-from helpers.other_users import HAS_OWNERS, give_to_another_user
 from helpers.planted_sampling import Planted, Raising
 
 
@@ -19,9 +18,6 @@ from helpers.planted_sampling import Planted, Raising
 def whole(tmp_path_factory):
     """The data set as it is when nothing goes wrong."""
     return whole_of(tmp_path_factory)
-
-
-PLANTED = ("generation.json", "00001.h5", "00001.lock", "merging.lock")
 
 
 # ---- files that are in the way -------------------------------------------------------------------------------------
@@ -48,25 +44,6 @@ def test_a_shard_of_another_data_set_is_not_counted(whole, tmp_path, caplog):
     (tmp_path / "a.h5.parts" / "00000.h5").write_bytes(shards_of(other)[0].read_bytes())
     assert_same(run_here(tmp_path / "a.h5"), whole)
     assert "a shard of another data set; it is simulated again" in caplog.text
-
-
-@HAS_OWNERS
-@pytest.mark.parametrize("name", ["a.h5", "a.h5.parts", *(f"a.h5.parts/{name}" for name in PLANTED)])
-def test_what_another_user_planted_is_no_work_of_ours(tmp_path, monkeypatch, name):
-    run_here(tmp_path / "a.h5")
-    if name != "a.h5":
-        (tmp_path / "a.h5").unlink()
-    planted = tmp_path / name
-    if planted.suffix == ".lock":
-        planted.with_suffix(".h5").unlink(missing_ok=True)
-        planted.touch()
-    give_to_another_user(planted, monkeypatch)
-    with pytest.raises(
-        DatasetError, match=rf"{re.escape(name)}: belongs to another user \(mallory\), .*; remove it, or"
-    ):
-        run_here(tmp_path / "a.h5")
-    if name == "a.h5":
-        assert storage.read_dataset(tmp_path / name).provenance["seed"] == 0, "read where that is asked for"
 
 
 @pytest.mark.parametrize(
@@ -131,7 +108,7 @@ def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
     assert re.search(r"a\.h5: cannot be written: File too large; free some space", complaint(3 * shard // 2))
     made = {path: path.stat().st_mtime_ns for path in shards_of(to)}
     assert len(made) * ROWS >= len(expected)
-    assert left_behind(tmp_path / "a.h5.parts") == ["merging.lock"]
+    assert left_behind(tmp_path / "a.h5.parts") == ["generating.lock"]
     assert_same(run_here(to, samples=300), expected)
     assert made == {path: path.stat().st_mtime_ns for path in shards_of(to)}
 

@@ -11,6 +11,7 @@ import copy
 import functools
 import inspect
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
@@ -69,11 +70,10 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
     def run(**options: Any) -> None:
         force = bool(options["force"] if own_force else options.pop("force", False))
         _check_numbers(options, limits, parameters)
-        with overwriting("replace" if force else "refuse"):
+        with overwriting() if force else nullcontext():
             for name, output in outputs.items():
                 if options.get(name) is not None:
                     output.check(options[name], force=force)
-        with overwriting("replace" if force else "beside"):
             command(**options)
 
     run.__signature__ = signature.replace(parameters=list(parameters.values()))  # type: ignore[attr-defined]

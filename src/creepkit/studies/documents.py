@@ -21,9 +21,7 @@ from creepkit.files.json_documents import (
 )
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError, ValueCodec
-from creepkit.files.temporary_names import is_temporary
-from creepkit.files.writing import write_bytes
-from creepkit.files.written_lists import is_foreign, is_listed, written_files
+from creepkit.files.writing import is_foreign, is_listed, temporary_files, write_bytes, written_files
 from creepkit.inverse.fingerprints import short_hash
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC
@@ -238,8 +236,7 @@ class ResultFolder:
     def clear(self, *, everything: bool) -> None:
         """Remove files that a process left half written when it died, or all results. No other process may write."""
         for folder in (self.folder, self.fits, self.identified):
-            left = [path for path in folder.glob(".*.part") if is_temporary(path)]
-            for path in (*left, *(written_files(folder, "*.json") if everything else ())):
+            for path in (*temporary_files(folder), *(written_files(folder, "*.json") if everything else ())):
                 path.unlink(missing_ok=True)
 
     @property

@@ -5,18 +5,18 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.files.owners import check_owner_by_name
+from creepkit.files.locking import locked
 from creepkit.files.record_codec import RecordError, record_to_json
 from creepkit.files.writing import check_folder_target
 from creepkit.inverse.kept_fits import COMPUTING, keep_fits
-from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text, series_of_task
+from creepkit.jobs.shard_progress import ProgressCallback, duration_text, series_of_task
 from creepkit.records import History
 from creepkit.reports.contents import ExportedFile, StageFailure
 from creepkit.studies.documents import (
@@ -94,23 +94,18 @@ def running_alone(folder: Path) -> Iterator[None]:
         if one.is_symlink():
             raise StudyError(f"{one}: is a link, and results are kept in a folder of the study's own; remove the link")
     check_folder_target(folder, StudyError)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for one in (folder, folder / FITS_FOLDER, folder / IDENTIFIED_FOLDER):
-            check_owner_by_name(one, StudyError)
-        lock = ShardLock(folder / RUNNING_LOCK, StudyError)
-        lock.__enter__()
-    except OSError as error:
-        raise StudyError(
-            f"{folder}: results cannot be kept there ({error.strerror}); remove what stands in their place, or name "
-            "another folder by --to"
-        ) from None
-    try:
-        if not lock.held:
+    with ExitStack() as stack:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            held = stack.enter_context(locked(folder / RUNNING_LOCK))
+        except OSError as error:
+            raise StudyError(
+                f"{folder}: results cannot be kept there ({error.strerror}); remove what stands in their place, or "
+                "name another folder by --to"
+            ) from None
+        if not held:
             raise StudyError(f"{folder}: another process is carrying out this study; wait for it, or end it")
         yield
-    finally:
-        lock.__exit__(None, None, None)
 
 
 @dataclass

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.files.writing import check_target, write_text
-from creepkit.files.written_lists import is_listed
+from creepkit.files.writing import check_target, is_listed, write_text
 from creepkit.reports.attachments import read_attachments
 from creepkit.studies.documents import ResultFolder, key_of
 from creepkit.studies.execution import StageRecord

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import StudyError, nearest
-from creepkit.files.writing import check_target
-from creepkit.files.written_lists import is_foreign, made_from
+from creepkit.files.writing import check_target, is_foreign, made_from
 from creepkit.reports.attachments import problem_of_name, same_name
 from creepkit.studies import arguments
 from creepkit.studies.camera_stages import CameraStages

@@ -13,7 +13,7 @@ from creepkit.exporters import write_export
 from creepkit.exporters.builtin import creepkit_exporters
 from creepkit.exporters.latex import LatexExporter, latex_number
 from creepkit.exporters.law_files import JsonExporter, read_valued_law
-from creepkit.files.written_lists import RECORD
+from creepkit.files.writing import RECORD
 from creepkit.language import CreepLaw, Param, State, activated, arrhenius, linear, parameters, states, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT

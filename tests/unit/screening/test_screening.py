@@ -16,7 +16,6 @@ from creepkit.screening import files
 from creepkit.screening.alloys import Compositions
 from creepkit.screening.screen import ScreeningOptions, screen
 from helpers.narrow_predictor import Narrow
-from helpers.other_users import HAS_OWNERS, give_to_another_user
 from helpers.planted_alloys import NORTON, Deadly, Doubting, bars, bulge
 
 QUICK = IdentificationSettings(starts=2, sobol_points=16)
@@ -164,14 +163,6 @@ def test_only_what_changed_is_done_again(tmp_path):
         TWO[3:], to=tmp_path, settings=dataclasses.replace(QUICK, seed=5), progress=lambda *t: seen.append(t[3][0])
     )
     assert seen == ["Y"]
-
-
-@HAS_OWNERS
-def test_an_answer_that_another_user_planted_is_refused(tmp_path, monkeypatch):
-    screened(TWO[:3], to=tmp_path)
-    give_to_another_user(tmp_path / "X.json", monkeypatch)
-    with pytest.raises(FitError, match=r"X\.json: belongs to another user \(mallory\)"):
-        screened(TWO[:3], to=tmp_path)
 
 
 def test_a_damaged_answer_is_worked_out_again(tmp_path, caplog):

@@ -12,7 +12,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.files.written_lists import RECORD
+from creepkit.files.writing import RECORD
 from creepkit.reports.attachments import embed
 from creepkit.reports.contents import Attachment
 from creepkit.studies.carried_study import study_of_report

@@ -10,7 +10,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import StudyError
-from creepkit.files.temporary_names import temporary_name
+from creepkit.files.writing import temporary_name
 from creepkit.studies import inputs
 from creepkit.studies.inputs import resolve_paths
 from helpers.study_runs import ONE_FIT, states
@@ -82,7 +82,7 @@ def test_only_regular_files_with_names_of_ours_are_cleared(study: Path) -> None:
     left = temporary_name(results / "fits" / "a.json")
     left.parent.mkdir(parents=True)
     left.touch()
-    kept = [results / ".x.part", results / "fits" / ".mine.part", temporary_name(results / "b.json")]
+    kept = [results / ".x.01234567.part", results / "fits" / ".mine.part", temporary_name(results / "b.json")]
     for path in kept[::2]:
         path.mkdir()
     kept[1].touch()

@@ -18,7 +18,6 @@ import creepkit as ck
 from creepkit.errors import StudyError
 from creepkit.files.writing import write_text
 from creepkit.studies.lock import differences
-from helpers.other_users import HAS_OWNERS, give_to_another_user
 from helpers.study_runs import ONE_FIT, STUDY, made, numbers, study_in
 
 
@@ -233,18 +232,6 @@ def test_two_processes_do_not_run_one_study_at_once(study: Path) -> None:
     with running_alone(study.parent / "study.results"), pytest.raises(StudyError, match="another process"):
         ck.Study.load(study).run()
     assert ck.Study.load(study).run(only="quality").failures == ()
-
-
-@HAS_OWNERS
-@pytest.mark.parametrize("name", ["study.results", "study.results/fits", "study.results/running.lock"])
-def test_results_in_a_folder_of_another_user_are_refused(
-    study: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    ck.Study.load(study).run(only="quality")
-    (study.parent / "study.results" / "fits").mkdir(exist_ok=True)
-    give_to_another_user(study.parent / name, monkeypatch)
-    with pytest.raises(StudyError, match=rf"{name}: belongs to another user \(mallory\)"):
-        ck.Study.load(study).run(only="quality")
 
 
 def test_a_changed_forecast_is_named_by_its_key_and_both_values() -> None:

@@ -10,7 +10,7 @@ from safetensors.numpy import load_file, save_file
 
 import creepkit as ck
 from creepkit.errors import SurrogateError
-from creepkit.files.written_lists import RECORD
+from creepkit.files.writing import RECORD
 from creepkit.inverse.composite_predictor import refined_of
 from creepkit.surrogates.loading import load_surrogate, surrogate_by_name
 from creepkit.surrogates.weight_files import SURROGATE, read_weights, write_weights
