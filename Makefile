@@ -1,4 +1,5 @@
-# make test   set up .venv, then check style, types, layers and run all tests, those of plugins/ included
+# make test   set up .venv, then check style, types, layers and run the tests, those of plugins/ included: six minutes
+# make nightly   the rest, an hour: slow tests, release, sanitizer, pictures, CalculiX, hostile input (.ci/nightly)
 # make verify-export   exported laws in a CalculiX built from Debian's source, beside our solver: a table
 # make docs   build the documentation into build/docs; needs no network once .venv is set up
 # make core   compile the core (src/core) again where its sources changed; 'make test' does it first
@@ -13,7 +14,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := test
-.PHONY: test core sanitize demo docs verify-export clean
+.PHONY: test nightly core sanitize demo docs verify-export clean
 
 PYTHONS := python3.11 python3.12 python3.13
 BIN := .venv/bin
@@ -38,9 +39,11 @@ test: core
 	$(BIN)/ruff format --check
 	$(BIN)/lint-imports --no-logo
 	@mkdir -p build; $(BIN)/mypy >build/types 2>&1 & types=$$!; \
-	for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q); done; \
+	$(BIN)/pytest -q -n 2 --dist loadgroup $(PYTEST_OPTIONS); \
 	wait $$types || { cat build/types; exit 1; }; cat build/types
-	$(BIN)/pytest -q -n 2 --dist loadgroup $(PYTEST_OPTIONS)
+
+nightly:
+	bash .ci/nightly
 
 core: .venv/.ok
 	@$(BIN)/python src/core/compile.py >/dev/null
@@ -51,7 +54,7 @@ sanitize: core
 	$(BIN)/python src/core/compile.py --sanitize
 	@CREEPKIT_CORE=$(CURDIR)/build/sanitize/libcreepkit_core.so ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1 \
 	    LD_PRELOAD="$$($(CXX) -print-file-name=libasan.so) $$($(CXX) -print-file-name=libstdc++.so)" \
-	    $(BIN)/python -m pytest -q -n 2 -m 'not long_when_sanitized' $(PYTEST_OPTIONS) $(SANITIZED_TESTS)
+	    $(BIN)/python -m pytest -q -n 2 -m "not long_when_sanitized and not nightly" $(PYTEST_OPTIONS) $(SANITIZED_TESTS)
 
 demo: core
 	$(BIN)/creepkit demo --to demo

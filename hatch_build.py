@@ -1,5 +1,7 @@
 """The part of the build that hatchling does not know: compile the core, and name the wheel after the platform.
 
+The core is compiled twice: as a library of this platform, and in WebAssembly for interactive pages.
+
 The library is loaded by ctypes, so one wheel serves every version of Python: py3-none-PLATFORM.
 """
 
@@ -46,12 +48,19 @@ class CoreBuildHook(BuildHookInterface):
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile; `version` is "editable" or "standard"."""
         compilation = _compilation()
+        build, wheel = ROOT / "build" / "core", ROOT / "build" / "wheel"
         try:
             if version == "editable":
-                compilation.compile_core(ROOT / "build" / "core")
+                compilation.compile_core(build)
+                page_core = compilation.compile_page_core(build)
             else:
-                library = compilation.compile_core(ROOT / "build" / "core", ROOT / "build" / "wheel")
+                library = compilation.compile_core(build, wheel)
                 build_data["force_include"][str(library)] = f"creepkit/core/{library.name}"
+                page_core = compilation.compile_page_core(build, wheel)
+                if page_core:
+                    build_data["force_include"][str(page_core)] = f"creepkit/app/{page_core.name}"
+            if not page_core:
+                self.app.display_warning(compilation.NO_PAGE_CORE)
         except compilation.CompilationError as error:
             sys.exit(str(error))
         build_data["tag"], build_data["pure_python"] = f"py3-none-{_platform()}", False

@@ -6,8 +6,8 @@ parameter sets predict them.
 
 FOLDER holds the histories (CSV with a head: temperature_C, modulus_GPa, pressure_1_MPa, pressure_2_MPa, jump_time_h,
 end_time_h; columns time_s, amplitude_mm, width_mm, shape). Without it three tests are simulated with a published set
-of parameters, with noise and apex thickness as measured, and go through the same steps. The figures in
-docs/pictures/inconel_625 were written with the measured histories. ``--quick`` simulates fewer frames::
+of parameters, with noise and apex thickness as measured, and go through the same steps. ``--quick``
+simulates fewer frames::
 
     python examples/03_inconel_625.py [--quick] [FOLDER [OUT]]
 """

@@ -1,8 +1,9 @@
 """Compile the core: `python src/core/compile.py`, which needs nothing but Python and what it asks for.
 
 The compiler is CXX, or else the first of c++, g++ and clang++ that the machine has, or else, and always on Windows, the
-one in the package `ziglang`. CMake and Ninja come from the packages of their names where the machine has none.
-`--requirements` prints those packages that are wanted, and missing from the machine.
+one in the package `ziglang`, which also compiles what interactive pages compute with, for WebAssembly. CMake and Ninja
+come from the packages of their names where the machine has none. `--requirements` prints those packages that are
+wanted, and missing from the machine.
 
 `hatch_build.py` calls this file when pip installs creepkit or builds a wheel of it, `make core` when sources changed.
 """
@@ -27,17 +28,26 @@ IN_PLACE = SOURCES.parent / "creepkit" / "core"
 COMPILERS = ("c++", "g++", "clang++")
 LIBRARY_NAMES = {"darwin": "libcreepkit_core.dylib", "win32": "creepkit_core.dll"}
 LIBRARY_NAME = LIBRARY_NAMES.get(sys.platform, "libcreepkit_core.so")
+PAGE_FOLDER, PAGE_NAME = SOURCES.parent / "creepkit" / "app", "creepkit_core.wasm"
+PAGE_MEMORY = 64 * 2**20  # bytes; webassembly/memory.cpp takes 56 MiB of them
+PAGE_OPTIONS = (
+    *("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c++17", "-O2", "-msimd128", "-fvisibility=hidden"),
+    *("-Wall", "-Wextra", "-fno-math-errno", "-fno-trapping-math", "-fno-exceptions", "-fno-rtti", "-nostdlib++"),
+    *("-Wl,--gc-sections", "-Wl,--export-dynamic", "-Wl,--strip-all", "-Wl,-z,stack-size=1048576"),
+    *(f"-Wl,--initial-memory={PAGE_MEMORY}", f"-Wl,--max-memory={PAGE_MEMORY}"),
+)
 
 
 class CompilationError(Exception):
     """The core cannot be compiled; the message is one sentence that says what is missing and what to do."""
 
 
+NO_PAGE_CORE = "interactive pages will not compute: run 'pip install ziglang', then 'make core'"
+
+
 def requirements() -> list[str]:
     """The packages to install before the core can be compiled, beside what the machine has."""
-    wanted = []
-    if system_compiler() is None:
-        wanted.append("ziglang>=0.13")
+    wanted = ["ziglang>=0.13"]  # the one compiler of WebAssembly; of the library too where there is no other
     if shutil.which("cmake") is None:
         wanted.append("cmake>=3.20")
     if shutil.which("make") is None and shutil.which("ninja") is None:
@@ -62,8 +72,7 @@ def compile_core(build: Path, output: Path = IN_PLACE, sanitize: bool = False) -
     sanitize : with checks of addresses and of undefined behaviour.
     """
     cmake, compiler = _tool("cmake"), system_compiler()
-    for name in ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"):
-        os.environ.setdefault(name, str(build.resolve() / "zig"))
+    _keep_cache_in(build)
     generator = ["Unix Makefiles"]
     if shutil.which("make") is None or sys.platform == "win32":
         generator = ["Ninja", f"-DCMAKE_MAKE_PROGRAM={_tool('ninja')}"]
@@ -83,6 +92,30 @@ def compile_core(build: Path, output: Path = IN_PLACE, sanitize: bool = False) -
     if not library.is_file():
         raise CompilationError(f"the core of creepkit cannot be compiled: {library} was not written")
     return library
+
+
+def compile_page_core(build: Path, output: Path = PAGE_FOLDER) -> Path | None:
+    """Compile what a page computes with, where sources changed; None where the package ziglang is not installed.
+
+    build : folder of object files. output : folder of the file.
+    """
+    program, file = _zig_program(), output / PAGE_NAME
+    if program is None:
+        return None
+    parts = ("surface_observation.cpp", "time_interpolation.cpp", "lanes/gaussian_fit.cpp")
+    sources = [*sorted((SOURCES / "webassembly").glob("*.cpp")), *(SOURCES / part for part in parts)]
+    newest = max(path.stat().st_mtime for path in [Path(__file__), *SOURCES.rglob("*.?pp")])
+    if not (file.is_file() and file.stat().st_mtime >= newest):
+        _keep_cache_in(build)
+        output.mkdir(parents=True, exist_ok=True)
+        _run([program, "c++", *PAGE_OPTIONS, "-I", str(SOURCES), "-o", str(file), *map(str, sources)])
+    return file
+
+
+def _keep_cache_in(build: Path) -> None:
+    """Tell the compiler of ziglang where to keep what it compiles of its own."""
+    for name in ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"):
+        os.environ.setdefault(name, str(build.resolve() / "zig"))
 
 
 def macos_version() -> str:
@@ -132,15 +165,22 @@ def _tool(name: str) -> str:
 
 def _zig() -> list[str]:
     """Command of the compiler in the package `ziglang`: C++ without its standard library, for any such processor."""
-    package = importlib.util.find_spec("ziglang")
-    if package is None or package.origin is None:
+    program = _zig_program()
+    if program is None:
         raise CompilationError(
             f"the core of creepkit cannot be compiled: no C++ compiler ({', '.join(COMPILERS)}) is installed, nor the "
             "Python package ziglang, which has one; install a compiler, run 'pip install ziglang', or install "
             "creepkit from a wheel"
         )
-    name = "zig.exe" if sys.platform == "win32" else "zig"
-    return [str(Path(package.origin).with_name(name)), "cc", "-mcpu=baseline"]
+    return [program, "cc", "-mcpu=baseline"]
+
+
+def _zig_program() -> str | None:
+    """Path of the compiler in the package `ziglang`."""
+    package = importlib.util.find_spec("ziglang")
+    if package is None or package.origin is None:
+        return None
+    return str(Path(package.origin).with_name("zig.exe" if sys.platform == "win32" else "zig"))
 
 
 def _run(command: list[str]) -> None:
@@ -169,6 +209,8 @@ def main() -> int:
             print(compile_core(ROOT / "build" / "sanitize", ROOT / "build" / "sanitize", sanitize=True))
         else:
             print(compile_core(ROOT / "build" / "core"))
+            if compile_page_core(ROOT / "build" / "core") is None:
+                print(NO_PAGE_CORE, file=sys.stderr)
     except CompilationError as error:
         print(error, file=sys.stderr)
         return 1

@@ -65,11 +65,6 @@ def check_numbers(name: str, values: Any, limits: Limits, error: type[CreepkitEr
 
 STARTS = Limits(1, 10_000)
 SOBOL_POINTS = Limits(1, 2**20)
-FURTHER_LAWS = Limits(0, 1000)
-COMPARED_FRAMES = Limits(2, 100_000)
-"""Of each test of an identification."""
-
-
 SEED = Limits(0, 2**63 - 1)
 SIMULATED_FRAMES = Limits(2, 1_000_000)
 """Of one test, as its history and its file are to fit into memory."""

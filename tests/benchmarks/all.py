@@ -4,6 +4,7 @@
     python tests/benchmarks/all.py NAME ... [--write]         run the commands of some, one after another
     python tests/benchmarks/all.py everything [--write]       run all that need no further file or program
     python tests/benchmarks/all.py --short [NAME ...]         run the short forms, as .ci/run does, of all that have one
+    python tests/benchmarks/all.py --nightly                  run the whole commands of those, as .ci/nightly does
 
 With --write every program writes its tables to docs/measured. Commands run from the root of the project.
 """
@@ -44,46 +45,29 @@ BENCHMARKS = {
     "core_speed": Benchmark(2),
     "random_simulations": Benchmark(30, short=("--cases", "1000", "--laws", "10", "--seed", "7", "--jobs", "2")),
     "killed_runs": Benchmark(90, short=("--runs", "2", "--kills-in-a-run", "3", "--seed", "7", "--jobs", "2")),
-    "camera_reading": Benchmark(0.5),
     "rendered_speckle": Benchmark(1, needs="pyvale 2026.10, here or in the Python of the option --python"),
     "user_costs": Benchmark(2, needs=DATA),
     "studies": Benchmark(4, needs=DATA),
-    "kernel_speed": Benchmark(1, ((), ("1000",)), "numba, for the hand-written code beside ours"),
-    "kernel_start": Benchmark(1),
-    "uniaxial_speed": Benchmark(1),
+    "kernel_speed": Benchmark(1, needs="numba, for the hand-written code beside ours"),
     "dimple_accuracy": Benchmark(
         90, (("--cases", "145", "--cache", "build/dimple_references.jsonl"),), "reference cases in ../shared/data"
     ),
     "camera_extraction": Benchmark(3, needs=DATA),
-    "sensitivity_cost": Benchmark(3, (("--cold",),)),
     "reduced_order_model": Benchmark(2),
     "calculix": Benchmark(6, (("N3", "N7", "TH", "c1", "c2", "c3"),), "CalculiX (ccx)"),
     "verify_export": Benchmark(20, needs="gcc, gfortran, make, the network for CalculiX's source; CalculiX is built"),
     "neml2_model": Benchmark(1, needs="NEML2 3.1, see the program"),
     "javascript_runtime": Benchmark(5, needs="node"),
     "clock_alignment": Benchmark(15, (("--tests", "39"),), DATA),
-    "dataset_generation_speed": Benchmark(6, (("--samples", "256"),)),
     "surrogate_accuracy": Benchmark(10, (("--samples", "150"),)),
-    "surrogate_any_specimen": Benchmark(5),
-    "surrogate_speed": Benchmark(3),
-    "identification_speed": Benchmark(1),
-    "bending_recovery": Benchmark(15),
     "specimen_recovery": Benchmark(25),
-    "search_success": Benchmark(15, (("--specimens", "6", "--searches", "default", "cma"),)),
-    "swarm_speed": Benchmark(1),
     "design_of_experiments": Benchmark(90),
     "law_recovery": Benchmark(45, (("--specimens", "24", "--others", "10"),)),
-    "penalty_confusion": Benchmark(
-        12, (("--specimens", "2", "--penalties", "L2", "GroupL2", "Sqrt", "Subsets", "paper"),)
-    ),
     "plate_of_alloys": Benchmark(8),
-    "report_size": Benchmark(18),
-    "temperature_forms": Benchmark(10, (("--through", "uniaxial", "--specimens", "2", "--max-forms", "2"),)),
     "inconel_event": Benchmark(15, needs=DATA),
     "inconel_temperature": Benchmark(4, needs=DATA),
     "measured_creep": Benchmark(90, needs=DATA),
     "whole_life": Benchmark(60, needs=DATA),
-    "rupture_coverage": Benchmark(4),
     "rupture_methods": Benchmark(3, needs=DATA),
     "rupture_strength_coverage": Benchmark(5, (("--sets", "40"),)),
     "forecast_coverage": Benchmark(50),
@@ -91,7 +75,6 @@ BENCHMARKS = {
     "weights": Benchmark(8),
     "noise_correlation": Benchmark(4),
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
-    "structure": Benchmark(0.1),
     "rate_tables": Benchmark(20, needs=DATA),
     "reader_fuzz": Benchmark(
         25, (("--per-kind", "10000", "--first", "2000000"),), short=("--short", "--first", "700000", "--jobs", "2")
@@ -148,10 +131,12 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="programs to run, or 'everything'; none: list them")
     parser.add_argument("--write", action="store_true", help="write the tables to docs/measured")
     parser.add_argument("--short", action="store_true", help="the short forms, whose tables are not written")
+    parser.add_argument("--nightly", action="store_true", help="the commands of programs with a short form")
     options = parser.parse_args()
-    names = options.names
-    if options.short:
-        with_short = [name for name, benchmark in BENCHMARKS.items() if benchmark.short]
+    names, with_short = options.names, [name for name, benchmark in BENCHMARKS.items() if benchmark.short]
+    if options.nightly:
+        names = with_short
+    elif options.short:
         if options.write or not set(names) <= set(with_short):
             parser.error(f"--short goes without --write, and with {', '.join(with_short)}")
         names = names or with_short

@@ -1,36 +1,15 @@
-"""Lags between the clocks of cameras and instruments, found from the response to pressure: planted lags, and one test.
+"""Lags between the clocks of cameras and instruments, found from the response to pressure.
 
     python tests/benchmarks/clock_alignment.py [--tests 100] [--write]
 
-Truth is the reduced-order model of the dimple under a programme of pressure (steps with ramps, staircases, slow ramps,
-with and without unloading), with a law of creep that the alignment does not know (sinh, Norton, strain hardening, time
-hardening; values as in planted_bulge_tests), so that the apex moves elastically and creeps before, during and after the
-ramps. The record holds the pressure with noise of 0.02 MPa, the frames the apex with noise of 1 um. The clock of the
-instrument is ahead by 0.1 s to 5 min, of either sign, and gains a normal deviate of 1e-4.
+Planted: the reduced-order model of the dimple under programmes of pressure, with a law of creep that the alignment does
+not know; noise of 0.02 MPa and 1 um. The clock of the instrument is ahead by 0.1 s to 5 min, of either sign, and gains
+a normal deviate of 1e-4. Columns: tests refused because several lags fit or none does; answers whose 95 % intervals
+hold the planted lag and drift; gross misses, wrong by more than ten half widths. The frames do not tell lags apart that
+put every ramp between the same frames. After a slow ramp, during which creep grows, take the interval for twice as
+wide, or align on a fast change of the load.
 
-Columns: tests; those refused because several lags fit, or because no lag does; answers whose 95 % intervals hold the
-planted lag and the planted drift (with 95 % binomial bounds); gross misses, lags that are wrong by more than ten half
-widths of their interval; the median error of the lag, the median width of its interval, CPU time of one alignment. The
-frames do not tell lags apart that put every ramp between the same frames, so that an interval is often nearly as wide
-as that of the frames. The default search takes every lag at which frames and record meet; every third test is aligned
-with a narrower one too.
-
-Gross misses are of frames 150 s apart: lags that are wrong by 16 and 22 s, with intervals that are far too narrow. The
-second is of the narrower search alone.
-
-The seed of these tests was chosen once, after the alignment was finished; the alignment was not changed after they were
-seen. The slow ramp of 300 s fails: its intervals hold too rarely, and nearly all its lags are too small. The cause was
-looked for with the first of these tests and with others. Where the displacement is proportional to the pressure the lag
-is found to 0.1 to 1 s, so neither the record nor the search is to blame. But in these tests creep grows during the ramp
-until the apex moves four to six times as far per MPa at its end as at its start, and goes on after it; the model takes
-that for a compliance that grows, and the end of the ramp for later than it is. Two remedies were tried, with other
-tests: a creep rate that changes with time only under load, and, with that, two exponents of the creep rate on the load
-in the place of one; the bias stayed, so the alignment was left as it was. After a slow ramp take the interval for twice
-as wide, or align on a fast change of the load, such as an unloading.
-
-The last section compares with the alignment by hand of the static test of dimple D1 (shared/data/cameras/dabi_static):
-its lag is read from the file by finding at which lag the record gives the aligned values, for every channel that both
-files have.
+The static test of dimple D1 (shared/data/cameras/dabi_static) was aligned by hand too: plateaus laid upon each other.
 """
 
 from __future__ import annotations

@@ -2,19 +2,11 @@
 
     python tests/benchmarks/common_events.py [--plates 240] [--steps 60] [--write]
 
-Simulated plates of 3 to 9 tests, observed at the same times. Half are dimples (reduced-order model, 1.5 um of noise),
-half bars under 60 to 140 MPa (noise of 2e-5). The alloy of a plate follows one of eight kinds of law: sinh, Norton,
-strain hardening, time hardening, Norton with strain hardening, primary creep that fades (Norton with time hardening),
-n(t), and damage. At 120 MPa and 1050 K its rate is 10^-7.3 to 10^-5.7 /s, Q is 350 to 450 kJ/mol; tests run at 1013 to
-1083 K. A third of the plates is under one load, a third is loaded higher, a third lower from half time on. Times are 96
-of 150 s or 48 of 900 s. Every second plate has, in the place of white noise, noise of which half the variance is common
-to all tests and the rest has an autocorrelation of 0.7 from frame to frame. Plates with a test that grows by less than
-ten times the noise, or breaks, are drawn again.
-
-The first table counts plates without any event of the rig in which one is flagged, with 95 % binomial intervals, and
-the flags on measured tests. The second has a step of the furnace at a fifth to four fifths of the time that multiplies
-the rate at the mean temperature by the factor; a step is found where a flag is within one frame. Then: flags at other
-times, single factors whose nominal 95 % error holds the planted one, and flags that see a step of the load.
+Simulated plates of 3 to 9 dimples or bars, observed at the same times, of eight kinds of law; tests run at 1013 to
+1083 K, under one load or with a change of load. Every second plate has noise of which half the variance is common to
+all tests and the rest is autocorrelated. The first table counts plates without any event in which one is flagged, the
+second the flags on measured tests. The third has a step of the furnace that multiplies the rate by the factor; it is
+found where a flag is within one frame.
 """
 
 from __future__ import annotations

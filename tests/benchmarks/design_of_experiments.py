@@ -3,33 +3,16 @@
     python tests/benchmarks/design_of_experiments.py [--bars 60] [--dimples 40] [--law-bars 120] [--laws 100]
                                                      [--shares half equal] [--jobs 1] [--keep FOLDER] [--write]
 
-Precision. A planted law is identified from a first campaign, the next test for the rate at a stress of service is
-asked of ck.design(), planted with noise at the true values, made, and all tests are identified again. "Predicted over
-realised" is the standard deviation of ln rate that was expected over the one that the new identification states;
-"deviation" is that of its estimate from the truth in units of the predicted standard deviation, root mean square over
-campaigns, and median over 0.674 (both 1 for a right prediction and normal errors). Bars: three creep curves of 40
-frames, noise of 2e-5; with scatter five, whose rates scatter by 10 %. Dimples: 2 h of 8, then 10 MPa with one dimple,
-modulus unknown by 10 %.
+Precision: a planted law is identified, the next test for the rate at a stress of service is asked of ck.design(),
+planted, made, and all tests are identified again. "Predicted over realised" is the standard deviation of ln rate that
+was expected over the one that the new identification states; "deviation" that of its estimate from the truth in units
+of the predicted one, root mean square. Bars: three creep curves; "scatter": five, whose rates scatter by 10 %; dimples:
+2 h of 8, then 10 MPa with one dimple, modulus unknown by 10 %.
 
-The law, by bars. One of the four single laws of Table 1 is identified from three bars at 70, 80 and 90 MPa with noise
-of 1e-4 and all four laws are selected; the test proposed for the law is made, and all are selected again.
-
-The law, by dimples. One of the four single laws of Table 1 is planted (laws, priors and noise of
-planted_bulge_tests.py, modulus unknown by 10 %). "Standard" is 8, then 10 MPa for 12 h, with one dimple of 0.50 mm, or
-with three of 0.44, 0.50 and 0.58 mm. Designed campaigns begin with 2 h of 8, then 10 MPa, with these three dimples, and
-go on with what ck.design() proposes for the rest of their hours of the oven, unless the verdict is decisive already;
-the rig takes three dimples at once, from 4 to 14 MPa, and each run costs 1 h beside its test. All tests have a frame
-each 300 s, and 60 at most, which lie further apart then. "Singled out and right" has more than 0.95 of the weight,
-explains the tests, and is the planted law; "decisive and right" stands every challenge too (docs/concepts/verdicts.md).
-"Met over expected" is of the chi-square by which each law that remained is worse than the planted one, after the
-proposed test was made and all laws were selected again, where either is above 5; the expected probability is that of a
-verdict which is decisive and right.
-
-Norton's law is a special case of the other three, so that where it is planted nothing but the penalty on parameters
-speaks for it, and no test singles it out; rows without it are given too.
-
-Tests of dimples are made on a finer mesh than the one that identifies (planted_bulge_tests.FINE). Finished campaigns
-are kept in the folder of --keep: stopped and started again, none is repeated.
+The law: one of the four single laws of Table 1 is planted. "Standard" is 8, then 10 MPa for 12 h, with one dimple or
+three. Designed campaigns begin with 2 h ("first") and go on with what ck.design() proposes for half of the standard
+hours, unless the verdict is decisive already. "Singled out" has more than 0.95 of the weight and explains the tests;
+"decisive" stands every challenge too. Norton's law is a special case of the others, so that no test singles it out.
 """
 
 import json

@@ -8,8 +8,7 @@ def print_precision(page, rows_by_kind):
     page.heading("Precision of the rate at a stress of service")
     page.table(
         "campaigns", "number", "sd of ln rate before, median", "predicted, median", "realised, median",
-        "predicted over realised: median [quartiles]", "|ln ratio|: median", "deviation: rms", "by its median",
-        "CPU s, median, largest",
+        "predicted over realised: median [quartiles]", "deviation: rms",
     )  # fmt: skip
     everything = [row for rows in rows_by_kind.values() for row in rows]
     for kind, rows in {**rows_by_kind, "all": everything}.items():
@@ -18,12 +17,9 @@ def print_precision(page, rows_by_kind):
             low, middle, high = np.quantile(ratio, (0.25, 0.5, 0.75))
             medians = (float(np.median([row[name] for row in rows])) for name in ("before", "predicted", "realised"))
             rms = float(np.sqrt(np.mean([row["deviation"] ** 2 for row in rows])))
-            robust = float(np.median([abs(row["deviation"]) for row in rows])) / 0.6745
-            cpu = [row["cpu"] for row in rows]
             page.row(
                 kind, len(rows), *(f"{m:.3g}" for m in medians), f"{middle:.2f} [{low:.2f}, {high:.2f}]",
-                f"{np.median(np.abs(np.log(ratio))):.3f}", f"{rms:.2f}", f"{robust:.2f}",
-                f"{np.median(cpu):.1f}, {max(cpu):.1f}",
+                f"{rms:.2f}",
             )  # fmt: skip
 
 
@@ -49,23 +45,7 @@ def print_arms(page, rows, standard, shares):
 
 
 def print_expectations(page, rows, names):
-    """Expected chi-squares and probabilities against those that were met."""
-    directions = [d for row in rows for d in row["directions"]]
-    page.table("tests", "directions", "within 5: median |met - expected|", "above 5",
-               "met over expected: median [quartiles]", "factor between them: median")  # fmt: skip
-    for name in (*names, "all"):
-        own = [d[3:] for d in directions if name in ("all", d[0])]
-        small = [abs(met - expected) for expected, met in own if max(expected, met) <= 5.0]
-        pairs = np.array([pair for pair in own if max(pair) > 5.0])
-        cells = ["", ""]
-        if len(pairs):
-            clipped = np.maximum(pairs, 1.0)
-            ratio = clipped[:, 1] / clipped[:, 0]
-            low, middle, high = np.quantile(ratio, (0.25, 0.5, 0.75))
-            cells = [
-                f"{middle:.2f} [{low:.2f}, {high:.2f}]", f"{np.median(np.maximum(ratio, 1 / ratio)):.2f}",
-            ]  # fmt: skip
-        page.row(name, len(own), f"{np.median(small):.1f}" if small else "", len(pairs), *cells)
+    """Expected probabilities of a right verdict against those that were met."""
     expected = [(r[name]["probability"], r[name]["decisive"] and r[name]["right"]) for r in rows for name in names
                 if "probability" in r.get(name, {})]  # fmt: skip
     page.table("expected probability of a right verdict", "designs", "mean", "met")
@@ -73,7 +53,3 @@ def print_expectations(page, rows, names):
         own = [(p, hit) for p, hit in expected if low < p <= high]
         if own:
             page.row(label, len(own), f"{np.mean([p for p, _ in own]):.2f}", share_with_interval([h for _, h in own]))
-    cpu = [seconds for row in rows for seconds in row["cpu"]]
-    if cpu:
-        page.table("CPU seconds of ck.design()", "median", "largest")
-        page.row("goal law", f"{np.median(cpu):.1f}", f"{max(cpu):.1f}")

@@ -5,16 +5,10 @@
                                                [--write]
 
 Each alloy is one dimple under 8, then 10 MPa for 4 h, a frame a minute, with white noise as measured (1.5 um on D_amp,
-0.02 mm on S_d, 0.02 on S_p), its law and values drawn around the three of Fig. 7a of Chen et al.
-(creepkit.screening.planted). The four laws of Table 1 are identified with intervals, the best one is confirmed by
-finite elements, and Eq. (2) is fitted without sparsity unless --no-full-law. `--how through` searches in the
-reduced-order model and ends with finite elements; `surrogate` uses nothing else; `finite-elements` does without it. The
-simulation of the plate is not timed. Started again with the same --to, the screening continues, and its time means
-nothing.
-
-Shares have 95 % intervals by Wilson. "Set of laws" holds those that the tests cannot rule out; an answer is decisive
-above 95 % of the weight. "Covered" is the share of planted values, of the alloys whose law was found, inside their 95 %
-intervals.
+0.02 mm on S_d, 0.02 on S_p), its law and values drawn around the three of Fig. 7a of Chen et al. The four laws of
+Table 1 are identified with intervals, the best one is confirmed by finite elements, and Eq. (2) is fitted without
+sparsity. "Set of laws": those that the tests cannot rule out. "Covered": planted values, of alloys whose law was found,
+inside their 95 % intervals.
 """
 
 import os
@@ -149,7 +143,6 @@ def main():
     cost_table(page, plate, wall, spent, options.workers or len(os.sched_getaffinity(0)))
     recovery_tables(page, plate, planted.truth)
     confirmation_table(page, plate)
-    page.code(str(plate))
     if options.write:
         page.write()
 

@@ -4,13 +4,9 @@
 
 Tests of six laws drawn over the paper's bounds, 12 h with 288 frames, by the reduced-order model and by finite
 elements of the same mesh, at the same tolerance of their steps. The error is the largest difference of the displacement
-of the top over all frames and nodes in % of the largest that the finite elements reach; median, 90 % and largest of the
-cases. Tests that end before 60 s or bulge by less than 0.02 mm are left out. Where a test ruptures, its frames before
-the first of both ruptures count; beside stands the difference of the times at which the middle of the top has risen
-by 2.4 mm, in % of the finite elements' (a simulation ends with the step that reaches 3 mm, not with 3 mm).
-
-CPU times are the least of three calls of the simulation alone, the mean over the cases, on one thread; a prediction
-adds set-up and observation.
+of the top over all frames and nodes, in % of the largest that the finite elements reach: median, 90 % and largest of
+the cases. Where a test ruptures, its frames before the first of both ruptures count; beside stands the difference of
+the times at which the middle has risen by 2.4 mm. CPU times are of the simulation alone, on one thread.
 """
 
 import time
@@ -25,7 +21,6 @@ import creepkit as ck
 from creepkit import kernels
 from creepkit.arrays import Floats
 from creepkit.fem.reduced_order_model import ReducedBasis, ReducedOrderModel
-from creepkit.fem.reduced_order_training import Snapshots, snapshots, train
 from creepkit.fem.simulation import Simulation, simulate
 from creepkit.fem.solver import SolverSettings
 from creepkit.kernels.interface import CompiledLaw
@@ -33,16 +28,12 @@ from creepkit.language import CreepLaw, Param, State, parameters, principal_stre
 from creepkit.records import History, Status
 from creepkit.specimens.bulge.finite_elements import solver_settings
 from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
-from creepkit.specimens.bulge.setup import BulgeSetup, model_of_geometry, set_up_test
+from creepkit.specimens.bulge.setup import BulgeSetup, set_up_test
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.reduced_order_training import RUNS, power_law_runs
 
 SHORTEST, LEAST = 60.0, 0.02
 DEFLECTION = 2.4
 """mm."""
-SIZES = ((12, 64), (16, 96), (24, 96), (24, 128), (32, 128), (32, 200))
-TRAINED, BETWEEN = (0.45, 0.5, 0.555), (0.47, 0.5, 0.53, 0.485, 0.515)
-"""Apex thicknesses, mm, of training and of the cases between them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,40 +124,6 @@ HEADS = (
 )  # fmt: skip
 
 
-def sizes_table(page: Page, cases: list[Reference], count: int, seed: int) -> None:
-    """Modes and points; trained at the dimple's own thickness, then at three and tested between them."""
-    page.heading("Modes and points")
-    complete = np.array([each.complete for each in cases])
-    mean = [
-        1e3 * np.mean([each.cpu for each, c in zip(cases, complete, strict=True) if c == state]) for state in (1, 0)
-    ]
-    page.paragraph(
-        f"{len(cases)} tests on the dimple of 0.5 mm, {complete.sum()} of them complete. Finite elements take "
-        f"{mean[0]:.2f} ms for a complete and {mean[1]:.2f} ms for a ruptured one. Training: {RUNS} runs of power laws."
-    )
-    data, spent = training((0.5,))
-    page.table("modes, points", "training, CPU s", *HEADS)
-    for modes, points in SIZES:
-        seconds, basis = timed(lambda m=modes, p=points: train(data, m, p, TRUE.deflection_limit), 1)
-        row(page, f"{modes}, {points}", cases, basis, f"{spent + seconds:.1f}")
-    page.heading("Thicknesses between those of training")
-    page.paragraph(f"Trained at {TRAINED} mm, tested at {BETWEEN} mm in turn.")
-    between = references(TRUE, BETWEEN, count, seed)
-    data, spent = training(TRAINED)
-    page.table("modes, points", "training, CPU s", *HEADS)
-    for modes, points in SIZES[1:]:
-        seconds, basis = timed(lambda m=modes, p=points: train(data, m, p, TRUE.deflection_limit), 1)
-        row(page, f"{modes}, {points}", between, basis, f"{spent + seconds:.1f}")
-
-
-def training(thicknesses: tuple[float, ...]) -> tuple[Snapshots, float]:
-    """Snapshots at some apex thicknesses, and the CPU time they took, s."""
-    models = [model_of_geometry(TRUE.geometry.replace(apex_thickness=h), 1.0) for h in thicknesses]
-    settings = SolverSettings(deflection_limit=TRUE.deflection_limit, strain_limit=TRUE.strain_limit)
-    seconds, data = timed(lambda: snapshots(power_law_runs(models, RUNS), settings), 1)
-    return data, seconds
-
-
 def default_table(page: Page, cases: list[Reference], count: int, seed: int) -> None:
     """The model that `reduced_order_model()` returns, law by law and on another specimen."""
     page.heading("The model as it is used")
@@ -190,36 +147,6 @@ def default_table(page: Page, cases: list[Reference], count: int, seed: int) -> 
 def default_basis(specimen: Bulge, reference: Reference) -> ReducedBasis:
     """The basis that a test of a specimen uses."""
     return BulgeReducedOrderModel(specimen).reduced_model_of(reference.setup).basis
-
-
-def predictions_table(page: Page) -> None:
-    """What a search pays: 300 candidates in one test of 289 frames, values and sensitivities to everything."""
-    page.heading("300 candidates in one test")
-    page.paragraph(
-        "The public prediction: set-up, simulation, observation. Internal values of candidates are drawn about given "
-        "ones, by 1 %. Sensitivities are those to all parameters of the law and to thickness and modulus. "
-        "CPU ms for each."
-    )
-    page.table("law", "reduced-order model", "with sensitivities", "finite elements", "with sensitivities")
-    models = (TRUE.reduced_order_model(), TRUE)
-    for name, values in SEARCHED.items():
-        law = ck.law(name)
-        rng = np.random.default_rng(0)
-        theta = np.repeat(law.to_internal(law.values(values)), 300, axis=0)
-        theta = theta * (1.0 + 0.01 * rng.normal(size=theta.shape))
-        test = plan(0.5)
-        given = {"thickness": np.full((1, 1), 0.5), "modulus": np.zeros((1, 1))}
-        cells = []
-        for model in models:
-            for some, kinds in ((theta, None), (theta[:60], given)):
-                seconds, _ = timed(
-                    lambda m=model, t=some, k=kinds, w=law, h=test: m.predict(
-                        w, t, [h], nuisances=k, sensitivities=k is not None
-                    ),
-                    2,
-                )
-                cells.append(f"{1e3 * seconds / len(some):.2f}")
-        page.row(name, *cells)
 
 
 SEARCHED = {
@@ -297,10 +224,8 @@ def main() -> None:
     options = parser.parse_args()
     page = Page("reduced_order_model", __doc__)
     cases = references(TRUE, (), options.cases, options.seed)
-    sizes_table(page, cases, options.cases, options.seed)
     default_table(page, cases, options.cases, options.seed)
     sensitivities_table(page)
-    predictions_table(page)
     if options.write:
         page.write()
 

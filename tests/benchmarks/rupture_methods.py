@@ -3,28 +3,14 @@
     python tests/benchmarks/rupture_methods.py [--data FOLDER] [--sets cmsx6 ...] [--laws NAME ...] [--starts 2]
                                                [--keep FOLDER] [--write]
 
-Everything is fitted to the tests that ended before a third of the longest test of the set, and predicts the time to
-rupture of the others, with a 95 % band of a single test. "Time-temperature methods" see stress, temperature, how each
-test ended, and its laboratory; "average" is `ck.rupture` with its defaults, the others are the best degree of each
-method. Their bands are those of a test in a new laboratory. With "laboratories not told apart" the scatter between
-laboratories counts as scatter between tests. Laws with tertiary creep see the whole curves: `ck.identify`, then
-`fit.rupture_time`. They know no laboratories: their bands hold the scatter between all tests fitted, each taken for
-independent of the others, as those of the methods do where laboratories are not told apart. Monkman-Grant's relation
-by its rate law sees minimum rates of the fitted tests; "by own rates" it is also given those of the predicted tests,
-which nobody knows before a test has run for a while. In "with the others as run-outs" the predicted tests count among
-the fitted ones, as run-outs at a third of the longest test: what a laboratory would know at that time.
+Everything is fitted to the tests that ended before a third of the longest, and predicts the time to rupture of the
+others, with a 95 % band of a single test. "Average" is `ck.rupture` with its defaults, other methods stand with their
+best degree; their bands are those of a new laboratory. Laws see the whole curves and know no laboratories.
+Monkman-Grant "by own rates" is also given the minimum rates of the predicted tests.
 
-Errors are log10(measured / predicted median) of the predicted tests that broke: their mean, their root mean square,
-and the largest. Inside counts the tests within the 95 % band; a run-out is inside where the upper end is later. So few
-tests, of which some share a laboratory, cannot tell a band that is right from one that is too wide: bands of normal
-errors that are right have half widths of about 1.96 rms errors. The half width is the median over tests of log10(upper
-end / median).
-
-Alloy 617 is base metal, 750 to 1000 °C, in air and helium, the folder of a record being its laboratory; no heats are
-named. Its first laboratory does not say how its tests ended: they count as run-outs at their last frame. A test that is
-there twice counts once. Minimum rates are those of the index of the data. Its tensile strength is not in the data, so
-Wilshire's method is not among them. CMSX-6 is at 980 °C, so the methods are one, a polynomial of log stress at one
-temperature.
+Errors are log10(measured / predicted median) of the predicted tests that broke; a run-out is inside where the upper end
+is later; the half width is the median of log10(upper end / median). Bands of normal errors that are right have half
+widths of 1.96 rms errors. Alloy 617 is base metal, 750 to 1000 °C, in air and helium.
 """
 
 from __future__ import annotations
@@ -47,19 +33,6 @@ SHARE = 1.0 / 3.0
 """Of the longest test: what ends before it is fitted."""
 
 HOUR = 3600.0
-
-SMALL_CHANGES = (
-    "That loading strain is recognised in 7 of the fitted tests is not why this law predicts long lives too short. "
-    "Without a primary stage (m = 0) it fits the curves best where phi is at its bound, 30, and damage hardly speeds "
-    "creep up: most tests then break by their loss of section alone, as with Norton's law, and the few that damage "
-    "breaks leave B, chi and Q_B badly determined. Least squares, in which a rupture time weighs as much as a curve, "
-    "and the likelihood, by which the best round is chosen, then differ; the rounds end before they agree, and which "
-    "solution comes out is decided by trifles, such as a change of every strain by a millionth. The band of a single "
-    "test is wide enough, the median is not to be relied on: a law whose fit says that it has not converged, and that "
-    "phi is not determined, is no basis of an extrapolation. With phi given the likelihood is lower and damage is "
-    "determined up to about phi = 6."
-)
-"""What the table of small changes shows."""
 
 
 def catalogue(histories):
@@ -118,7 +91,7 @@ def errors(predicted, tests):
     )
 
 
-def by_methods(fitted, predicted, own_rates=True, settings=None):
+def by_methods(fitted, predicted, settings=None):
     """{name: [(median, low, high) s of each predicted test]}, and the verdict."""
     assessment = ck.rupture(fitted, hours=[1e4], settings=settings)
     names = ["average", *assessment.methods]
@@ -133,7 +106,7 @@ def by_methods(fitted, predicted, own_rates=True, settings=None):
             assessment.rupture_time(stress_of(h), h.mean_temperature, method="monkman-grant") for h in predicted
         ]
         known = [h for h in predicted if h.minimum_rate is not None]
-        if own_rates and len(known) == len(predicted):
+        if len(known) == len(predicted):
             rates = np.array([h.minimum_rate for h in predicted])
             nothing = np.full(rates.shape, np.nan)
             times = mixed(assessment.models("monkman-grant"), Conditions(nothing, nothing, nothing, rates), "test")
@@ -161,60 +134,6 @@ def by_law(name, title, fitted, predicted, options):
     return result
 
 
-def changed_slightly(tests):
-    """{name: tests}: the same tests, but for what should make no difference to a law that they determine."""
-
-    def disturbed(tests, seed):
-        draw = np.random.default_rng(seed)
-        return [
-            h.replace(outputs={"strain": h.outputs["strain"] * (1 + 1e-6 * draw.standard_normal(h.times.size))})
-            for h in tests
-        ]
-
-    without = [h.replace(includes_elastic=False, used=_with_first_frames(h)) for h in tests]
-    name = f"loading strain of {sum(h.includes_elastic for h in tests)} tests not recognised"
-    changed = "strains changed by 1e-6 of themselves"
-    return {
-        "as read": tests,
-        f"as read, {changed}": disturbed(tests, 0),
-        name: without,
-        **{f"{name}, {changed}, seed {seed}": disturbed(without, seed) for seed in (0, 1)},
-    }
-
-
-def _with_first_frames(h):
-    """(frames,) used ones, with those before the end of loading where that was recognised."""
-    return h.used | (h.includes_elastic & (np.arange(h.used.size) < np.argmax(h.used)))
-
-
-def small_changes(page, fitted, predicted, options):
-    """How much the identified damage of Kachanov and Rabotnov, and the lives it predicts, owe to trifles."""
-    page.heading("Kachanov-Rabotnov under small changes")
-    page.paragraph(SMALL_CHANGES)
-    page.table(
-        "tests, and phi", "log-likelihood", "converged", "phi", "chi", "Q_B, kJ/mol", "95 %", "mean error", "rms"
-    )
-    bar = ck.specimen("uniaxial").replace(tolerance=1e-4)
-    law = catalogue(fitted)["Kachanov-Rabotnov"]
-    bare = [h.replace(minimum_rate=None) for h in fitted]
-    cases = {name: (law, tests) for name, tests in changed_slightly(bare).items()}
-    cases |= {f"as read, phi = {phi} given": (law.fix(phi=phi), bare) for phi in (3, 6, 10, 20)}
-    for name, (given, tests) in cases.items():
-        fit = ck.identify(given, tests, bar, starts=options.starts)
-        stresses, temperatures = [stress_of(h) for h in predicted], [h.mean_temperature for h in predicted]
-        times = np.array(fit.rupture_time(np.array(stresses), np.array(temperatures))).T
-        page.row(
-            name,
-            f"{fit.log_likelihood:.1f}",
-            "yes" if fit.converged else "no",
-            f"{fit.values.get('phi', np.nan):.3g}".replace("nan", "given"),
-            f"{fit.values['chi']:.2f}",
-            f"{fit.values['Q_B'] / 1e3:.0f}",
-            *errors(times, predicted)[:2],
-        )
-        progress(name)
-
-
 def table_of(page, title, histories, options):
     longest = max(end_of(h) for h in histories)
     fitted = [h for h in histories if end_of(h) < SHARE * longest]
@@ -229,28 +148,11 @@ def table_of(page, title, histories, options):
     )
     rows, assessment = by_methods(fitted, predicted)
     pooled, _ = by_methods(fitted, predicted, settings=ck.RuptureSettings(random_effects=False))
-    as_run_outs = [
-        ck.History(
-            h.name,
-            [SHARE * longest],
-            {},
-            h.loading,
-            h.temperature,
-            labels=h.labels,
-            alloy=h.alloy,
-            unruptured=True,
-            minimum_rate=h.minimum_rate,
-        )
-        for h in predicted
-    ]
     page.table("predicted by", "mean error", "rms error", "largest error", "inside", "half width", "CPU time, s")
     for name, values in rows.items():
         page.row(name, *errors(values, predicted), "")
     if assessment.tests.groups:
         page.row("average, laboratories not told apart", *errors(pooled["average"], predicted), "")
-    more, _ = by_methods([*fitted, *as_run_outs], predicted, own_rates=False)
-    for name, values in more.items():
-        page.row(f"{name}, with the others as run-outs", *errors(values, predicted), "")
     for name in catalogue(fitted) if options.laws is None else options.laws:
         try:
             values, cpu = by_law(name, title, fitted, predicted, options)
@@ -259,10 +161,6 @@ def table_of(page, title, histories, options):
             continue
         page.row(f"law: {name}", *errors(values, predicted), f"{cpu:.0f}")
         progress(f"{title}, {name}: {cpu:.0f} CPU s")
-    page.paragraph("The assessment of the fitted tests, without the others as run-outs:")
-    page.code(str(assessment))
-    if any(h.includes_elastic for h in fitted):
-        small_changes(page, fitted, predicted, options)
 
 
 def main():

@@ -2,15 +2,11 @@
 
     python tests/benchmarks/rupture_strength_coverage.py [--sets 200] [--write]
 
-Each simulated set has tests at 550, 600 and 650 °C of 20 to 10,000 h in the mean, planted by Larson-Miller's method
-with C = 20 and a quadratic of log stress, by Orr, Sherby and Dorn's with Q = 330 kJ/mol and a quadratic, or by Manson
-and Haferd's with a line that meets at 500 K and 1e14 h; log10 of times scatters between heats as the table says, and
-by 0.08 between tests of a heat; tests are stopped at a given time (run-outs). Asked for are the strengths at 600 °C
-and 1e4 and 1e5 h. The table gives the share of sets whose 95 % bounds of the mean hold the planted strength, and the
-mean share of 400 drawn new heats, and of 400 drawn tests of new heats, whose own strength lies within theirs; wherever
-a bound is missing it counts as infinite. The method that was planted is fitted alone, with its own degree; "average"
-fits all three methods with polynomials of degree 1 to 3, as far as the tests are enough for them. Each row
-has sets of its own; a share of 95 % of n sets has a standard error of 22 % / sqrt(n).
+Each simulated set has tests at 550, 600 and 650 °C of 20 to 10,000 h, planted by the method named; log10 of times
+scatters between heats as the table says, and by 0.08 between tests of a heat; tests are stopped at a given time. The
+table gives the share of sets whose 95 % bounds of the mean strength at 600 °C hold the planted one, and the share of
+new heats, and of tests of new heats, inside theirs. The planted method is fitted alone; "average" fits all three. A
+share of 95 % of n sets has a standard error of 22 % / sqrt(n).
 """
 
 from __future__ import annotations

@@ -2,15 +2,11 @@
 
     python tests/benchmarks/specimen_recovery.py [--sets 20] [--names tube plate ...] [--write]
 
-A set is an alloy of which four test pieces of one kind are tested at 800 C, at loads over the middle of the range
-that the specimen states, with 25 frames each. The exponent is drawn from 3 to 7; the coefficient such that the
-leading output of the second test grows by some 150 times its noise. The length that the specimen knows least exactly
-differs from test piece to test piece by its tolerance (one standard deviation), and no file states it: it is a
-nuisance parameter. The data come from another discretisation, elements of half the size in steps of a tenth of the
-tolerance, or twice the fibres and stations, with the noise that the specimen states. Columns: shares of sets whose 95
-% interval holds the planted value of the exponent, and of the rate at the geometric mean of the reference stresses;
-median half width of the latter in per cent; share of all lengths within their own 95 %; CPU seconds of a fit, in the
-median. A binomial share of 0.95 in 20 sets lies from 0.85 to 1 in 98 of 100 cases.
+Four test pieces of one kind are tested at 800 C over the middle of the range of loads that the specimen states, with 25
+frames each. The length that the specimen knows least exactly differs from piece to piece by its tolerance, and no file
+states it. The data come from a finer discretisation, with the noise that the specimen states. Columns: shares of sets
+whose 95 % interval holds the planted exponent and the rate amid the tests; half width of the latter; share of all
+lengths within their own 95 %; CPU seconds of a fit. A share of 0.95 in 20 sets lies from 0.85 to 1 in 98 of 100 cases.
 """
 
 from __future__ import annotations

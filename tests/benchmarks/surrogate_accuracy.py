@@ -3,15 +3,11 @@
     python tests/benchmarks/surrogate_accuracy.py [--models FILE ...] [--samples 200] [--folder build/surrogates]
                                                   [--sets NAME ...] [--write]
 
-Held-out sets are drawn from the conditioned domain of each law (seed 77, apex thickness 0.44 to 0.60 mm, 12 h, 900 s
-apart; 20 um of creep or more), so that no network was trained on them; those of the hyperbolic sine are separated by
-their local stress exponent at 1.5 times the reference stress, and mixtures are those samples of the combined law in
-which two terms or more hold 5 % of the rate. They are simulated once and kept in the folder (some 8 CPU s a hundred
-samples). Models: the reduced-order model, and the trained networks of --models, each on the sets of its law.
-
-Columns: relative error of D_amp over all times, and at 12 h (medians); relative squared error (Eq. 4) of D_amp, S_d and
-S_p; largest error of D_amp in a history, median and 95 % quantile; samples flagged as outside the applicability domain;
-share of samples whose largest error is below 5 um or 2 % of the largest deflection.
+Held-out sets are drawn from the conditioned domain of each law (apex thickness 0.44 to 0.60 mm, 12 h, 20 um of creep or
+more). Models: the reduced-order model, and the trained networks of --models, each on the sets of its law. Columns:
+relative error of D_amp over all times, and at 12 h (medians); relative squared error (Eq. 4) of D_amp, S_d and S_p;
+largest error of D_amp in a history, median and 95 % quantile; samples outside the applicability domain; share of
+samples whose largest error is below 5 um or 2 % of the largest deflection.
 """
 
 from pathlib import Path

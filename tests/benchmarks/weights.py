@@ -2,13 +2,10 @@
 
     python tests/benchmarks/weights.py [--sets 40] [--write]
 
-Sets of simulated creep tests of bars are identified with weights="noise" and weights="likelihood". The rates of tests
-scatter by 15 % (one standard deviation), strains have noise of 2e-5, which the files of the hardening law state; every
-other test of that law has a step of stress. Columns: identifications that failed; the share of 95 % intervals that hold
-the planted value, of all parameters, of the rate in the middle of the tests' stresses (at their mean strain), of the
-rate at the lowest stress times 0.8, and of the time to rupture of the law there; the rms error of the middle rate's
-logarithm, and the median half width of its interval. The second table ranks four laws of single terms by each: how
-often the planted one is decisive, how often another one is.
+Sets of simulated creep tests of bars are identified with weights="noise" and weights="likelihood". Rates scatter by
+15 % between tests, strains have noise of 2e-5. Columns: the share of 95 % intervals that hold the planted value, of all
+parameters, of the rate in the middle of the tests' stresses, of the rate at 0.8 of the lowest stress and of the time to
+rupture there; rms error and median half width of the middle rate's logarithm. The second table ranks four laws by each.
 """
 
 from __future__ import annotations

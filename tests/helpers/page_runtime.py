@@ -20,6 +20,7 @@ from helpers.javascript import run_in_node
 RUN = """
 import vm from "node:vm";
 vm.runInThisContext(await readFile("runtime.js", "utf8"));
+await creepkit.ready;
 async function main({ cases, data, then }) {
   return cases.map(([source, call, values, options]) => {
     try {
@@ -52,6 +53,8 @@ def values_that_creep(
 ) -> dict[str, float]:
     """The middle of the bounds, every term multiplied so that the strain at `duration`, s, is about `goal`."""
     values = law.center()
+    if "s_0" in values:  # a threshold, below which nothing creeps
+        values["s_0"] = 0.5 * stress
     coefficients = {law.names[positions[0]] for positions in log_form(law).coefficients if positions}
     coefficients |= {n for n, p in law.table.items() if p.scale == "log" and p.unit == "1/s"}  # of states too
     for _ in range(40):

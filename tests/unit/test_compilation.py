@@ -1,9 +1,6 @@
 """How the core is compiled on other systems, as far as Linux can tell: names of the library and of the wheel."""
 
 import importlib.util
-import re
-import shutil
-import subprocess
 import sys
 import sysconfig
 
@@ -26,24 +23,6 @@ COMPILATION = module_of(ROOT / "src" / "core" / "compile.py")
 
 def test_the_library_has_one_name_for_its_compilation_and_for_its_use():
     assert COMPILATION.LIBRARY_NAMES == LIBRARY_NAMES
-
-
-@pytest.mark.skipif(shutil.which("cmake") is None or shutil.which("make") is None, reason="needs cmake and make")
-def test_cmake_gives_the_library_of_windows_that_name(gxx, tmp_path):
-    """The rules of CMake for Windows, with the machine's compiler, which is not called to link."""
-    options = {
-        "SYSTEM_NAME": "Windows",
-        "SYSTEM_PROCESSOR": "AMD64",
-        "CXX_COMPILER": gxx,
-        "CXX_COMPILER_WORKS": "1",
-        "RC_COMPILER": sys.executable,
-    }
-    words = ["cmake", "-S", ROOT / "src" / "core", "-B", tmp_path, "-G", "Unix Makefiles"]
-    words += [f"-DCMAKE_{name}={value}" for name, value in options.items()]
-    run = subprocess.run([*words, f"-DCREEPKIT_OUTPUT={tmp_path}"], capture_output=True, text=True, check=False)
-    assert run.returncode == 0, run.stdout + run.stderr
-    (link,) = tmp_path.rglob("creepkit_core.dir/link.txt")
-    assert f"-o {LIBRARY_NAMES['win32']} " in re.sub(r"-o \S*/", "-o ", link.read_text(encoding="utf-8"))
 
 
 def test_on_windows_the_compiler_is_that_of_a_package(monkeypatch):

@@ -119,35 +119,3 @@ def arrays_without_shape() -> Iterator[str]:
 def test_the_shape_of_every_array_is_stated() -> None:
     missing = list(arrays_without_shape())
     assert not missing, "no shape of an array is stated in:\n" + "\n".join(missing)
-
-
-def class_names(node: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> set[str]:
-    """Fields, properties, attributes that methods set, and arguments of __init__, also of base classes."""
-    names: set[str] = set()
-    for base in node.bases:
-        if (parent := classes.get(ast.unparse(base).split("[")[0])) is not None:
-            names |= class_names(parent, classes)
-    for member in node.body:
-        if isinstance(member, ast.AnnAssign):
-            names.add(ast.unparse(member.target))
-        elif isinstance(member, ast.Assign):
-            names |= {ast.unparse(t) for t in member.targets}
-        elif isinstance(member, Function):
-            names |= {member.name} | ({a.arg for a in arguments(member)} if member.name == "__init__" else set())
-    names |= {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
-    return names
-
-
-def entries_of_nothing() -> Iterator[str]:
-    """Entries of docstrings, private ones too, that are no field of their class or parameter of their function."""
-    classes = {n.name: n for _, tree in modules(EXEMPT) for n in tree.body if isinstance(n, ast.ClassDef)}
-    for where, node, text, _ in public_objects(EXEMPT, private=True):
-        known = class_names(node, classes) if isinstance(node, ast.ClassDef) else {a.arg for a in arguments(node)}
-        for name in entries(text):
-            if name not in known:
-                yield f"{where}: {name}"
-
-
-def test_docstrings_describe_only_what_exists() -> None:
-    unknown = list(entries_of_nothing())
-    assert not unknown, "no field or parameter has the name of these entries:\n" + "\n".join(unknown)

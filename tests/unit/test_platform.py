@@ -1,7 +1,6 @@
 """Systems other than Linux, as far as Linux can stand in for them: what a system lacks is taken away here."""
 
 import ast
-import itertools
 import ntpath
 import os
 import subprocess
@@ -158,34 +157,6 @@ def test_names_differ_by_more_than_case(texts) -> None:
     assert len({name.casefold() for name in hashed}) == len(hashed)
 
 
-@pytest.mark.parametrize("name", ["CON", "nul", "Aux", "COM1", "lpt9", "con.1", "PRN.2024"])
-def test_names_of_devices_are_changed(name) -> None:
-    assert not is_savable(name + ".csv")
-    assert is_savable(file_stem(name) + ".csv")
-
-
-def test_tests_of_difficult_names_are_written_apart(tmp_path) -> None:
-    from creepkit.cli.read import _write
-
-    history = ck.read_histories(ck.example_data("planted creep curves"))[0]
-    from dataclasses import replace
-
-    names = ["CON", "bar A", "bar a", "Prüfling 3", "a/b:c"]
-    paths = _write([replace(history, name=name) for name in names], tmp_path / "out")
-    assert len({path.name.casefold() for path in paths}) == len(names)
-    assert all(is_savable(path.name) for path in paths)
-    assert len(list((tmp_path / "out").glob("*.csv"))) == len(names)
-
-
-def test_long_paths_are_written_and_read(tmp_path) -> None:
-    folder = tmp_path.joinpath(*itertools.repeat("f" * 60, 8))  # beyond the 260 signs of old Windows
-    folder.mkdir(parents=True)
-    run = ck.read_histories(ck.example_data("planted creep curves"))[0]
-    path = ck.write_history(run, folder / f"{'n' * 80}.csv")
-    assert len(str(path)) > 500
-    assert ck.read_histories(path)[0].times.size == run.times.size
-
-
 # ---- terminals -----------------------------------------------------------------------------------------------------
 
 ONCE_EACH = (
@@ -267,11 +238,6 @@ def cluster(tmp_path):
 
 
 USES = {"excel": spreadsheet, "mcmc": posterior, "cluster": cluster}
-
-
-def test_every_extra_is_tried() -> None:
-    """But for plugins, whose laws are asked for in unit/cli/test_missing_laws.py."""
-    assert USES.keys() | {"plugins"} == extras().keys()
 
 
 @pytest.mark.parametrize("extra", sorted(USES))

@@ -77,11 +77,6 @@ def test_parts_of_a_job_array_become_one_file(whole, tmp_path):
     assert made.items() <= {path: path.stat().st_mtime_ns for path in shards_of(to)}.items()
 
 
-def test_nothing_is_left_behind(tmp_path):
-    run_here(tmp_path / "a.h5")
-    assert left_behind(tmp_path) == ["generating.lock"]
-
-
 # ---- deaths --------------------------------------------------------------------------------------------------------
 
 

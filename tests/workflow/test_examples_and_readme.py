@@ -76,17 +76,3 @@ def test_readme_commands_run_in_order(tmp_path, monkeypatch, capsys):
         if words[0] == "run":
             truth = json.loads(Path("curves/truth.json").read_text())
             assert f"decisive: {truth['law']}" in result.stdout
-
-
-@pytest.mark.parametrize("language", ["python", "sh"])
-def test_every_task_of_readme_has_a_command_and_a_snippet(language):
-    sections = re.split(r"^## ", README, flags=re.M)[1:]
-    tasks = [s for s in sections if s.partition("\n")[0] not in ("The laws", "Where things are")]
-    assert len(tasks) == 8
-    assert all(len(re.findall(rf"```{language}\n", task)) == 1 for task in tasks)
-
-
-def test_readme_opens_with_the_two_commands():
-    first = README.split("```")[1]
-    assert "make demo" in first
-    assert "make test" in first

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import pytest
 
 from creepkit.reports.html import report_html
@@ -85,15 +83,6 @@ def test_the_law_answers_to_its_sliders(browser, address, width) -> None:
     page.context.close()
 
 
-def test_without_scripts_the_sliders_say_that_they_need_them_and_paper_has_none(browser, address) -> None:
-    page, _, _ = opened(browser, address, java_script_enabled=False)
-    assert "needs scripts" in page.locator("#sliders noscript").inner_text()
-    page.emulate_media(media="print")
-    assert not page.locator("#sliders").is_visible()
-    assert page.locator("#findings").is_visible()
-    page.context.close()
-
-
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_its_window_and_is_drawn(browser, address, width, scheme, tmp_path) -> None:
@@ -112,44 +101,6 @@ def test_it_fits_its_window_and_is_drawn(browser, address, width, scheme, tmp_pa
     page.context.close()
 
 
-def test_panels_of_a_figure_are_stacked_where_the_window_is_narrow(browser, address) -> None:
-    """Each panel below the one before, with text of 9 pixels and more; a wide window shows the whole figure."""
-    page, _, _ = opened(browser, address, viewport={"width": 400, "height": 900})
-    found = page.evaluate(
-        """() => [...document.querySelectorAll('.drawing')].map((figure) => {
-            const place = (svg) => { const r = svg.getBoundingClientRect(); return [r.top, r.bottom, r.width]; };
-            const parts = [...figure.querySelectorAll('svg.part')];
-            const smallest = (whole, drawn) => Math.min(...[...whole.querySelectorAll('text')]
-                .map((text) => parseFloat(getComputedStyle(text).fontSize))) * drawn;
-            const whole = figure.querySelector('svg:not(.part)'), first = parts[0] ?? whole;
-            const drawn = first.getBoundingClientRect().width / first.viewBox.baseVal.width;
-            return { parts: parts.map(place), letters: smallest(whole, drawn), whole: place(whole)[2] };
-        })"""
-    )
-    divided = [one["parts"] for one in found if one["parts"]]
-    assert divided
-    for parts in divided:
-        assert all(after[0] >= before[1] - 0.5 for before, after in pairwise(parts))
-    assert all(one["letters"] > 8.9 for one in found)
-    assert all(one["whole"] <= 1.0 for one in found if one["parts"])
-    page.set_viewport_size({"width": 1280, "height": 900})
-    assert page.locator("svg.part:visible").count() == 0
-    page.context.close()
-
-
-def test_the_keyboard_reaches_everything(browser, address) -> None:
-    page, _, _ = opened(browser, address)
-    page.keyboard.press("Tab")
-    assert page.evaluate("document.activeElement.textContent") == "Skip to the findings"
-    page.keyboard.press("Enter")
-    assert page.evaluate("location.hash") == "#main"
-    beyond = page.evaluate(
-        "[...document.querySelectorAll('a, .scroll, pre')].filter(e => e.tabIndex < 0).map(e => e.className)"
-    )
-    assert beyond == []
-    page.context.close()
-
-
 def test_a_file_is_downloaded(browser, address, tmp_path) -> None:
     page, _, _ = opened(browser, address, accept_downloads=True)
     with page.expect_download() as download:
@@ -158,12 +109,4 @@ def test_a_file_is_downloaded(browser, address, tmp_path) -> None:
     download.value.save_as(target)
     assert download.value.suggested_filename.endswith("law.py")
     assert target.read_text(encoding="utf-8") == contents(hostile=True).exports[0].text
-    page.context.close()
-
-
-def test_it_prints(browser, address) -> None:
-    page, _, _ = opened(browser, address, java_script_enabled=False)
-    document = page.pdf(format="A4")
-    assert document.startswith(b"%PDF")
-    assert len(document) > 30_000
     page.context.close()

@@ -17,10 +17,6 @@ def creepkit(*words):
     return CliRunner().invoke(app, ["--plugin", str(PLUGIN), *map(str, words)])
 
 
-def one_line(result):
-    return " ".join(result.output.split())
-
-
 @pytest.fixture
 def beams(tmp_path):
     """Five noisy beams of other heights, which their files state."""
@@ -55,13 +51,6 @@ def test_loads_and_lengths_are_keys_and_options_in_their_units(tmp_path):
     assert (again.geometry, again.specimen) == (test.geometry, test.specimen)
 
 
-def test_a_file_is_of_the_only_specimen_with_such_an_output_and_load(tmp_path):
-    ck.load_plugin(PLUGIN)
-    path = tmp_path / "unnamed.csv"
-    path.write_text("# temperature_C: 700\n# end_force_N: 11\ntime_h,end_deflection_mm\n1,0\n10,0.2\n100,0.3\n")
-    assert ck.read_histories(path)[0].specimen == "test-cantilever"
-
-
 def test_from_files_to_a_law_a_forecast_and_a_picture(beams, tmp_path):
     result = creepkit(
         "identify", beams, "--law", "norton", "--nuisance", "rate=none", "--weights", "likelihood", "--to", tmp_path
@@ -76,25 +65,3 @@ def test_from_files_to_a_law_a_forecast_and_a_picture(beams, tmp_path):
     assert forecast.exit_code == 0, forecast.output
     assert (tmp_path / "band.png").stat().st_size > 10_000
     assert '"unit": "mm"' in forecast.output
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--end-forse", "12"), "No such option: --end-forse; --specimen"),
-        (("--stress", "12"), "--stress belongs to --specimen"),
-        ((), "specimen 'test-cantilever' needs a end_force: give --end-force, such as 10"),
-        (("--end-force", "12", "--height", "90"), "height is 90 mm; allowed is 0.2 to 20 mm"),
-        (("--end-force", "12", "--geometry", "hight=2"), "no length of the test piece is called 'hight'; did you mean"),
-    ],
-)
-def test_what_makes_no_sense_is_said_in_one_line(words, said):
-    result = creepkit("simulate", "norton", *TRUTH, "--specimen", "test-cantilever", *words, "--end-h", "10")
-    assert result.exit_code in (1, 2)
-    assert said in one_line(result), result.output
-
-
-def test_specimens_shows_all_that_one_says_of_itself():
-    shown = creepkit("specimens", "test-cantilever").output
-    for word in ("end_deflection", "mm", "0.002", "--end-force", "N", "--height", "breadth"):
-        assert word in shown

@@ -55,40 +55,6 @@ def test_a_folder_becomes_a_study_and_its_results(folder: Path, tmp_path: Path) 
     assert len([one for one in folder.iterdir() if one.name[0] != "."]) == 5  # the data, the notes and the study
 
 
-def test_every_mistake_is_one_line_with_file_and_line(folder: Path) -> None:
-    study = folder / "study.toml"
-    study.write_text('[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["nortn"]\n')
-    ran = creepkit("run", study)
-    assert ran.exit_code == 1
-    (line,) = ran.stderr.splitlines()
-    assert line.startswith(f"creepkit: {study}:4: [identification] laws 1: ")
-    assert "did you mean 'norton'" in line
-    ran = creepkit("run", folder / "planted_850C_70MPa.csv")
-    assert ran.exit_code == 1
-    assert "this is no study file, but looks like data" in ran.stderr
-    ran = creepkit("run", study, "--only", "identify")
-    assert ran.exit_code == 1
-    ran = creepkit("init", folder / "missing")
-    assert ran.exit_code == 1
-    assert "there is no folder" in ran.stderr
-    (folder.parent / "other").mkdir()
-    ran = creepkit("init", folder.parent)
-    assert ran.exit_code == 1
-    (line,) = ran.stderr.splitlines()
-    assert f"creepkit init {folder}" in line  # the sub-folder that holds tests
-    assert "other" not in line
-
-
-def test_a_dimple_is_offered_its_reduced_order_model(tmp_path: Path) -> None:
-    (source,) = (path for path in ck.example_data("planted bulge test").glob("*.csv"))
-    (tmp_path / source.name).write_bytes(source.read_bytes())
-    assert creepkit("init", tmp_path).exit_code == 0
-    text = (tmp_path / "study.toml").read_text()
-    assert '# predictor = "dimple"' in text
-    (tmp_path / "study.toml").write_text(text.replace("# predictor", "predictor"))
-    assert ck.Study.load(tmp_path / "study.toml").file.model.identification.predictor == "dimple"
-
-
 def study_text(name: str) -> str:
     return (EXAMPLES / "studies" / f"{name}.toml").read_text()
 

@@ -1,21 +1,6 @@
 import numpy as np
 
 import creepkit
-from creepkit.registry import default_registry
-from creepkit.testing import check_law
-
-
-def test_it_comes_through_the_entry_point() -> None:
-    found = default_registry().laws()["logarithmic"]
-
-    assert found.provenance.name == "logarithmic"
-    assert found.provenance.origin.startswith("creepkit-logarithmic ")
-
-
-def test_it_keeps_what_every_law_promises() -> None:
-    report = check_law(creepkit.law("logarithmic"))
-
-    assert report.passed, str(report)
 
 
 def test_strain_is_logarithmic_in_time_at_constant_stress() -> None:

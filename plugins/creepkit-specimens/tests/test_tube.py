@@ -134,10 +134,3 @@ def test_stresses_as_calculix() -> None:
     found = np.interp(list(calculix), places[order, 0], stress[order])
     known = [np.sqrt(0.5 * ((r - z) ** 2 + (z - h) ** 2 + (h - r) ** 2)) for r, z, h in calculix.values()]
     np.testing.assert_allclose(found, known, rtol=4e-3)
-
-
-def test_a_solid_tube_is_refused() -> None:
-    with pytest.raises(
-        ck.errors.SolveError, match="thickness is 10 mm; allowed is less than half of the outer diameter"
-    ):
-        Tube(20.0, 10.0)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Literal
 
 from creepkit import registry
 from creepkit.checked_arguments import checked
-from creepkit.errors import ExportError, FitError, nearest, quoted
-from creepkit.records import History, LawWithValues, Nuisance, Predictor, Units, dimension_named, exported_text
+from creepkit.errors import ExportError, FitError, quoted
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.options import takes_options
+from creepkit.records import History, LawWithValues, Predictor, Units, exported_text
 from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictors
 
 if TYPE_CHECKING:
@@ -20,27 +22,11 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.search.global_search import GlobalSearch
     from creepkit.inverse.selection import Ranking
-    from creepkit.inverse.settings import IdentificationSettings, OutputWeights
     from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
     from creepkit.language import CreepLaw, Elastic
 
 
-class SettingChanges(TypedDict, total=False):
-    """Fields of IdentificationSettings that a call may change by name."""
-
-    starts: int
-    sobol_points: int
-    frames: int
-    seed: int
-    loss: str
-    nuisances: Sequence[Nuisance | str] | Nuisance | str | None
-    weights: OutputWeights
-    test_loss: str
-    further_laws: int
-    suspect_frames: Literal["exclude", "keep"]
-    rupture_times: Literal["auto", "use", "ignore"]
-
-
+@takes_options(IdentificationSettings)
 @checked
 def identify(
     law: CreepLaw | str,
@@ -52,7 +38,7 @@ def identify(
     through: Predictor | Literal["auto"] | None = "auto",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    **changes: Unpack[SettingChanges],
+    **changes: Any,
 ) -> Identification:
     """Identify the parameters of a law from all histories at once, with 95 % intervals.
 
@@ -65,18 +51,17 @@ def identify(
         values and intervals; "auto" takes the reduced-order model of `using` where that states its own error.
         A surrogate that does not know the class of the law is replaced by its specimen, and a note says so.
     settings : what is minimised, nuisance parameters, starts, seed, frames, robust losses, and whether suspect frames
-        are left out; see IdentificationSettings. changes : single fields of it by name:
+        are left out. changes : single fields of it, see IdentificationSettings:
         starts=4, nuisances=["offset", Nuisance("rate", sd=0.1)], weights="likelihood".
     """
     from creepkit.inverse.composite_predictor import through_for_law
     from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
     from creepkit.inverse.identify import identify as run
     from creepkit.inverse.nuisance_parameters import check_nuisance_tests
-    from creepkit.inverse.settings import IdentificationSettings
     from creepkit.inverse.sparsity.term_selection import identify_sparse
 
     law, predictor = resolve_law(law), resolve_predictors(using, check_histories(histories))
-    settings = change_settings(settings or IdentificationSettings(), changes, predictor)
+    settings = (settings or IdentificationSettings()).changed(changes, predictor)
     histories, left_out = sound_tests(check_histories(histories), settings)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     surrogate = _resolve_through(through, predictor)
@@ -98,6 +83,7 @@ def identify(
     return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
 
 
+@takes_options(IdentificationSettings, weights="likelihood")
 @checked
 def select(
     laws: Sequence[CreepLaw | str],
@@ -109,7 +95,7 @@ def select(
     by: Literal["bic", "aicc", "hold-out"] = "bic",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    **changes: Unpack[SettingChanges],
+    **changes: Any,
 ) -> Ranking:
     """Identify several laws from the same histories by likelihood, and rank them by how well they explain these.
 
@@ -122,10 +108,9 @@ def select(
     from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
     from creepkit.inverse.nuisance_parameters import check_nuisance_tests
     from creepkit.inverse.selection.select import select as run
-    from creepkit.inverse.settings import IdentificationSettings
 
     predictor = resolve_predictors(using, check_histories(histories))
-    settings = change_settings(settings or IdentificationSettings(), changes, predictor)
+    settings = (settings or IdentificationSettings()).changed(changes, predictor)
     if changes.get("weights") not in (None, "likelihood"):
         raise FitError(
             f"select() compares laws by their likelihood, found weights={changes['weights']!r}; leave weights out, or "
@@ -196,40 +181,6 @@ def confirm(
         return run(fit, histories, resolve_predictors(using, histories))
     used = {h.specimen: known[h.specimen] for h in histories}
     return run(fit, histories, used if len(used) > 1 else next(iter(used.values())))
-
-
-def change_settings(
-    settings: IdentificationSettings,
-    changes: SettingChanges,
-    predictor: Predictor | Mapping[str, Predictor] | None = None,
-) -> IdentificationSettings:
-    """The settings with fields changed by name; nuisances=None leaves those of `settings`.
-
-    A nuisance that is a name alone has its prior as usual; that of a length is the tolerance that its specimen states.
-
-    With another number of starts the number of Sobol points that are screened follows, unless it is given too.
-    """
-    known = [field.name for field in fields(settings)]
-    given: dict[str, Any] = {name: value for name, value in changes.items() if value is not None}
-    for name in given:
-        if name not in known:
-            raise FitError(f"settings of an identification have no '{name}'; {nearest(name, known)}")
-    if "nuisances" in given:
-        listed: Any = given["nuisances"]
-        listed = [listed] if isinstance(listed, str | Nuisance) else listed
-        given["nuisances"] = tuple(_nuisance_named(one, predictor) if isinstance(one, str) else one for one in listed)
-    if "starts" in given:  # eight points a start, a power of two, and at least 64
-        points = max(64, 1 << (8 * max(int(given["starts"]), 1) - 1).bit_length())
-        given.setdefault("sobol_points", points)
-    return replace(settings, **given)
-
-
-def _nuisance_named(kind: str, predictor: Predictor | Mapping[str, Predictor] | None) -> Nuisance:
-    """The nuisance of this name; of a length with the tolerance of its specimen, the largest where several have it."""
-    predictors = [*predictor.values()] if isinstance(predictor, Mapping) else [predictor]
-    lengths = [length for p in predictors if (length := dimension_named(p, kind)) is not None]
-    sd = max((length.tolerance * length.default for length in lengths), default=0.0)
-    return Nuisance(kind, sd=sd) if sd > 0.0 else Nuisance(kind)
 
 
 def _resolve_through(

@@ -54,8 +54,9 @@ def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") ->
 
 
 _POLICY_OF_A_FILE = (
-    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; "
-    "style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'\">"
+    '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; script-src '
+    "'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+    "form-action 'none'\">"
 )
 """A page that is a file loads nothing and sends nothing."""
 

@@ -1,27 +1,32 @@
-"""The scripts of the runtime, in the order in which a page or a program loads them."""
+"""The runtime of a page: the core in WebAssembly, and scripts in the order in which a page or a program loads them."""
 
 from __future__ import annotations
 
+import base64
+import gzip
+import json
 from functools import cache
 from importlib import resources
+from typing import Any
 
-RUNTIME_FILES = (
-    "base.js",
-    "time_transformation.js",
-    "tableau.js",
-    "stage_solver.js",
-    "point_integration.js",
-    "bars.js",
-    "kinematics.js",
-    "body_points.js",
-    "reduced_model.js",
-    "body_integration.js",
-    "time_interpolation.js",
-    "profile_fit.js",
-    "dimple.js",
-    "network.js",
-)
+import numpy as np
+
+from creepkit.errors import CreepkitError
+from creepkit.fem import simulation
+from creepkit.integration import batch_integration
+from creepkit.integration.core_structures import SettingsStructure
+from creepkit.integration.step_control import IntegrationSettings
+from creepkit.integration.time_discretisation import SDIRK4
+from creepkit.integration.time_transformation import SMALLEST_EXPONENT
+from creepkit.records import Status
+from creepkit.specimens.bulge.reduced_order_model import SEARCH_GROWTH, SEARCH_MODES, SEARCH_TOLERANCE
+
+RUNTIME_FILES = ("core.js", "programs.js", "bars.js", "dimple.js", "network.js")
 """Each needs those before it."""
+
+
+CORE_NAME = "creepkit_core.wasm"
+"""The core in WebAssembly, which src/core/compile.py makes."""
 
 
 def runtime_files() -> dict[str, str]:
@@ -33,4 +38,41 @@ def runtime_files() -> dict[str, str]:
 @cache
 def runtime_script() -> str:
     """The whole runtime as the text of one classic script, which holds no end of a script element."""
-    return "\n".join(runtime_files().values())
+    packed = {"type": "gzip", "data": base64.b64encode(gzip.compress(core_code(), 9, mtime=0)).decode("ascii")}
+    started = f"creepkit.load({json.dumps(packed)}, {json.dumps(_constants())});"
+    return "\n".join([*runtime_files().values(), started])
+
+
+def core_code() -> bytes:
+    """The core in WebAssembly; CreepkitError where the build had no compiler of it."""
+    file = resources.files("creepkit.app").joinpath(CORE_NAME)
+    if not file.is_file():
+        raise CreepkitError(
+            f"a page needs the core in WebAssembly, {CORE_NAME}, which is missing; run 'pip install ziglang' and 'make "
+            "core' in a clone of the sources, or install creepkit from a wheel"
+        )
+    return file.read_bytes()
+
+
+def _constants() -> dict[str, Any]:
+    """Numbers and words that the core's callers bring along: the method of integration, settings, endings."""
+    settings = IntegrationSettings()
+    tolerance = {"tolerance": SEARCH_TOLERANCE, "newton": 1e-3 * SEARCH_TOLERANCE, "growth": SEARCH_GROWTH}
+    numbers = np.concatenate([SDIRK4.a, SDIRK4.c, SDIRK4.error, SDIRK4.dense], axis=None).tolist()
+    return {
+        "bar": {
+            "settings": {name: getattr(settings, name) for name, *_ in SettingsStructure._fields_},
+            "tableau": {"sizes": [*SDIRK4.dense.shape, SDIRK4.error_order], "numbers": numbers},
+            "endings": _endings(batch_integration.REASONS, batch_integration.STATUS),
+        },
+        "body": {
+            "search": {"modes": SEARCH_MODES, "settings": tolerance},
+            "smallest_exponent": SMALLEST_EXPONENT,
+            "endings": _endings(simulation.REASONS, simulation.STATUS),
+        },
+    }
+
+
+def _endings(reasons: dict[int, str], status: Any) -> list[tuple[str, str]]:
+    """Reason and status in words of each code, from 0 on."""
+    return [(reasons[code], Status(int(status[code])).name.lower().replace("_", " ")) for code in sorted(reasons)]

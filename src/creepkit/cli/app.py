@@ -50,7 +50,7 @@ from creepkit.cli import (
 from creepkit.cli.declared_options import checked
 from creepkit.cli.described_test import TestCommand
 from creepkit.cli.failures import NO_READER, failure_sentence, output_sentence, say
-from creepkit.cli.identification_options import CommandWithDefaults
+from creepkit.cli.given_options import CheckedCommand
 from creepkit.cli.interrupts import exit_code, interrupted_sentence, was_interrupted
 from creepkit.errors import CreepkitError, PluginError
 from creepkit.files.writing import FULL
@@ -181,7 +181,7 @@ TEST_COMMANDS = ("simulate", "predict")
 
 
 for name, command in COMMANDS.items():
-    app.command(name, cls=TestCommand if name in TEST_COMMANDS else CommandWithDefaults)(checked(command))
+    app.command(name, cls=TestCommand if name in TEST_COMMANDS else CheckedCommand)(checked(command))
 
 
 def _print_version(requested: bool) -> None:

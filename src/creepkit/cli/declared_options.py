@@ -19,9 +19,11 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 import typer
 from typer.models import ParameterInfo
 
+from creepkit.cli.generated_options import command_options, given_values, parameter_of
 from creepkit.errors import CreepkitError
 from creepkit.files.writing import check_folder_target, check_target, overwriting
 from creepkit.limits import Limits
+from creepkit.options import Options
 
 
 @dataclass(frozen=True)
@@ -53,13 +55,20 @@ FORCE = Annotated[bool, typer.Option("--force", help="Overwrite files that creep
 def checked(command: Callable[..., None]) -> Callable[..., None]:
     """The command with what its options declare checked before it begins, and with `--force` where it writes."""
     hints = get_type_hints(command, include_extras=True)
+    records = {name: found for name, hint in hints.items() if (found := _record_of(hint)) is not None}
     outputs = {name: found for name, hint in hints.items() if (found := _declared(hint, OutputPath)) is not None}
     limits = {name: found for name, hint in hints.items() if (found := _declared(hint, Limits)) is not None}
     signature = inspect.signature(command)
     parameters = {
         name: parameter.replace(annotation=_quoting(hints[name], limits.get(name)))
         for name, parameter in signature.parameters.items()
+        if name not in records
     }
+    generated = {one.name: (name, one) for name, record in records.items() for one in command_options(record)}
+    for field, (_, one) in generated.items():
+        parameters[field] = inspect.Parameter(
+            field, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=parameter_of(one)
+        )
     own_force = "force" in parameters
     if outputs and not own_force:
         parameters["force"] = inspect.Parameter(
@@ -70,6 +79,11 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
     def run(**options: Any) -> None:
         force = bool(options["force"] if own_force else options.pop("force", False))
         _check_numbers(options, limits, parameters)
+        texts = {field: options.pop(field) for field in generated}
+        for name, record in records.items():
+            options[name] = given_values(
+                record, {field: texts[field] for field in texts if generated[field][0] == name}
+            )
         with overwriting() if force else nullcontext():
             for name, output in outputs.items():
                 if options.get(name) is not None:
@@ -81,6 +95,12 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
     run.__annotations__["return"] = None
     del run.__wrapped__  # whose annotations typer would read instead
     return run
+
+
+def _record_of(hint: Any) -> type[Options] | None:
+    """The record of options that a parameter stands for; None for another parameter."""
+    metadata = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+    return next((one for one in metadata if isinstance(one, type) and issubclass(one, Options)), None)
 
 
 def _declared(hint: Any, kind: type) -> Any:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from creepkit.cli.identification_options import CommandWithDefaults
+from creepkit.cli.given_options import CheckedCommand
 from creepkit.cli.options import parse_numbers, parse_steps
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ LOAD_TEXT = re.compile(r"([0-9.]+:)?[+-]?[0-9.]+([eE][+-]?[0-9]+)?")
 """The value of a load: a number, or SECONDS:NUMBER."""
 
 
-class TestCommand(CommandWithDefaults):
+class TestCommand(CheckedCommand):
     """A command that takes the loads and lengths of any specimen as options, beside its own."""
 
     __test__ = False  # not a test case, whatever its name says to pytest

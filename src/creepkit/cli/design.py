@@ -10,7 +10,7 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
-from creepkit.cli.options import parsed_number
+from creepkit.cli.generated_options import parsed_number
 from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
 
 if TYPE_CHECKING:

@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.generated_options import parsed_number
 from creepkit.cli.identification_options import (
     BoundOption,
     FixOption,
-    FramesOption,
     OnlyOption,
-    RuptureTimesOption,
-    SeedOption,
-    StartsOption,
     SurrogateOption,
-    SuspectFramesOption,
-    WeightsOption,
     change_laws,
     select_by_label,
-    setting_changes,
     surrogate_named,
 )
-from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, parsed_number
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
 
 if TYPE_CHECKING:
@@ -40,6 +34,7 @@ def command(
         list[str],
         typer.Argument(metavar="FILE...", help="Measured files, folders or patterns; or identifications (.json)."),
     ],
+    settings: Annotated[dict[str, Any], IdentificationSettings],
     law: Annotated[str, typer.Option("--law", metavar="NAME", help="The law, without temperature.")] = "norton",
     to: Annotated[
         Path,
@@ -62,23 +57,9 @@ def command(
     within: Annotated[
         float, typer.Option(help="K; tests so near are at one temperature."), limits.KELVIN_DIFFERENCE
     ] = 5.0,
-    nuisance: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar=NUISANCE_SYNTAX,
-            help="What differs between tests, beside offset and rate, such as thickness=0.4935:0.027; rate=none leaves "
-            "one out.",
-        ),
-    ] = None,
     moduli: Annotated[
         bool, typer.Option("--moduli/--no-moduli", help="First find each test's modulus from its first 15 frames.")
     ] = False,
-    starts: StartsOption = None,
-    seed: SeedOption = None,
-    frames: FramesOption = None,
-    suspect_frames: SuspectFramesOption = None,
-    rupture_times: RuptureTimesOption = None,
-    weights: WeightsOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Find forms of temperature for the parameters of a law.
@@ -88,7 +69,6 @@ def command(
     folder.
     """
     import creepkit as ck
-    from creepkit.api.identification import change_settings
     from creepkit.errors import FitError
 
     form_options: FormOptions = {"forms": parse_forms(form), "prior": parse_prior_odds(prior)}
@@ -97,15 +77,6 @@ def command(
             raise FitError("--only, --fix, --bound and --surrogate are for measured tests, not for identifications")
         temperature_law = _discover_from_identifications(files, form_options)
     else:
-        changes = setting_changes(
-            starts=starts,
-            seed=seed,
-            frames=frames,
-            suspect_frames=suspect_frames,
-            rupture_times=rupture_times,
-            nuisances=parse_nuisances(nuisance),
-            weights=weights,
-        )
         (changed_law,) = change_laws([ck.law(law)], fix, bound)
         with ProgressBar() as progress:
             study = ck.temperature_study(
@@ -114,7 +85,7 @@ def command(
                 surrogate_named(surrogate),
                 moduli=moduli,
                 within=within,
-                settings=change_settings(ck.IdentificationSettings(), changes),
+                settings=ck.IdentificationSettings().changed(settings),
                 progress=progress.tick,
                 **form_options,
             )

@@ -11,7 +11,8 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
-from creepkit.cli.options import PAPER_SPECIMEN, parsed_number
+from creepkit.cli.generated_options import parsed_number
+from creepkit.cli.options import PAPER_SPECIMEN
 from creepkit.reports.terminal import tell, tell_written
 
 if TYPE_CHECKING:

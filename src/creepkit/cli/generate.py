@@ -9,8 +9,9 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.generated_options import parsed_number
 from creepkit.cli.interrupts import kept_when_interrupted
-from creepkit.cli.options import PAPER_SPECIMEN, parsed_number
+from creepkit.cli.options import PAPER_SPECIMEN
 from creepkit.reports.terminal import ProgressBar
 
 if TYPE_CHECKING:

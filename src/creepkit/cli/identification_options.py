@@ -1,69 +1,18 @@
-"""Options that identify, screen and discover share: settings, changes of laws, subsets of tests, surrogates.
-
-Every option is None where nothing is said, which means "as in Python": IdentificationSettings has the defaults, and
-help texts quote them as {settings.NAME}, which CommandWithDefaults fills in when help is asked for.
-"""
+"""Options that identify and discover share beside the settings: changes of laws, subsets of tests, surrogates."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit import limits
-from creepkit.cli.given_options import CheckedCommand
-from creepkit.cli.options import parse_weights, parsed_number
+from creepkit.cli.generated_options import parsed_number
 
 if TYPE_CHECKING:
-    from creepkit.api.identification import SettingChanges
     from creepkit.language import CreepLaw
-    from creepkit.records import History, Nuisance, Predictor
-
-
-StartsOption = Annotated[
-    int | None, typer.Option(help="Starts of the search; {settings.starts} by default."), limits.STARTS
-]
-
-
-SeedOption = Annotated[int | None, typer.Option(help="Seed of the search; {settings.seed} by default."), limits.SEED]
-
-
-FramesOption = Annotated[
-    int | None,
-    typer.Option(help="Frames of each test that are compared; {settings.frames} by default."),
-    limits.COMPARED_FRAMES,
-]
-
-
-SuspectFramesOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="WORD",
-        help="exclude or keep frames that unload, fall or lie apart; {settings.suspect_frames} by default.",
-    ),
-]
-
-
-RuptureTimesOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="WORD",
-        help="auto, use or ignore rupture times and run-outs of tests without curves; {settings.rupture_times} by "
-        "default: used by laws that describe rupture.",
-    ),
-]
-
-
-WeightsOption = Annotated[
-    str | None,
-    typer.Option(
-        help="noise; likelihood; equal, Eq. (4); paper, Eq. (S3); or amplitude=0.99,width=0.01. By default "
-        "{settings.weights}; several laws are compared by likelihood."
-    ),
-]
+    from creepkit.records import History, Predictor
 
 
 FixOption = Annotated[
@@ -91,44 +40,6 @@ OnlyOption = Annotated[
 SurrogateOption = Annotated[
     str | None, typer.Option(metavar="NAME", help="Identify through a surrogate alone, such as dimple; quicker.")
 ]
-
-
-class CommandWithDefaults(CheckedCommand):
-    """A command whose help quotes defaults from the records that hold them; loading these takes too long otherwise."""
-
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help, with {settings.NAME} replaced by the default of that setting."""
-        if any("{settings." in (getattr(option, "help", None) or "") for option in self.params):
-            from creepkit.inverse.settings import IdentificationSettings
-
-            settings = SimpleNamespace(**vars(IdentificationSettings()))
-            for option in self.params:
-                if "{settings." in (getattr(option, "help", None) or ""):
-                    option.help = option.help.format(settings=settings)  # type: ignore[attr-defined]
-        super().format_help(ctx, formatter)
-
-
-def setting_changes(
-    *,
-    starts: int | None = None,
-    seed: int | None = None,
-    frames: int | None = None,
-    suspect_frames: str | None = None,
-    nuisances: Sequence[Nuisance] | None = None,
-    weights: str | None = None,
-    **others: str | None,
-) -> SettingChanges:
-    """Changes of the settings that were asked for; others : further fields by name."""
-    changes: dict[str, Any] = {
-        "starts": starts,
-        "seed": seed,
-        "frames": frames,
-        "suspect_frames": suspect_frames,
-        "nuisances": nuisances,
-        "weights": None if weights is None else parse_weights(weights),
-        **others,
-    }
-    return {name: value for name, value in changes.items() if value is not None}  # type: ignore[return-value]
 
 
 def surrogate_named(name: str | None) -> Predictor | None:

@@ -12,21 +12,15 @@ from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.identification_options import (
     BoundOption,
     FixOption,
-    FramesOption,
     OnlyOption,
-    RuptureTimesOption,
-    SeedOption,
-    StartsOption,
     SurrogateOption,
-    SuspectFramesOption,
-    WeightsOption,
     change_laws,
     select_by_label,
-    setting_changes,
     surrogate_named,
 )
 from creepkit.cli.identified_folder import identifying_alone, write_ranking
-from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, penalty_named, search_named
+from creepkit.cli.options import penalty_named, search_named
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.reports.ranking import print_ranking, ranking_to_json
 from creepkit.reports.terminal import ProgressBar, print_json, tell
 
@@ -46,6 +40,7 @@ def command(
             "--law", metavar="NAME", help="A law to fit, or a sum, norton+strain-hardening; may be given several times."
         ),
     ],
+    settings: Annotated[dict[str, Any], IdentificationSettings],
     to: Annotated[
         Path,
         typer.Option(help="Folder for results; made if needed."),
@@ -62,23 +57,6 @@ def command(
     up_to: Annotated[
         float | None, typer.Option(help="Use frames up to this strain only, such as 0.05."), limits.STRAIN
     ] = None,
-    starts: StartsOption = None,
-    seed: SeedOption = None,
-    frames: FramesOption = None,
-    suspect_frames: SuspectFramesOption = None,
-    rupture_times: RuptureTimesOption = None,
-    loss: Annotated[
-        str | None,
-        typer.Option(help="Of frames: linear, soft_l1, huber, cauchy or arctan; {settings.loss} by default."),
-    ] = None,
-    test_loss: Annotated[
-        str | None,
-        typer.Option(
-            help="Of whole tests: gaussian; or student, with which one far from its replicates weighs less; "
-            "{settings.test_loss} by default."
-        ),
-    ] = None,
-    weights: WeightsOption = None,
     search: Annotated[str, typer.Option(help="How to begin: multi-start, swarm or cma-es.")] = "multi-start",
     penalty: Annotated[
         str | None, typer.Option(metavar="NAME", help="Reduce a sum of terms: l2, group-l2, sqrt or subsets.")
@@ -89,14 +67,6 @@ def command(
     further: Annotated[
         bool, typer.Option("--further-tests", help="Say which tests would distinguish the remaining laws.")
     ] = False,
-    nuisance: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar=NUISANCE_SYNTAX,
-            help="What differs between tests, beside offset and rate, such as thickness=0.4935:0.027; rate=none leaves "
-            "one out.",
-        ),
-    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Fit laws to creep curves and rank them.
@@ -119,18 +89,8 @@ def command(
     if temperature == "auto":
         candidate_laws = [ck.with_arrhenius(candidate_law, histories) for candidate_law in candidate_laws]
     candidate_laws = change_laws(candidate_laws, fix, bound)
-    changes = setting_changes(
-        starts=starts,
-        seed=seed,
-        frames=frames,
-        suspect_frames=suspect_frames,
-        rupture_times=rupture_times,
-        nuisances=parse_nuisances(nuisance),
-        weights=weights,
-        loss=loss,
-        test_loss=test_loss,
-    )
-    options: dict[str, Any] = {"using": surrogate_named(surrogate), **changes}
+    options: dict[str, Any] = {"using": surrogate_named(surrogate), **settings}
+    weights, loss = settings.get("weights"), settings.get("loss")
     by_likelihood = weights in (None, "likelihood") and loss in (None, "linear") and search == "multi-start"
     by_likelihood = by_likelihood and penalty is None
     if sums is not None and not by_likelihood:

@@ -10,7 +10,8 @@ import typer
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.described_test import further_options
-from creepkit.cli.options import parse_numbers, parsed_number
+from creepkit.cli.generated_options import parsed_number
+from creepkit.cli.options import parse_numbers
 from creepkit.cli.planned_test import (
     ControlOption,
     GeometryOption,

@@ -9,8 +9,8 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.generated_options import parsed_integer, parsed_number
 from creepkit.cli.identification_options import OnlyOption, select_by_label
-from creepkit.cli.options import parsed_integer, parsed_number
 from creepkit.reports.terminal import print_json, tell, tell_written
 
 HOURS_BY_SUFFIX = {"h": 1.0, "d": 24.0, "s": 1.0 / 3600.0, "": 1.0}

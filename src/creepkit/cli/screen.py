@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -12,20 +12,15 @@ from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.identification_options import (
     BoundOption,
     FixOption,
-    FramesOption,
     OnlyOption,
-    RuptureTimesOption,
-    SeedOption,
-    StartsOption,
     SurrogateOption,
-    SuspectFramesOption,
     change_laws,
     select_by_label,
-    setting_changes,
     surrogate_named,
 )
 from creepkit.cli.interrupts import kept_when_interrupted
-from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, penalty_named
+from creepkit.cli.options import penalty_named
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.reports.terminal import ProgressBar
 
 if TYPE_CHECKING:
@@ -40,6 +35,7 @@ CONFIRMATION_CHOICES = {"when-in-doubt": "when in doubt", "always": True, "never
 @kept_when_interrupted("alloys that are finished are kept, and the same command goes on with the others")
 def command(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of history files, their alloys in them.")],
+    settings: Annotated[dict[str, Any], IdentificationSettings],
     law: Annotated[
         list[str] | None, typer.Option("--law", metavar="NAME", help="A candidate; the four of Table 1 by default.")
     ] = None,
@@ -64,22 +60,9 @@ def command(
     confirm: Annotated[
         str, typer.Option(help="Simulate the best law by finite elements: when-in-doubt, always or never.")
     ] = "when-in-doubt",
-    nuisance: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar=NUISANCE_SYNTAX,
-            help="What differs between tests, beside offset and rate, such as thickness=0.4935:0.027; rate=none leaves "
-            "one out.",
-        ),
-    ] = None,
     only: OnlyOption = None,
     fix: FixOption = None,
     bound: BoundOption = None,
-    starts: StartsOption = None,
-    seed: SeedOption = None,
-    frames: FramesOption = None,
-    suspect_frames: SuspectFramesOption = None,
-    rupture_times: RuptureTimesOption = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes; one for each core by default."), limits.WORKERS
     ] = None,
@@ -90,20 +73,10 @@ def command(
     Interrupted, it goes on where it was when it is started again in the same way.
     """
     import creepkit as ck
-    from creepkit.api.identification import change_settings
     from creepkit.screening.screen import CANDIDATE_LAWS, resolve_tests
 
-    changes = setting_changes(
-        starts=starts,
-        seed=seed,
-        frames=frames,
-        suspect_frames=suspect_frames,
-        rupture_times=rupture_times,
-        nuisances=parse_nuisances(nuisance),
-    )
-    settings = change_settings(ck.ScreeningOptions().settings, changes)
     options = ck.ScreeningOptions(
-        settings=settings,
+        settings=ck.IdentificationSettings().changed(settings),
         through=surrogate_named(through),
         dense=None if dense == "none" else dense,
         penalty=penalty_named(penalty),

@@ -9,8 +9,8 @@ import typer
 
 from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.generated_options import parsed_integer
 from creepkit.cli.interrupts import kept_when_interrupted
-from creepkit.cli.options import parsed_integer
 from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell_written
 
 

@@ -158,7 +158,7 @@ class CompiledReducedModel:
 
     width : modes in whole blocks.
     points : (points,) number of each one used, with copies of the first without weight up to whole blocks.
-    structure : for calls of the core.
+    arrays : {field of the core's model: array}. structure : for calls of the core.
     """
 
     def __init__(self, model: FiniteElementModel, basis: ReducedBasis) -> None:
@@ -182,10 +182,10 @@ class CompiledReducedModel:
             "surface": self._padded(observed.T),
             "measures": np.concatenate([limited, _in_blocks(pressed)], axis=1),
         }
-        self._kept = {name: np.ascontiguousarray(array, dtype=float) for name, array in kept.items()}
+        self.arrays = {name: np.ascontiguousarray(array, dtype=float) for name, array in kept.items()}
         self.structure = _ModelStructure(
-            count, self.points.size, len(sides), model.top.size, limited.shape[1], self._kept["measures"].shape[1],
-            *(address(array) for array in self._kept.values()),
+            count, self.points.size, len(sides), model.top.size, limited.shape[1], self.arrays["measures"].shape[1],
+            *(address(array) for array in self.arrays.values()),
         )  # fmt: skip
 
     def _padded(self, values: Floats) -> Floats:

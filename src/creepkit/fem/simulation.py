@@ -34,13 +34,18 @@ REASONS = {
 """What each ending means, in words."""
 
 
-_STATUS = {
+STATUS = {
     solver.REACHED_END: Status.COMPLETE,
     solver.DEFLECTION_LIMIT: Status.RUPTURED,
     solver.STRAIN_LIMIT: Status.RUPTURED,
     solver.STATE_LIMIT: Status.RUPTURED,
     solver.LIMIT_LOAD: Status.RUPTURED,
+    **dict.fromkeys(
+        (solver.LOST_CONVERGENCE, solver.TOO_MANY_STEPS, solver.LAW_FAILED, solver.SINGULAR_TANGENT),
+        Status.NOT_CONVERGED,
+    ),
 }
+"""Each ending as a status."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +183,7 @@ def simulate(
         displacements=model.displacements(record.displacements),
         mises=record.mises,
         values=record.values,
-        status=_STATUS.get(record.code, Status.NOT_CONVERGED),
+        status=STATUS[record.code],
         end_time=float(record.time),
         reason=REASONS[record.code],
         iterations=record.counts,

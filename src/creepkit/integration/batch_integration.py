@@ -47,13 +47,13 @@ REASONS = {
 """What each ending means, in words."""
 
 
-_STATUS = np.full(len(REASONS), int(Status.NOT_CONVERGED))
+STATUS = np.full(len(REASONS), int(Status.NOT_CONVERGED))
 
 
-_STATUS[REACHED_END] = Status.COMPLETE
+STATUS[REACHED_END] = Status.COMPLETE
 
 
-_STATUS[[STRAIN_LIMIT, STATE_LIMIT, DIVERGED]] = Status.RUPTURED
+STATUS[[STRAIN_LIMIT, STATE_LIMIT, DIVERGED]] = Status.RUPTURED
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ class Integration:
     @property
     def status(self) -> Ints:
         """Status of each row, (candidates, tests)."""
-        return np.asarray(_STATUS[self.terminations])
+        return np.asarray(STATUS[self.terminations])
 
     def of(self, test: int) -> Floats:
         """Strain of one test, (candidates, times)."""

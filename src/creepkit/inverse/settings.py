@@ -8,36 +8,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Literal
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 
-from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest, quoted
-from creepkit.records import Nuisance
+from creepkit.limits import SEED, SOBOL_POINTS, STARTS, Limits
+from creepkit.options import Options, option
+from creepkit.records import Nuisance, Predictor, dimension_named
 
-LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
-
-
-TEST_LOSSES = ("gaussian", "student")
-
-
-WEIGHTINGS = ("noise", "likelihood", "equal", "paper")
+Weighting = Literal["noise", "likelihood", "equal", "paper"]
 
 
-SUSPECT_FRAMES = ("exclude", "keep")
-
-
-RUPTURE_TIMES = ("auto", "use", "ignore")
-
-
-OutputWeights = Literal["noise", "likelihood", "equal", "paper"] | Mapping[str, float]
+OutputWeights = Weighting | Mapping[str, float]
 
 
 @checked
 @dataclass(frozen=True)
-class IdentificationSettings:
+class IdentificationSettings(Options, title="settings of an identification", error=FitError):
     """What a run can be repeated from.
 
     starts : of the multi-start search; sobol_points : that are screened for them, a power of two is best; half of them
@@ -61,38 +50,32 @@ class IdentificationSettings:
         can; "use" or "ignore": with every law or with none. Curves that were followed to rupture are compared to it.
     """
 
-    starts: int = 8
-    sobol_points: int = 64
-    frames: int = 60
-    seed: int = 0
-    loss: str = "linear"
-    nuisances: tuple[Nuisance, ...] = (Nuisance("offset"), Nuisance("rate"))
-    weights: OutputWeights = "noise"
-    test_loss: str = "gaussian"
-    suspect_frames: Literal["exclude", "keep"] = "exclude"
-    further_laws: int = 6
-    rupture_times: Literal["auto", "use", "ignore"] = "auto"
+    starts: int = option(8, "Starts of the search.", STARTS)
+    sobol_points: int = option(64, "Points that are screened for the starts; 8 a start.", SOBOL_POINTS)
+    frames: int = option(60, "Frames of each test that are compared.", Limits(2, 100_000))
+    seed: int = option(0, "Seed of random draws.", SEED)
+    loss: Literal["linear", "soft_l1", "huber", "cauchy", "arctan"] = option("linear", "Of frames.")
+    nuisances: tuple[Nuisance, ...] = option(
+        (Nuisance("offset"), Nuisance("rate")),
+        "What differs between tests beside the default; rate=none leaves one out.",
+        flag="nuisance",
+        example="thickness=0.4935:0.027",
+    )
+    weights: OutputWeights = option(
+        "noise", "Of outputs; equal: Eq. (4), paper: Eq. (S3).", example="amplitude=0.99,width=0.005"
+    )
+    test_loss: Literal["gaussian", "student"] = option(
+        "gaussian", "Of whole tests; with student one far from its replicates weighs less."
+    )
+    suspect_frames: Literal["exclude", "keep"] = option("exclude", "Frames that unload, fall or lie apart.")
+    further_laws: int = option(6, "Laws that are tried at most where none explains the tests.", Limits(0, 1000))
+    rupture_times: Literal["auto", "use", "ignore"] = option(
+        "auto", "Rupture times and run-outs of tests without curves; auto: with laws that describe rupture."
+    )
 
     def __post_init__(self) -> None:
-        for name, allowed in (
-            ("starts", limits.STARTS),
-            ("sobol_points", limits.SOBOL_POINTS),
-            ("frames", limits.COMPARED_FRAMES),
-            ("seed", limits.SEED),
-            ("further_laws", limits.FURTHER_LAWS),
-        ):
-            limits.check_number(name, getattr(self, name), allowed, FitError)
-        if self.loss not in LOSSES:
-            raise FitError(f"loss '{self.loss}' is not known; allowed are {', '.join(LOSSES)}")
-        if self.test_loss not in TEST_LOSSES:
-            raise FitError(f"test_loss '{self.test_loss}' is not known; allowed are {' and '.join(TEST_LOSSES)}")
-        if self.suspect_frames not in SUSPECT_FRAMES:
-            raise FitError(
-                f"suspect_frames '{self.suspect_frames}' is not known; allowed are {' and '.join(SUSPECT_FRAMES)}"
-            )
-        if self.rupture_times not in RUPTURE_TIMES:
-            raise FitError(f"rupture_times '{self.rupture_times}' is not known; allowed are {', '.join(RUPTURE_TIMES)}")
         _check_weights(self.weights)
+        super().__post_init__()
         if self.weights == "likelihood" and self.loss != "linear":
             raise FitError(
                 f"loss '{self.loss}' does not go with weights 'likelihood', which judges values, noise and laws; "
@@ -108,6 +91,30 @@ class IdentificationSettings:
                     f"nuisance '{first.key}' is given twice; give one, with the scope that matters most, or name the "
                     "tests of each by tests="
                 )
+
+    def changed(self, changes: Mapping[str, Any], predictor: Predictor | Mapping[str, Predictor] | None = None) -> Self:
+        """The settings with fields changed by name; None leaves a field as it is.
+
+        A nuisance that is a name alone has its prior as usual; that of a length is the tolerance that its specimen, the
+        predictor, states. With another number of starts the number of Sobol points follows, unless it is given too.
+        """
+        given = {name: value for name, value in changes.items() if value is not None}
+        if "nuisances" in given:
+            listed: Any = given["nuisances"]
+            listed = [listed] if isinstance(listed, str | Nuisance) else listed
+            given["nuisances"] = tuple(_nuisance_named(n, predictor) if isinstance(n, str) else n for n in listed)
+        if "starts" in given:  # eight points a start, a power of two, and at least 64
+            points = max(64, 1 << (8 * max(int(given["starts"]), 1) - 1).bit_length())
+            given.setdefault("sobol_points", points)
+        return super().changed(given)
+
+
+def _nuisance_named(kind: str, predictor: Predictor | Mapping[str, Predictor] | None) -> Nuisance:
+    """The nuisance of this name; of a length with the tolerance of its specimen, the largest where several have it."""
+    predictors = [*predictor.values()] if isinstance(predictor, Mapping) else [predictor]
+    lengths = [length for p in predictors if (length := dimension_named(p, kind)) is not None]
+    sd = max((length.tolerance * length.default for length in lengths), default=0.0)
+    return Nuisance(kind, sd=sd) if sd > 0.0 else Nuisance(kind)
 
 
 @checked
@@ -127,10 +134,9 @@ def default_nuisances(*further: Nuisance, without: Sequence[str] = ()) -> tuple[
 
 def _check_weights(weights: OutputWeights) -> None:
     if isinstance(weights, str):
-        if weights not in WEIGHTINGS:
-            raise FitError(
-                f'weights is "{weights}"; allowed are {", ".join(WEIGHTINGS)} and a mapping such as {{"strain": 0.99}}'
-            )
+        if weights not in get_args(Weighting):
+            words = ", ".join(get_args(Weighting))
+            raise FitError(f'weights is "{weights}"; allowed are {words} and a mapping such as {{"strain": 0.99}}')
         return
     invalid = [f"{name}: {value!r}" for name, value in weights.items() if not (np.isfinite(value) and value > 0)]
     if invalid or not weights:

@@ -181,16 +181,16 @@ class _ImportedModules(importlib.abc.MetaPathFinder):
 def main() -> None:
     """Do the task of each number read from standard input, and write its result, a line of JSON."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    stdin, stdout = sys.stdin.buffer, os.fdopen(os.dup(1), "w", encoding="utf-8")
+    stdin, stdout = sys.stdin.buffer, os.fdopen(os.dup(1), "w", buffering=1, encoding="utf-8")
     os.dup2(2, 1)  # whatever else is printed belongs on stderr
     sys.meta_path.append(_ImportedModules(pickle.load(stdin)))
     for plugin_file in pickle.load(stdin):
         load_plugin_file(plugin_file)
     job = pickle.load(stdin).on_one_thread()
     try:
-        print(json.dumps("ready"), file=stdout, flush=True)
+        stdout.write("ready\n")
         for line in stdin:
-            print(json.dumps(asdict(run_task(job, int(line)))), file=stdout, flush=True)
+            stdout.write(f"{json.dumps(asdict(run_task(job, int(line))))}\n")
     except BrokenPipeError:  # the process that asked has ended; the task is done all the same
         os._exit(0)
 

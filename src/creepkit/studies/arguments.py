@@ -217,7 +217,6 @@ def _unit_of_kind(kind: str) -> str:
 def settings_of(file: StudyFile) -> IdentificationSettings:
     """Settings of every identification: the defaults with what the study changes."""
     import creepkit as ck
-    from creepkit.api.identification import change_settings
 
     model, changes = file.model, {"seed": file.model.study.seed, "suspect_frames": file.model.data.suspect_frames}
     base = ck.IdentificationSettings()
@@ -227,13 +226,13 @@ def settings_of(file: StudyFile) -> IdentificationSettings:
             value = getattr(part, name)
             if value is not None:
                 with file.at("identification", name):
-                    change_settings(base, {name: value})  # type: ignore[misc]
+                    base.changed({name: value})
                 changes[name] = value
         changes["nuisances"] = nuisances_of(file)  # type: ignore[assignment]
     if model.selection is not None and model.selection.further_laws is not None:
         changes["further_laws"] = model.selection.further_laws
     with file.at("identification"):
-        return change_settings(base, changes)  # type: ignore[arg-type]
+        return base.changed(changes)
 
 
 def steps_of(steps: Sequence[Step]) -> list[tuple[float, float]]:

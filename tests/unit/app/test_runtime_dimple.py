@@ -15,9 +15,8 @@ from creepkit.registry import default_registry
 from helpers.export_cases import LAWS
 from helpers.page_runtime import in_page, pairs, values_that_creep
 
-AGREEMENT = 5e-5
-"""Relative, of amplitude, width and shape: modes and gradients are packed in single precision, and both integrators
-solve equilibrium to 1e-5 of the displacement."""
+AGREEMENT = 1e-6
+"""Relative, of amplitude, width and shape: modes and gradients are packed in single precision."""
 
 TIMES = [0.0, 2.0, 60.0, 900.0, 7200.0, 1.4e4, 1.6e4, 3e4, 4.32e4]
 JUMP = ck.PressureJump(P1=7.0, P2=8.5, Tj=14400.0)
@@ -94,13 +93,12 @@ def test_the_coarse_model_is_near_and_the_section_is_that_of_the_modes(model, da
     np.testing.assert_allclose(np.array(fast["outputs"]["amplitude"])[3:], amplitude[3:], rtol=0.02)
     assert fast["steps"] < full["steps"]
     mesh = model.own_setup().model
-    np.testing.assert_allclose(full["rest"], mesh.nodes, atol=1e-12)
-    moved = np.array(full["places"])[mesh.top, 1] - mesh.nodes[mesh.top, 1]
-    np.testing.assert_allclose(moved, full["profile"], atol=1e-12)
+    rest, places = (np.reshape(full[name], (-1, 2)) for name in ("rest", "places"))
+    np.testing.assert_allclose(rest, mesh.nodes, atol=1e-12)
+    np.testing.assert_allclose((places - mesh.nodes)[mesh.top, 1], full["profile"], atol=1e-12)
     np.testing.assert_allclose(full["radii"], mesh.nodes[mesh.top, 0], atol=1e-12)
     run = simulated(model, STRAIN_HARDENING, values, JUMP)
     assert full["profile"][0] == pytest.approx(run.outputs["amplitude"][-1], rel=0.05)
-    assert {node for edge in full["edges"] for node in edge} >= {int(node) for node in mesh.top}
 
 
 def test_a_dimple_of_another_thickness(model, tmp_path):

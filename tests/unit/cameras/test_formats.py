@@ -94,14 +94,6 @@ def test_images_of_one_file(tmp_path: Path) -> None:
     assert frames[1].source.endswith("all.csv, image 2")
 
 
-def test_images_across_the_chunks_of_a_search(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = written(tmp_path, vic_3d_images(tuple(np.linspace(0, 0.4, 9))), "all.csv")
-    for size in (97, 100, 128, 1001):
-        monkeypatch.setattr("creepkit.cameras.text_files.CHUNK_BYTES", size)
-        frames = ck.read_frames(path)
-        assert [frame.displacements[24, 2] for frame in frames] == pytest.approx(np.linspace(0, 0.4, 9))
-
-
 def test_a_broken_line_of_the_third_image_is_named(tmp_path: Path) -> None:
     content = vic_3d_images((0.0, 0.2, 0.4)).split(b"\n")
     content[2 * 51 + 10] = b"1,2,what,4,5,6,7,8"
@@ -170,75 +162,12 @@ def test_a_point_without_a_number_is_lost(word: str, tmp_path: Path) -> None:
     assert list(np.flatnonzero(~frame.valid)) == [2, *LOST]
 
 
-def test_infinity_is_no_matter_where_a_point_is_lost(tmp_path: Path) -> None:
-    lines = vic_3d().decode().split("\n")
-    lines[4] = "1,2,inf,4,5,6,-1,8"
-    assert not ck.read_frames(written(tmp_path, "\n".join(lines).encode(), "a.csv"))[0].valid[2]
-
-
-def test_decimal_commas_in_quotes(tmp_path: Path) -> None:
-    rows = [
-        ",".join(f'"{cell}"' for cell in line.split(";"))
-        for line in ["X [mm];Y [mm];Z [mm];U [mm];V [mm];W [mm];sigma", "1,5;2;3;0,25;0;-1,25e-1;0,01"]
-    ]
-    frame = ck.read_frames(written(tmp_path, "\n".join(rows).encode(), "a.csv"))[0]
-    assert frame.points[0].tolist() == [1.5, 2.0, 3.0]
-    assert frame.displacements[0].tolist() == [0.25, 0.0, -0.125]
-
-
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
 @pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
 def test_encodings_and_ends_of_lines(encoding: str, newline: str, tmp_path: Path) -> None:
     text = dice().decode().replace("\n", newline).encode(encoding)
     frame = ck.read_frames(written(tmp_path, text, "DICe_solution_1.txt"))[0]
     np.testing.assert_allclose(frame.displacements[30], dome().displacements[30], rtol=1e-9)
-
-
-def test_columns_named_by_the_user(tmp_path: Path) -> None:
-    head = b"time_s;PosX (m);PosY (m);PosZ (m);dx (mm);dy (mm);dz (mm);quality\n"
-    path = written(tmp_path, head + b"12,5;1;2;3;4;5;6;0,9\n12,5;1;2;3;4;5;7;0,1\n", "lab.csv")
-    names = {"x": "PosX", "y": "PosY", "z": "PosZ", "u": "dx", "v": "dy", "w": "dz", "time": "time"}
-    with pytest.raises(HistoryError, match="no camera format has its columns"):
-        ck.read_frames(path)
-
-    frames = ck.read_frames(path, format=names)
-    assert frames[0].points[0].tolist() == [1000.0, 2000.0, 3000.0]
-    assert frames.times.tolist() == [12.5]
-    assert frames[0].time == 12.5
-
-    ours = ck.CameraFormat(
-        "ours", "ours", {**names, "confidence": "quality"}, lost={"quality": "< 0.5"}, axes=(1, -1, -1)
-    )
-    frames = ck.read_frames(path, format=ours)
-    assert frames[0].valid.tolist() == [True, False]
-    assert frames[0].displacements[0].tolist() == [4.0, -5.0, -6.0]
-    assert ck.read_frames(path, format={**names, "x": "posx"})[0].points[0, 0] == 1000.0  # other capitals do
-
-
-def test_what_a_format_must_state() -> None:
-    columns = dict(zip("xyzuvw", "abcdef", strict=True))
-    for change, message in [
-        ({"columns": {"x": "a"}}, "no column is given for y; name those of x y u v"),
-        ({"columns": {**columns, "q": "g"}}, "'q' is no quantity of a frame"),
-        ({"unit": "px"}, "'px' is no unit of length"),
-        ({"axes": (1, 2, 3)}, "give three factors that are 1 or -1"),
-        ({"lost": {"sigma": "negative"}}, "the rule of 'sigma' is 'negative'; write one such as '< 0'"),
-        ({"time": ("file", "", "s")}, "time is ('file', '', 's'); write"),
-    ]:
-        with pytest.raises(HistoryError) as caught:
-            ck.CameraFormat(**{"name": "ours", "title": "ours", "columns": columns, **change})
-        assert message in str(caught.value)
-
-
-def test_two_formats_for_one_head(tmp_path: Path) -> None:
-    from creepkit.cameras.formats import FORMATS
-    from creepkit.cameras.reading import read_frames
-
-    twin = dataclasses.replace(ck.available("cameras")["zeiss"], name="twin")
-    path = written(tmp_path, zeiss(), "nodemap.txt")
-    with pytest.raises(HistoryError, match="the camera formats 'zeiss' and 'twin' both fit it; say which one"):
-        read_frames(path, [*FORMATS, twin])
-    assert len(read_frames(path, [*FORMATS, twin], "twin")) == 1
 
 
 def test_arrays_of_matlab_written_in_other_ways(tmp_path: Path) -> None:
@@ -264,49 +193,6 @@ def test_arrays_of_matlab_written_in_other_ways(tmp_path: Path) -> None:
         ck.read_frames(written(tmp_path, vic_3d_mat()[:900], "c.mat"))
 
 
-def test_arrays_of_matlab_that_are_not_asked_for_are_not_unpacked(tmp_path: Path) -> None:
-    """160 MB of zeros beside a frame; and columns that are as large, which are refused before they are read."""
-    import tracemalloc
-
-    import h5py
-
-    truth = dome()
-    arrays = dict(zip("XYZUVW", (*truth.points.T, *truth.displacements.T), strict=True))
-
-    def write(name: str, large: str, count: int) -> Path:
-        with h5py.File(tmp_path / name, "w") as file:
-            for column, values in arrays.items():
-                file[column] = values
-            for column in large:
-                if column in file:
-                    del file[column]
-                file.create_dataset(column, (count,), dtype="f8", fillvalue=1.0)
-        return tmp_path / name
-
-    tracemalloc.start()
-    try:
-        assert len(ck.read_frames(write("beside.mat", "ABC", 20_000_000))[0].points) == 49
-        with pytest.raises(HistoryError, match="frame of 60000000 numbers, of at most 20000000"):
-            ck.read_frames(write("large.mat", "XYZUVW", 10_000_000))[0]
-        assert tracemalloc.get_traced_memory()[1] < 50e6
-    finally:
-        tracemalloc.stop()
-
-
-def test_arrays_of_matlab_of_other_shapes_or_of_one_name_are_refused(tmp_path: Path) -> None:
-    from scipy.io import savemat
-
-    truth = dome()
-    arrays = dict(zip("XYZUVW", (*truth.points.T, *truth.displacements.T), strict=True))
-    savemat(tmp_path / "a.mat", {**arrays, "X": arrays["X"].reshape(7, 7)})
-    with pytest.raises(HistoryError, match=r"differ in their number of points \(X has 7 x 7, Y has 1 x 49"):
-        ck.read_frames(tmp_path / "a.mat")[0]
-    savemat(tmp_path / "b.mat", arrays)
-    content = (tmp_path / "b.mat").read_bytes()
-    with pytest.raises(HistoryError, match="two of its arrays are called 'X'; keep one of them"):
-        ck.read_frames(written(tmp_path, content + content[128:], "c.mat"))[0]
-
-
 UNKNOWN = b"xpos_um;ypos_um;zpos_um;dx_um;dy_um;dz_um\n" + b"1;2;3;4;5;6\n" * 600
 
 
@@ -327,18 +213,6 @@ def test_what_is_no_frame_is_found_out_from_some_of_its_files(tmp_path: Path, mo
     assert len(ck.read_frames(tmp_path)) == 100
 
 
-@pytest.mark.parametrize(("given", "found"), [(None, "found None"), ([1, 2], r"found \[1, 2\]"), (3, "found 3")])
-def test_what_is_no_list_of_files(given: object, found: str) -> None:
-    with pytest.raises(HistoryError, match=rf"takes a folder, a file, a pattern or a list of files, {found}"):
-        ck.read_frames(given)
-
-
-def test_a_file_that_is_listed_twice(tmp_path: Path) -> None:
-    path = written(tmp_path, zeiss(), "a.txt")
-    with pytest.raises(HistoryError, match="a.txt: stands twice in the list of frames"):
-        ck.read_frames([path, path])
-
-
 def test_times_in_names_have_decimals(tmp_path: Path) -> None:
     format = dataclasses.replace(ck.available("cameras")["zeiss"], time=("name", "", "s"))
     for name in ("t_2.txt", "t_12.txt"):
@@ -347,29 +221,3 @@ def test_times_in_names_have_decimals(tmp_path: Path) -> None:
     for name in ("t_2.25.txt", "t_12.5.txt"):
         (tmp_path / f"{name[:-4].split('.')[0]}.txt").rename(tmp_path / name)
     assert ck.read_frames(tmp_path, format=format).times.tolist() == [2.25, 12.5]
-
-
-SIX = dict(zip("xyzuvw", "XYZUVW", strict=True))
-WRONG_DECLARATIONS: dict[str, tuple[dict[str, object], str]] = {
-    "title": ({"title": None}, "title is None; give a text"),
-    "unit": ({"unit": 3}, "unit is 3; give a text"),
-    "axes": ({"axes": 3}, "axes are 3; give three factors"),
-    "lost list": ({"lost": ["sigma"]}, "lost is .'sigma'.; write {column: rule}"),
-    "lost None": ({"lost": None}, "lost is None; write"),
-    "patterns": ({"patterns": (3,)}, "patterns is .3,.; give a tuple of texts"),
-    "object": ({"layout": (("X", "O"),)}, "layout holds .'X', 'O'.; give a column and its type"),
-    "type": ({"layout": (("X", "zz"),)}, "layout holds .'X', 'zz'."),
-    "no pair": ({"layout": ("X",)}, "layout holds 'X'"),
-    "twice": ({"layout": (("X", "<f8"), ("X", "<f8"))}, "layout has the column 'X' twice"),
-    "key": ({"time": ("head", 3, "s")}, "time is .'head', 3, 's'.; give a tuple of texts"),
-    "unit of time": ({"time": ("head", "t", [])}, "time is .*; give a tuple of texts"),
-    "column": ({"columns": {**SIX, "x": 3}}, "the column of x is 3; give its name"),
-    "one column": ({"columns": {**SIX, "y": "X"}}, "the column 'X' is named for x and for y"),
-}
-
-
-@pytest.mark.parametrize("case", WRONG_DECLARATIONS)
-def test_a_declaration_checks_itself(case: str) -> None:
-    changes, message = WRONG_DECLARATIONS[case]
-    with pytest.raises(HistoryError, match=f"camera format 'lab': {message}"):
-        ck.CameraFormat(**{"name": "lab", "title": "a laboratory's own", "columns": SIX, **changes})

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +10,7 @@ import pytest
 import creepkit as ck
 from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import HistoryError
-from helpers.camera_samples import dice, dice_blanks, dome, matchid_2023, pyvale, vic_3d, zeiss
+from helpers.camera_samples import dice, dome, pyvale
 
 
 def folder_of(path: Path, names: list[str], write=dice) -> Path:
@@ -36,11 +34,6 @@ def test_natural_order_and_missing_numbers(tmp_path: Path) -> None:
     assert frames[-1].source.endswith("DICe_solution_12.txt")
 
 
-def test_numbers_may_count_in_steps(tmp_path: Path) -> None:
-    frames = ck.read_frames(folder_of(tmp_path / "test", [f"run2_{k:05d}_0.csv" for k in (10, 20, 30, 50)], vic_3d))
-    assert frames.missing == (40,)
-
-
 def test_what_else_lies_in_the_folder_is_no_frame(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "test", ["f_1.txt", "f_2.txt"])
     (folder / "frame_times.csv").write_text("index,time\n0,1755561113266\n")
@@ -60,24 +53,6 @@ def test_a_broken_frame_is_missed_when_it_is_read(content: bytes, tmp_path: Path
     assert frames[2].valid.size == 49
     with pytest.raises(HistoryError, match="f_2.txt"):
         frames[1]
-
-
-def test_frames_of_other_columns(tmp_path: Path) -> None:
-    folder = folder_of(tmp_path / "test", ["f_1.txt", "f_2.txt", "f_3.txt"])
-    (folder / "f_2.txt").write_bytes(dice_blanks())  # the same columns, with blanks
-    (folder / "f_3.txt").write_bytes(dice().replace(b"GAMMA", b"GAMMA_2"))
-    frames = ck.read_frames(folder)
-
-    assert frames[1].valid.size == 49
-    with pytest.raises(HistoryError, match=r"f_3.txt:5: its columns are not those of f_1.txt \('GAMMA'"):
-        frames[2]
-
-
-def test_an_image_that_comes_twice_in_a_file_of_a_folder(tmp_path: Path) -> None:
-    folder = folder_of(tmp_path / "test", ["f_1.csv", "f_2.csv"], vic_3d)
-    (folder / "f_2.csv").write_bytes(vic_3d() + vic_3d())
-    with pytest.raises(HistoryError, match="f_2.csv:53: the line of columns comes again"):
-        ck.read_frames(folder)[1]
 
 
 @pytest.mark.parametrize(
@@ -128,39 +103,6 @@ def test_times_given(tmp_path: Path) -> None:
             ck.read_frames(folder, times=times)
 
 
-def test_times_in_heads_and_names(tmp_path: Path) -> None:
-    import dataclasses
-
-    folder = folder_of(tmp_path / "test", ["map_100.txt", "map_350.txt"], zeiss)
-    for k, file in enumerate(sorted(folder.iterdir())):
-        file.write_bytes(file.read_bytes().replace(b"# force :", f"# clock: {k + 2} min\n# force :".encode()))
-    system = ck.available("cameras")["zeiss"]
-    assert np.isnan(ck.read_frames(folder).times).all()
-    by_head = dataclasses.replace(system, time=("head", "clock", "min"))
-    assert ck.read_frames(folder, format=by_head).times.tolist() == [120.0, 180.0]
-    by_name = dataclasses.replace(system, time=("name", "", "ms"))
-    assert ck.read_frames(folder, format=by_name).times.tolist() == pytest.approx([0.1, 0.35])
-
-
-def test_one_frame_at_a_time_in_memory(tmp_path: Path) -> None:
-    """Thirty frames take no more memory than six; nothing of a frame is kept."""
-    folder = tmp_path / "test"
-    folder.mkdir()
-    for k in range(30):
-        (folder / f"f_{k}.csv").write_bytes(matchid_2023(dome(0.1, count=25)))
-
-    def peak(pattern: str) -> int:
-        tracemalloc.start()
-        total = sum(np.nansum(frame.displacements) for frame in ck.read_frames(f"{folder}/{pattern}"))
-        _, most = tracemalloc.get_traced_memory()
-        tracemalloc.stop()
-        assert np.isfinite(total)
-        return most
-
-    peak("f_?.csv")  # what is imported and remembered at the first time
-    assert peak("f_*.csv") < 1.1 * peak("f_[0-5].csv") + 30_000
-
-
 def test_a_test_of_pyvale(tmp_path: Path) -> None:
     frames = ck.read_frames(folder_of(tmp_path / "test", [f"dic_results_{k:04d}.csv" for k in range(3)], pyvale))
     assert apexes(frames) == [0.0, 0.1, 0.2]
@@ -178,20 +120,3 @@ def test_a_test_of_pyvale(tmp_path: Path) -> None:
 def test_times_of_frames_from_a_file(tmp_path, text, expected):
     (tmp_path / "times.csv").write_text(text)
     np.testing.assert_allclose(read_frame_times(tmp_path / "times.csv"), expected, rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "is empty"),
-        ("0,1\n1,2\n", "2 columns without names; call the one of times time"),
-        ("a,b\n1,2\n", "which of 'a', 'b' is the time of a frame is not clear"),
-        ("index,time\n0,1\n1\n", "3: 1 cells in a table of 2 columns"),
-        ("index,time\n0,x\n", "2: 'time' is 'x'"),
-        ("time [mm]\n1\n", "times in 'mm'"),
-    ],
-)
-def test_times_of_frames_that_are_not_understood(tmp_path, text, message):
-    (tmp_path / "times.csv").write_text(text)
-    with pytest.raises(HistoryError, match=re.escape(message)):
-        read_frame_times(tmp_path / "times.csv")

@@ -1,6 +1,5 @@
 """What options declare: limits of every number, places of everything that is written, and what holds without words."""
 
-import inspect
 import types
 from pathlib import Path
 from typing import Annotated, Union, get_args, get_origin, get_type_hints
@@ -10,8 +9,6 @@ import pytest
 from creepkit import limits
 from creepkit.cli.app import COMMANDS
 from creepkit.cli.declared_options import OutputPath
-from creepkit.errors import FitError
-from creepkit.inverse.settings import IdentificationSettings
 from helpers.command_line import creepkit, one_line
 
 READ = {
@@ -66,19 +63,3 @@ def test_a_command_that_writes_has_force_and_no_other_has():
 def test_a_number_beyond_its_limits_is_one_line(value):
     message = one_line(creepkit("simulate", "norton", "--set", "A=1e-9", "--end-h", "1", "--modulus-gpa", value))
     assert message.endswith("allowed are numbers above 0 up to 1000000\n")
-
-
-def test_the_library_has_the_same_limits():
-    for starts in (10**9, 0, float("nan"), 1.5, True, "8", 10**5000):
-        with pytest.raises(FitError, match="allowed are whole numbers from 1 to 10000"):
-            IdentificationSettings(starts=starts)
-
-
-def test_the_signature_of_a_command_keeps_its_defaults():
-    """What `checked` makes of a command is called by typer with the same defaults."""
-    from creepkit.cli.declared_options import checked
-
-    for function in COMMANDS.values():
-        before, after = inspect.signature(function).parameters, inspect.signature(checked(function)).parameters
-        assert {name: after[name].default for name in before} == {n: one.default for n, one in before.items()}
-        assert set(after) - set(before) <= {"force"}

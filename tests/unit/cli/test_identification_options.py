@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.cli.identification_options import change_laws, select_by_label, setting_changes
+from creepkit.cli.identification_options import change_laws, select_by_label
 from creepkit.errors import FitError, HistoryError, LawError
 from helpers.command_line import creepkit, one_line
 
@@ -56,15 +56,6 @@ def test_only_takes_labels() -> None:
         select_by_label(tests, ["a"])
     with pytest.raises(HistoryError, match="no test has name=d; there are a, b, c"):
         select_by_label(tests, ["name=d"])
-
-
-def test_settings_that_nothing_is_said_of_stay_as_in_python() -> None:
-    assert setting_changes() == {}
-    assert setting_changes(seed=0, weights="amplitude=0.99", loss=None, test_loss="student") == {
-        "seed": 0,
-        "weights": {"amplitude": 0.99},
-        "test_loss": "student",
-    }
 
 
 def test_a_sum_by_name_is_the_sum_of_the_laws() -> None:

@@ -1,28 +1,19 @@
 """discover() and refit() from creep curves to an ordinary law, on a closed-form predictor and on one dimple."""
 
-import json
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import creepkit as ck
-from creepkit.cli.app import app
-from creepkit.discovery.discover import discover, group_by_temperature, isothermal_tests, temperature_study
-from creepkit.discovery.refitting import refit
-from creepkit.errors import FitError
+from creepkit.discovery.discover import discover, group_by_temperature, temperature_study
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identify import identify
-from creepkit.inverse.reference_conditions import ReferencePoint, spans_temperatures
+from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.kernels import lower
 from creepkit.language import Elastic, arrhenius, linear, temperature
 from creepkit.laws.norton import NORTON
-from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.records import PressureJump, Program
+from creepkit.records import PressureJump
 from helpers.steady_rate_predictor import Steady, planted
-from helpers.written_files import names_in
 
 T_REF = 1023.15
 TRUE = NORTON.with_temperature(n=linear(T_REF)).times(arrhenius(T_REF))
@@ -89,33 +80,10 @@ def test_the_law_is_an_ordinary_one(trend, tmp_path):
     assert "valid between 973 and 1083 K" in ck.export(trend.valued, "latex")
 
 
-def test_text_file_and_plot(trend, tmp_path):
-    text = str(trend)
-    assert "A  arrhenius" in text
-    assert "prior odds" in text
-    assert "5 temperatures, 973 to 1083 K, and valid between them" in text
-    data = json.loads(trend.save(tmp_path / "trend.json").read_text())
-    assert data["format"] == "creepkit-temperature-law"
-    assert data["plausible_forms"]["n"][0]["name"] == "linear"
-    assert data["fit"]["format"] == "creepkit-identification"
-    figure = trend.plot(tmp_path / "trend.png")
-    assert [axes.get_xlabel() for axes in figure.axes] == ["temperature, K"] * 2
-    assert (tmp_path / "trend.png").stat().st_size > 10_000
-    with pytest.raises(FitError, match="choose a file in a folder that exists"):
-        trend.save(tmp_path / "none" / "trend.json")
-
-
 def test_parameters_that_may_not_depend_on_temperature(alone):
     found = discover(alone, forms=FEW, parameters=("A",))
     assert found.forms["n"] == "constant"
     assert list(found.prior_odds["n"]) == ["constant"]
-
-
-def test_beyond_its_range_a_law_is_not_asked(trend):
-    with pytest.raises(FitError, match="holds between 973 and 1083 K; it was evaluated outside"):
-        trend.parameters_at(1100.0)
-    with pytest.raises(FitError, match="has no parameter 'n_t': did you mean 'n_T'"):
-        trend.estimate("n_t")
 
 
 def test_a_study_groups_tests_and_finds_the_same(tests, trend):
@@ -125,24 +93,6 @@ def test_a_study_groups_tests_and_finds_the_same(tests, trend):
     assert found.joint_fit.law.names == ("A", "n", "Q")
     assert found.temperature_law.forms == trend.forms
     assert "Norton power law (PL) with Arrhenius temperature dependence" in str(found)
-
-
-def stepped(test, kelvin):
-    """The test with a step of temperature in the middle of its frames, which its strains do not follow."""
-    middle = float(test.times[test.times.size // 2])
-    T = Program.steps([(0.0, test.temperature), (middle, test.temperature + kelvin)])
-    return test.replace(name=f"step of {kelvin:g} K", temperature=T)
-
-
-def test_a_test_with_a_step_of_temperature_is_left_out_by_its_name(tests, trend):
-    """The law is that of the other tests alone, digit by digit, and the note says which test is missing and why."""
-    step = stepped(tests[7], 20.0)
-    found = temperature_study(NORTON, [*tests, step], Steady(), settings=QUICK, forms=FEW)
-    assert found.notes == ("step of 20 K (755 to 775 °C) is left out, for it is not at one temperature",)
-    assert found.temperature_law.values == trend.values
-    assert [h.name for h in found.tests] == [h.name for h in tests]
-    with pytest.raises(FitError, match="no test is at one temperature: step of 20 K"):
-        temperature_study(NORTON, [step], Steady(), settings=QUICK)
 
 
 def test_tests_of_several_specimens_are_studied_together(tests, trend):
@@ -155,18 +105,6 @@ def test_tests_of_several_specimens_are_studied_together(tests, trend):
         assert found.temperature_law.values[name] == pytest.approx(value, rel=1e-3)
 
 
-def test_what_happened_after_the_last_used_frame_does_not_count(tests):
-    """A test that is cut at its step is one at a single temperature for all that is said of temperatures."""
-    step = stepped(tests[7], 20.0)
-    cut = step.replace(used=np.arange(step.times.size) <= step.times.size // 2)
-    assert isothermal_tests([cut]) == ([cut], "")
-    assert isothermal_tests([step], 30.0) == ([], isothermal_tests([step])[1])
-    assert np.ptp(cut.followed_temperatures) == 0.0
-    before = step.replace(used=np.arange(step.times.size) < step.times.size // 2)
-    assert before.mean_temperature == tests[7].temperature
-    assert not spans_temperatures([before])
-
-
 def test_a_form_is_where_it_should_be_at_its_reference_temperature():
     coordinates = Coordinates(TRUE, ReferencePoint(100.0, 0.01, 7e3, T_REF))
     theta = np.array([np.log(1.5e-16), 4.6, -8e-3, 4.2e5])
@@ -177,82 +115,7 @@ def test_a_form_is_where_it_should_be_at_its_reference_temperature():
 # ---- the command ---------------------------------------------------------------------------------------------------
 
 
-def test_the_command_on_saved_identifications(alone, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for k, fit in enumerate(alone):
-        fit.save(tmp_path / f"{k}.json")
-    files = [f"{k}.json" for k in range(len(alone))]
-    forms = ["--form", "A=arrhenius", "--form", "n=constant,linear", "--prior", "n:linear=2"]
-    told = CliRunner().invoke(app, ["discover", *files, *forms, "--json", "--to", "out"])
-    assert told.exit_code == 0, told.output
-    answer = json.loads(told.stdout)
-    assert answer["forms"] == {"A": "arrhenius", "n": "linear"}
-    assert answer["judged_by"] == "points"
-    names = {"temperature.json", "temperature.png", "law.tex", "law.py"}
-    assert {*names_in(tmp_path / "out")} == names
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (["--form", "n"], "--form n is not known; write n=constant,linear"),
-        (["--form", "q=linear"], "has no parameter 'q'"),
-        (["--prior", "A:arrhenius=much"], "write A:arrhenius=10"),
-    ],
-)
-def test_the_command_says_what_is_wrong(alone, tmp_path, monkeypatch, given, said):
-    monkeypatch.chdir(tmp_path)
-    for k, fit in enumerate(alone):
-        fit.save(tmp_path / f"{k}.json")
-    told = CliRunner().invoke(app, ["discover", *(f"{k}.json" for k in range(len(alone))), *given])
-    assert told.exit_code == 1
-    assert said in told.stderr
-
-
 # ---- what cannot be known ------------------------------------------------------------------------------------------
-
-
-def test_one_temperature_says_what_it_cannot(tests, alone):
-    with pytest.raises(FitError, match="from one temperature neither an activation energy nor how any other parameter"):
-        discover(alone[:1])
-    found = temperature_study(NORTON, tests[:3], Steady(), settings=QUICK)
-    assert found.temperature_law is None
-    assert "all tests are at 973 K" in found.notes[0]
-
-
-def test_two_temperatures_have_no_form(alone):
-    with pytest.raises(FitError, match="at 973 and 1000 K alone: two temperatures give an activation energy but no"):
-        discover(alone[:2])
-
-
-def test_identifications_that_do_not_belong_together(alone, tests):
-    other = identify(STRAIN_HARDENING, tests[:3], Steady(), settings=QUICK)
-    with pytest.raises(FitError, match="are of 'norton' and of 'strain-hardening'; give those of one law"):
-        discover([*alone, other])
-    warm = identify(NORTON.times(arrhenius()), tests[:6], Steady(), settings=QUICK)
-    with pytest.raises(FitError, match="depends on temperature already"):
-        discover([warm, *alone])
-    joint = identify(NORTON, tests[:6], Steady(), settings=QUICK)
-    with pytest.raises(FitError, match="spans 973 to 1000 K; identify each temperature alone"):
-        discover([joint, *alone])
-    with pytest.raises(FitError, match="takes a list of identifications"):
-        discover(alone[0])
-    with pytest.raises(FitError, match="give using="):
-        discover([replace(fit, predictor=None) for fit in alone], forms=FEW, histories=tests)
-
-
-def test_a_form_that_cannot_be_refitted_is_told(trend, tests, monkeypatch):
-    from creepkit.discovery import refitting
-
-    def failing(law, *given, **how):
-        if "n_I" in law.names:
-            raise FitError("this one never converges")
-        return identify(law, *given, **how)
-
-    monkeypatch.setattr(refitting, "identify", failing)
-    found = refit(trend, tests, Steady(), settings=QUICK, search_again=False)
-    assert found.forms == trend.forms
-    assert all("this one never converges" in note for note in found.notes)
 
 
 # ---- a dimple ------------------------------------------------------------------------------------------------------

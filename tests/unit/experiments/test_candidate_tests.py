@@ -6,12 +6,11 @@ import pickle
 import numpy as np
 import pytest
 
-import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import frame_times, grid_of_rig, variations_of_tests
 from creepkit.experiments.rig import Rig, rigs_of
 from creepkit.laws.norton import NORTON
-from creepkit.records import PressureJump, Program, constant_strain
+from creepkit.records import PressureJump, constant_strain
 from creepkit.specimens.bulge.specimen import Bulge
 from helpers.log_rate_predictor import END, LogRates, measured
 
@@ -92,47 +91,3 @@ def test_variations_of_bulge_tests_change_pressure_and_thickness():
     assert any(text.startswith("8 MPa to ") and " h, then 14 MPa to " in text for text in told)
     thicknesses = {h.geometry["apex_thickness"] for c in told.values() for h in c.histories}
     assert thicknesses == {0.45, 0.5, 0.55}
-
-
-@pytest.mark.parametrize(
-    ("changes", "sentence"),
-    [
-        ({"levels": (5.0, 4.0)}, "levels are"),
-        ({"levels": (0.0, 4.0)}, "levels are"),
-        ({"longest_hours": 0.0}, "longest_hours must be above zero"),
-        ({"setup_hours": -1.0}, "setup_hours must be zero or more"),
-        ({"tests_per_run": 0}, "tests_per_run is a whole number"),
-        ({"temperatures": ()}, "temperatures are numbers in K"),
-        ({"dimensions": {"apex_thickness": (-0.5,)}}, "apex_thickness must be lengths"),
-        ({"oven": 3}, "a rig has no 'oven'"),
-    ],
-)
-def test_a_rig_that_cannot_be_is_refused(changes, sentence):
-    rig = Rig("bulge", (4.0, 14.0), 12.0, (1000.0,))
-    with pytest.raises(FitError, match=sentence):
-        rig.replace(**changes)
-
-
-def test_a_rig_says_why_it_cannot_make_a_test():
-    rig = Rig("bulge", (4.0, 14.0), 12.0, (1000.0,))
-    assert rig.refusal(dimple(times=np.array([3600.0]), outputs={}, standard_deviation={})) == ""
-    over = dimple(times=np.array([3600.0]), outputs={}, standard_deviation={})
-    assert "20 MPa is outside the rig's 4 to 14 MPa" in rig.refusal(over.replace(loading=PressureJump(8, 20, 600.0)))
-    assert "more than the 12 h" in rig.refusal(over.replace(times=np.array([1e6])))
-    warm = over.replace(temperature=Program([0.0, 3600.0], [1100.0, 1120.0]))
-    assert "1100 K is none of the rig's temperatures (1000 K)" in rig.refusal(warm)
-
-
-def test_any_load_is_varied_in_its_unit_after_the_ramp_that_was_made():
-    base = ck.History(
-        "beam", np.linspace(3600.0, 36000.0, 10), {}, ck.constant_load("force", 200.0, ramp=30.0), 1000.0,
-        "three-point-bend", ck.Elastic(150e3),
-    )  # fmt: skip
-    found = grid_of_rig(Rig("three-point-bend", (100.0, 400.0), 20.0, (1000.0,)), base)
-    assert any(c.description.startswith("400 N for ") for c in found)
-    assert any("100 N to " in c.description and " h, then 141 N to " in c.description for c in found)
-    for candidate in found:
-        loading = candidate.histories[0].loading
-        assert loading.quantity == "force"
-        assert loading.program().values[0] == 0.0
-        assert loading.program().times[1] == 30.0

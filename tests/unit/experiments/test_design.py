@@ -1,13 +1,10 @@
 """Designs of experiments against closed forms of linear regression, and what a test tells once it is made."""
 
-import json
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.experiments.design import design, further_tests
+from creepkit.experiments.design import design
 from creepkit.experiments.rig import Rig
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection import rank
@@ -98,19 +95,6 @@ def test_expected_precision_is_met_when_the_test_is_made():
     assert np.log(high / low) / (2 * after._quantile) == pytest.approx(found.best.expectation.sd, rel=0.15)
 
 
-def test_what_is_known_before_a_test_is_what_the_fit_states():
-    """Also of values that were not found by likelihood, whose covariance is a sandwich."""
-    tests = bars(STRAIN_HARDENING, SPL, [constant_stress(s, "stress") for s in (45.0, 50.0, 55.0, 60.0)], seed=3)
-    fit = identify(STRAIN_HARDENING, tests, BAR, settings=IdentificationSettings(starts=4, sobol_points=32))
-    found = design(fit, goal=rate_at(50.0))
-    _, low, high = fit.rate(50.0)
-    assert found.best.expectation.current_sd == pytest.approx(np.log(high / low) / (2 * fit._quantile), rel=1e-3)
-    known = found.best.expectation.current_parameter_sd
-    to_theta = fit.coordinates.jacobian(fit.u)
-    stated = np.sqrt(np.diag(to_theta @ fit.covariance @ to_theta.T))
-    assert [known[name] for name in ("ln A", "n", "m")] == pytest.approx(stated, rel=1e-3)
-
-
 # ---- the law ---------------------------------------------------------------------------------------------------------
 
 
@@ -195,51 +179,7 @@ def test_the_expected_chi_square_is_met_when_the_test_is_made(hardening):
     assert 1 / 1.5 < met / expected < 1.5
 
 
-def test_where_one_law_remains_nothing_is_proposed(hardening):
-    alone = rank([hardening.best])
-    assert further_tests(alone).tests == ()
-    assert "one law remains, " in design(alone, goal="law").sentence
-
-
 # ---- records ---------------------------------------------------------------------------------------------------------
-
-
-def test_a_design_is_told_as_text_json_and_a_map(hardening, tmp_path):
-    found = design(hardening)
-    told = json.loads(json.dumps(found.to_json()))
-    assert told["goal"] == "law"
-    assert told["advice"] == found.sentence
-    assert len(told["tests"]) == len(found.tests)
-    assert {"description", "oven_hours", "probability", "chi_squares"} <= set(told["tests"][0])
-    found.plot(tmp_path / "map.png")
-    assert (tmp_path / "map.png").stat().st_size > 1000
-    assert str(found).startswith(found.sentence)
-    able = [test.hours for test in found.tests if test.at_draws and test.expectation.probability >= 0.95]
-    said = cheapest_text(found)
-    assert said in str(found)
-    assert (
-        f"({min(able):.3g} h of machine time with setting up)" if able else "no test considered separates the laws"
-    ) in said
-
-
-def test_a_number_in_the_map_is_one_of_the_table(hardening):
-    """In each cell the probability of the first test of the table with that first load and duration."""
-    found = design(hardening)
-    first: dict[tuple[bool, float, float], str] = {}
-    for test in found.tests:
-        levels = test.histories[0].loading.program().values
-        place = bool(np.ptp(levels[levels > 0]) == 0.0), round(test.first_level, 6), round(test.histories[0].times[-1])
-        first.setdefault(place, f"{test.expectation.probability:.2f}")
-    drawn = [text.get_text() for panel in found.plot().axes[:2] for text in panel.texts]
-    assert sorted(drawn) == sorted(first.values())
-
-
-def test_a_test_that_hardly_decides_is_not_advised(hardening):
-    found = design(hardening)
-    poor = tuple(replace(t, expectation=replace(t.expectation, probability=0.1)) for t in found.tests)
-    said = replace(found, tests=poor, plan=(), expected=None).sentence
-    assert said.startswith(f"none of the {len(poor)} tests considered is likely to tell")
-    assert "with probability 0.10" in said
 
 
 def test_work_that_is_stopped_gives_the_best_so_far(hardening):
@@ -254,37 +194,7 @@ def test_work_that_is_stopped_gives_the_best_so_far(hardening):
     assert "stopped before the end" in str(found)
 
 
-def test_the_same_question_has_the_same_answer(line):
-    first, second = (design(line, rig=RIG, goal=rate_at(40.0), seed=3) for _ in range(2))
-    assert [t.description for t in first.tests] == [t.description for t in second.tests]
-    assert first.best.expectation.sd == second.best.expectation.sd
-
-
 # ---- bad input -------------------------------------------------------------------------------------------------------
-
-
-def test_what_cannot_be_made_or_told_is_one_sentence(line, hardening):
-    with pytest.raises(FitError, match=r"'120 MPa' cannot be made: 120 MPa is outside the rig's 40 to 80 MPa"):
-        design(line, rig=RIG, candidates=plans(120.0))
-    with pytest.raises(FitError, match="goal 'best' is not known"):
-        design(line, goal="best")
-    with pytest.raises(FitError, match="budget is -1 h"):
-        design(line, budget=-1)
-    with pytest.raises(FitError, match="none of the planned tests fits into a budget"):
-        design(line, rig=RIG, candidates=plans(50.0), budget=1.0)
-    with pytest.raises(FitError, match="the rig tests specimen 'bulge', but the law was identified from tests of 'uni"):
-        design(line, rig=Rig("bulge", (4.0, 14.0), 12.0, (1000.0,)))
-    with pytest.raises(FitError, match="is of specimen 'bulge', but the law was identified from"):
-        design(line, rig=RIG, candidates=[plans(50.0)[0].replace(specimen="bulge")])
-
-
-def test_a_law_without_tests_or_intervals_is_refused(line):
-    from dataclasses import replace
-
-    with pytest.raises(FitError, match="loaded from a file: attach its histories"):
-        design(replace(line, histories=()))
-    with pytest.raises(FitError, match="the identification of norton has no intervals; identify it again"):
-        design(replace(line, covariance=np.full((2, 2), np.nan)))
 
 
 def test_a_test_that_ruptures_or_does_not_grow_is_refused_or_left_out(hardening):
@@ -299,17 +209,3 @@ def test_a_test_that_ruptures_or_does_not_grow_is_refused_or_left_out(hardening)
     found = design(hardening, rig=Rig("uniaxial", (5.0, 4000.0), 28.0, (1000.0,)))
     assert any("rupture" in reason for _, reason in found.left_out)
     assert all(max(h.loading.program().values) < 1000 for t in found.tests for h in t.histories)
-
-
-def test_a_loading_without_levels_is_asked_for(line):
-    from dataclasses import replace
-
-    class Odd:
-        quantity = "components"
-
-        def program(self):
-            return StressSteps(((0.0, 50.0),)).program()
-
-    odd = replace(line, histories=tuple(h.replace(loading=Odd()) for h in line.histories))
-    with pytest.raises(FitError, match="no further tests are known for a loading by components"):
-        design(odd)

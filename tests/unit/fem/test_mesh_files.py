@@ -3,13 +3,11 @@
 import json
 import re
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 import pytest
 
 from creepkit.errors import SolveError
-from creepkit.fem.input_deck import builder_from_deck
 from creepkit.fem.mesh import Mesh, discretize, half_bandwidth, mesh_quality
 from creepkit.fem.mesh_builder import renumbered
 from creepkit.fem.mesh_files import read_input_deck, read_mesh
@@ -134,10 +132,6 @@ def test_a_deck_becomes_the_same_mesh(tmp_path, pressed):
     check(deck(tmp_path, DECK, pressed=pressed))
 
 
-def test_a_deck_may_press_elements_one_by_one(tmp_path):
-    check(deck(tmp_path, DECK.replace("*Dsload\n Low, P, 8.", "*DLOAD\n1, P1, 1.\n_Low_S4, P4, 1.")))
-
-
 def check(mesh: Mesh) -> None:
     """Two squares, pressed from below, held at r = 2."""
     assert (len(mesh.elements), len(mesh.nodes)) == (2, 13)
@@ -169,47 +163,6 @@ def test_renumbering_keeps_the_mesh_and_never_widens_its_bandwidth():
     for one, other in ((mesh.elements, again.elements), (mesh.pressed, again.pressed), (mesh.top, again.top)):
         np.testing.assert_array_equal(mesh.nodes[one], again.nodes[other])
         np.testing.assert_array_equal(mesh.held[one], again.held[other])
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        (dict(nodes=NODES.replace("r_mm", "r")), "nodes.csv:1: missing column 'r_mm'; found: id, r, z_mm"),
-        (dict(nodes=NODES + "7,x,0\n"), "nodes.csv:8: 'r_mm' is 'x'; write a finite number such as 2.5"),
-        (dict(nodes=NODES + "7,1e999,0\n"), "nodes.csv:8: 'r_mm' is '1e999'; write a finite number such as 2.5"),
-        (dict(nodes=NODES + "7,1\n"), "nodes.csv:8: number of cells 2, of columns 3; write one cell a column"),
-        (dict(nodes=NODES + "7,-1,0\n"), "nodes.csv:8: node 7 has a radius of -1 mm; allowed is 0, the axis, or more"),
-        (dict(quads=QUADS + "3,1,2,5,9\n"), "quads.csv:4: element 3 names node 9, which is not among the nodes"),
-        (
-            dict(quads=QUADS.replace("1,1,2,5,4", "1,1,5,2,4")),
-            "quads.csv:2: element 1 is not a convex quadrilateral: its corners 1, 5, 2, 4 cross over, fold in or fall "
-            "together; list them once round, in either sense",
-        ),
-        (
-            dict(pressure_face_S1=[], pressure_face_S4=[]),
-            "sets.json: the mesh has no pressed side; say which sides of which elements are pressed",
-        ),
-        (
-            dict(pressure_face_S2=[1]),
-            "quads.csv:2: side 2 of element 1 is pressed, but another element lies there; press sides of the outline "
-            "only",
-        ),
-        (
-            dict(encastre=[]),
-            "sets.json: the mesh has no held nodes: nothing is held in z, so it would fly off; say which nodes are",
-        ),
-        (dict(encastre=[77]), "sets.json: set 'encastre' names node 77, which is not among the nodes"),
-        (dict(encastre="3"), "sets.json: set 'encastre' is not a list of node numbers; write one such as [1, 6, 147]"),
-        (
-            dict(top=[5, 6]),
-            "sets.json: the nodes of the top are not one line of element sides from the axis outwards; give the nodes "
-            "of such a line, or none",
-        ),
-    ],
-)
-def test_what_is_wrong_in_tables(tmp_path, changes, message):
-    with pytest.raises(SolveError, match=f"^{re.escape(f'{tmp_path}/{message}')}$"):
-        write(tmp_path, **changes)
 
 
 @pytest.mark.parametrize(
@@ -256,58 +209,3 @@ def test_what_is_wrong_in_decks(tmp_path, monkeypatch, old, new, message):
     Path("mesh.inp").write_text(DECK.replace(old, new))
     with pytest.raises(SolveError, match=f"^{re.escape(message)}$"):
         read_input_deck("mesh.inp")
-
-
-def test_files_that_are_no_meshes(tmp_path):
-    with pytest.raises(SolveError, match=r"nodes.csv: there is no such file"):
-        read_mesh(tmp_path / "nodes.csv", tmp_path / "quads.csv", tmp_path / "sets.json")
-    (tmp_path / "bad.inp").write_bytes(b"*NODE\n\xff\xfe")
-    with pytest.raises(SolveError, match="bad.inp:2: byte 0xff is not text in UTF-8; a mesh is read from text files"):
-        read_input_deck(tmp_path / "bad.inp")
-    (tmp_path / "empty.inp").write_text("")
-    with pytest.raises(SolveError, match="empty.inp: the mesh has no elements; it needs quadrilaterals of four or"):
-        read_input_deck(tmp_path / "empty.inp", top=None)
-
-
-def test_middle_nodes_that_turn_an_element_inside_out(tmp_path):
-    nodes = "id,r_mm,z_mm\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n5,.9,0\n6,1,.5\n7,.5,1\n8,0,.5\n"
-    sets = dict(top=[], encastre=[2, 6, 3], pressure_face_S1=[1], pressure_face_S4=[])
-    message = (
-        "quads.csv:2: element 1 is turned inside out by its middle nodes; put each near the middle of its side, in the "
-        "order of the sides 1-2, 2-3, 3-4, 4-1"
-    )
-    with pytest.raises(SolveError, match=re.escape(message)):
-        write(tmp_path, nodes, "id,n1,n2,n3,n4,n5,n6,n7,n8\n1,1,2,3,4,5,6,7,8\n", **sets)
-
-
-def _deck_of_a_large_set(more: str) -> str:
-    return "*NODE,NSET=A\n" + "\n".join(f"{k},{k},0" for k in range(1, 20001)) + f"\n{more}\n*NSET,NSET=TOP\n1\n"
-
-
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        ("*NSET,NSET=B\n" + ("A," * 20 + "\n") * 5000, ""),
-        ("*BOUNDARY\n" + "A,1,2\n" * 50_000, ""),
-        ("*NSET,NSET=B,GENERATE\n1,10000000,1", "there is no node 20001"),
-        ("*NSET,NSET=B,GENERATE\n" + "1,20000,1\n" * 20_000, "the limit MOST_MEMBERS"),
-        ("".join(f"*NSET,NSET=B{k}\nA\n" for k in range(1000)), "the limit MOST_MEMBERS"),
-    ],
-)
-def test_large_sets_that_are_named_often_take_no_long_time(tmp_path: Path, more: str, message: str) -> None:
-    (tmp_path / "large.inp").write_text(_deck_of_a_large_set(more))
-    start = process_time()
-    if message:
-        with pytest.raises(SolveError, match=message):
-            builder_from_deck(tmp_path / "large.inp", None, "top")
-    else:
-        draft = builder_from_deck(tmp_path / "large.inp", None, "top")
-        assert draft.top == {1}
-        assert draft.held == (dict.fromkeys(range(1, 20001), (True, True)) if "BOUNDARY" in more else {})
-    assert process_time() - start < 5.0
-
-
-def test_a_set_that_grew_is_expanded_again(tmp_path: Path) -> None:
-    text = "*NODE\n1,0,0\n2,1,0\n*NSET,NSET=A\n1\n*NSET,NSET=TOP\nA\n*NSET,NSET=A\n2\n*NSET,NSET=TOP\nA\n"
-    (tmp_path / "two.inp").write_text(text)
-    assert builder_from_deck(tmp_path / "two.inp", None, "top").top == {1, 2}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import random
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +9,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
-from creepkit.instruments.column_heads import split_head
-from creepkit.instruments.reading_options import ReadingOptions, RecordOptions
 from helpers.instrument_samples import samples
 from helpers.paths import SHARED, needs_shared_data
 
@@ -96,29 +92,6 @@ def test_a_date_that_may_be_two_is_asked_for(tmp_path: Path, order: str, day: st
     assert record.start == np.datetime64(day).astype("datetime64[s]").astype(float)
 
 
-def test_other_rows_decide_on_the_order_of_a_date(tmp_path: Path) -> None:
-    by_number = ck.read_record(written(tmp_path, table(["12/8/2025 23:59:00", "13/8/2025 00:00:00"])))
-    by_order = ck.read_record(written(tmp_path, table(["3/4/2025 23:59:00", "3/5/2025 00:00:00"])))
-    assert by_number.times.tolist() == by_order.times.tolist() == [0.0, 60.0]
-    assert "its dates have the day first" in by_number.notes
-    assert any("month first" in note for note in by_order.notes)
-
-
-def test_clocks_that_are_put_back_for_winter(tmp_path: Path) -> None:
-    stamps = [f"2025-11-02 {hour}:{minute:02d}:00" for hour in ("00", "01", "01", "02") for minute in (0, 30)]
-    path = written(tmp_path, table(stamps))
-    with pytest.raises(HistoryError, match=r"x.csv:6: time falls by 1800 s; .*state time_zone"):
-        ck.read_record(path)
-    record = ck.read_record(path, time_zone="America/Chicago")
-    np.testing.assert_array_equal(np.diff(record.times), 1800.0)
-
-
-def test_a_time_that_no_clock_showed_is_refused(tmp_path: Path) -> None:
-    path = written(tmp_path, table(["2025-03-09 01:59:00", "2025-03-09 02:30:00"]))
-    with pytest.raises(HistoryError, match=r"x.csv:3: there was no 02:30 on 2025-03-09 in America/Chicago"):
-        ck.read_record(path, time_zone="America/Chicago")
-
-
 def test_absolute_pressures_become_gauge_only_by_a_stated_ambient_pressure(tmp_path: Path) -> None:
     path = written(tmp_path, "time_s,p_bara\n0,1.013\n1,11.013\n")
     assert ck.read_record(path).channel("p").reference == "absolute"
@@ -136,18 +109,6 @@ def test_rows_are_averaged_and_channels_left_out_on_reading(tmp_path: Path) -> N
         part.channel("D1: Press.").values, whole.channel("D1: Press.").values.reshape(-1, 8).mean(axis=1)
     )
     np.testing.assert_allclose(np.diff(part.times), 0.8, atol=1e-9)
-
-
-def test_files_of_several_parts_are_read_as_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from creepkit.instruments import record_tables
-
-    path = written(tmp_path, FILES["plate.csv"].replace(b"\n", b"\r\n"))
-    whole = ck.read_record(path)
-    for size in (700, 1023, 1500):
-        monkeypatch.setattr(record_tables, "PART_BYTES", size)
-        parts = ck.read_record(path)
-        np.testing.assert_array_equal(parts.times, whole.times)
-        np.testing.assert_array_equal(parts.channel("D1: Temp.").values, whole.channel("D1: Temp.").values)
 
 
 @pytest.mark.parametrize(
@@ -193,34 +154,6 @@ def test_what_cannot_be_read_is_said_in_one_sentence(
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", sorted(FILES))
-def test_damaged_files_are_read_or_refused_in_one_sentence(tmp_path: Path, name: str) -> None:
-    draw = random.Random(name)
-    messages: list[str] = []
-    for _ in range(40):
-        content = bytearray(FILES[name])
-        for _ in range(draw.choice((1, 3, 10))):
-            place = draw.randrange(len(content))
-            kind = draw.randrange(4)
-            if kind == 0:
-                content[place] = draw.randrange(256)
-            elif kind == 1:
-                del content[place : place + draw.choice((1, 40, 400))]
-            elif kind == 2:
-                content[place:place] = draw.choice((b'"', b",", b"\n", b"nan", b"1e999", b"99:99", b"2/30/2025", b"\0"))
-            else:
-                start = draw.randrange(len(content))
-                content[place:place] = content[start : start + 60]
-            content = content or bytearray(b" ")
-        try:
-            record = ck.read_record(written(tmp_path, bytes(content), name))
-        except HistoryError as error:
-            messages.append(str(error))
-        else:
-            assert (np.diff(record.times) > 0).all()
-    assert not any("\n" in message for message in messages)
-
-
 @pytest.mark.parametrize(
     ("names", "reference"),
     [
@@ -237,35 +170,6 @@ def test_whether_a_pressure_is_absolute_stands_in_its_unit_or_its_name(
 ) -> None:
     (channel,) = ck.read_record(written(tmp_path, f"time_s,{names}\n0,1\n1,2\n")).channels.values()
     assert (channel.quantity, channel.reference) == ("pressure", reference)
-
-
-def test_a_row_of_units_that_says_more_than_the_names(tmp_path: Path) -> None:
-    record = ck.read_record(written(tmp_path, "time_s,p [bar],T (upper)\ns,barg,K\n0,1,800\n1,2,800\n"))
-    assert [(c.reference, c.quantity) for c in record.channels.values()] == [("gauge", "pressure"), ("", "temperature")]
-
-
-@pytest.mark.parametrize(("order", "day"), [("year first", "2025-08-18"), ("day first", "2018-08-25")])
-def test_years_of_two_digits(tmp_path: Path, order: str, day: str) -> None:
-    content = "time,p_bar\n25-08-18 00:00,1\n25-08-18 00:01,2\n"
-    record = ck.read_record(written(tmp_path, content), date_order=order, time_zone="+00:00")
-    assert record.start == np.datetime64(day).astype("datetime64[s]").astype(float)
-
-
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
-def test_a_last_line_without_an_end_is_remarked(tmp_path: Path, encoding: str) -> None:
-    content = "time_s,p_bar\n0,800\n1,800\n2,8"
-    remark = "its last line, 4, has no end; it may be cut off amid a number"
-    for text, expected in ((content, True), (f"{content}00\n", False)):
-        record = ck.read_record(written(tmp_path, text.encode(encoding)))
-        assert (remark in record.notes) is expected
-
-
-def test_units_in_heads() -> None:
-    assert split_head("A1: Press.(PSIG)") == ("A1: Press.", "PSIG")
-    assert split_head("P1 [bar(g)]") == ("P1", "bar(g)")
-    assert split_head("p / kPa") == ("p", "kPa")
-    assert split_head("furnace_temperature_C") == ("furnace_temperature", "C")
-    assert split_head("set_point") == ("set_point", "")
 
 
 @needs_shared_data
@@ -291,34 +195,3 @@ def test_units_that_are_nearly_known_are_not_taken_in_silence(tmp_path: Path) ->
     assert "p: taken for numbers without a unit; if 'psgi' means psi, write psi into the head" in text
     assert "V: numbers in 'rpm', which is not converted" in text
     assert not any(note.startswith(("valve", "T_set")) for note in record.notes)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"title": None}, "title is None; give a text"),
-        ({"missing": [3]}, "missing is .3.; give a tuple of texts"),
-        ({"required": "P"}, "required is 'P'; give a tuple of texts"),
-        ({"units": {"P": 3}}, "units is {'P': 3}; give {text: text}"),
-        ({"required": ("(a+)+$",)}, "repeats what it repeats already"),
-    ],
-)
-def test_a_declaration_of_an_instrument_checks_itself(changes: dict[str, object], message: str) -> None:
-    with pytest.raises(HistoryError, match=f"instrument format 'lab': .*{message}"):
-        ck.InstrumentFormat(**{"name": "lab", "title": "a logger", **changes})
-
-
-def test_long_names_are_not_matched() -> None:
-    declared = ck.InstrumentFormat("lab", "a logger", required=("a*a*b",), units={"a*": "bar"})
-    assert not declared.accepts(["a" * 100_000])
-    assert (declared.unit_of("a" * 100_000), declared.unit_of("aa")) == ("", "bar")
-
-
-@pytest.mark.parametrize("options", [{"format": []}, {"missing": [3]}])
-def test_options_of_other_types(tmp_path: Path, options: dict[str, object]) -> None:
-    with pytest.raises(HistoryError, match=r"(format|missing) is \[3?\]; give"):
-        ck.read_record(written(tmp_path, "time_s,p_bar\n0,1\n"), **options)
-
-
-def test_keywords_are_the_options() -> None:
-    assert [*RecordOptions.__annotations__] == [one.name for one in fields(ReadingOptions)]

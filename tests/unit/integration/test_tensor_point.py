@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from creepkit.errors import SolveError
 from creepkit.integration import IntegrationSettings
 from creepkit.integration.tensor_integration import (
     TENSOR_COMPONENTS,
@@ -32,7 +31,6 @@ from creepkit.laws.norton import NORTON
 from creepkit.records import Program, Status
 
 STEEL = (150e3, 0.3)
-SHEAR = 150e3 / 2.6
 A, n, C, v = parameters("A n C v")
 (damage,) = states("damage")
 RATES = {
@@ -150,23 +148,6 @@ def test_temperature_follows_its_program() -> None:
     assert result.equivalent[0] == pytest.approx(quad(rate, 0, 3600)[0], rel=1e-5)
 
 
-def test_outputs_at_a_jump_show_what_holds_from_then_on() -> None:
-    controls = {"11": prescribed_stress(Program.steps([(0.0, 50.0), (100.0, 80.0)]))}
-    result = run(NORTON, {"A": 1e-12, "n": 3}, controls, [0.0, 100.0, 100.0, 150.0])
-    np.testing.assert_allclose(result.stress[:, 0], [50.0, 80.0, 80.0, 80.0])
-    np.testing.assert_allclose(result.creep_strain[:, 0], 1e-12 * 50**3 * 100 * np.array([0, 1, 1, 1 + 0.5 * 1.6**3]))
-    np.testing.assert_allclose(
-        result.strain[:, 1], -0.5 * result.creep_strain[:, 0] - 0.3 * result.stress[:, 0] / 150e3
-    )
-
-
-def test_without_load_nothing_happens() -> None:
-    result = run(DAMAGING, {"A": 1e-14, "n": 4.0, "C": 1e-12, "v": 3.5}, {"13": prescribed_strain(0.0)}, [1e3])
-    assert result.status == Status.COMPLETE
-    assert not result.stress.any()
-    assert not result.strain.any()
-
-
 class TestEnds:
     def test_a_state_at_its_limit(self) -> None:
         """Kachanov: (1 - damage)^(v+1) = 1 - (v+1) C s^v t; outputs beyond are left out."""
@@ -203,21 +184,3 @@ class TestEnds:
         assert result.status == Status.NOT_CONVERGED
         assert result.reason == "the cap on steps was reached"
         assert result.times.tolist() == [0.0]
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"times": [2.0, 1.0]}, "output times must be finite, at or after 0 s, and must not decrease"),
-        ({"theta": [1.0]}, "theta has 1 numbers, but the law needs 2: A, n"),
-        ({"elastic": (0.0, 0.3)}, "E is 0 MPa and nu 0.3; allowed are E above 0 and nu in \\(-1, 0.5\\)"),
-        (
-            {"controls": {"21": prescribed_stress(1.0)}},
-            "no component '21' to drive; allowed are 11, 22, 33, 12, 23, 13",
-        ),
-    ],
-)
-def test_what_cannot_be_driven_is_refused(change, message: str) -> None:
-    given = {"theta": [-30.0, 4.0], "elastic": STEEL, "controls": {}, "temperature": 300.0, "times": [1.0]}
-    with pytest.raises(SolveError, match=message):
-        integrate_tensor_point(lower(NORTON, "compiled"), **(given | change))

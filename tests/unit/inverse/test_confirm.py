@@ -1,6 +1,5 @@
 """The simulation of an identified law beside its tests: differences of known size, and the sentence for each case."""
 
-import json
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,13 +7,9 @@ import pytest
 from scipy.stats import chi2, f
 
 import creepkit as ck
-from creepkit.errors import FitError
-from creepkit.inverse.confirmation import Confirmation, ConfirmedTest, _confirmed_output, confirm, outside_domain
-from creepkit.inverse.identification_document import read_identification
-from creepkit.readers.history_csv import write_history
+from creepkit.inverse.confirmation import Confirmation, ConfirmedTest, _confirmed_output, confirm
 from creepkit.records import Status
 from creepkit.records.history import EVERY_FRAME
-from helpers.command_line import creepkit, one_line
 from helpers.planted_alloys import bars
 
 BAR = ck.specimen("uniaxial")
@@ -66,11 +61,6 @@ def test_a_surrogate_that_is_far_off_is_not_believed(fit):
     assert told.verdict.endswith("identify again with using= this specimen")
 
 
-def test_a_law_that_follows_no_test_is_said_whoever_predicts_it(fit):
-    tight = [h.replace(standard_deviation={"strain": SD / 1e4}) for h in TESTS]
-    assert "confirmed, but the law does not follow the tests: chi-square" in confirm(fit, tight, BAR).verdict
-
-
 @pytest.mark.parametrize(
     ("status", "words"),
     [(Status.RUPTURED, "the specimen bursts at 3600 s"), (Status.NOT_CONVERGED, "the simulation stops at 3600 s")],
@@ -79,47 +69,6 @@ def test_a_simulation_that_ends_early_confirms_nothing(fit, status, words):
     told = confirm(fit, TESTS, Stranger(status=status))
     assert not told.confirmed
     assert told.verdict.startswith(f"not confirmed: by stranger, {words} of test 'X-60'")
-
-
-def test_only_the_guard_of_a_surrogate_doubts(fit):
-    assert not outside_domain(fit)
-    assert outside_domain(replace(fit, predictor=Stranger(status=Status.OUTSIDE_DOMAIN)))
-    assert not outside_domain(replace(fit, predictor=None))
-
-
-def test_a_fit_from_a_file_is_held_against_the_misfit_it_tells(fit, tmp_path):
-    found = read_identification(replace(fit, predictor=None).save(tmp_path / "fit.json"))
-    told = confirm(found, TESTS, BAR)
-    assert np.isnan(told["X-60", "strain"].rms_difference)
-    assert told.noise_ratio == pytest.approx(0.0, abs=1e-3)
-    far = confirm(found, TESTS, Stranger(100 * SD))
-    assert far.noise_ratio == pytest.approx(100.0, rel=0.05)
-
-
-def test_other_tests_are_predicted_without_a_misfit_of_the_fit(fit):
-    others = [h.replace(name=f"new {h.name}") for h in TESTS]
-    told = confirm(replace(fit, predictor=None), others, {"uniaxial": BAR})
-    assert told.tests[0].outputs[0].fit_errors is None
-    assert np.isnan(told.noise_ratio)
-
-
-def test_it_takes_tests(fit):
-    with pytest.raises(FitError, match="law 'norton': there are no tests to confirm it with"):
-        confirm(fit, [], BAR)
-
-
-def test_confirm_command(fit, tmp_path):
-    path = fit.save(tmp_path / "fit.json")
-    for history in TESTS:
-        write_history(history, tmp_path / f"{history.name}.csv")
-    told = creepkit("confirm", str(path), str(tmp_path / "*.csv"))
-    assert told.exit_code == 0
-    assert "norton by uniaxial" in told.stdout
-    answer = json.loads(creepkit("confirm", str(path), str(tmp_path / "*.csv"), "--json").stdout)
-    assert answer["tests"][0]["outputs"][0]["rms_difference"] == 0.0  # by the same specimen
-    assert {t["name"] for t in answer["tests"]} == {h.name for h in TESTS}
-    refused = creepkit("confirm", str(tmp_path / "none.json"), str(tmp_path / "*.csv"))
-    assert "there is no such file" in one_line(refused)
 
 
 # ---- the uncertainty of the noise itself ---------------------------------------------------------------------------

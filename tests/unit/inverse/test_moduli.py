@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from creepkit.discovery.elastic_moduli import fit_wachtman, identify_moduli
-from creepkit.errors import FitError
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
@@ -37,11 +36,3 @@ def test_wachtman_through_its_own_values() -> None:
     E = 177.5e3 - 210.0 * T * np.exp(-948.5 / T)
     E0, b, T0 = fit_wachtman(T, E, np.full(5, 1e3))
     assert (E0, b, T0) == pytest.approx((177.5e3, 210.0, 948.5), rel=1e-5)
-
-
-def test_what_cannot_be_found_is_refused() -> None:
-    (test,) = planted(LAW, TRUTH, [Plan(760, 8.0, 8.0)])
-    with pytest.raises(FitError, match="states no modulus to begin from; set elastic=Elastic"):
-        identify_moduli(LAW, [replace(test, elastic=None)], OneDegree())
-    with pytest.raises(FitError, match="frames is 2; at least 3 are needed"):
-        identify_moduli(LAW, [test], OneDegree(), frames=2)

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
 
-from creepkit.inverse.noise_covariance import effective_sample_size, log_likelihood, predicted_random_effects
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, autocorrelated_components, covariance
+from creepkit.inverse.noise_covariance import effective_sample_size, predicted_random_effects
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
 from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.records import Nuisance
 
@@ -38,28 +37,6 @@ def made(tests, frames, seed, scatter):
     return replace(shape, values=(factor @ rng.normal(size=(tests, frames, 1)))[..., 0])
 
 
-def test_likelihood_is_that_of_a_multivariate_normal():
-    scatter = sizes(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, correlation_length=1.5)
-    residuals = made(3, 12, 0, scatter)
-    c = covariance(residuals, scatter)
-    truth = sum(multivariate_normal(np.zeros(12), c[k]).logpdf(residuals.values[k]) for k in range(3))
-    assert log_likelihood(residuals, scatter) == pytest.approx(truth, rel=1e-10)
-
-
-def test_absent_frames_do_not_count():
-    scatter = sizes(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, correlation_length=1.5)
-    whole = made(2, 12, 1, scatter)
-    present = whole.present.copy()
-    present[1, 7:] = False
-    part = replace(whole, present=present, values=np.where(present, whole.values, 0),
-                   offset_sensitivity=np.where(present, whole.offset_sensitivity, 0),
-                   log_rate_sensitivity=np.where(present, whole.log_rate_sensitivity, 0))  # fmt: skip
-    c = covariance(whole, scatter)
-    truth = multivariate_normal(np.zeros(12), c[0]).logpdf(whole.values[0])
-    truth += multivariate_normal(np.zeros(7), c[1][:7, :7]).logpdf(whole.values[1, :7])
-    assert log_likelihood(part, scatter) == pytest.approx(truth, rel=1e-10)
-
-
 def test_planted_scatter_is_found():
     """150 tests: the standard error of a standard deviation from 150 draws is 6 %, so 25 % is four of them."""
     truth = sizes(noise=2e-5, offset=1e-4, rate=0.4, drift=0.1, correlation_length=0.45)
@@ -69,14 +46,6 @@ def test_planted_scatter_is_found():
     assert found.rate == pytest.approx(truth.rate, rel=0.25)
     assert found["strain"].drift == pytest.approx(truth["strain"].drift, rel=0.25)
     assert found["strain"].correlation_length == pytest.approx(truth["strain"].correlation_length, rel=0.5)
-
-
-def test_a_given_prior_stays():
-    residuals = made(20, 20, 3, sizes(2e-5, 0, 1e-4, 0.4, 0.1, 1.5))
-    found = estimate_variance_components(
-        residuals, sizes(2e-5, 0, 7e-5, 0.5, 0.1, 1.5), (Nuisance("offset", sd=7e-5), Nuisance("rate"))
-    )
-    assert found["strain"].offset == 7e-5
 
 
 def test_effective_size_counts_a_test_once_when_its_residuals_move_together():
@@ -113,30 +82,6 @@ def two_outputs():
     return residuals_of(rng.normal(size=(2, 10)), slopes, np.ones((2, 10), bool), times, effect, output), scatter
 
 
-def by_hand(residuals, scatter, test):
-    """The covariance of one test, entry by entry."""
-    r, c = residuals, np.zeros((10, 10))
-    for i in range(10):
-        for j in range(10):
-            a, b = (list(scatter.outputs.values())[r.output_index[test, k]] for k in (i, j))
-            c[i, j] = scatter.rate**2 * r.log_rate_sensitivity[test, i] * r.log_rate_sensitivity[test, j]
-            if a is b:
-                lag = abs(r.correlation_coordinate[test, i] - r.correlation_coordinate[test, j])
-                c[i, j] += (
-                    a.drift**2 * np.exp(-lag / a.correlation_length)
-                    + a.offset**2 * r.offset_sensitivity[test, i] * r.offset_sensitivity[test, j]
-                )
-            if i == j:
-                c[i, j] += (a.noise * r.offset_sensitivity[test, i]) ** 2 + a.misfit**2
-    return c
-
-
-def test_outputs_share_the_rate_alone():
-    residuals, scatter = two_outputs()
-    for k, found in enumerate(covariance(residuals, scatter)):
-        np.testing.assert_allclose(found, by_hand(residuals, scatter, k), rtol=1e-7, atol=1e-8)
-
-
 def test_a_test_of_little_trust_scatters_more():
     residuals, scatter = two_outputs()
     plain, doubted = (
@@ -145,26 +90,6 @@ def test_a_test_of_little_trust_scatters_more():
     )
     np.testing.assert_allclose(doubted[0], plain[0])
     np.testing.assert_allclose(doubted[1], 4 * plain[1])
-
-
-def test_slopes_of_the_likelihood_are_its_differences():
-    from creepkit.inverse.variance_components import _Likelihood
-
-    residuals, scatter = two_outputs()
-    free = [(o, n) for o in scatter.outputs for n in ("misfit", "offset", "drift", "correlation_length")] + [
-        ("", "rate")
-    ]
-    residuals = residuals.with_test_weights(np.array([1.0, 0.3]))
-    likelihood = _Likelihood(residuals, scatter, free)
-    x = np.log([*(getattr(scatter[o], n) for o, n in free[:-1]), scatter.rate])
-    slope = likelihood.cost(x)[1]
-    for k in range(x.size):
-        step = np.zeros(x.size)
-        step[k] = 1e-5
-        difference = (likelihood.cost(x + step)[0] - likelihood.cost(x - step)[0]) / 2e-5
-        assert slope[k] == pytest.approx(difference, rel=1e-5, abs=1e-7)
-    ends = [likelihood.cost(x + d)[0] + log_likelihood(residuals, likelihood.noise_model(x + d)) for d in (0, 1)]
-    assert ends[0] == pytest.approx(ends[1], rel=1e-12)
 
 
 # ---- model discrepancy ---------------------------------------------------------------------------------------------
@@ -187,13 +112,6 @@ def test_a_discrepancy_is_one_size_and_one_length_for_all_outputs():
         expected = 1.3**2 * np.outer(unit[test], unit[test]) * np.exp(-lags / 0.8)
         expected[:5, 5:] = expected[5:, :5] = 0.0
         np.testing.assert_allclose(more, expected, rtol=1e-7, atol=1e-8)
-
-
-def test_the_likelihood_with_a_discrepancy_is_that_of_a_multivariate_normal():
-    residuals, scatter = with_discrepancy()
-    c = covariance(residuals, scatter)
-    truth = sum(multivariate_normal(np.zeros(10), c[k]).logpdf(residuals.values[k]) for k in range(2))
-    assert log_likelihood(residuals, scatter) == pytest.approx(truth, rel=1e-10)
 
 
 @pytest.mark.parametrize("restricted", [False, True])
@@ -249,19 +167,3 @@ def test_stated_noise_is_a_lower_bound_with_a_prior(actual, stated):
     cost = 25 * np.log(s) + 0.5 * (values**2).sum() / s**2 + 0.5 * (np.log(s / stated) / 0.2) ** 2
     assert found == pytest.approx(s[np.argmin(cost)], rel=1e-3)
     assert found >= stated * (1 - 1e-9)
-
-
-def test_noise_that_nobody_stated_may_be_smaller_than_its_estimate():
-    """The root mean square of the residuals, whatever the third differences said."""
-    values = 0.1 * np.random.default_rng(10).normal(size=(1, 400))
-    ones = np.ones_like(values)
-    residuals = residuals_of(values, ones, ones > 0, np.linspace(1.0, 2.0, 400)[None], 0 * ones)
-    found = estimate_variance_components(residuals, sizes(0.2), (), fixed=())["strain"].noise
-    assert found == pytest.approx(np.sqrt((values**2).mean()), rel=1e-3)
-
-
-def test_autocorrelated_parts_are_counted():
-    scatter = NoiseModel({"amplitude": OutputNoise(0.1, drift=0.2), "width": OutputNoise(0.1, drift=1e-4)})
-    assert autocorrelated_components(scatter) == 2
-    assert autocorrelated_components(replace(scatter, discrepancy=1.0)) == 4
-    assert autocorrelated_components(replace(scatter, discrepancy=0.01)) == 2

@@ -7,16 +7,9 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import CreepkitError, FitError
+from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
-from creepkit.inverse.predictor_documents import (
-    PredictorDocument,
-    missing_predictor,
-    predictor_documents,
-    predictor_from_documents,
-    registered_specimens,
-)
 from helpers.planted_alloys import bars
 
 BAR = ck.specimen("uniaxial").replace(strain_limit=0.7, max_steps=5000)
@@ -53,30 +46,6 @@ def test_it_predicts_without_using(fit, tmp_path):
     assert ck.confirm(back, TESTS).verdict == ck.confirm(fit).verdict
 
 
-def test_with_its_histories_alone_it_is_the_whole_identification(fit, tmp_path):
-    back = ck.load(fit.save(tmp_path / "fit.json")).with_histories(TESTS)
-
-    assert back.predictor == BAR
-    again, profile = back.profile("n"), fit.profile("n")
-    assert (again.low, again.high) == pytest.approx((profile.low, profile.high), rel=1e-6)
-    assert ck.load(back.save(tmp_path / "again.json")).predictor == BAR
-
-
-def test_a_specimen_of_changed_settings_confirms_its_own_fit(fit):
-    assert registered_specimens(fit.predictor) == {"uniaxial": BAR}
-    assert ck.confirm(fit).noise_ratio == 0.0
-
-
-def test_a_fit_that_was_never_told_takes_the_specimens_of_its_histories(document):
-    old = {key: value for key, value in document.items() if key != "predictor_documents"}
-    back = identification_from_json(old)
-
-    with pytest.raises(FitError, match="loaded from a file: give using="):
-        back.predict(TESTS)
-    assert back.with_histories(TESTS).predictor == ck.specimen("uniaxial")
-    assert back.with_histories(TESTS, "uniaxial").predictor == ck.specimen("uniaxial")
-
-
 def test_several_specimens_come_back_each_with_its_settings(fit):
     several = replace(fit, predictor=CompositePredictor({"uniaxial": BAR, "relaxation": ck.specimen("relaxation")}))
     back = identification_from_json(json.loads(json.dumps(identification_to_json(several))))
@@ -102,51 +71,3 @@ def test_a_predictor_that_no_file_holds_is_named(fit, tmp_path):
     with pytest.raises(FitError, match="made with 'foreign', which a file cannot hold: give using="):
         back.predict(TESTS)
     assert back.predict(TESTS, Foreign()).values.shape[1] == len(TESTS)
-
-
-def test_a_specimen_under_another_ones_name_is_no_specimen():
-    (document,) = predictor_documents(Foreign("uniaxial")).values()
-    assert document.kind == "other"
-
-
-def test_a_reduced_order_model_is_found_again_with_the_fields_of_its_specimen():
-    dimple = ck.surrogate("dimple")
-    coarse = dimple.specimen.replace(refinement=0.5).reduced_order_model()
-    for model in (dimple, coarse):
-        documents = predictor_documents(model)
-        assert documents[""].kind == "reduced-order model"
-        assert predictor_from_documents(documents) == model
-
-    gone = {"": replace(documents[""], name="torsion-tube")}
-    assert predictor_from_documents(gone) is None
-    assert "made with specimen 'torsion-tube', which is not known here" in missing_predictor(gone)
-
-
-def test_a_trained_surrogate_is_asked_for():
-    network = {"": PredictorDocument("surrogate", "parameter-gru of bulge", fingerprint="0" * 32)}
-    assert predictor_from_documents(network) is None
-    assert "made with the surrogate 'parameter-gru of bulge' of a file: give using=" in missing_predictor(network)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"kind": "pickle", "name": "x"}, "predictor_documents"),
-        ({"kind": "specimen", "name": "uniaxial", "fields": {"no_such": 1}}, "no_such"),
-        ({"kind": "specimen", "name": "uniaxial", "fields": {"max_steps": "many"}}, "max_steps"),
-        ({"kind": "specimen", "name": "uniaxial", "fields": 3}, "uniaxial"),
-        ({"kind": "specimen", "name": "uniaxial", "fields": {}, "module": "os"}, "module"),
-        ({"kind": "specimen"}, "name"),
-        ([], "predictor_documents"),
-    ],
-)
-def test_what_a_file_says_of_its_predictor_is_checked(document, wrong, message):
-    with pytest.raises(CreepkitError, match=message):
-        identification_from_json({**document, "predictor_documents": {"": wrong}})
-
-
-def test_the_document_of_a_specimen_is_plain_data():
-    (document,) = predictor_documents(BAR).values()
-    assert isinstance(document, PredictorDocument)
-    assert document.fields["strain_limit"] == 0.7
-    assert json.loads(json.dumps(document.fields)) == document.fields

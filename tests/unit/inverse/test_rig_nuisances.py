@@ -6,17 +6,12 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import CompositePredictor, predict, predict_with_sensitivities
+from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities
 from creepkit.inverse.identification import IdentificationSettings
-from creepkit.inverse.identification_document import identification_to_json, read_identification
 from creepkit.inverse.identify import identify, refit
-from creepkit.inverse.nuisance_parameters import check_nuisance_tests
-from creepkit.inverse.settings import default_nuisances
-from creepkit.language import Elastic, arrhenius
+from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
-from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.records import History, Nuisance, PressureJump, constant_strain, constant_stress
-from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.records import History, Nuisance, constant_stress
 from creepkit.specimens.uniaxial import Uniaxial
 
 T_REF, R = 1048.15, 8.314462618
@@ -67,40 +62,6 @@ def test_steps_and_drifts_of_a_steady_rate_have_closed_forms():
     np.testing.assert_allclose(strain({"rate drift": 0.3}), rate() * np.expm1(growth * t) / growth, rtol=1e-6)
 
 
-def test_a_rate_step_reaches_internal_variables_and_hardening_laws():
-    """Strain hardening, rate = A s^n e^m: e^(1-m)/(1-m) grows as A s^n times the integral of the factor."""
-    law = STRAIN_HARDENING
-    values = dict(zip(law.names, (1e-15, 4.0, -0.5), strict=True))
-    t, factor = bar("one").times, np.exp(0.7)
-    found = strain({"rate step@8250": 0.7}, law=law, theta=law.to_internal(values)[0])
-    time = np.minimum(t, START + 2.5) + factor * np.maximum(t - START - 2.5, 0.0)
-    away = np.abs(t - START) > 10
-    expected = (1.5 * 1e-15 * 90.0**4 * time) ** (1 / 1.5)
-    np.testing.assert_allclose(found[away], expected[away], rtol=2e-4)
-
-
-def test_a_drift_of_temperature_is_the_recorded_ramp():
-    test = bar("one")
-    recorded = test.replace(temperature=test.temperature_program())
-    np.testing.assert_allclose(
-        strain({"temperature drift": 5.0}), strain({"temperature drift": 5.0}, recorded), rtol=1e-12
-    )
-    assert strain({"temperature drift": 5.0})[-1] > 1.05 * strain({})[-1]
-
-
-def test_candidates_and_specimens_may_differ_in_what_the_rig_did():
-    tests = [bar("one"), bar("two", 70.0).replace(specimen="other")]
-    both = CompositePredictor({"uniaxial": BAR, "other": BAR})
-    nuisances = {"temperature step@8250": np.array([[-5.0, 0.0], [8.0, 3.0]]), "rate drift": np.array([[0.1, 0.2]])}
-    theta = np.array([THETA, LAW.to_internal({**VALUES, "A": 5e-16})[0]])
-    found = predict(both, LAW, theta, tests, nuisances=nuisances).values
-    for c in range(2):
-        for k, test in enumerate(tests):
-            own = {key: values[min(c, len(values) - 1), k] for key, values in nuisances.items()}
-            expected = strain(own, test, both, theta=theta[c])
-            np.testing.assert_allclose(found[c, k, :, 0], expected, rtol=1e-9)
-
-
 # ---- derivatives -------------------------------------------------------------------------------------------------
 
 
@@ -117,35 +78,6 @@ def test_derivatives_of_bars_are_those_of_differences(key):
     np.testing.assert_allclose(found.nuisance_jacobian[key][present], expected[present], atol=1e-3 * largest)
     plain = predict_with_sensitivities(BAR, LAW, THETA, tests, {key: 0.0 * values[key]})
     assert plain.jacobian.shape == found.jacobian.shape == (1, 2, 24, 1, 3)
-
-
-@pytest.mark.parametrize("key", STEPS)
-def test_derivatives_of_finite_elements_are_those_of_differences(key):
-    """Against differences of runs with a hundredth of the step tolerance; the modulus depends on temperature."""
-    from creepkit.language import temperature
-
-    test = History(
-        "one", np.linspace(1200.0, 14400.0, 12), {}, PressureJump(8.0, 8.0, 10800.0), 1040.0, "bulge",
-        elastic=Elastic(210e3 - 100 * temperature),
-    )  # fmt: skip
-    (value, step), coarse, fine = STEPS[key], Bulge(refinement=0.5), Bulge(refinement=0.5, tolerance=1e-4)
-    values = {key: np.array([[value]])}
-    found = predict_with_sensitivities(coarse, LAW, THETA, [test], values).nuisance_jacobian[key][0, 0, :, 0]
-    up, down = (
-        predict(fine, LAW, THETA[None], [test], nuisances={key: values[key] + s}).values[0, 0, :, 0]
-        for s in (step, -step)
-    )
-    expected = (up - down) / (2 * step)
-    np.testing.assert_allclose(found, expected, atol=5e-3 * np.abs(expected).max())
-
-
-def test_finite_elements_differentiate_programs_themselves():
-    test = History("one", np.array([3600.0, 10800.0]), {}, PressureJump(8.0, 8.0, 9000.0), 1040.0, "bulge",
-                   elastic=Elastic(100e3))  # fmt: skip
-    values = {"temperature step@8250": np.array([[-5.0]]), "rate drift": np.array([[0.1]])}
-    found = predict(Bulge(refinement=0.5), LAW, THETA[None], [test], nuisances=values, sensitivities=True)
-    assert set(found.nuisance_jacobian) == set(values)
-    assert found.jacobian.shape[-1] == 3
 
 
 # ---- identification ----------------------------------------------------------------------------------------------
@@ -184,11 +116,6 @@ def test_planted_steps_of_two_groups_are_found(fit):
     assert "temperature step@8250 of bar_4 and 1 more, K: -2" in str(fit)
 
 
-def test_a_fit_without_the_step_is_worse(fit):
-    plain = identify(LAW, planted(), BAR, settings=replace(QUICK, nuisances=()))
-    assert plain.rms > 5 * fit.rms
-
-
 def test_other_tests_are_predicted_with_the_step_of_their_group(fit):
     """A stranger has none; a named one has its group's, also where it is held out."""
     tests = planted()
@@ -202,15 +129,6 @@ def test_other_tests_are_predicted_with_the_step_of_their_group(fit):
     assert without_group.nuisance_values([tests[5]])["temperature step@8250"][0, 0] == 0.0
 
 
-def test_round_trip_through_json(fit, tmp_path):
-    again = read_identification(fit.save(tmp_path / "fit.json"))
-    assert identification_to_json(again) == identification_to_json(fit)
-    assert again.settings.nuisances == GROUPS
-    assert [n.key for n in again.nuisances] == [n.key for n in fit.nuisances]
-    attached = again.with_histories(planted(), BAR)
-    np.testing.assert_array_equal(attached.predict().values, fit.predict().values)
-
-
 def test_a_prior_holds_a_step_that_the_tests_do_not_show(fit):
     """A step that comes after the last frame is refused, and one of standard deviation 0.01 K stays at its mean."""
     late = replace(GROUPS[0], start=20000.0)
@@ -219,23 +137,6 @@ def test_a_prior_holds_a_step_that_the_tests_do_not_show(fit):
     tight = replace(GROUPS[0], mean=-3.0, sd=0.01)
     held = identify(LAW, planted(), BAR, settings=replace(QUICK, nuisances=(tight, GROUPS[1])))
     assert abs(held.nuisances[0].value + 3.0) < 0.5
-
-
-def test_a_rate_step_takes_the_place_where_a_law_has_no_temperature():
-    plain = LAW.fix(Q=VALUES["Q"]).at(1040.0)
-    rng, tests = np.random.default_rng(5), []
-    for k, name in enumerate(NAMES):
-        plan = bar(name, (70.0, 90.0, 110.0)[k % 3])
-        clean = strain({"temperature step@8250": -24.0 if name in FAST else -11.0}, plan)
-        tests.append(plan.replace(outputs={"strain": clean + 2e-6 * rng.normal(size=clean.size)}))
-    with pytest.raises(FitError, match=r"has no temperature and cannot follow a temperature step; take a 'rate step'"):
-        identify(plain, tests, BAR, settings=QUICK)
-    steps = tuple(replace(n, kind="rate step", sd=1.0) for n in GROUPS)
-    found = identify(plain, tests, BAR, settings=replace(QUICK, nuisances=steps))
-    for n, kelvin in zip(found.nuisances, (-11.0, -24.0), strict=True):
-        expected = -VALUES["Q"] / R * (1 / (1040.0 + kelvin) - 1 / 1040.0)
-        assert abs(n.value - expected) < 4 * n.sd
-        assert n.sd < 0.05
 
 
 # ---- what cannot be told apart -----------------------------------------------------------------------------------
@@ -251,37 +152,4 @@ def test_nuisances_that_do_the_same_are_named_or_refused():
         identify(LAW, planted(), BAR, settings=replace(QUICK, nuisances=free))
 
 
-def test_nuisances_that_differ_are_not_named(fit):
-    assert not any("cannot be told apart" in note for note in fit.notes)
-
-
 # ---- settings ----------------------------------------------------------------------------------------------------
-
-
-def test_groups_must_not_overlap_and_must_exist():
-    with pytest.raises(FitError, match="'temperature step@8250' is given twice; give one"):
-        IdentificationSettings(nuisances=(GROUPS[0], replace(GROUPS[1], tests=("bar_3",))))
-    IdentificationSettings(nuisances=(GROUPS[0], replace(GROUPS[0], start=9000.0)))
-    with pytest.raises(FitError, match="nuisance 'thickness' belongs to every test; leave out tests="):
-        IdentificationSettings(nuisances=(Nuisance("thickness", tests=("bar_3",)),))
-    with pytest.raises(
-        FitError, match="nuisance 'temperature step@8250': there is no test 'bar_8'; did you mean 'bar_"
-    ):
-        check_nuisance_tests((replace(GROUPS[0], tests=("bar_8",)),), NAMES)
-
-
-def test_the_defaults_and_further_ones():
-    usual = IdentificationSettings().nuisances
-    thickness = Nuisance("thickness", mean=0.49, sd=0.03)
-    assert default_nuisances() == usual
-    assert default_nuisances(thickness, without=["rate"]) == (usual[0], thickness)
-    assert default_nuisances(Nuisance("rate", sd=0.2)) == (usual[0], Nuisance("rate", sd=0.2))
-    with pytest.raises(FitError, match="'rat' is no default nuisance that could be left out; did you mean 'rate'"):
-        default_nuisances(without=["rat"])
-
-
-def test_a_load_step_needs_a_load():
-    relaxing = bar("one").replace(loading=constant_strain(0.002))
-    settings = replace(QUICK, nuisances=(Nuisance("load step", "all", sd=0.1, start=START),))
-    with pytest.raises(FitError, match="nothing"):
-        identify(LAW, [relaxing.replace(outputs={"strain": np.linspace(0, 1e-3, 24)})], BAR, settings=settings)

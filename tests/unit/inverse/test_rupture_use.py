@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import FitError
-from creepkit.inverse.rupture_use import common_rupture_times, compared_tests, has_tertiary_creep
-from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.rupture_use import has_tertiary_creep
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, constant_stress
 from helpers.literature_laws import EQUATIONS
-from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, whole_life_table
+from helpers.rate_tables import GAS_CONSTANT
 
 KACHANOV = EQUATIONS["Kachanov-Rabotnov"]
 REFERENCE = 873.15
@@ -73,43 +71,3 @@ def test_rates_and_lives_that_contradict_one_another_reject_a_law():
     assert fit.adequacy.contradicting.p_value < 1e-6
     assert "contradict one another by this law: predicted over measured is" in str(fit)
     assert str(fit).splitlines()[1].startswith("  this law does not fit the tests")
-
-
-def test_laws_are_compared_from_the_same_values():
-    """Norton's law is rejected beside damage by lives of its tests, and alone identified from rates."""
-    tests = whole_life_table(np.random.default_rng(2))
-    ranking = ck.select([NORTON, KACHANOV.fix(r=KACHANOV_VALUES["r"])], tests, starts=1, sums=False)
-    best, other = (ranked.fit for ranked in ranking.laws)
-    assert best.law.name.startswith(KACHANOV.name)
-    assert not best.adequacy.rejects
-    for e in best.estimates:
-        assert e.low <= KACHANOV_VALUES[e.name] <= e.high
-    assert other.settings.rupture_times == "use"
-    with pytest.raises(FitError, match="rupture_times='use' or 'ignore' for all laws"):
-        ck.rank([ck.identify(NORTON, tests, starts=1), best])
-
-
-def test_saved_and_attached_again(tmp_path):
-    tests = damaged_table(1, 5.0, 400e3, 0.06, 0.9, 0.1)
-    fit = ck.identify(NORTON.times(ck.arrhenius(T_ref=REFERENCE)), tests, starts=1)
-    back = ck.load(fit.save(tmp_path / "fit.json"))
-    assert str(back) == str(fit)
-    assert back.with_histories(tests).least_squares_problem.observations.count == sum(
-        h.minimum_rate is not None for h in tests
-    )
-
-
-def test_what_says_nothing_is_left_out_and_ends_alone_are_refused():
-    settings, tests = IdentificationSettings(), damaged_table(0, 5.0, 4e5, 0.06, 0.9, 0.1)
-    silent = [h.replace(rupture_time=None, unruptured=False) for h in tests]
-    compared = compared_tests(NORTON, silent, settings)
-    assert len(compared.histories) == 15
-    assert compared.notes[0].endswith("'T4', 'T9', 'T14'")
-    ends = [h.replace(minimum_rate=None) for h in tests]
-    with pytest.raises(FitError, match="breaks by loss of section alone, and these tests state nothing but their ends"):
-        compared_tests(NORTON, ends, settings)
-    assert len(compared_tests(KACHANOV, ends, settings).histories) == len(ends)
-    assert common_rupture_times([NORTON, KACHANOV], settings).rupture_times == "use"
-    assert common_rupture_times([NORTON], settings) == settings
-    with pytest.raises(FitError, match="rupture_times 'never' is not known"):
-        IdentificationSettings(rupture_times="never")

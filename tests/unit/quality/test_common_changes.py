@@ -1,18 +1,13 @@
 """What happened in several tests at one time: planted steps of the furnace, jumps of a camera, and clean plates."""
 
-import json
-
 import numpy as np
 import pytest
 
-import creepkit as ck
-from creepkit.errors import HistoryError
 from creepkit.quality import check_data_quality
 from creepkit.quality.rig_flags import temperature_step
 from creepkit.quality.smooth_curve import smooth_curve
 from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, PressureJump
-from creepkit.reports.data_quality import data_quality_to_json
 from helpers.paths import SHARED, needs_shared_data
 
 TIMES = 150.0 * np.arange(1, 97)
@@ -63,19 +58,6 @@ def test_one_test_alone_is_no_event_of_the_rig():
     assert not events(tests)
 
 
-def test_changes_at_unlike_times_are_no_event_of_the_rig():
-    rng = np.random.default_rng(3)
-    tests = [dimple(rng, k, event=3900.0 + 1500.0 * k, factor=0.6) for k in range(1, 5)]
-    assert not events(tests)
-
-
-def test_a_raise_of_the_pressure_in_all_tests_is_no_event():
-    rng = np.random.default_rng(4)
-    for _ in range(5):
-        tests = [dimple(rng, k, P2=10.0) for k in range(2, 8)]
-        assert not [flag for flag in check_data_quality(tests) if flag.kind in ("rate change", "jump")]
-
-
 def test_a_jump_of_the_camera_is_one_finding_for_all_tests():
     rng = np.random.default_rng(5)
     tests = [dimple(rng, k, event=6000.0, jump=0.02) for k in range(2, 8)]
@@ -84,13 +66,6 @@ def test_a_jump_of_the_camera_is_one_finding_for_all_tests():
     assert (flag.earliest, flag.latest) == (6000.0, 6150.0)
     assert all(abs(size - 0.02) < 4 * NOISE for size in flag.jumps.values())
     assert not events(tests)
-
-
-def test_a_step_of_the_load_without_a_record_is_called_one():
-    rng = np.random.default_rng(6)
-    tests = [dimple(rng, k, event=9000.0, factor=2.0, jump=0.02) for k in range(2, 8)]
-    (flag,) = events(tests)
-    assert '"load step"' in flag.proposal
 
 
 def test_slopes_and_steps_of_a_curve_are_those_planted():
@@ -121,19 +96,3 @@ def test_inconel_625_slows_at_8250_s():
 def test_no_common_change_in_creep_machines(folder):
     """Their tests ran on machines and clocks of their own."""
     assert not events(read_histories(SHARED / folder, creepkit_readers()))
-
-
-def test_text_and_json_of_the_findings():
-    rng = np.random.default_rng(8)
-    quality = ck.check_data_quality([dimple(rng, k, event=9000.0, factor=0.4) for k in range(2, 8)])
-    assert "1 flag in 6 tests" in str(quality)
-    assert "rate change: at " in str(quality)
-    (entry,) = json.loads(json.dumps(data_quality_to_json(quality)))["flags"]
-    assert entry["rate_factors"].keys() == entry["temperature_steps"].keys() == set(entry["tests"])
-    assert str(ck.check_data_quality([dimple(rng, 2)])) == "nothing suspect in 1 test"
-    twice = ck.check_data_quality(
-        [dimple(rng, k, event=9000.0, factor=0.4) for k in range(2, 8)], activation_energy=2e5
-    )
-    assert "200 kJ/mol" in str(twice)
-    with pytest.raises(HistoryError, match="an activation energy of -1 J/mol is not above zero"):
-        ck.check_data_quality([], activation_energy=-1.0)

@@ -37,81 +37,12 @@ def test_none_of_600_misspelt_keys_is_accepted(template: str, specimen: str, tmp
         assert "\n" not in str(caught.value)
 
 
-def test_an_index_refuses_misspelt_columns_too(tmp_path: Path):
-    """A column of an index that resembles no key is a label; a misspelt key of seven letters or more is an error."""
-    spellings = HeaderVocabulary().terms().spellings
-    keys = [key for key in HeaderVocabulary().terms("uniaxial").spellings.values() if len(key) >= 7]
-    (tmp_path / "curves.csv").write_text("key,time_s,strain_pct\na,0,0\na,10,0.1\n")
-    index = "key,temperature_C,stress_MPa,{}\na,850,60,7\n"
-    accepted, refused = [], 0
-    for key, wrong in misspelt_keys(keys, 200, 96, spellings):
-        (tmp_path / "index.csv").write_text(index.format(f'"{wrong}"'))
-        try:
-            accepted += [(key, wrong, dict(h.labels)) for h in INDEXED_TABLE.read(tmp_path)]
-        except HistoryError as error:
-            refused += str(error).startswith(str(tmp_path / "index.csv"))
-    assert (accepted, refused) == ([], 200)
-    (tmp_path / "index.csv").write_text(index.format("grain_size_um"))
-    assert INDEXED_TABLE.read(tmp_path)[0].labels["grain_size_um"] == "7"
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        (
-            "stres_MPa: 60",
-            "x.csv:3: unknown key 'stres_MPa'; did you mean 'stress_MPa'\\? A label is written 'label st",
-        ),
-        ("furnace: 4", "x.csv:3: unknown key 'furnace'; a label is written 'label furnace'"),
-        ("lable heat: 4", "x.csv:3: unknown key 'lable heat'; "),
-        ("label: 4", "x.csv:3: unknown key 'label'; "),
-        (": 4", "x.csv:3: unknown key ''; a label is written 'label NAME'"),
-        ("strain_mesure: logarithmic", "x.csv:3: unknown key 'strain_mesure'; did you mean 'strain_measure'"),
-        (
-            "heet: 4\n# furnace: 2",
-            "x.csv:3: unknown key 'heet'; did you mean 'heat'.*; unknown too: 'furnace' in line 4",
-        ),
-        ("geometry apex_thicknes_mm: 0.4", "x.csv:3: no length of .* 'apex_thicknes'; did you mean 'apex_thickness'"),
-        ("specimen: Uniaxal", "x.csv:3: there is no specimen 'Uniaxal'; did you mean 'uniaxial'"),
-        ("heat: a\n# label heat: b", "x.csv:4: '.*heat' is given twice"),
-    ],
-)
-def test_message(line: str, message: str, tmp_path: Path):
-    with pytest.raises(HistoryError, match=message):
-        read(f"{HEAD}# {line}\n{BODY}", tmp_path / "x.csv")
-
-
-def test_capitals_blanks_hyphens_and_brackets_do_not_matter(tmp_path: Path):
-    head = (
-        "# Temperature [C]: 850\n# STRESS (MPa): 60\n# Strain-Measure: logarithmic\n# includes elastic: no\n"
-        "# Control: load\n# Specimen: Uniaxial\n# Modulus, GPa: 150\n"
-    )
-    history = read(head + BODY, tmp_path / "x.csv")
-    plain = "# temperature_C: 850\n# stress_MPa: 60\n# strain_measure: logarithmic\n# includes_elastic: no\n"
-    expected = read(plain + "# control: load\n# modulus_GPa: 150\n" + BODY, tmp_path / "x.csv")
-    assert (history.temperature, history.loading) == (expected.temperature, expected.loading)
-    assert (history.elastic, history.strain_measure, history.specimen) == (expected.elastic, "logarithmic", "uniaxial")
-    assert dict(history.labels) == {}
-
-
-def test_no_two_keys_are_spelt_alike_but_for_capitals():
-    """Otherwise capitals would decide what a key means."""
-    terms = HeaderVocabulary().terms()
-    keys = list(terms._keys(terms.condition_kinds, terms.dimensions))
-    assert len({plain_name(key) for key in keys}) == len(set(keys))
-
-
 def test_heat_and_laboratory_are_labels_of_their_own(tmp_path: Path):
     history = read(HEAD + "# cast: X7\n# lab: north\n# label furnace: 4\n" + BODY, tmp_path / "x.csv")
     assert {"heat": "X7", "laboratory": "north", "furnace": "4"}.items() <= history.labels.items()
     text = write_history(history, tmp_path / "y.csv").read_text()
     assert "# label heat: X7\n" in text
     assert HISTORY_CSV.read(tmp_path / "y.csv")[0].labels == history.labels
-
-
-def test_what_was_assumed_stays_known(tmp_path: Path):
-    text = HEAD + "# label assumed: modulus of the data sheet\n" + BODY
-    assert read(text, tmp_path / "x.csv").labels["assumed"].startswith("modulus of the data sheet, control load")
 
 
 def test_the_names_of_a_laboratory_are_misspelt_as_well(tmp_path: Path):

@@ -5,10 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 import creepkit as ck
-from creepkit.errors import HistoryError
 from creepkit.testing.reader_checks import history_difference
 from helpers.samples_creep_schema import LIS, SERIES_NAME, document, value
 
@@ -40,32 +38,6 @@ def test_a_folder_gives_each_test_once_and_the_series_alone_says_the_same(tmp_pa
     assert alone.labels["assumed"] == "control load"
 
 
-def test_the_first_files_are_in_the_code_page_of_windows(tmp_path: Path):
-    (test,) = ck.read_histories(write(tmp_path, document(), encoding="cp1252"))
-    assert test.times.size == 4
-
-
-@pytest.mark.parametrize(
-    ("name", "at_start"), [("Percentage plastic extension", 0.07), ("Percentage extension", 0.251)]
-)
-def test_extensions_that_hold_the_loading_strain(tmp_path: Path, name: str, at_start: float):
-    """ISO 204: plastic extension = initial plastic + creep extension; extension = initial total + creep extension."""
-    head, _, rows = LIS.partition("\nh\t%\t°C\t°C\t\t\n")
-    lines = [line.split("\t") for line in rows.splitlines()]
-    moved = ["\t".join([line[0], f"{float(line[1]) + at_start:.6f}", *line[2:]]) for line in lines]
-    series = "".join([head, "\nh\t%\t°C\t°C\t\t\n", "\n".join(moved), "\n"])
-    (test,) = ck.read_histories(write(tmp_path, document(), series.replace("Percentage creep extension", name)))
-    np.testing.assert_allclose(test.outputs["strain"], [0.0, 1.25e-4, 2.125e-3, 0.025125], atol=1e-12)
-    assert "subtracted" in test.labels["assumed"]
-
-
-def test_versions_differ_in_capitals(tmp_path: Path):
-    text = json.dumps(document()).replace("AdditionalMetadata", "additionalMetadata").replace("TestInfo", "testInfo")
-    path = write(tmp_path, {})
-    path.write_text(text)
-    assert ck.read_histories(path)[0].condition == "950 °C, 152.5 MPa"
-
-
 def test_a_stopped_test(tmp_path: Path):
     changes = {"endOfTestCriterium": {"endOfTestCriteriumOptions": "Time limit"}}
     (test,) = ck.read_histories(write(tmp_path, document(rupture=value("Not applicable", "h"), **changes)))
@@ -76,73 +48,3 @@ def test_a_rupture_time_without_a_series(tmp_path: Path):
     (test,) = ck.read_histories(write(tmp_path, document(link="Not applicable"), series=None))
     assert (test.times.tolist(), dict(test.outputs)) == ([61.5 * 3600], {})
     assert (test.rupture_time, test.condition) == (61.5 * 3600, "950 °C, 152.5 MPa")
-
-
-def test_entries_are_known_by_their_whole_name(tmp_path: Path):
-    """An uncertainty, a tolerance, an expected time or an earlier test is not the quantity that its name ends with."""
-    others = (
-        "Uncertainty of initial stress\tu\tMPa\t2\t\t\t\nTolerance of specified temperature\tdT\t°C\t3\t\t\t\n"
-        "Expected creep rupture time\ttu\th\t5000\t\t\t\nPrevious test ID\t\t\tQ1\t\t\t\n"
-    )
-    (tmp_path / SERIES_NAME).write_text(LIS.replace("Date of test start", f"{others}Date of test start"))
-    (test,) = ck.read_histories(tmp_path)
-    assert (test.name, test.condition, test.rupture_time) == ("Q7", "950 °C, 152.5 MPa", 61.5 * 3600)
-
-
-def test_a_rupture_time_without_load_control_says_what_was_assumed(tmp_path: Path):
-    (test,) = ck.read_histories(write(tmp_path, document(link="", loadControlType=""), series=None))
-    assert (test.loading.control, test.labels) == ("load", {"assumed": "control load"})
-
-
-STRESS_LINE = "Initial stress\tRo\tMPa\t152.5\t\t\t\n"
-NO_TIME = {"link": "", "rupture": value("")}
-TIME_LIMIT = {"endOfTestCriterium": {"endOfTestCriteriumOptions": "Time limit"}}
-BAD = {
-    "millipascal": (document(initialStress=value("152.5", "mPa")), LIS, "initialStress: the unit 'mPa' is not underst"),
-    "two stresses": (
-        document(),
-        LIS.replace(STRESS_LINE, f"{STRESS_LINE}{STRESS_LINE.replace('152.5', '15.2')}"),
-        f"{SERIES_NAME}:9: 'initial stress' stands there twice",
-    ),
-    "broke, no time": (document(**NO_TIME), None, "Options: the test piece broke, and there is no creepRuptureTime"),
-    "no criterion": (document(**NO_TIME, endOfTestCriterium=""), None, "Options: it is not stated, and there is no cr"),
-    "stopped and broke": (document(**TIME_LIMIT), LIS, "Options: it is 'time limit', and a rupture time is stated"),
-    "both, no series": (document(link="", **TIME_LIMIT), None, "it is 'time limit', and a rupture time is stated"),
-    "compression, no series": (document(link="", typeOfLoading="Compression"), None, "'Compression' is not underst"),
-    "no rupture time": (document(link="", rupture=value("0", "h")), None, "RuptureTime: it is 0 h; it must be above"),
-    "no stress": (document(initialStress=value("")), LIS, "Q7.json: no loading"),
-    "unit": (document(initialStress=value("152.5", "N")), LIS, "testParameters/initialStress: the unit 'N' is not und"),
-    "no number": (document(specifiedTemperature=value("hot", "°C")), LIS, "specifiedTemperature: 'hot' is no number"),
-    "thousands": (document(initialStress=value("1,520", "MPa")), LIS, "'1,520' may be a thousand or a decimal; write"),
-    "compression": (document(typeOfLoading="Compression"), LIS, "typeOfLoading: 'Compression' is not understood; all"),
-    "list": (document(initialStress=[152]), LIS, "initialStress: it is list; write a text or a number"),
-    "no document": ({"Measurement": {"MeasurementData": 1}}, LIS, "no object 'MeasurementData'"),
-    "other test": (document(), LIS.replace("\tQ7\t", "\tQ8\t"), f"{SERIES_NAME}: it is of the test 'Q8', and .* 'Q7'"),
-    "no series": (document(), None, f"its series stand in '{SERIES_NAME}', which is not beside it"),
-    "cut row": (document(), LIS.replace("10.5\t0.2125\t950.0\t951.25", "10.5\t0.2125"), ":20: number of cells 2, of c"),
-    "unit of time": (
-        document(),
-        LIS.replace("h\t%\t°C", "weeks\t%\t°C"),
-        "'Elapsed time from end of loading' in 'weeks' is not un",
-    ),
-    "column": (
-        document(),
-        LIS.replace("Percentage creep", "Diametral"),
-        "column 'Diametral extension' in '%' is not un",
-    ),
-    "no data": (document(), LIS.replace("[data]", ""), "no line '\\[data\\]' with rows of names"),
-    "nothing": (
-        document(link="", rupture=value(""), duration=value("")),
-        None,
-        "Q7.json: it names no series, no creepR",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_message(case: str, tmp_path: Path):
-    content, series, message = BAD[case]
-    path = write(tmp_path, content, series)
-    with pytest.raises(HistoryError, match=message) as caught:
-        ck.read_histories(path)
-    assert "\n" not in str(caught.value)

@@ -91,12 +91,6 @@ def test_recorded_columns_become_programs(read):
     np.testing.assert_allclose(history.standard_deviation["strain"], [1e-4, 2e-4])
 
 
-def test_column_that_never_changes_is_a_constant(read):
-    history = read("# temperature_C: 700\ntime_s,strain_1,stress_MPa,temperature_C\n0,0,50,700\n1,1e-3,50,700\n")
-    assert history.temperature == 973.15
-    assert history.loading.steps == ((0.0, 50.0),)
-
-
 def test_temperature_steps_and_programs(read):
     body = "# stress_MPa: 50\ntime_s,strain_1\n0,0\n10,1e-3\n"
     stepped = read("# temperature_steps: 0 s 900 K; 5 s 910 K\n" + body).temperature_program()
@@ -105,28 +99,12 @@ def test_temperature_steps_and_programs(read):
     np.testing.assert_allclose(ramped.at([0, 5, 20]), [900, 905, 910])
 
 
-def test_one_standard_deviation_serves_all_frames(read):
-    history = read(CREEP + "# strain_sd_1: 1e-5\ntime_s,strain_1\n0,0\n1,0.1\n")
-    np.testing.assert_array_equal(history.standard_deviation["strain"], [1e-5, 1e-5])
-
-
-def test_geometry_is_in_mm_unless_it_says_otherwise(read):
-    history = read(CREEP + "# geometry apex_thickness_um: 480\n# geometry angle: 3\ntime_s,strain_1\n0,0\n1,0.1\n")
-    assert history.geometry == pytest.approx({"apex_thickness": 0.48, "angle": 3.0})
-
-
 def test_frames_of_one_time_become_their_mean_and_are_counted(read):
     history = read(CREEP + "time_s,strain_1,strain_sd_1\n0,0,1e-4\n5,0.1,1e-4\n5,0.2,3e-4\n5,0.6,2e-4\n9,1,1e-4\n")
     np.testing.assert_allclose(history.times, [0, 5, 9])
     np.testing.assert_allclose(history.outputs["strain"], [0, 0.3, 1])
     np.testing.assert_allclose(history.standard_deviation["strain"], [1e-4, 2e-4, 1e-4])
     assert history.labels["merged_frames"] == "2"
-
-
-def test_frames_after_the_end_are_kept_but_not_used(read):
-    history = read(CREEP + "# end_time_h: 4\ntime_s,strain_1\n0,0\n14400,0.1\n14550,0.09\n")
-    assert history.used.tolist() == [True, True, False]
-    assert history.labels["frames_after_end"] == "1"
 
 
 def test_marked_frames(read):

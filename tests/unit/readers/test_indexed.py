@@ -56,21 +56,6 @@ def test_one_file_a_test_in_the_order_of_the_index(tmp_path):
     assert first.source == str(made / "B_creep.csv")
 
 
-def test_any_file_of_the_folder_leads_to_it(tmp_path):
-    made = folder(tmp_path, files())
-    assert all(INDEXED_FILES.accepts(made / name) for name in ("", "index.csv", "A_creep.csv"))
-    assert [history.name for history in INDEXED_FILES.read(made / "index.csv")] == ["B", "A"]
-    assert [history.name for history in INDEXED_FILES.read(made / "A_creep.csv")] == ["A"]
-    assert not INDEXED_TABLE.accepts(made)
-    (made / "notes.csv").write_text("x\n1\n")
-    assert not INDEXED_FILES.accepts(made / "notes.csv")
-
-
-def test_alloy_from_the_index(tmp_path):
-    index = "test,temperature_C,stress_MPa,alloy\nA,980,230,CMSX-6\nB,980,140,CMSX-6\n"
-    assert {history.alloy for history in INDEXED_FILES.read(folder(tmp_path, files(index)))} == {"CMSX-6"}
-
-
 def test_another_laboratory_is_a_declaration(tmp_path):
     layout = IndexedFolderReader(
         name="lab",
@@ -91,57 +76,8 @@ def test_another_laboratory_is_a_declaration(tmp_path):
     np.testing.assert_allclose(history.outputs["strain"], [0, 0.02])
 
 
-BAD = {
-    "test twice": (INDEX + "a/1,900,25,149000,\n", CURVES, "index.csv:4: test 'a/1' already stands in line 2"),
-    "test without a name": (INDEX + ",900,25,149000,\n", CURVES, "index.csv:4: the key is empty or not printable"),
-    "test without frames": (INDEX + "a/3,900,25,149000,\n", CURVES, "index.csv:4: test 'a/3' has no frames in .*"),
-    "frames without test": (INDEX, CURVES + "b,900,25,0,0\n", "curves.csv:6: test 'b' is not in .*index.csv; add it"),
-    "no stress": (
-        INDEX.replace("stress_MPa", "weight"),
-        CURVES.replace("stress_MPa", "strain_sd_1"),
-        "index.csv:2: no l",
-    ),
-    "falling time": (INDEX, CURVES + "a/1,900,25,9,0.2\n", "curves.csv:6: time falls from 10 s to 9 s"),
-    "empty index": ("", CURVES, "index.csv: the file is empty"),
-    "no key": (INDEX.replace("key", "test"), CURVES, "index.csv:1: missing column 'key'; found: test, temperature_C"),
-    "negative stress": (INDEX.replace(",20,", ",-20,"), CURVES, "index.csv:3: 'stress_MPa' is -20; a stress must lie"),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_message_of_a_bad_table(case, tmp_path):
-    index, curves, message = BAD[case]
-    made = folder(tmp_path, {"index.csv": index, "curves.csv": curves})
-    with pytest.raises(HistoryError, match=message):
-        INDEXED_TABLE.read(made)
-
-
-def test_message_for_missing_and_extra_files(tmp_path):
-    made = folder(tmp_path, files())
-    (made / "B_creep.csv").rename(made / "C_creep.csv")
-    with pytest.raises(HistoryError, match=r"C_creep.csv: no test in .*index.csv has these frames"):
-        INDEXED_FILES.read(made)
-    (made / "C_creep.csv").unlink()
-    with pytest.raises(HistoryError, match=r"index.csv:2: test 'B' has no file B_creep.csv"):
-        INDEXED_FILES.read(made)
-
-
 def test_key_cannot_lead_out_of_the_folder(tmp_path):
     (tmp_path / "A_creep.csv").write_text("secret")
     index = "test,temperature_C,stress_MPa\nA,980,230\nB,980,140\n../A,980,1\n"
     with pytest.raises(HistoryError, match=r"index.csv:4: test '../A' has no file"):
         INDEXED_FILES.read(folder(tmp_path, files(index)))
-
-
-def test_missing_thermocouple(tmp_path):
-    frames = "time_h,creep_extension_pct,T_top_C,T_mid_C\n0,0,980,981\n2,0.5,980,981\n"
-    with pytest.raises(HistoryError, match=r"B_creep.csv:1: missing column 'T_bot_C'; found: time_h, creep_ext"):
-        INDEXED_FILES.read(folder(tmp_path, files(frames=frames)))
-
-
-def test_what_an_empty_cell_of_the_index_leaves_unknown_is_said(tmp_path):
-    index = "key,temperature_C,stress_MPa,youngs_MPa,state,product\na/1,900,25,,Ruptured,\na/2,950,20,144000,,Base\n"
-    first, second = INDEXED_TABLE.read(folder(tmp_path, {"index.csv": index, "curves.csv": CURVES}))
-    assert "youngs_MPa unknown (empty cell)" in first.labels["assumed"].split(", ")
-    assert "state unknown (empty cell)" in second.labels["assumed"].split(", ")
-    assert "product" not in first.labels["assumed"]

@@ -7,8 +7,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
-from creepkit.readers.history_csv import HistoryCsvReader
-from creepkit.readers.vocabulary import HeaderVocabulary
 
 GERMAN = """# Zeitstandversuch DIN EN ISO 204;;;;
 # Prüfer: Müller;;;;
@@ -66,12 +64,3 @@ def test_values_with_units_above_pairs_are_conditions(tmp_path: Path) -> None:
     tests = ck.read_histories(workbook(tmp_path / "wide.xlsx", curves=rows))
     assert [test.loading.program().values.tolist() for test in tests] == [[120.0], [140.0]]
     assert [test.temperature for test in tests] == [923.15, 923.15]
-
-
-def test_a_wrong_declaration_of_a_reader_is_one_sentence() -> None:
-    with pytest.raises(HistoryError, match=r"columns is a HeaderVocabulary; give a tuple of names"):
-        HistoryCsvReader("lab", "tables of a laboratory", HeaderVocabulary())
-    with pytest.raises(HistoryError, match=r"columns is a str; give a tuple"):
-        HistoryCsvReader("lab", "tables of a laboratory", "Zeit")
-    with pytest.raises(HistoryError, match=r"vocabulary is a dict; give a HeaderVocabulary"):
-        HistoryCsvReader("lab", "tables of a laboratory", vocabulary={})

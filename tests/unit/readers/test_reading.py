@@ -1,6 +1,5 @@
 """Which reader gets which file, and what tests are called when they come together."""
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import pytest
 from creepkit.errors import HistoryError
 from creepkit.quality.comparison import duplicate_tests
 from creepkit.readers.reading import creepkit_readers, read_histories
-from creepkit.records import History, Program, constant_stress
+from creepkit.records import History, constant_stress
 
 READERS = creepkit_readers()
 TEST = "# temperature_C: 850\n# stress_MPa: 60\ntime_s,strain_1\n0,0\n1,0.1\n"
@@ -62,48 +61,8 @@ def test_equal_names_get_their_folder_in_front(tests_in_folders):
     assert names(f"{tests_in_folders}/*/*.csv", READERS) == ["one/a", "b", "two/a"]
 
 
-def test_equal_names_in_one_folder_are_refused(tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / f"{name}.csv").write_text("# name: same\n" + TEST)
-    with pytest.raises(HistoryError, match=r"two tests are called '.*/same', in .*a.csv and .*b.csv; rename one"):
-        read_histories(tmp_path, READERS)
-
-
-def test_indexed_folder_reached_by_a_pattern_over_its_files(tmp_path):
-    (tmp_path / "index.csv").write_text("test,temperature_C,stress_MPa\nA,980,230\nB,980,140\n")
-    for name in "AB":
-        text = "time_h,creep_extension_pct,T_top_C,T_mid_C,T_bot_C\n0,0,980,980,980\n2,0.5,980,980,980\n"
-        (tmp_path / f"{name}_creep.csv").write_text(text)
-    assert names(f"{tmp_path}/*", READERS) == ["A", "B"]
-    assert names(f"{tmp_path}/B*", READERS) == ["B"]
-
-
 def test_general_reader_yields_to_another_one(tests_in_folders):
     assert names(tests_in_folders / "two", [*READERS, Always("lab")]) == ["lab a"]
-
-
-def test_named_reader_is_used(tests_in_folders):
-    readers = [*READERS, Always("lab")]
-    assert names(tests_in_folders / "two", readers, reader="csv") == ["a"]
-    with pytest.raises(HistoryError, match="no reader is called 'cvs'; did you mean 'csv'"):
-        read_histories(tests_in_folders, readers, reader="cvs")
-
-
-def test_two_readers_for_one_file_are_told(tests_in_folders):
-    with pytest.raises(HistoryError, match=r"a.csv: the readers 'lab' and 'other' both accept it; say which one"):
-        read_histories(tests_in_folders / "two", [*READERS, Always("lab"), Always("other")])
-
-
-def test_nothing_understood_nothing_found_nothing_given(tests_in_folders):
-    (tests_in_folders / "notes.txt").write_text("hello")
-    with pytest.raises(HistoryError, match=r"notes.txt: no reader understands it; known are indexed-table: a folder"):
-        read_histories(tests_in_folders / "notes.txt", READERS)
-    with pytest.raises(HistoryError, match="no reader understands it"):
-        read_histories(tests_in_folders, READERS)
-    with pytest.raises(HistoryError, match=r"nine\*.csv: no such file or folder, and no file matches it as a pattern"):
-        read_histories(tests_in_folders / "nine*.csv", READERS)
-    with pytest.raises(HistoryError, match="no file, folder or pattern was given"):
-        read_histories([], READERS)
 
 
 def test_bad_file_among_good_ones_is_named(tests_in_folders):
@@ -119,32 +78,3 @@ def planned(name: str, end: float = 1e6, strain: float = 0.4, stress: float = 25
 def test_test_published_twice_is_found():
     records = [planned("a"), planned("b", stress=26.0), planned("c", end=1e6 + 0.7), planned("d", strain=0.40001)]
     assert duplicate_tests(records) == [("a", "c"), ("a", "d"), ("c", "d")]
-
-
-@pytest.mark.parametrize(
-    "other",
-    [
-        planned("b", end=1.001e6),
-        planned("b", strain=0.41),
-        planned("b", stress=26.0),
-        planned("b", temperature=1223.15),
-        planned("b", temperature=Program([0, 1], [1173.15, 1174])),
-    ],
-)
-def test_like_tests_are_no_duplicates(other):
-    assert duplicate_tests([planned("a"), other]) == []
-
-
-def test_what_is_no_file_is_one_sentence(tmp_path: Path) -> None:
-    """A pipe, a link to nothing, and a pattern that finds such a link alone."""
-    os.mkfifo(tmp_path / "pipe.csv")
-    (tmp_path / "link.csv").symlink_to(tmp_path / "nothing.csv")
-
-    with pytest.raises(
-        HistoryError, match=r"pipe.csv: is no regular file but a device, a pipe or the like; name a file"
-    ):
-        read_histories(tmp_path / "pipe.csv", READERS)
-    with pytest.raises(HistoryError, match=r"link.csv: is a link to .*nothing.csv, which does not exist"):
-        read_histories(tmp_path / "link.csv", READERS)
-    with pytest.raises(HistoryError, match="no file matches it as a pattern"):
-        read_histories(tmp_path / "li*.csv", READERS)

@@ -1,7 +1,6 @@
 """Spreadsheets: the layouts of text tables, several sheets, merged cells, formulas, and files that are none."""
 
 import io
-import sys
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -170,19 +169,3 @@ def test_what_is_no_spreadsheet(content: bytes, message: str, tmp_path: Path):
     with pytest.raises(HistoryError, match=message) as caught:
         SPREADSHEET.read(tmp_path / "x.xlsx")
     assert "\n" not in str(caught.value)
-
-
-def test_a_sheet_that_claims_a_million_columns(tmp_path: Path):
-    path = written(tmp_path / "x.xlsx", {"S": CONDITIONS + FRAMES})
-    with zipfile.ZipFile(path) as archive:
-        parts = {name: archive.read(name) for name in archive.namelist()}
-    parts["xl/worksheets/sheet1.xml"] = parts["xl/worksheets/sheet1.xml"].replace(b"A1:B6", b"A1:XFD1048576")
-    path.write_bytes(zipped(parts))
-    assert read(path)[0].times.size == 3
-
-
-def test_without_openpyxl_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    path = written(tmp_path / "x.xlsx", {"S": CONDITIONS + FRAMES})
-    monkeypatch.setitem(sys.modules, "openpyxl", None)
-    with pytest.raises(HistoryError, match=r"x.xlsx: to read spreadsheets, install openpyxl: pip install"):
-        SPREADSHEET.read(path)

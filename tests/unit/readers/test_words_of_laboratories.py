@@ -4,10 +4,8 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
-from creepkit.readers.unbroken_words import unbroken_words
 
 TABLE = "test,stress_MPa,T (C),t_r (h),{name}\nA,200,800,1200,{a}\nB,220,800,800,{b}\n"
-HEAD = "# specimen: uniaxial\n# stress_MPa: 100\n# temperature_C: 750\n# control: load\n"
 
 
 def _read(tmp_path, text, name="t.csv"):
@@ -31,40 +29,6 @@ def test_a_remark_that_a_test_did_not_break_makes_no_rupture(tmp_path, name, tex
     assert (ruptured.unruptured, ruptured.rupture_time) == (False, 800 * 3600.0)
 
 
-def test_with_the_column_renamed_the_row_is_a_run_out(tmp_path):
-    first, second = _read(tmp_path, TABLE.format(name="status", a="", b="Läufer"))
-    assert (first.rupture_time, second.rupture_time, second.unruptured) == (1200 * 3600.0, None, True)
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["ruptured in gauge length", "necking", "breakthrough of oxide", "heat X7", "failure outside gauge", "Bruch"],
-)
-def test_other_remarks_are_labels(tmp_path, text):
-    assert unbroken_words(text) == ""
-    assert _read(tmp_path, TABLE.format(name="remark", a="", b=text))[1].labels["remark"] == text
-
-
-def test_the_head_of_a_test_with_frames_is_asked_alike(tmp_path):
-    frames = "time_h,strain_pct\n1,0.1\n2,0.2\n3,0.3\n"
-    head = HEAD + "# strain_measure: engineering\n# includes_elastic: no\n# rupture_h: 3\n# label remark: stopped\n"
-    with pytest.raises(HistoryError, match="'remark' says 'stopped'"):
-        _read(tmp_path, head + frames)
-    assert _read(tmp_path, head + "# ended: ruptured\n" + frames)[0].rupture_time == 3 * 3600.0
-
-
-@pytest.mark.parametrize("mark", ["n.a.", "n/a", "NA", "n.b.", "-", "--", "k.A.", ""])
-def test_marks_of_missing_values_are_empty_where_empty_is_allowed(tmp_path, mark):
-    table = f"test,stress_MPa,T (C),min creep rate (1/h),t_r (h)\nA,200,800,1e-6,{mark}\nB,220,800,2e-6,800\n"
-    first, second = _read(tmp_path, table)
-    assert (first.rupture_time, second.rupture_time) == (None, 800 * 3600.0)
-    beside = f"Time (h),A1 strain (%),B1 strain (%)\n1,0.1,0.2\n2,{mark},0.3\n3,0.3,0.4\n"
-    head = HEAD + "# strain_measure: engineering\n# includes_elastic: no\n"
-    assert [one.times.size for one in _read(tmp_path, head + beside)] == [2, 3]
-    with pytest.raises(HistoryError, match="leave the row out"):
-        _read(tmp_path, head + f"time_h,strain_pct\n1,0.1\n2,{mark}\n3,0.3\n4,0.4\n")
-
-
 @pytest.mark.parametrize("text", ["nan", "NaN", "inf", "none"])
 def test_numbers_that_were_lost_are_no_missing_values(tmp_path, text):
     with pytest.raises(HistoryError):
@@ -84,10 +48,3 @@ def test_german_names_and_units(tmp_path):
     assert one.outputs["strain"] == pytest.approx(other.outputs["strain"], rel=1e-12)
     assert one.loading.program().values[-1] == pytest.approx(20 * 9.80665, rel=1e-12)
     assert not one.includes_elastic
-
-
-def test_a_column_that_lacks_its_name_is_not_advised_to_be_removed(tmp_path):
-    wide = "Spannung (MPa);200;220\nTemperatur (°C);800;800\nZeit (min);Kriechdehnung (µm/m)\n1;12;14\n60;150;170\n"
-    with pytest.raises(HistoryError, match="220 stands above .* column without a name") as caught:
-        _read(tmp_path, wide)
-    assert "remove" not in str(caught.value)

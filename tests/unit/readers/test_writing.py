@@ -93,16 +93,3 @@ def test_what_would_not_survive_is_refused_and_nothing_is_written(changes, messa
     with pytest.raises(HistoryError, match=message):
         write_history(HISTORIES[0].replace(**changes), tmp_path / "x.csv")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_one_frame_is_refused():
-    with pytest.raises(HistoryError, match="history 'a' has one frame"):
-        history_text(History("a", [1.0], {"strain": [0.0]}, constant_stress(1.0), 900.0))
-
-
-def test_old_file_survives_a_failed_writing(tmp_path):
-    path = tmp_path / "x.csv"
-    path.mkdir()  # a folder in the place of the file, which cannot be replaced by one
-    with pytest.raises(HistoryError, match=r"x.csv: cannot be written: it is a folder"):
-        write_history(HISTORIES[0], path)
-    assert names_in(tmp_path) == ["x.csv"]

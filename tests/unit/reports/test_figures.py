@@ -3,14 +3,7 @@
 import numpy as np
 import pytest
 
-from creepkit.reports.figures import (
-    LARGEST_PIXELS,
-    empty_figure,
-    logarithmic_labels,
-    power_of_ten,
-    save_figure,
-    set_range,
-)
+from creepkit.reports.figures import empty_figure, logarithmic_labels, set_range
 
 RANGES = [(80.0, 125.0), (32.0, 175.0), (0.011, 1100.0), (3e-11, 3e-6), (1e-14, 1e2), (1.0, 1.0), (0.99, 1.01)]
 
@@ -41,25 +34,3 @@ def test_an_axis_has_a_written_label_within_three_per_cent_of_either_end(low, hi
     assert ends[1] - written.max() <= tolerance
     assert ends[0] <= np.log(low) + 1e-9
     assert ends[1] >= np.log(high) - 1e-9
-
-
-def test_a_linear_axis_ends_at_labels():
-    figure = empty_figure(4.0, 3.0)
-    axes = figure.subplots()
-    set_range(axes, "y", -3.3, 7.4)
-    labels = axes.get_yticks()
-    assert axes.get_ylim() == pytest.approx((labels[0], labels[-1]))
-    assert labels[0] <= -3.3
-    assert labels[-1] >= 7.4
-
-
-def test_numbers_are_written_as_powers_of_ten():
-    assert power_of_ten(1e-8) == "$10^{-8}$"
-    assert power_of_ten(3e5) == r"$3\times10^{5}$"
-
-
-def test_a_large_figure_is_written_with_few_enough_pixels(tmp_path):
-    from matplotlib.image import imread
-
-    save_figure(empty_figure(100.0, 2.0), tmp_path / "large.png")
-    assert max(imread(tmp_path / "large.png").shape) <= LARGEST_PIXELS

@@ -24,10 +24,6 @@ def ranked(fits, *scores):
     return ranking_from_scores(fits, np.array(scores), "bic", independent_frames=50.0)
 
 
-def panel_titles(figure):
-    return [axes.get_title() for axes in figure.axes if axes.get_visible() and axes.get_title()]
-
-
 def test_of_two_laws_that_cannot_be_told_apart_both_are_drawn_and_named(fits, tmp_path):
     ranking = ranked(fits, 0.0, 1.0)
     figure = ranking.plot(tmp_path / "ranking.png")
@@ -43,11 +39,6 @@ def test_of_two_laws_that_cannot_be_told_apart_both_are_drawn_and_named(fits, tm
     assert (tmp_path / "ranking.png").stat().st_size > 10_000
 
 
-def test_of_a_decisive_ranking_the_one_law_is_drawn(fits):
-    figure = ranked(fits, 0.0, 30.0).plot()
-    assert all(len(axes.lines) == 2 for axes in figure.subfigs[1].axes if axes.get_visible())
-
-
 def test_misfits_are_those_of_which_the_verdict_is_the_mean(fits):
     """All tests have as many readings, so that the reduced chi-square of all is the mean of theirs."""
     ranking = ranked(fits, 0.0, 1.0)
@@ -56,15 +47,3 @@ def test_misfits_are_those_of_which_the_verdict_is_the_mean(fits):
     (image,) = ranking.plot().subfigs[0].axes[0].images
     np.testing.assert_allclose(image.get_array(), shown)
     assert "own rate" in misfit_name(ranking)
-
-
-def test_a_ranking_that_was_loaded_without_histories_shows_its_misfits(fits, tmp_path):
-    import creepkit as ck
-
-    loaded = [ck.load(fit.save(tmp_path / f"{k}.json")) for k, fit in enumerate(fits)]
-    expected = [[m["strain"].errors.chi_square for m in fit.tests] for fit in loaded]
-    np.testing.assert_allclose(misfits(ranked(loaded, 0.0, 1.0)), expected)
-    assert "the law's rate" in misfit_name(ranked(loaded, 0.0, 1.0))
-    figure = ranked(loaded, 0.0, 1.0).plot()
-    assert len(figure.subfigs) == 1
-    assert figure.get_suptitle().startswith("not decisive")

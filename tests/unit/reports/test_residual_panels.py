@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,13 +11,7 @@ import pytest
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
-from creepkit.reports.curve_of_test import TestCurve
-from creepkit.reports.figures import empty_figure
-from creepkit.reports.forecast_plot import LONGEST_AXIS, _time_end
 from creepkit.reports.judged_readings import judged_readings
-from creepkit.reports.prediction_bands import fitted_curves
-from creepkit.reports.residual_panels import _limit, draw_residuals
-from creepkit.reports.test_figure import _end_text, fitted_test_text
 from helpers.steady_rate_predictor import Steady, planted
 
 if TYPE_CHECKING:
@@ -57,58 +50,3 @@ def test_the_scatter_between_tests_is_in_the_misfit_of_the_common_rate_alone() -
     assert 0.3 < np.median(own) < 3.0
     residuals = np.concatenate([readings.residuals(k, "strain")[1] for k in range(len(STRESSES))])
     assert np.sqrt(np.mean(residuals**2)) == pytest.approx(1.0, abs=0.35)
-
-
-def test_one_test_far_from_the_others_does_not_set_the_axis() -> None:
-    rng = np.random.default_rng(0)
-    ordinary = [rng.normal(size=40) for _ in range(5)]
-    limit = _limit(ordinary, 3.5)
-    assert 3.5 <= limit < 5.0
-    assert _limit([*ordinary, 500.0 * ordinary[0]], 3.5) == pytest.approx(limit, rel=0.3)
-    assert _limit([100.0 * one for one in ordinary], 3.5) > 100.0  # what most tests need is shown
-
-
-def test_readings_beyond_the_axis_are_marked_at_its_edge() -> None:
-    one = fit()
-    readings = judged_readings(one)
-    assert readings is not None
-    deviation = readings.judged.deviation
-    kept = deviation[2].copy()
-    deviation[2] *= 400.0
-    try:
-        axes = empty_figure(4.0, 4.0).subplots()
-        title = draw_residuals(axes, one, fitted_curves(one), "strain", range(len(STRESSES)), ["C0"] * len(STRESSES))
-    finally:
-        deviation[2] = kept
-    edge = axes.get_ylim()[1]
-    marks = [line for line in axes.lines if line.get_marker() in ("^", "v")]
-    assert edge < 10.0
-    assert marks
-    assert all(np.abs(line.get_ydata()) == pytest.approx(edge) for line in marks)
-    assert f"{sum(len(line.get_xdata()) for line in marks)} beyond the axis" in title
-
-
-def test_the_text_of_a_test_counts_the_readings_that_are_compared() -> None:
-    text = fitted_test_text(fit(), fitted_curves(fit()), 0)
-    assert "40 readings" in text
-    assert "the 40 residuals with the test's own rate and offset" in text
-
-
-def end_text(identified: list[float], half_width: list[float]) -> str:
-    hours, measured = np.arange(1.0, 4.0), np.array([1.0, 2.0, 3.0])
-    curve = TestCurve(hours, measured, np.array(identified), np.array(half_width), np.zeros(3), logarithmic=True)
-    return _end_text(curve, "%")
-
-
-def test_a_band_that_spans_decades_is_said_to_be_unbounded() -> None:
-    assert "95 % band 2.71 to 3.32" in end_text([1.0, 2.0, 3.0], [0.1, 0.1, 0.1])
-    assert "unbounded" in end_text([1.0, 2.0, 90.0], [0.1, 0.1, 50.0])
-    assert "e+" not in end_text([1.0, 2.0, 90.0], [0.1, 0.1, 50.0])
-    assert "follows 2 readings, to 2 h" in end_text([1.0, 2.0, float("nan")], [0.1, 0.1, float("nan")])
-
-
-@pytest.mark.parametrize(("high", "end"), [(991.0, 991.0), (1e6, LONGEST_AXIS * 300.0)])
-def test_the_axis_of_a_forecast_holds_the_interval_of_the_rupture_time(high: float, end: float) -> None:
-    """The interval of a strain carries the axis to 513 h, within which that of the rupture time begins."""
-    times = [SimpleNamespace(low=3600.0 * a, high=3600.0 * b) for a, b in ((341.0, high), (115.0, 513.0))]
-    assert _time_end(SimpleNamespace(times=times), 300.0) == pytest.approx(end)

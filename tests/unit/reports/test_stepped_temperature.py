@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 
-from creepkit.inverse.held_levels import temperature_range
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.kernels import lower
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Program, constant_stress
-from creepkit.reports.condition_colours import condition_groups
-from creepkit.reports.identification_plot import identification_figure
 from creepkit.reports.prediction_bands import rates_of_tests
 from creepkit.specimens.uniaxial import Uniaxial
 
@@ -46,29 +43,8 @@ def fit():
     return identify(LAW, [*tests, stepped_test(215.0)], Uniaxial(), settings=settings)
 
 
-def test_a_temperature_between_two_levels_is_written_nowhere(fit):
-    figure = identification_figure(fit)
-    labels = [text for axes in figure.axes for text in axes.get_legend_handles_labels()[1]]
-    assert [text for text in labels if text.endswith("°C")] == ["600 °C", "620 °C"]
-
-
-def test_a_test_with_a_step_is_a_group_of_its_levels(fit):
-    titles = [title for title, _ in condition_groups(fit.histories, fit.predictor)]
-    assert titles == [
-        "600 °C, 200 to 230 MPa, 2 tests",
-        "600 to 620 °C, 215 MPa, 1 test",
-        "620 °C, 200 to 230 MPa, 2 tests",
-    ]
-
-
 def test_each_hold_of_temperature_shows_the_rate_at_that_temperature(fit):
     shown = [r for r in rates_of_tests(fit, fit.predict()) if r.test == 4]
     assert [(r.stress, r.temperature) for r in shown] == [(pytest.approx(215.0), COLD), (pytest.approx(215.0), HOT)]
     for one in shown:
         assert one.rate == pytest.approx(rate(215.0, one.temperature), rel=0.01)
-
-
-def test_a_ramp_has_its_ends():
-    ramp = stepped_test(215.0).replace(temperature=Program((0.0, 2 * HALF), (COLD, HOT)))
-    assert temperature_range(ramp) == (COLD, HOT)
-    assert temperature_range(steady_test(215.0, HOT)) == (HOT, HOT)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import re
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from creepkit.reports.figures import empty_figure
 from creepkit.reports.html.compact_svg import relative_path
-from creepkit.reports.html.svg import svg_text
 from creepkit.reports.html.thinning import PIXEL, TOLERANCE, kept_dots, kept_points
 
 
@@ -89,34 +86,3 @@ def absolute(path: str) -> list[tuple[float, float]]:
 def test_relative_paths_have_the_same_points(path: str) -> None:
     found, expected = absolute(relative_path(path)), absolute(path)
     assert np.allclose(found, expected, atol=0.051)
-
-
-def test_a_curve_of_many_frames_costs_few_bytes_and_no_more() -> None:
-    sizes = []
-    for count in (1_000, 100_000):
-        figure = empty_figure(6.0, 3.0)
-        axes = figure.subplots()
-        x = np.linspace(0.0, 1.0, count)
-        noise = np.random.default_rng(2).normal(size=count)
-        axes.plot(x, x + 0.01 * noise, ".")
-        axes.fill_between(x, x - 0.1, x + 0.1)
-        axes.plot(x, np.sin(x) + 0.01 * noise)
-        sizes.append(len(svg_text(figure, "f1", "Title", "Description")))
-    assert sizes[1] < 30_000
-    assert sizes[1] < 1.5 * sizes[0]
-
-
-def test_text_in_a_figure_is_text() -> None:
-    figure = empty_figure(6.0, 3.0)
-    axes = figure.subplots()
-    axes.plot([0, 1], [0, 1], label="</text><script>x</script>")
-    axes.legend()
-    axes.set_xticks([0, 1], ["<b>", "\u202eturned\x07"])
-    axes.set_title("$unpaired & ]]>")
-    svg = svg_text(figure, "f1", "<title>", "a -- b\x00")
-    root = ElementTree.fromstring(svg)  # well formed
-    texts = ["".join(e.itertext()) for e in root.iter() if e.tag in ("text", "title", "desc")]
-    assert "</text><script>x</script>" in texts
-    assert "$unpaired & ]]>" in texts
-    assert "<b>" in texts
-    assert not re.search("[\x00-\x08\u202e]", svg)

@@ -1,6 +1,5 @@
 """Alloy after alloy: what is found, what is kept, what is done again, and what is said when something is wrong."""
 
-import csv
 import dataclasses
 
 import h5py
@@ -8,15 +7,13 @@ import numpy as np
 import pytest
 
 from creepkit.api.objects import specimen
-from creepkit.errors import FitError, HistoryError
+from creepkit.errors import FitError
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.penalties import Sqrt
 from creepkit.readers.history_csv import write_history
 from creepkit.screening import files
 from creepkit.screening.alloys import Compositions
 from creepkit.screening.screen import ScreeningOptions, screen
-from helpers.narrow_predictor import Narrow
-from helpers.planted_alloys import NORTON, Deadly, Doubting, bars, bulge
+from helpers.planted_alloys import NORTON, Deadly, bars, bulge
 
 QUICK = IdentificationSettings(starts=2, sobol_points=16)
 COMPOSITIONS = Compositions({"X": {"Fe": 70.0, "Cr": 30.0}, "Y": {"Ni": 40.0, "Co": 38.0, "Cr": 22.0}})
@@ -51,17 +48,6 @@ def test_shares_of_laws_go_by_class_and_add_up_to_one(plate):
     assert plate.law_fractions()["Fe-rich"]["norton"] == pytest.approx(plate["X"].laws[0].weight)
 
 
-def test_the_table_has_a_row_an_alloy(plate, tmp_path):
-    with plate.to_csv(tmp_path / "plate.csv").open() as stream:
-        rows = {row["alloy"]: row for row in csv.DictReader(stream)}
-    assert (rows["X"]["class"], rows["Y"]["class"]) == ("Fe-rich", "near-equimolar")
-    rate = NORTON["A"] * 100.0 ** NORTON["n"]
-    assert float(rows["X"]["rate_100MPa"]) == pytest.approx(rate, rel=0.05)
-    assert float(rows["X"]["local_exponent_100MPa"]) == pytest.approx(NORTON["n"], abs=0.05)
-    assert float(rows["X"]["n_low"]) < float(rows["X"]["n"]) < float(rows["X"]["n_high"])
-    assert float(rows["X"]["loss_dense"]) == pytest.approx(float(rows["X"]["loss_reduced"]), rel=0.2)
-
-
 def test_the_numbers_file_holds_tests_and_covariances(plate, tmp_path):
     with h5py.File(plate.to_hdf5(tmp_path / "plate.h5")) as file:
         first = file["alloys/0000"]
@@ -73,29 +59,6 @@ def test_the_numbers_file_holds_tests_and_covariances(plate, tmp_path):
         np.testing.assert_allclose(predicted, measured, rtol=0.2)
 
 
-def test_pictures_are_drawn_of_what_there_is(plate, tmp_path):
-    names = [path.name for path in plate.plot(tmp_path / "pictures")]
-    assert names == ["histories.png", "laws.png", "misfit.png", "parity.png"]
-    plate["X"].best.plot(tmp_path / "X.png")
-    assert (tmp_path / "X.png").stat().st_size > 10_000
-
-
-def test_text_says_shares_and_failures(plate):
-    told = str(plate)
-    assert "2 of 2 alloys identified" in told
-    assert "near-equimolar (1): norton" in told
-
-
-def test_a_confirmation_that_fails_is_a_note_and_no_failure(monkeypatch):
-    def fail(fit, tests, using):
-        raise FitError("the mesh is torn")
-
-    monkeypatch.setattr("creepkit.screening.job.confirm", fail)
-    found = screened(TWO[:3], confirm=True)["X"]
-    assert found.identified
-    assert "not confirmed: the mesh is torn" in found.notes
-
-
 def test_confirmed_by_the_specimen_itself():
     found = screened(TWO[:3], confirm=True)["X"]
     assert found.confirmation.confirmed
@@ -103,28 +66,7 @@ def test_confirmed_by_the_specimen_itself():
     assert screened(TWO[:3])["X"].confirmation is None
 
 
-@pytest.mark.parametrize(("excess", "holds"), [(0.0, True), (0.5, False)])
-def test_where_a_guard_doubts_the_specimen_is_asked(excess, holds):
-    """A stand-in that is off by half of every strain is found out, one that is right is confirmed."""
-    found = screened(TWO[:3], using=Doubting(excess))
-    assert found["X"].confirmation.confirmed is holds
-    assert found["X"].confirmation.predictor_name == "uniaxial"
-    assert ("X: not confirmed: uniaxial differs from the fit by" in str(found)) is not holds
-    assert screened(TWO[:3], using=Doubting(excess), confirm=False)["X"].confirmation is None
-
-
 # ---- kept, and done again ------------------------------------------------------------------------------------------
-
-
-def test_laws_outside_the_class_of_a_surrogate_are_the_specimens_own():
-    """Values, curves and the place of the law among the others are those of the bars; a note says by what."""
-    narrow, itself = (screened(TWO[:3], using=using)["X"] for using in (Narrow(), specimen("uniaxial")))
-    assert narrow.best.law.name == "norton"
-    assert narrow.best.values == itself.best.values
-    assert "identified with 'uniaxial' in the place of 'narrow': law 'norton' is none of its laws" in narrow.notes
-    for name, outputs in itself.predicted.items():
-        assert np.isfinite(narrow.predicted[name]["strain"]).all()
-        assert narrow.predicted[name]["strain"] == pytest.approx(outputs["strain"])
 
 
 def test_an_answer_is_read_back_as_it_was(plate, tmp_path):
@@ -165,20 +107,6 @@ def test_only_what_changed_is_done_again(tmp_path):
     assert seen == ["Y"]
 
 
-def test_a_damaged_answer_is_worked_out_again(tmp_path, caplog):
-    screened(TWO[:3], to=tmp_path)
-    (tmp_path / "X.json").write_text("{}")
-    assert screened(TWO[:3], to=tmp_path)["X"].identified
-    assert "X.json: this is not the result of an alloy that creepkit wrote" in caplog.text
-
-
-def test_names_that_are_no_file_names_still_have_their_own_files(tmp_path):
-    screened([*bars("a/b"), *bars("a:b")], to=tmp_path)
-    names = sorted(path.name for path in tmp_path.glob("*.json"))
-    assert len(names) == 2
-    assert all(name.startswith("a-b_") for name in names)
-
-
 def test_workers_find_what_this_process_finds_and_one_that_dies_costs_one_alloy():
     deadly = [h.replace(specimen="deadly") for h in bars("D")]
     apart = screened([*deadly, *TWO[:3]], using={"uniaxial": specimen("uniaxial"), "deadly": Deadly()}, workers=2)
@@ -201,25 +129,6 @@ def test_an_alloy_without_creep_does_not_stop_the_others(tmp_path):
         _ = found["E"].best
 
 
-def test_all_laws_failing_is_told_with_a_reason():
-    few = [h.replace(times=h.times[:2], outputs={"strain": h.outputs["strain"][:2]}) for h in bars("Z", (80.0,))]
-    found = screened([*few, *TWO[:3]], laws=["norton", "strain-hardening"])
-    assert found["X"].identified
-    assert found.failures["Z"].startswith(
-        "none of the 2 laws could be identified; norton: law 'norton' has 2 parameters"
-    )
-    with pytest.raises(FitError, match="no alloy of this plate has a law, so there is nothing to draw"):
-        screened(few).plot("pictures")
-
-
-def test_a_folder_without_tests_is_said(tmp_path):
-    with pytest.raises(HistoryError, match="no CSV file of a history is in it; name the folder that holds them"):
-        screened(tmp_path)
-    (tmp_path / "compositions.csv").write_text("# unit: wt.%\nalloy,Fe\nX,100\n")
-    with pytest.raises(HistoryError, match="no CSV file of a history is in it"):
-        screened(tmp_path, compositions=tmp_path / "compositions.csv")
-
-
 def test_compositions_may_lie_beside_the_tests(tmp_path):
     for history in bars("X"):
         write_history(history, tmp_path / f"{history.name}.csv")
@@ -227,31 +136,6 @@ def test_compositions_may_lie_beside_the_tests(tmp_path):
     found = screened(tmp_path, compositions=tmp_path / "compositions.csv")
     assert found.class_of("X") == "unknown"
     assert found.notes[0].endswith("no alloy 'X', whose class stays unknown; known: Y")
-
-
-@pytest.mark.parametrize(
-    ("how", "message"),
-    [
-        ({"histories": []}, "there are no histories to screen"),
-        ({"histories": [1]}, "screen\\(\\) takes a list of histories"),
-        ({"histories": [TWO[0], TWO[0]]}, "2 histories are called 'X-60'; give each its own name"),
-        ({"laws": []}, "laws must be at least one, each with a name of its own; found none"),
-        ({"laws": ["norton", "norton"]}, "found 'norton' twice"),
-        ({"confirm": "maybe"}, "confirm is 'maybe'; allowed are True, False and \"when in doubt\""),
-        ({"penalty": Sqrt}, "penalty is Sqrt; write L2\\(\\), GroupL2"),
-        ({"penalty": Sqrt()}, "a penalty reduces the dense law, and there is none"),
-        ({"settings": IdentificationSettings(loss="huber")}, "loss 'huber' does not go with weights 'likelihood'"),
-        ({"workers": 0}, "workers is 0; allowed are whole numbers from 1 to 1024"),
-    ],
-)
-def test_what_is_given_is_checked_before_any_work(how, message):
-    with pytest.raises(FitError, match=message):
-        screened(**{"histories": TWO, **how})
-
-
-def test_an_alloy_that_is_not_there_is_asked_for(plate):
-    with pytest.raises(FitError, match="the plate has no alloy 'Z'"):
-        plate["Z"]
 
 
 def test_a_copy_of_a_test_is_left_out_with_a_note():

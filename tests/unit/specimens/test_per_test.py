@@ -9,7 +9,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import SolveError
-from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.records import Status
 from creepkit.specimens.per_test import OneTest, PerTest
 
@@ -75,14 +74,6 @@ def test_planted_values_are_found_from_data_of_another_solver(using):
     assert fit.values["n"] == pytest.approx(4.0, rel=1e-3)
 
 
-def test_it_simulates_and_forecasts():
-    run = ck.simulate(NORTON, Bar(), TRUTH, loading=ck.constant_stress(80.0, "stress"), times=TIMES)
-    np.testing.assert_allclose(run.outputs["strain"], 1e-16 * 80.0**4 * TIMES, rtol=1e-12)
-    fit = ck.identify(NORTON, planted(), Bar(), starts=1, nuisances=[ck.Nuisance("rate", sd=0.1)])
-    one = fit.forecast(plans(70.0)).tests[0].outputs["strain"]
-    assert one.band.low[-1] < 1e-16 * 70.0**4 * TIMES[-1] < one.band.high[-1]
-
-
 class Ends(Bar):
     def one(self, law, values, history, nuisances):
         strain = np.asarray(super().one(law, values, history, nuisances)["strain"])
@@ -122,18 +113,6 @@ def test_an_author_is_told_which_test_values_and_line(given, sentence):
         Wrong().predict(NORTON, NORTON.to_internal(TRUTH), plans(60.0))
 
 
-def test_a_nuisance_that_one_does_not_take_is_refused():
-    with pytest.raises(SolveError, match="specimen 'awk' does not know the nuisance 'thickness'"):
-        Awk().predict(NORTON, NORTON.to_internal(TRUTH), plans(60.0), nuisances={"thickness": np.array([[0.5]])})
-
-
-def test_differences_leave_a_coefficient_off_that_is_off():
-    """-inf has no neighbours: its derivative is zero, and nothing is warned of."""
-    theta = NORTON.to_internal({"A": 0.0, "n": 4.0})
-    found = predict_with_sensitivities(Bar(), NORTON, theta[0], plans(60.0), {})
-    np.testing.assert_array_equal(found.jacobian, np.zeros_like(found.jacobian))
-
-
 @dataclass(frozen=True)
 class Wire(PerTest):
     """A wire that hangs under a weight, of a length and a diameter."""
@@ -164,19 +143,6 @@ def test_a_length_is_what_the_test_states_else_its_nuisance_else_the_default():
     np.testing.assert_allclose(given.values, as_built.values * 1.2**-8, rtol=1e-12)
     changed = Wire().replace(diameter=1.2).predict(NORTON, theta, [wire()])
     np.testing.assert_allclose(changed.values, given.values, rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("test", "message"),
-    [
-        (wire(diameter=20.0), "history 'wire': diameter is 20 mm; allowed is 0.1 to 10 mm"),
-        (wire(diamter=1.1), "no length of the test piece is called 'diamter'; did you mean 'diameter'"),
-        (plans(60.0)[0].replace(specimen="wire"), "specimen 'wire' is loaded by weight .N., found stress"),
-    ],
-)
-def test_a_test_that_does_not_fit_the_piece_is_refused(test, message):
-    with pytest.raises(SolveError, match=message):
-        Wire().predict(NORTON, NORTON.to_internal(TRUTH), [test])
 
 
 def test_a_diameter_is_found_as_a_nuisance_parameter():

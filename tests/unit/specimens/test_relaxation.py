@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import SolveError
-from creepkit.language import wachtman
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.readers.history_csv import write_history
-from creepkit.records import History, Program, RecordedLoading, Specimen, Status, StrainSteps
-from creepkit.specimens.relaxation import Relaxation, creepkit_specimens
+from creepkit.records import History, Status, StrainSteps
+from creepkit.specimens.relaxation import Relaxation
 from creepkit.specimens.uniaxial import Uniaxial
 
 E, START, N = 1.6e5, 180.0, 5.0
@@ -34,12 +31,6 @@ def stress(*histories, values=VALUES, law=NORTON, **more):
     return TIGHT.predict(law, law.to_internal(values), histories, **more)
 
 
-def test_it_is_a_specimen_that_the_registry_knows():
-    (found,) = creepkit_specimens()
-    assert isinstance(found, Specimen)
-    assert (ck.specimen("relaxation"), found.outputs) == (found, ("stress",))
-
-
 def test_norton_relaxes_as_its_closed_form_does_and_so_do_its_derivatives():
     found = stress(held(), values={"A": np.array([A, 2 * A, 0.0]), "n": N}, sensitivities=True)
     np.testing.assert_allclose(found.of(0)[:, 0], relaxed(START, TIMES), rtol=1e-8)
@@ -61,23 +52,6 @@ def test_a_step_of_strain_adds_its_elastic_stress_and_relaxation_begins_anew():
     np.testing.assert_allclose(stress(plan).of(0)[:, 0], expected, rtol=1e-7)
 
 
-def test_a_step_of_temperature_changes_the_rate():
-    """At twice the rate the clock runs twice as fast: sigma depends on the integral of A dt alone."""
-    law = NORTON.times(ck.arrhenius(T_ref=1000.0))
-    Q = np.log(2.0) * 8.314462618 / (1 / 1000 - 1 / 1050)
-    plan = held(temperature=Program.steps([(0.0, 1000.0), (1e3, 1050.0)]))
-    aged = np.where(TIMES < 1e3, TIMES, 1e3 + 2 * (TIMES - 1e3))
-    found = stress(plan, law=law, values={**VALUES, "Q": Q}).of(0)[:, 0]
-    np.testing.assert_allclose(found, relaxed(START, aged), rtol=1e-7)
-
-
-def test_a_ramp_of_strain_ends_in_steady_creep():
-    """At a constant rate e' of strain the stress tends to (e'/A)^(1/n)."""
-    rate = A * 150.0**N
-    ramp = RecordedLoading(Program([0.0, 2e6], [0.0, 2e6 * rate]), "strain")
-    assert stress(held(loading=ramp, times=[2e6])).of(0)[-1, 0] == pytest.approx(150.0, rel=1e-6)
-
-
 def test_strain_hardening_relaxes_as_quadrature_says():
     """t(sigma) = int dsigma' / (E f(sigma', (s0 - sigma')/E)), by Gauss-Legendre in ln of the strain."""
     values = {"A": 1e-15, "n": 4.0, "m": -0.5}
@@ -88,11 +62,6 @@ def test_strain_hardening_relaxes_as_quadrature_says():
     time = float(0.5 * weights @ (2 * p * 0.5 * (nodes + 1) / rates))
     found = stress(held(times=[time]), law=STRAIN_HARDENING, values=values).of(0)[0, 0]
     assert found == pytest.approx(START - E * p, rel=1e-7)
-
-
-def test_an_engineering_strain_is_taken_as_its_logarithm():
-    plan = held(0.01, times=[0.0], strain_measure="engineering")
-    assert stress(plan).of(0)[0, 0] == pytest.approx(E * np.log(1.01), rel=1e-12)
 
 
 def test_temperature_and_modulus_may_be_off():
@@ -113,79 +82,6 @@ def test_a_bar_that_would_be_compressed_ends_and_says_so():
     assert run.end_time == pytest.approx(1e4)
     assert run.times.tolist() == [0.0, 1e3]
     assert "compress" in run.reason
-
-
-def test_a_ramp_down_that_compresses_says_so_however_far_the_last_frame_is():
-    """All but 13 MPa has relaxed when the strain begins to fall, 1 MPa in 3 s; the last frame is at 1 s."""
-    down = StrainSteps(((0, START / E), (1e7, 0.0)), ramp=3 * START)
-    run = ck.simulate(NORTON, TIGHT, VALUES, loading=down, times=[1.0, 2e7], elastic=ck.Elastic(E))
-    assert "compress" in run.reason
-    assert run.end_time == pytest.approx(1e7 + 3 * relaxed(START, 1e7), abs=0.5)
-
-
-def test_a_bar_that_begins_in_compression_is_not_complete():
-    """Later frames would show a stress, though what the bar crept before is unknown."""
-    ramp = RecordedLoading(Program(np.array([0.0, 1000.0]), np.array([-1e-4, 1e-3])), "strain")
-    plan = held(times=np.array([0.0, 500.0, 1000.0]), loading=ramp)
-    prediction = stress(plan, held())
-    assert prediction.status[0].tolist() == [Status.NOT_CONVERGED, Status.COMPLETE]
-    assert np.isnan(prediction.of(0)).all()
-    assert prediction.end_times[0, 0] == 0.0
-    with pytest.raises(SolveError, match="a compressed bar needs the specimen point"):
-        TIGHT.run(NORTON, VALUES, plan)
-
-
-def test_no_frame_shows_a_bar_in_compression():
-    down = StrainSteps(((0, START / E), (1e4, 0.0)))
-    run = ck.simulate(NORTON, TIGHT, VALUES, loading=down, times=[0.0, 1e3, 1e4, 2e4], elastic=ck.Elastic(E))
-    assert "compress" in run.reason
-    assert run.times.tolist() == [0.0, 1e3]
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"loading": ck.constant_stress(100.0)}, "loaded by strain, found stress; use StrainSteps or constant_strain"),
-        ({"elastic": None}, "a relaxation specimen under prescribed strain needs elastic data; set elastic="),
-        (
-            {"elastic": ck.Elastic(wachtman(2e5, 60.0, 300.0)), "temperature": Program.steps([(0, 900), (9, 1000)])},
-            "the modulus changes from .* with the temperature of the test",
-        ),
-    ],
-)
-def test_what_cannot_be_relaxed_is_said(changes, said):
-    with pytest.raises(SolveError, match=said):
-        stress(held(**changes))
-
-
-def test_a_strain_on_the_uniaxial_specimen_is_sent_here():
-    with pytest.raises(SolveError, match="loaded by stress, found strain; use the specimen relaxation"):
-        Uniaxial().predict(NORTON, NORTON.to_internal(VALUES), [held()])
-
-
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda: StrainSteps(((1.0, 0.1),)), "must start at time 0"),
-        (lambda: ck.constant_strain(2.0), r"from 0 to 1 in every step, found \[2.0\]"),
-        (
-            lambda: StrainSteps(((0, 0.1), (5, 0.2)), ramp=6.0),
-            "ramp is 6 s; it must not be negative nor outlast a step",
-        ),
-    ],
-)
-def test_strains_that_make_no_sense_are_refused(make, said):
-    with pytest.raises(SolveError, match=said):
-        make()
-
-
-def test_a_history_of_relaxation_survives_its_file(tmp_path):
-    loading = StrainSteps(((0, 1e-3), (600, 1.2e-3)))
-    run = ck.simulate(NORTON, TIGHT, VALUES, loading=loading, times=[0, 100, 900], elastic=ck.Elastic(E))
-    (again,) = ck.read_histories(write_history(run, tmp_path / "held.csv"))
-    assert (again.specimen, again.loading, again.elastic) == ("relaxation", loading, ck.Elastic(E))
-    assert again.outputs["stress"].tolist() == run.outputs["stress"].tolist()
-    assert again.condition == "20 °C, strain 0.001 to 0.0012"
 
 
 def noisy(plan, specimen, output, noise, rng):

@@ -50,16 +50,12 @@
 
   const SECTION_TIMES = 8, meshes = new WeakMap();
 
-  function decoded(packed, kind) {
-    return Array.from(new kind(Uint8Array.from(atob(packed.data), (c) => c.charCodeAt(0)).buffer));
-  }
-
   function meshOf(model) {
     if (!meshes.has(model)) {
-      const sides = decoded(model.arrays.elements, Int32Array), elements = [];
+      const sides = creepkit.decode(model.arrays.elements), elements = [];
       // corners and middles of the sides in turn, as they are met around an element
       for (let e = 0; e < sides.length; e += 8) elements.push([0, 4, 1, 5, 2, 6, 3, 7].map((k) => sides[e + k]));
-      meshes.set(model, { nodes: decoded(model.arrays.places, Float64Array), elements });
+      meshes.set(model, { nodes: creepkit.decode(model.arrays.places), elements });
     }
     return meshes.get(model);
   }
@@ -67,7 +63,7 @@
   function section(run, model) {
     const { nodes, elements } = meshOf(model), last = run.status === "complete" ? run.times.at(-1) : run.endTime;
     const times = Array.from({ length: SECTION_TIMES }, (_, k) => (last * (k + 1)) / SECTION_TIMES);
-    return { nodes, elements, times, at: (k) => run.placesAt(times[k]).flat().map((place, n) => place - nodes[n]), stress: null };
+    return { nodes, elements, times, at: (k) => run.placesAt(times[k]).map((place, n) => place - nodes[n]), stress: null };
   }
 
   // A network answers while a slider moves, and always for a specimen that the runtime does not know itself.

@@ -204,7 +204,8 @@
     return { data, state, redraw: () => last && draw(last) };
   };
 
-  function startAll() {
+  async function startAll() {
+    await globalThis.creepkit.ready;
     for (const root of document.querySelectorAll(".creepkit-page:not([data-started])")) {
       root.dataset.started = "";
       page.start(root);

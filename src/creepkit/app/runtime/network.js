@@ -7,8 +7,7 @@
 
   function unpacked(data) {
     if (!unpackedNetworks.has(data)) {
-      const array = ({ data: text, type }) => creepkit.decode(text, type);
-      const arrays = (given) => Object.fromEntries(Object.entries(given).map(([name, packed]) => [name, array(packed)]));
+      const arrays = (given) => Object.fromEntries(Object.entries(given).map(([name, packed]) => [name, creepkit.decode(packed)]));
       unpackedNetworks.set(data, { layers: data.layers.map(arrays), ...arrays(data.arrays) });
     }
     return unpackedNetworks.get(data);
@@ -87,10 +86,10 @@
   /** Inputs at the frames: the load, its mean since the frame before, log10 of 1 s + the time and + the step. */
   function seriesRows(names, load, frames) {
     const pieces = creepkit.segments([load], Math.max(frames[frames.length - 1], 1e-300));
-    const integral = (time) => pieces.reduce((total, { start, end, first, last }) => {
+    const integral = (time) => pieces.reduce((total, [start, end, first, last]) => {
       const reach = Math.min(time, end) - start;
       if (!(reach > 0.0)) return total;
-      return total + reach * (first[0] + (0.5 * (last[0] - first[0]) * reach) / (end - start));
+      return total + reach * (first + (0.5 * (last - first) * reach) / (end - start));
     }, 0.0);
     let before = 0.0, held = 0.0;
     return frames.map((time) => {
@@ -124,7 +123,7 @@
       : data.grid.values.filter((time, k) => k === 0 || data.grid.values[k - 1] < end * (1 - data.grid.rounding));
     const rows = evaluate(data, [...lawColumns(data, law.values), ...constants], seriesRows(data.series, load, frames));
     const outputs = data.outputs.map((name, k) => [name, Float64Array.from(times, (time) => between(frames, rows, time, k))]);
-    return { times, outputs: Object.fromEntries(outputs), ...creepkit.ending("complete", end) };
+    return { times, outputs: Object.fromEntries(outputs), ...creepkit.ending("bar", 0, end) };
   }
 
   /** Linear in time between frames, constant before the first and beyond the last. */

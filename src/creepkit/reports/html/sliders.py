@@ -56,4 +56,4 @@ def script_policy(sections: Sequence[PageSection]) -> str:
     blocks = [block for section in sections for block in section.blocks if isinstance(block, Fragment)]
     scripts = [script for block in blocks for script in _SCRIPT.findall(block.markup)]
     hashes = [f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts]
-    return f"script-src {' '.join(hashes)}; " if hashes else ""
+    return f"script-src 'wasm-unsafe-eval' {' '.join(hashes)}; " if hashes else ""

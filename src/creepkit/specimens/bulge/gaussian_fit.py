@@ -36,6 +36,11 @@ class PolarGrid:
     log_sine: Floats
     angular: Floats
 
+    @property
+    def numbers(self) -> Floats:
+        """All of them one after another, as functions of the core take them."""
+        return np.concatenate([self.log_radius, self.radial, self.log_cosine, self.log_sine, self.angular])
+
 
 @dataclass(frozen=True, eq=False)
 class GaussianFit:
@@ -100,5 +105,4 @@ class GaussianFit:
         """What `_core_arguments` point to."""
         grid = self.grid
         counts = np.array([grid.log_radius.size, grid.angular.size, self.nodes.shape[1]], np.int64)
-        parts = grid.log_radius, grid.radial, grid.log_cosine, grid.log_sine, grid.angular
-        return counts, np.concatenate(parts, dtype=float), np.ascontiguousarray(self.nodes, dtype=float)
+        return counts, grid.numbers, np.ascontiguousarray(self.nodes, dtype=float)

@@ -46,19 +46,6 @@ def test_a_planted_law_lies_in_its_intervals_whatever_searched(stand_in, test, n
     assert fit.search_trace.evaluations[-1] <= fit.provenance["search_evaluations"]
 
 
-def test_each_iteration_is_one_prediction_of_all_particles(stand_in, test):
-    class Counted:
-        name, outputs, nuisances, calls = "counted", stand_in.outputs, stand_in.nuisances, []
-
-        def predict(self, law, theta, histories, **options):
-            self.calls.append((len(theta), len(histories)))
-            return stand_in.predict(law, theta, histories, **options)
-
-    using = Counted()
-    identify(NORTON, [test, test.replace(name="twin")], using, search=ParticleSwarm(30, 7, refined_candidates=1))
-    assert using.calls[:7] == [(30, 2)] * 7
-
-
 def test_of_a_sum_the_swarm_keeps_the_best_of_each_subset(stand_in, test):
     """Norton alone is refined as if it were alone, and a second term gains no more than its three parameters may.
 

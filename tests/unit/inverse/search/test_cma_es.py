@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from creepkit.errors import FitError
 from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.search.derivative_free import CmaEs
 from creepkit.inverse.search.global_search import SearchTrace
@@ -55,26 +54,6 @@ def test_a_generation_is_one_call_and_a_seed_gives_the_same_answer_twice():
     assert (runs[0].trace.quartiles != runs[2].trace.quartiles).any()
 
 
-def test_progress_is_told():
-    told = []
-    CmaEs(iterations=4, restarts=0, refined_candidates=1).minima(Known(rosenbrock, cube(2)), lambda *a: told.append(a))
-    assert told == [("generation", k, 4) for k in range(1, 5)] + [("refinement", 1, 1)]
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (dict(iterations=0), "CMA-ES: iterations is 0; allowed are whole numbers from 1 to"),
-        (dict(population=2), "population is 2"),
-        (dict(restarts=-1), "restarts is -1"),
-        (dict(initial_step_size=0), "initial_step_size is 0 of the width"),
-    ],
-)
-def test_settings_that_cannot_be(options, words):
-    with pytest.raises(FitError, match=words):
-        CmaEs(**options)
-
-
 # ---- trace ---------------------------------------------------------------------------------------------------------
 
 COSTS = [np.array([9.0, 5.0, 7.0]), np.array([6.0, 8.0, 10.0]), np.array([3.0, 4.0, 5.0, 6.0, 7.0])]
@@ -86,28 +65,3 @@ def test_a_trace_keeps_the_lowest_so_far_what_was_asked_and_the_quartiles():
     np.testing.assert_array_equal(trace.evaluations, [3, 6, 11])
     np.testing.assert_array_equal(trace.quartiles, [[6, 7, 8], [7, 8, 9], [4, 5, 6]])
     assert len(trace) == 3
-
-
-def test_the_picture_shows_the_best_on_a_logarithmic_axis_and_candidates_on_a_second_one(tmp_path):
-    trace = CmaEs(iterations=200, restarts=1).minima(Known(rastrigin, cube(3, 5.12))).trace
-    figure = trace.plot(tmp_path / "trace.png")
-    (axes,) = figure.axes
-    assert axes.get_yscale() == "log"
-    best = next(line for line in axes.lines if line.get_label() == "best so far")
-    np.testing.assert_array_equal(best.get_ydata(), trace.best_cost)
-    (above,) = axes.child_axes
-    figure.draw_without_rendering()
-    shown = [int(t.get_text().replace(",", "")) for t in above.get_xticklabels()]
-    assert set(shown) <= set(trace.evaluations.tolist())
-    assert shown[-1] == trace.evaluations[-1]
-    assert (tmp_path / "trace.png").stat().st_size > 10_000
-
-
-def test_a_trace_of_a_few_rows_without_quartiles_is_drawn(tmp_path):
-    SearchTrace("starts", np.array([4.0]), np.array([8])).plot(tmp_path / "one.svg")
-    assert (tmp_path / "one.svg").read_text().startswith("<?xml")
-
-
-def test_a_picture_that_cannot_be_written(tmp_path):
-    with pytest.raises(FitError, match="cannot be written|is no format of pictures"):
-        SearchTrace.from_costs("search", COSTS).plot(tmp_path / "trace.word")

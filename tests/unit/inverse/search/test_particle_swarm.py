@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.errors import FitError
 from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.search.derivative_free import ParticleSwarm
 from creepkit.inverse.search.term_mask import TermMask
 from creepkit.inverse.settings import IdentificationSettings
-from helpers.cost_functions import SUM, TRIPLE, Known, cube, quadratic, rastrigin, rosenbrock
+from helpers.cost_functions import SUM, Known, cube, quadratic, rastrigin, rosenbrock
 
 BARE = ParticleSwarm(refined_candidates=0)
 SMALL = ParticleSwarm(particles=40, iterations=30)
@@ -50,14 +49,6 @@ def test_least_squares_finishes_what_the_swarm_leaves():
     assert fine.trace.refined_cost == fine.minima[0].cost
 
 
-def test_refined_minima_differ_and_come_best_first():
-    found = ParticleSwarm(refined_candidates=4).minima(Known(rastrigin, cube(3, 5.12))).minima
-    assert [m.cost for m in found] == sorted(m.cost for m in found)
-    starts = np.array([m.x for m in found])
-    assert len(found) == 4
-    assert len(np.unique(starts.round(2), axis=0)) > 1
-
-
 # ---- rules ---------------------------------------------------------------------------------------------------------
 
 
@@ -86,13 +77,6 @@ def test_no_step_is_longer_than_the_limit_and_none_leaves_the_box(boundary, velo
     assert steps.max() > 0.9 * velocity
 
 
-def test_an_optimum_beyond_a_wall_is_found_on_it():
-    box = Bounds(np.array([2.0, -5.0]), np.array([5.0, 5.0]))
-    found = BARE.minima(Known(quadratic, box)).minima[0]
-    assert found.x[0] == 2.0
-    assert found.x[1] == pytest.approx(2.0, abs=1e-3)
-
-
 def test_walls_absorb_or_reflect():
     """Pushed through a wall by .1 of the box, a particle stops there, or comes back by what it went too far."""
     from creepkit.inverse.search.derivative_free import _Swarm
@@ -116,26 +100,11 @@ def test_it_starts_from_a_sobol_set_at_rest():
 # ---- one prediction an iteration, seeds, progress ------------------------------------------------------------------
 
 
-def test_each_iteration_is_one_call():
-    landscape = Known(quadratic, cube(2))
-    found = ParticleSwarm(particles=30, iterations=12).minima(landscape)
-    assert landscape.calls == [30] * 12
-    np.testing.assert_array_equal(found.trace.evaluations, 30 * np.arange(1, 13))
-
-
 def test_a_seed_gives_the_same_answer_twice_and_another_seed_another():
     runs = [SMALL.minima(Known(rastrigin, cube(4), IdentificationSettings(seed=seed))) for seed in (7, 7, 8)]
     np.testing.assert_array_equal(runs[0].minima[0].x, runs[1].minima[0].x)
     np.testing.assert_array_equal(runs[0].trace.quartiles, runs[1].trace.quartiles)
     assert (runs[0].trace.quartiles != runs[2].trace.quartiles).any()
-
-
-def test_progress_is_told_of_each_iteration_and_refinement():
-    told = []
-    ParticleSwarm(particles=8, iterations=5, refined_candidates=1).minima(
-        Known(quadratic, cube(2)), lambda *a: told.append(a)
-    )
-    assert told == [("swarm", k, 5) for k in range(1, 6)] + [("refinement", 1, 1)]
 
 
 def test_patience_ends_a_swarm_that_gains_nothing():
@@ -194,40 +163,6 @@ def test_minima_are_the_best_of_each_subset_and_more_terms_fit_no_worse():
     assert costs[()] < min(costs[(HARDENING,)], costs[(POWER,)])
 
 
-def test_of_subsets_that_fit_alike_the_simplest_comes_first():
-    """Data without waves of a single term: the sum of both is not better by more than its bottom allows."""
-    flat = Known(
-        lambda u: 0.5 * np.exp(u[:, 2]) + (u[:, 0] - 1) ** 2 + 0.01 * (u[:, 1] - 3) ** 2, BOX, law=SUM, rates=(0, 2)
-    )
-    found = CAREFUL.minima(flat).minima
-    assert found[0].terms_off == (HARDENING,)
-    assert found[0].cost == pytest.approx(0.0, abs=1e-4)
-
-
-def test_what_is_off_rests_at_the_bottom_of_its_rate():
-    found = CAREFUL.minima(planted(POWER)).minima[0]
-    assert found.terms_off == (HARDENING,)
-    assert found.x[2] == -12.0
-
-
-def test_only_what_may_be_off_is():
-    landscape = planted(POWER)
-    found = ParticleSwarm(particles=40, iterations=20, maskable_terms=POWER).minima(landscape)
-    assert all(HARDENING not in m.terms_off for m in found.minima)
-    assert ParticleSwarm(particles=40, iterations=20).minima(landscape).minima[0].terms_off == ()
-
-
-def test_masks_of_three_terms_are_never_empty_and_reach_every_subset():
-    landscape = Known(quadratic, cube(len(TRIPLE.names)), law=TRIPLE, rates=(0, 2, 5))
-    switches, rng = TermMask.from_problem(landscape, "any"), np.random.default_rng(0)
-    masks = switches.initial_masks(2000, rng)
-    assert masks.any(axis=1).all()
-    assert len(np.unique(masks, axis=0)) == 7
-    later = switches.recombined(np.zeros((2000, 3), bool), np.zeros(3, bool), rng)
-    assert later.any(axis=1).all()
-    assert len(np.unique(later, axis=0)) == 7
-
-
 def test_a_parameter_shared_with_another_term_does_not_rest():
     from creepkit.language import arrhenius
 
@@ -240,46 +175,3 @@ def test_a_parameter_shared_with_another_term_does_not_rest():
 
 
 # ---- what cannot be ------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (dict(particles=1), "particles is 1; allowed are whole numbers from 2 to"),
-        (dict(iterations=2.5), "iterations is 2.5"),
-        (dict(patience=0), "patience is 0"),
-        (dict(form="best"), "form is 'best'; allowed are constriction and inertia"),
-        (dict(boundary="none"), "boundary is 'none'; allowed are absorb and reflect"),
-        (dict(inertia=(1.2, 0.4)), r"inertia is \(1.2, 0.4\); both are from 0 to 1"),
-        (dict(max_velocity=0), "max_velocity is 0 of the width"),
-        (dict(cognitive=2.0, social=2.0), "must be more than 4 together"),
-    ],
-)
-def test_settings_that_cannot_be(options, words):
-    with pytest.raises(FitError, match=words):
-        ParticleSwarm(**options)
-
-
-@pytest.mark.parametrize(
-    ("off", "words"),
-    [
-        ("strain hardning", "no term 'strain hardning' to switch off; did you mean 'strain hardening'"),
-        (("x",), "known:"),
-    ],
-)
-def test_terms_that_are_not_there(off, words):
-    with pytest.raises(FitError, match=words):
-        ParticleSwarm(maskable_terms=off).minima(planted(POWER))
-
-
-def test_a_single_term_cannot_be_off():
-    (term,) = ("power law",)
-    with pytest.raises(FitError, match="has one term, 'power law', which cannot be switched off"):
-        ParticleSwarm(maskable_terms=term).minima(Known(quadratic, cube(2)))
-    assert (
-        ParticleSwarm(particles=8, iterations=3, maskable_terms="any")
-        .minima(Known(quadratic, cube(2)))
-        .minima[0]
-        .terms_off
-        == ()
-    )

@@ -1,25 +1,13 @@
 """A sum reduced to the terms that planted bulge tests need: single laws, two-term laws, paths and draws."""
 
-import json
-from dataclasses import replace
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from creepkit.errors import FitError
-from creepkit.inverse.identification_document import CODEC
 from creepkit.inverse.search.derivative_free import ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.bootstrap import (
-    binomial_interval,
-    bootstrap_weights,
-    selection_frequencies,
-    with_weights,
-)
-from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Sqrt, Subsets
+from creepkit.inverse.sparsity.bootstrap import binomial_interval, bootstrap_weights, selection_frequencies
+from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Sqrt
 from creepkit.inverse.sparsity.reduced_laws import terms_above
-from creepkit.inverse.sparsity.result import Sparsity
 from creepkit.inverse.sparsity.term_selection import (
     TermChoice,
     choose_terms,
@@ -63,12 +51,6 @@ def test_a_planted_single_law_is_found(reduced):
     assert reduced.sparsity.p_value > 0.01
 
 
-def test_subsets_find_it_too(hardening):
-    choice = choose_terms(hardening[1], Subsets())
-    assert choice.kept_terms == (STRAIN,)
-    assert choice.contributions[STRAIN] == pytest.approx(1.0, abs=1e-3)
-
-
 def test_a_swarm_searches_the_penalised_landscape(hardening):
     """Its cost at the optimum is what least squares has there, penalty included."""
     _, reductions = hardening
@@ -101,16 +83,6 @@ def test_memory_that_is_not_there_is_switched_off():
     assert next(v for k, v in fit.values.items() if k.startswith("n")) == pytest.approx(3.5, abs=0.2)
 
 
-def test_two_terms_are_kept_where_three_pressures_need_them():
-    law = NORTON + TIME_HARDENING
-    values = {"A_1": 1.5e-20, "n_1": 6.5, "A_2": 3.3e-9, "n_2": 2.0, "m": -0.6}
-    plans = [Plan(760, P, 1.15 * P) for P in (6, 8, 10.5)]
-    tests = planted(law, values, plans, seed=7, frames=12)
-    fit = identify_sparse(law, tests, EXACT, penalty=Sqrt(), settings=QUICK)
-    assert fit.sparsity.kept_terms == ("power law", "time hardening")
-    assert fit.values["n_1"] == pytest.approx(6.5, abs=0.3)
-
-
 # ---- the path, and draws -------------------------------------------------------------------------------------------
 
 
@@ -126,13 +98,6 @@ def test_along_the_path_terms_go_and_misfit_grows(path):
     assert path.kept_terms[path.chosen] == (STRAIN,)
     assert path.bic_excess[path.chosen] == 0
     assert "<- chosen" in str(path)
-
-
-def test_the_path_is_drawn(path, tmp_path):
-    assert path.plot(tmp_path / "path.png").axes[0].get_xlabel() == "strength of the penalty"
-    assert (tmp_path / "path.png").stat().st_size > 10_000
-    with pytest.raises(FitError, match="is no format of pictures"):
-        path.plot(tmp_path / "path.unknown")
 
 
 def test_draws_of_frames_keep_what_the_whole_test_keeps(hardening):
@@ -153,21 +118,6 @@ def test_draws_weigh_all_frames_alike(hardening):
     np.testing.assert_allclose(weights[present], 1.0, atol=0.1)
 
 
-def test_of_several_tests_whole_ones_are_drawn():
-    """As many as there are, each as likely as another; all entries of a test together."""
-    observations = SimpleNamespace(present=np.ones((5, 7), bool), frame_index=np.tile(np.arange(7), (5, 1)))
-    drawn = np.array(list(bootstrap_weights(observations, 2000, np.random.default_rng(0))))
-    assert (drawn == drawn[:, :, :1]).all()
-    np.testing.assert_array_equal(drawn[:, :, 0].sum(axis=1), 5)
-    np.testing.assert_allclose(drawn.mean(axis=0), 1.0, atol=0.1)
-
-
-def test_frames_drawn_twice_count_twice(hardening):
-    stage = hardening[1].problem
-    twice = with_weights(stage, np.full(stage.problem.observations.present.shape, 2.0))
-    assert twice.problem.chi_square(stage.start) == pytest.approx(2 * stage.problem.chi_square(stage.start))
-
-
 def test_intervals_of_frequencies_are_exact():
     """Clopper and Pearson: none of n gives 1 - (.025)^(1/n)."""
     assert binomial_interval(0, 20) == pytest.approx((0.0, 1 - 0.025 ** (1 / 20)))
@@ -183,24 +133,3 @@ def test_a_term_that_is_needed_comes_back(hardening):
     _, reductions = hardening
     wrong = TermChoice((SINE,), {SINE: 0.6, STRAIN: 0.3, TIME: 0.1}, reductions.problem.start)
     assert STRAIN in confirmed_law(reductions, wrong).kept_terms
-
-
-def test_the_record_says_what_was_dropped_and_survives_a_file(reduced):
-    told = reduced.sparsity
-    assert "without 'hyperbolic sine' and 'time hardening' of 'combined' chi-square rises by" in told.verdict
-    assert "'strain hardening' suffices" in told.verdict
-    stored = json.loads(json.dumps(CODEC.to_json(told)))
-    assert CODEC.from_json(Sparsity, stored) == told
-    back = replace(told, proposed_terms=())
-    assert "The penalty had dropped 'strain hardening' too" in back.verdict
-
-
-def test_one_term_is_nothing_to_choose_from():
-    tests = planted(NORTON, {"A": 2e-13, "n": 3.5}, [Plan(760)], frames=8)
-    with pytest.raises(FitError, match="law 'norton' has one term, 'power law', and a penalty chooses among terms"):
-        identify_sparse(NORTON, tests, EXACT, penalty=Sqrt())
-
-
-def test_the_largest_term_stays_whatever_the_least_share():
-    assert terms_above({"a": 0.6, "b": 0.04}) == ("a",)
-    assert terms_above({"a": 0.03, "b": 0.04}) == ("b",)

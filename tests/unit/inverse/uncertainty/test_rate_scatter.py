@@ -1,14 +1,11 @@
 """Scatter of rates: balanced designs, where REML is the analysis of variance (Searle et al. (1992), chapter 4)."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
 import creepkit as ck
 from creepkit.inverse.uncertainty.rate_scatter import FLAT_BELOW, USUAL_SD, RateScatter
-from creepkit.inverse.uncertainty.stored_rate_scatter import problem_with
 from helpers.rupture_tests import BAR
 
 
@@ -28,25 +25,6 @@ def scatter_of(log_factor, variance=0.0, heats=(), known=None):
         gradient=np.zeros(1),
         known=known,
     )
-
-
-@pytest.mark.parametrize(
-    ("change", "problem"),
-    [
-        ({}, ""),
-        ({"weight": np.full(3, 1e13)}, "weight holds numbers that are too large"),
-        ({"weight": np.zeros(3)}, "a variance is negative, or a weight not above zero"),
-        ({"variance": np.full(3, -1.0)}, "a variance is negative, or a weight not above zero"),
-        ({"design": np.full((3, 1), np.nan)}, "design holds numbers that are too large"),
-        ({"log_factor": np.zeros(2)}, r"log_factor has the shape (2,), not (3,)"),
-        ({"precision": np.full((1, 1), -1.0)}, "precision is not symmetric and positive semi-definite"),
-        ({"tests": ("a", "b", "c")}, "its tests are not those of the identification"),
-        ({"known": -1.0}, "known is -1, which is no standard deviation"),
-    ],
-)
-def test_a_stored_record_of_hostile_numbers_is_refused(change, problem):
-    scatter = scatter_of([0.1, 0.2, 0.3])
-    assert problem_with(dataclasses.replace(scatter, **change), scatter.tests, 1) == problem
 
 
 def test_without_heats_the_restricted_likelihood_is_largest_at_the_sample_variance():
@@ -108,12 +86,6 @@ def test_many_tests_overrule_the_prior():
     assert (1.0 / (posterior.weight**2).sum()) > 10  # nodes within the posterior distribution, not one of them
 
 
-def test_a_given_standard_deviation_is_taken():
-    posterior = scatter_of([0.1, -0.3, 0.2], known=0.07).posterior
-    assert posterior.sd.tolist() == [[0.07]]
-    assert posterior.weight.tolist() == [1.0]
-
-
 def bars(count, scatter, seed, noise=2e-6):
     """Norton bars at one stress, their strains in closed form, e = A s^n t."""
     rng = np.random.default_rng(seed)
@@ -141,15 +113,6 @@ def test_each_test_says_its_own_factor():
     assert sd == pytest.approx(0.1 / np.sqrt(6), rel=0.02)
 
 
-def test_heats_and_laboratories_are_read_from_labels():
-    tests, _ = bars(6, 0.1, 3)
-    labelled = [h.replace(labels={"heat": "ab"[k % 2], "lab": "one"}) for k, h in enumerate(tests)]
-    scatter = ck.identify(ck.law("norton").fix(n=5.0), labelled, using=BAR, starts=1).rate_scatter
-    assert scatter.levels == ("heat", "test")
-    assert scatter.members["heat"] == ("a", "b", "a", "b", "a", "b")
-    assert scatter.common == {"laboratory": "one"}
-
-
 def heats_of(*heats):
     tests, _ = bars(len(heats), 0.1, 3)
     labelled = [h.replace(labels={"heat": heat} if heat else {}) for h, heat in zip(tests, heats, strict=True)]
@@ -163,19 +126,3 @@ def test_a_test_without_a_heat_makes_no_second_heat_beside_one_that_is_named():
     assert [(e.value, e.low, e.high) for e in fit.estimates] == [(e.value, e.low, e.high) for e in labelled.estimates]
     assert f"{fit.histories[4].name} states no heat: taken for one of heat b, as the others are" in fit.notes
     assert not any("states no heat" in one for one in labelled.notes)
-
-
-def test_a_test_without_a_heat_is_one_of_its_own_beside_two_that_are_named():
-    fit = heats_of(*"aabb", "", "b")
-    assert fit.rate_scatter.levels == ("heat", "test")
-    assert len(set(fit.rate_scatter.members["heat"])) == 3
-    assert not fit.rate_scatter.common
-    assert any(one.endswith("taken for a heat of its own") for one in fit.notes)
-
-
-def test_a_new_test_of_the_named_heat_has_the_same_band_with_and_without_the_unlabelled_test():
-    fit, labelled = heats_of(*"bbbb", "", "b"), heats_of(*"bbbbbb")
-    new = labelled.histories[0].replace(name="new")
-    assert fit.rate_scatter.new_test(new) == labelled.rate_scatter.new_test(new)
-    assert fit.rate_scatter.new_test(new).unseen == ()
-    assert fit.rate_scatter.new_test(new.replace(labels={"heat": "c"})).unseen == ("heat",)

@@ -1,6 +1,5 @@
 """Samples of the posterior against closed forms."""
 
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.posterior import Posterior, sample_posterior
@@ -62,14 +60,6 @@ def test_intervals_of_rate_and_exponent(samples, tests):
     assert samples.interval(exponent_at(60.0)) == pytest.approx(samples.interval("n"), rel=1e-6)
 
 
-def test_poorly_known_scatter_widens_them(fit, tests):
-    """With 4 degrees of freedom the marginal of n is Student's t, whose 95 % interval is 2.78 standard errors."""
-    best, covariance = least_squares(tests, SD)
-    found = sample_posterior(replace(fit, freedom=4.0), walkers=32, steps=500, seed=4)
-    half = student.ppf(0.975, 4.0) * np.sqrt(covariance[1, 1])
-    assert found.interval("n") == pytest.approx((best[1], best[1] - half, best[1] + half), abs=0.15 * half)
-
-
 def test_rates_that_scatter_between_tests_count_once_a_test():
     """ln rate of 12 tests on ln stress is a regression: the slope's standard error is sd / sqrt(sum of squares).
 
@@ -120,30 +110,3 @@ def test_nuisances_are_integrated_out(tests):
     y = np.concatenate([h.outputs["amplitude"] - h.times / 1e5 for h in tests])
     left = [y - rows @ u for u in points]
     assert up - down == pytest.approx(left[0] @ inverse @ left[0] - left[1] @ inverse @ left[1], rel=1e-4)
-
-
-def test_a_seed_repeats_the_draws(fit):
-    first, again = (sample_posterior(fit, walkers=8, steps=20, seed=5) for _ in range(2))
-    assert np.array_equal(first.chain, again.chain)
-    assert not np.array_equal(first.chain, sample_posterior(fit, walkers=8, steps=20, seed=6).chain)
-
-
-def test_a_short_chain_says_so(fit):
-    found = sample_posterior(fit, walkers=8, steps=20, seed=5)
-    assert not found.converged
-    assert "not converged" in found.notes[0]
-    assert "not converged" in str(found)
-
-
-def test_what_cannot_be_sampled_is_refused(fit, monkeypatch):
-    with pytest.raises(FitError, match="at least 6 walkers"):
-        sample_posterior(fit, walkers=4)
-    monkeypatch.setitem(sys.modules, "emcee", None)
-    with pytest.raises(FitError, match=r"needs emcee, which is not installed: pip install 'creepkit\[mcmc\]'"):
-        sample_posterior(fit)
-
-
-def test_pairs_are_drawn(samples, tmp_path):
-    figure = samples.plot(tmp_path / "pairs.png")
-    assert (tmp_path / "pairs.png").stat().st_size > 5000
-    assert len([axes for axes in figure.axes if axes.get_visible()]) == 3

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import SolveError
-from creepkit.fem.mesh import Mesh
 
 AREA = 4.0 * np.pi
 LAWS = {
@@ -130,100 +128,6 @@ def test_a_length_that_moves_the_mesh_alone() -> None:
     elastic = 700.0 / AREA / 9e7
     exact = -(10.0 * (strain - elastic) * np.exp(5.0 * strain) + 2.0 * elastic) / 2.0  # of -ln(1 - n A s^n t)/n + s/E
     assert found.nuisance_jacobian["radius"][0, 0, 0, 0] == pytest.approx(exact, rel=1e-3)
-
-
-def test_a_mesh_from_elsewhere() -> None:
-    """The same mesh, given as one from a file would be: what is held comes with it, sides and points are named."""
-    made = RoundBar().section("force")
-    held = np.zeros(made.nodes.shape, bool)
-    held[np.unique(made.sides["bottom"]), 1] = True
-    mesh = Mesh(made.nodes, made.elements, held, made.sides["right"], np.zeros(0, int))
-
-    @dataclass(frozen=True)
-    class ReadBar(RoundBar):
-        grid: Mesh = field(default=mesh)
-
-        def section(self, load: str) -> ck.Section:
-            bar = ck.Section.of_mesh(self.grid).with_side("top", lambda r, z: z > 3.999).with_point("top_left", 0, 4)
-            return bar.plane("top").pull("top")
-
-    plan = plan_of(RoundBar(), ck.constant_load("force", 700.0), [1e3, 1e5])
-    one, other = (predicted(bar, "norton", LAWS["norton"], [plan]).of(0) for bar in (RoundBar(), ReadBar()))
-    np.testing.assert_allclose(one, other, rtol=1e-12)
-
-
-def test_a_run_keeps_the_whole_body() -> None:
-    run = ck.simulate(
-        "norton", RoundBar(), LAWS["norton"], loading=ck.constant_load("force", 60.0 * AREA), temperature=1000.0,
-        elastic=ck.Elastic(E=9e7), times=[1e3, 1e4],
-    )  # fmt: skip
-    assert run.geometry == {"radius": 2.0, "gauge_length": 3.0}
-    assert run.displacements().shape == (2, len(run.model.nodes), 2)
-    stress = 60.0 * np.exp(run.outputs["strain"])[:, None]
-    np.testing.assert_allclose(run.field("stress").values / stress, 1.0, rtol=1e-4)
-    np.testing.assert_allclose(run.field("creep strain").values[-1], run.outputs["strain"][-1], rtol=1e-3)
-    with pytest.raises(SolveError, match="nothing is known at 20000 s; the simulation reaches from 0 to 10000 s"):
-        run.field("stress", 2e4)
-
-
-def test_a_bar_ends_in_tertiary_creep() -> None:
-    """A dead load leads to infinite strain at 1/(n A s^n), which is a result; the strain limit comes just before."""
-    values = {"A": 1e-16, "n": 5.0}
-    end = 1.0 / (5.0 * 1e-16 * 80.0**5)
-    run = ck.simulate(
-        "norton", RoundBar(tolerance=1e-3), values, loading=ck.constant_load("force", 80.0 * AREA), temperature=1000.0,
-        elastic=ck.Elastic(E=150e3), times=np.linspace(0.1, 2.0, 20) * end,
-    )  # fmt: skip
-    assert run.status is ck.Status.RUPTURED
-    assert run.rupture_time == pytest.approx(end, rel=0.01)
-    assert run.reason in ("creep strain reached the strain limit", "equilibrium was lost while the load did not rise")
-
-
-@dataclass(frozen=True)
-class Grows(RoundBar):
-    """A bar with more elements where it is thicker."""
-
-    def section(self, load: str) -> ck.Section:
-        bar = ck.Section.rectangle((0.0, 0.0), (self.radius, 4.0), 2 + (self.radius > 2.0), 2)
-        return bar.hold("bottom", z=True).plane("top").pull("top")
-
-
-@dataclass(frozen=True)
-class Forgets(RoundBar):
-    """A bar that observes nothing."""
-
-    def observe(self, displacements: ck.Displacements):
-        return {}
-
-
-@dataclass(frozen=True)
-class Misnames(RoundBar):
-    """A bar that observes a point that it does not have."""
-
-    def observe(self, displacements: ck.Displacements):
-        return {"strain": displacements.axial("topleft")}
-
-
-def test_what_is_wrong_is_said() -> None:
-    force = ck.constant_load("force", 700.0)
-    plan = plan_of(RoundBar(), force, [1e3])
-    radius = {"nuisances": {"radius": np.array([[2.0]])}, "sensitivities": True}
-    for bar, test, more, message in (
-        (RoundBar(), plan.replace(elastic=None), {}, "specimen 'round-bar' needs elastic data"),
-        (RoundBar(), plan.replace(loading=ck.constant_load("pressure", 1.0)), {}, "is loaded by force"),
-        (RoundBar(), plan.replace(loading=ck.constant_load("force", 0.0)), {}, "the force is zero throughout"),
-        (RoundBar(), plan.replace(geometry={"radius": 200.0}), {}, "radius is 200 mm; allowed is 0.1 to 100 mm"),
-        (Forgets(), plan, {}, "specimen 'round-bar' under force: observe.. gave no 'strain'"),
-        (Misnames(), plan, {}, "a section has no point 'topleft' to observe; did you mean 'top_left'"),
-        (Grows(), plan, radius, "another 'radius' makes another mesh, not the same one with its nodes moved"),
-        (RoundBar(), plan, {"nuisances": {"window": np.ones((1, 1))}}, "does not know the nuisance 'window'"),
-    ):
-        with pytest.raises(SolveError, match=message):
-            predicted(bar, "norton", LAWS["norton"], [test], **more)
-    with pytest.raises(SolveError, match="round-bar specimen: tolerance is 1; allowed are 1e-06 to 0.1"):
-        RoundBar(tolerance=1.0)
-    with pytest.raises(SolveError, match="only a side that the load moves has a force to be observed"):
-        ck.Displacements(RoundBar().section("force")).force  # noqa: B018
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from creepkit.errors import FitError
 from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.specimens.bulge.field_fit import fit_field
 from creepkit.specimens.bulge.observation import Observation
@@ -37,15 +36,6 @@ def test_standard_errors_of_a_field_are_its_scatter():
     np.testing.assert_allclose([f.residual_sd for f in fits], 0.02, rtol=0.15)
 
 
-def test_lost_and_wild_points():
-    x, y = pixels()
-    surface = cross(x - 0.7, y + 0.4, 0.35, 3.6, 2.3)
-    surface[3, 4], surface[9:12, 9] = 2.0, np.nan
-    fit = fit_field(x, y, surface)
-    assert fit.points == 2497
-    np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], [0.35, 3.6, 2.3], rtol=0.005)
-
-
 @needs_shared_data
 def test_field_and_operator_see_the_same():
     nodes, profile = profile_with_apex(0.81)
@@ -56,15 +46,3 @@ def test_field_and_operator_see_the_same():
     expected = Observation("field", 5.0).observe(nodes, profile)[0]
     np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], expected, rtol=2e-4)  # pixels end raggedly
     np.testing.assert_allclose([fit.x_center, fit.y_center], [1.3, -2.0], atol=1e-6)
-
-
-def test_fields_that_show_no_bulge():
-    x, y = pixels(20)
-    noise = np.random.default_rng(4).normal(size=x.shape)
-    with pytest.raises(FitError, match=r"the field of 400 points shows no bulge of Eq\. \(7\): the best fit has D = "):
-        fit_field(x, y, noise)
-    with pytest.raises(FitError, match=r"found the shapes \(20, 20\), \(20, 20\), \(19, 20\)"):
-        fit_field(x, y, noise[1:])
-    for heights in (np.full_like(x, np.nan), np.zeros_like(x), np.where(x > 7.9, 1.0, np.nan)):
-        with pytest.raises(FitError, match="points cannot be fitted; it needs at least 12"):
-            fit_field(x, y, heights)

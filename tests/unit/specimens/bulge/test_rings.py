@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import HistoryError, SolveError
-from creepkit.records import History, growing_output, output_named
+from creepkit.records import History
 from creepkit.specimens.bulge.observation import Observation
 from creepkit.specimens.bulge.specimen import Bulge
 from helpers.bulge_profiles import NODES, bell
@@ -37,26 +35,6 @@ def test_text_and_operator_are_one(text: str) -> None:
     assert operator.outputs == tuple(f"displacement_{k + 1}" for k in range(len(operator.radii)))
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["rings", "rings mm", "rings 0, 2, 4", "rings 2, 0 mm", "rings 0, 0 mm", "rings -1, 2 mm", "rings 0, nan mm",
-     "rings 0, 2, mm", "rings 0 2 mm", "rings 0-7.5 mm", "rings 0, 1, 2, 3, 4, 5, 6, 7, 7.2 mm", "rings 0, inf mm",
-     "rings 0, 1_0 mm", "rings " + "0," * 5000 + " mm"],
-)  # fmt: skip
-def test_other_texts_are_refused_in_one_sentence(text: str) -> None:
-    with pytest.raises(SolveError, match=r"^observation: .*rings 0, 2, 4 mm|^observation: rings have the radii"):
-        Observation.from_text(text)
-
-
-def test_what_rings_and_fits_do_not_share_is_refused() -> None:
-    with pytest.raises(SolveError, match="leave window and points out"):
-        Observation("rings", 5.0, radii=(0, 2))
-    with pytest.raises(SolveError, match="a window and no radii"):
-        Observation("field", radii=(0, 2))
-    assert Observation("field", 5.0).replace(form="rings", radii=(0, 2)) == Observation("rings", radii=(0, 2))
-    assert Observation("rings", radii=(0, 2)).replace(form="field") == Observation("field")
-
-
 def test_a_bell_is_read_where_the_rings_are() -> None:
     radii = (0.0, 2.1, 4.7)
     frames = np.array([bell(NODES, D, 3.8, 2.2) for D in (0.0, 0.1, 0.8)])
@@ -64,22 +42,6 @@ def test_a_bell_is_read_where_the_rings_are() -> None:
     expected = [bell(np.array(radii), D, 3.8, 2.2) for D in (0.0, 0.1, 0.8)]
     np.testing.assert_allclose(seen, expected, atol=2e-4)  # quadratic between nodes
     np.testing.assert_allclose(np.einsum("fon,fn->fo", slopes, frames), seen, rtol=1e-12)  # linear, at rest too
-
-
-def test_radii_beyond_the_surface_are_refused() -> None:
-    specimen = Bulge(refinement=0.5, threads=1)
-    law = ck.law("norton")
-    with pytest.raises(SolveError, match="radius of 12 mm; the observed surface reaches from 0 to 10 mm"):
-        specimen.predict(law, law.to_internal({"A": 2e-12, "n": 3.0}), [planned("rings 0, 12 mm")])
-
-
-def test_a_specimen_that_is_observed_on_rings_says_so() -> None:
-    specimen = Bulge(threads=1).replace(observation=RINGS)
-    assert specimen.outputs == specimen.reduced_order_model().outputs == NAMES
-    assert Bulge().outputs == ("amplitude", "width", "shape")
-    output = output_named("displacement_8", "bulge")
-    assert (output.unit, output.grows, output.noise) == ("mm", True, 0.0015)
-    assert output.long_name == "displacement on ring 8"
 
 
 def test_tests_of_several_operators_are_predicted_together() -> None:
@@ -102,12 +64,6 @@ def test_tests_of_several_operators_are_predicted_together() -> None:
         assert not together.nuisance_jacobian["window"][0, 1][:, 3:].any()
 
 
-def test_the_error_of_the_reduced_order_model_on_rings_is_that_of_the_middle() -> None:
-    specimen = Bulge(refinement=0.5, threads=1)
-    error = specimen.reduced_order_model().error
-    assert error["displacement_1"] == error["displacement_8"] >= 0.9 * error["amplitude"] > 0.0
-
-
 @pytest.fixture(scope="module")
 def case() -> dict:
     """Norton's law with n of 3, converged on a mesh of other elements by other code."""
@@ -127,14 +83,6 @@ def reference(case: dict, noise: float = 0.0) -> History:
 
 
 @needs_shared_data
-def test_simulated_rings_are_those_of_the_converged_reference(case: dict) -> None:
-    test, law = reference(case), ck.law("norton")
-    found = Bulge(threads=1).refined().predict(law, law.to_internal({"A": 2e-12, "n": 3.0}), [test])
-    expected = np.stack([test.outputs[name] for name in NAMES], axis=-1)
-    np.testing.assert_allclose(found.values[0, 0], expected, rtol=5e-4)  # its error is stated as 2e-4
-
-
-@needs_shared_data
 @pytest.mark.long_when_sanitized
 def test_a_law_is_found_from_rings_of_another_code(case: dict) -> None:
     fit = ck.identify("norton", [reference(case, noise=0.0015)])
@@ -143,49 +91,3 @@ def test_a_law_is_found_from_rings_of_another_code(case: dict) -> None:
     assert fit.values["n"] == pytest.approx(3.0, abs=0.05)
     assert fit.values["A"] * 100.0 ** fit.values["n"] == pytest.approx(2e-12 * 100.0**3, rel=0.02)
     assert {o.output for o in fit.tests[0].outputs} == set(NAMES)
-
-
-def test_files_keep_rings(tmp_path: Path) -> None:
-    random = np.random.default_rng(0)
-    outputs = {name: np.sort(random.random(4)) for name in NAMES}
-    test = planned(outputs=outputs, standard_deviation={"displacement_2": 0.002})
-    again = ck.read_histories(ck.write_history(test, tmp_path / "rings.csv"))[0]
-    assert again.operator == RINGS
-    assert growing_output(again) == "displacement_1"
-    for name in NAMES:
-        np.testing.assert_array_equal(again.outputs[name], outputs[name])
-    np.testing.assert_array_equal(again.standard_deviation["displacement_2"], np.full(4, 0.002))
-
-
-@pytest.mark.parametrize(
-    ("operator", "columns", "reason"),
-    [
-        ("", "displacement_1_mm", r"'displacement_1' is not among amplitude, width, shape.*'# operator: rings 0, 2"),
-        ("rings 0, 2 mm", "displacement_3_mm", r"'displacement_3' is not among displacement_1, displacement_2"),
-        (RINGS, "amplitude_mm", r"'amplitude' is not among displacement_1.*'# operator: profile 0-7.5 mm'"),
-        ("profile 0-7.5 mm", "displacement_1_mm", r"'# operator: rings 0, 2, 4 mm'"),
-        ("ring 0, 2 mm", "displacement_1_mm", r"'ring 0, 2 mm' is not understood"),
-    ],
-)
-def test_columns_and_operator_must_agree(tmp_path: Path, operator: str, columns: str, reason: str) -> None:
-    path = tmp_path / "test.csv"
-    head = f"# operator: {operator}\n" if operator else ""
-    path.write_text(
-        f"# specimen: bulge\n# pressure_MPa: 8\n# temperature_C: 700\n# modulus_GPa: 150\n{head}time_s,{columns}\n"
-        "100,0.1\n200,0.2\n"
-    )
-    with pytest.raises(HistoryError, match=rf"^{path}:\d+: .*{reason}"):
-        ck.read_histories(path)
-
-
-def test_a_run_on_rings_is_drawn(tmp_path: Path) -> None:
-    run = ck.simulate(
-        "norton", Bulge(refinement=0.5, threads=1).replace(observation=RINGS), {"A": 2e-12, "n": 3.0},
-        loading=ck.PressureJump(8.0, 8.0, 1e5), times=[600.0, 1800.0, 3600.0], temperature=1000.0,
-        elastic=ck.Elastic(150e3),
-    )  # fmt: skip
-    assert run.operator == RINGS
-    for k, radius in enumerate((0.0, 2.0, 4.0)):
-        np.testing.assert_allclose(run.outputs[NAMES[k]], run.displacement(radius), rtol=1e-9)
-    assert len(run.plot(tmp_path / "run.png").axes) == 2
-    assert list(Bulge().plotted_series(run.outputs)) == [f"displacement on ring {k}" for k in (1, 2, 3)]

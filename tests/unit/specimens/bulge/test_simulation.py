@@ -1,21 +1,12 @@
 """What a simulated bulge test holds: displacements, profile, stresses, fields and pictures, until its end."""
 
-import pickle
-from pathlib import Path
-
 import numpy as np
 import pytest
-from matplotlib.collections import LineCollection, TriMesh
-from matplotlib.image import imread
 
 import creepkit as ck
 from creepkit.errors import SolveError
-from creepkit.language import stress
-from creepkit.readers.history_csv import write_history
-from creepkit.records import Program, RecordedLoading, Specimen, Status
+from creepkit.records import Program, RecordedLoading, Status
 from creepkit.specimens.bulge.run import BulgeRun
-from creepkit.specimens.bulge.specimen import creepkit_specimens
-from helpers.literature_laws import POWER, RATE, A, B, damage, k, n
 
 N3 = {"A": 5e-13, "n": 3.0}
 TIMES = np.array([0.0, 150, 600, 1800, 3600, 7200, 14400, 28800, 43200])
@@ -39,52 +30,12 @@ def burst() -> BulgeRun:
     return simulated(values={"A": 5e-11, "n": 3.0})
 
 
-def test_it_is_a_specimen_and_comes_through_the_hook() -> None:
-    (found,) = creepkit_specimens()
-    assert isinstance(found, Specimen)
-    assert (found.name, found.outputs) == ("bulge", ("amplitude", "width", "shape"))
-
-
 # ---- displacements -------------------------------------------------------------------------------------------------
-
-
-def test_displacement_has_an_axis_for_times_and_one_for_several_radii(run: BulgeRun) -> None:
-    assert run.displacement().shape == (9,)
-    assert run.displacement([0, 2, 4]).shape == (9, 3)
-    assert run.displacement(2.0, 3600).shape == ()
-    assert run.displacement([2.0], 3600).shape == (1,)
-    np.testing.assert_array_equal(run.displacement([0, 2])[:, 0], run.displacement())
-
-
-def test_displacement_at_nodes_is_that_of_the_profile_and_quadratic_between_them(run: BulgeRun) -> None:
-    radii, rise = run.profile()
-    np.testing.assert_allclose(run.displacement(radii), rise, atol=1e-15)
-    assert (radii[0], radii[-1]) == (0.0, 10.0)
-    halfway = np.array([0.375, 0.75, -0.125])
-    found = run.displacement(halfway @ radii[2:5])
-    np.testing.assert_allclose(found, rise[:, 2:5] @ halfway, rtol=1e-9)
-
-
-def test_the_apex_rises_most_and_the_rim_not_at_all(run: BulgeRun) -> None:
-    rise = run.profile().displacement
-    assert (rise[0] == 0.0).all()
-    assert (np.diff(rise[1:], axis=0) >= -1e-12)[:, :5].all()
-    assert (rise.argmax(axis=1)[1:] == 0).all()
-    np.testing.assert_array_equal(rise[:, -1], 0.0)
-
-
-def test_what_is_observed_is_close_to_the_apex(run: BulgeRun) -> None:
-    np.testing.assert_allclose(run.outputs["amplitude"][1:], run.displacement()[1:], rtol=0.02)
 
 
 def test_the_answer_does_not_depend_on_the_times_asked_for(run: BulgeRun) -> None:
     few = simulated(times=[7200.0, 43200.0])
     np.testing.assert_allclose(few.displacement(), run.displacement(times=[7200.0, 43200.0]), rtol=1e-12)
-
-
-def test_a_run_says_what_prediction_says(run: BulgeRun) -> None:
-    found = ck.specimen("bulge").predict(ck.law("norton"), ck.law("norton").to_internal(N3), [run])
-    np.testing.assert_allclose(found.of(0), np.stack(list(run.outputs.values()), axis=1), rtol=1e-9)
 
 
 # ---- stresses and strains ------------------------------------------------------------------------------------------
@@ -106,16 +57,6 @@ def test_stresses_are_those_of_figure_2c_of_the_paper() -> None:
     assert (np.quantile(values[:, places[:, 0] <= 7.5], 0.05, axis=1) > 40).all()
 
 
-def test_the_range_is_of_points_within_a_radius(run: BulgeRun) -> None:
-    places, values = run.field("stress", 3600.0)
-    for radius, found in ((7.5, run.mises_range(3600.0)), (3.0, run.mises_range(3600.0, within=3.0))):
-        mine = values[places[:, 0] <= radius]
-        assert found == (mine.min(), mine.max())
-    assert run.mises_range().high.shape == (9,)
-    with pytest.raises(SolveError, match="no integration point lies within a radius of 0.001 mm"):
-        run.mises_range(within=1e-3)
-
-
 def test_creep_redistributes_the_elastic_stress(run: BulgeRun) -> None:
     elastic = run.mises_range(5.0)
     later = run.mises_range(3600.0)
@@ -123,30 +64,7 @@ def test_creep_redistributes_the_elastic_stress(run: BulgeRun) -> None:
     assert elastic.low < later.low
 
 
-def test_creep_strain_only_grows(run: BulgeRun) -> None:
-    """To what the interpolation between steps costs, where next to nothing creeps."""
-    _, strain = run.field("creep strain")
-    assert strain.shape == (9, len(run.point_coordinates))
-    assert (strain[0] == 0).all()
-    assert (np.diff(strain, axis=0) > -1e-4 * strain.max()).all()
-
-
-def test_states_of_a_law_are_fields() -> None:
-    law = damage(A * stress**n, B * stress**k, {A: RATE, n: POWER, B: RATE, k: POWER})
-    run = simulated(law, {**N3, "B": 1e-12, "k": 3.0}, times=[0.0, 3600.0])
-    _, damaged = run.field("omega", 3600.0)
-    _, strain = run.field("creep strain", 3600.0)
-    np.testing.assert_allclose(damaged, 2 * strain, rtol=1e-6)
-    with pytest.raises(SolveError, match="a bulge run has no field 'omga'; did you mean 'omega'"):
-        run.field("omga")
-
-
 # ---- how it ends ---------------------------------------------------------------------------------------------------
-
-
-def test_a_complete_run_says_so(run: BulgeRun) -> None:
-    assert (run.status, run.end_time, run.reason, dict(run.labels)) == (Status.COMPLETE, 43200.0, "", {})
-    assert str(run).startswith("simulated: complete; 9 frames to 43200 s, where amplitude ")
 
 
 def test_a_burst_is_an_answer_up_to_there(burst: BulgeRun) -> None:
@@ -178,57 +96,3 @@ def test_a_program_holds_its_last_value_beyond_its_end(run: BulgeRun) -> None:
 
 
 # ---- kept, written, drawn ------------------------------------------------------------------------------------------
-
-
-def test_a_run_is_a_history_that_files_keep(run: BulgeRun, tmp_path: Path) -> None:
-    thin = simulated(using=ck.specimen("bulge").replace(apex_thickness=0.45))
-    (read,) = ck.read_histories(write_history(thin, tmp_path / "thin.csv"))
-    assert read.specimen == "bulge"
-    assert read.geometry == thin.geometry
-    assert read.geometry["apex_thickness"] == 0.45
-    assert (read.operator, read.elastic, read.loading) == ("profile 0-7.5 mm", STIFF, HELD)
-    for name, values in thin.outputs.items():
-        np.testing.assert_array_equal(read.outputs[name], values)
-    again = ck.specimen("bulge").predict(ck.law("norton"), ck.law("norton").to_internal(N3), [read])
-    np.testing.assert_allclose(again.of(0)[:, 0], thin.outputs["amplitude"], rtol=1e-9)
-
-
-def test_a_run_survives_a_pickle_and_a_replacement(run: BulgeRun) -> None:
-    for again in (pickle.loads(pickle.dumps(run)), run.replace(name="again")):
-        assert isinstance(again, BulgeRun)
-        np.testing.assert_array_equal(again.displacement(2.0), run.displacement(2.0))
-
-
-def test_the_section_is_drawn_where_the_dimple_is(run: BulgeRun, tmp_path: Path) -> None:
-    figure = run.section(path=tmp_path / "section.png")
-    axes, bar = figure.axes
-    meshes = [drawn for drawn in axes.collections if isinstance(drawn, TriMesh)]
-    top = 4.0 + run.displacement()[-1]
-    np.testing.assert_allclose(axes.dataLim.extents, [-10.0, 0.0, 10.0, top], atol=1e-9)
-    lines = [drawn for drawn in axes.collections if isinstance(drawn, LineCollection)]
-    tops = sorted(max(segment[:, 1].max() for segment in line.get_segments()) for line in lines)
-    np.testing.assert_allclose(tops, [4, 4, top, top])
-    assert axes.get_title() == "simulated: 12 h, 8 MPa (dashed: at rest)"
-    assert bar.get_ylabel() == "von Mises stress, MPa"
-    assert meshes[0].get_clim() == (run.field().values[-1].min(), run.field().values[-1].max())
-    assert np.ptp(imread(tmp_path / "section.png")[..., :3], axis=2).max() > 0.5, "it is in colour"
-
-
-@pytest.mark.parametrize("time", [0.0, 5.0, 600.0])
-def test_any_field_is_drawn_at_any_time(run: BulgeRun, time: float) -> None:
-    assert run.section(time, "creep strain").axes[1].get_ylabel() == "equivalent creep strain"
-
-
-def test_outputs_and_pressure_are_drawn_over_time(burst: BulgeRun, tmp_path: Path) -> None:
-    panels = burst.plot(tmp_path / "outputs.png").axes
-    labels = [axes.get_ylabel() for axes in panels]
-    assert labels == ["amplitude, mm", "width, mm", "shape", "pressure, MPa"]
-    np.testing.assert_array_equal(panels[0].lines[0].get_xydata()[:, 1], burst.outputs["amplitude"])
-    hours, pressure = panels[3].lines[0].get_xydata().T
-    assert (hours[-1], pressure[-1]) == (burst.end_time / 3600, 8.0)
-    assert (tmp_path / "outputs.png").stat().st_size > 10_000
-
-
-def test_a_picture_that_cannot_be_written_is_said(run: BulgeRun, tmp_path: Path) -> None:
-    with pytest.raises(SolveError, match="cannot be written|is no format of pictures"):
-        run.section(path=tmp_path / "none" / "section.png")
