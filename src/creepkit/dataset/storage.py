@@ -206,7 +206,7 @@ def read_header(file: h5py.File, source: str) -> Dataset:
     """The data set of a file with no samples in it yet."""
     check_format(file, source)
     name_lists: dict[str, Any] = {name: stored_names(file, name, source) for name in NAME_LISTS}
-    documents = {}
+    documents: dict[str, Any] = {}
     for name in ("law", "specimen", "design", "provenance"):
         text = file.attrs.get(name)
         documents[name] = parse_json(text, f"{source}: its {name}", DATASET_FILE) if isinstance(text, str) else None
