@@ -59,6 +59,13 @@ def test_a_law_of_one_number_ends_in_a_status(body, value: float) -> None:
     assert np.isin(integrate(law, THETA, [point], jacobian=True).status, [int(s) for s in Status]).all()
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_derivatives_that_are_no_numbers_end_the_simulation(body, value: float) -> None:
+    made = run(body, replace(norton(), sensitivity=entry(9, value)), directions=sensitivity_directions(body, LOAD))
+    assert made.status is Status.NOT_CONVERGED
+    assert "tangent was singular" in made.reason
+
+
 @pytest.mark.parametrize("theta", [[np.nan, 4.0], [0.0, np.inf], [-np.inf, 4.0], [700.0, 4.0], [-30.0, -5.0]])
 def test_any_parameters_end_in_a_status(body, theta: list[float]) -> None:
     made = run(body, norton(), np.array(theta), directions=sensitivity_directions(body, LOAD))

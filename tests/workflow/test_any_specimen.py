@@ -1,5 +1,6 @@
 """From a specimen that no module knows by name to a data set, a network, and an identification by it."""
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -80,6 +81,21 @@ def test_a_network_of_the_cantilever_identifies_a_planted_law(beams):
     assert found["A"] * stress ** found["n"] == pytest.approx(truth["A"] * stress ** truth["n"], rel=0.1)
 
 
+def test_samples_of_a_bar_in_relaxation_are_its_closed_form(tmp_path):
+    """Norton: sigma^(1-n) grows by (n - 1) A E t while the strain is held."""
+    data = ck.generate(
+        "norton", "relaxation", draws=16, seed=3, to=tmp_path / "r.h5", every=2 * HOUR, execution=ONE_PROCESS
+    )
+    assert data.condition_names == ("modulus", "strain_1", "strain_2", "jump_time")
+    for row in range(8):
+        values, conditions, times = data.values_of(row), data.conditions_of(row), data.times(row)
+        A, n, E = values["A"], values["n"], conditions["modulus"]
+        early = times < conditions["jump_time"]
+        start = E * conditions["strain_1"]
+        expected = (start ** (1 - n) + (n - 1) * A * E * times[early]) ** (1 / (1 - n))
+        np.testing.assert_allclose(data.values[row, early, 0], expected, rtol=1e-4)
+
+
 def test_the_command_line_generates_and_trains_for_a_specimen_of_a_plugin_file(tmp_path):
     from creepkit.registry import default_registry
 
@@ -99,3 +115,42 @@ def test_the_command_line_generates_and_trains_for_a_specimen_of_a_plugin_file(t
         assert "parameter-gru of cantilever" in ck.surrogate(model).name
     finally:
         default_registry.cache_clear()
+
+
+SCRIPT = """
+import sys
+from dataclasses import dataclass
+import creepkit as ck
+
+@dataclass(frozen=True)
+class Rod(ck.PerTest):
+    name, title = "rod", "A rod that a script wrote"
+    outputs = (ck.Output("elongation", "length", noise=0.001),)
+    loads = (ck.Load("force", "force"),)
+    conditions = {"force": (500.0, 1000.0)}
+    area: float = 10.0
+
+    def reference_stress(self, history):
+        return history.loading.program().values / self.area
+
+    def growth_per_strain(self, history):
+        return 100.0
+
+    def one(self, law, values, history, nuisances):
+        stress = history.loading.program().values[0] / self.area
+        return {"elongation": 100.0 * values["A"] * stress ** values["n"] * history.times}
+
+data = ck.generate("norton", Rod(), draws=8, seed=1, to=sys.argv[1], every=14400)
+print(len(data), ck.read_dataset(sys.argv[1]).specimen)
+"""
+
+
+def test_a_specimen_of_the_main_script_is_simulated_where_it_is(tmp_path):
+    """No other process could read its class."""
+    script = tmp_path / "rods.py"
+    script.write_text(SCRIPT)
+    done = subprocess.run(
+        [sys.executable, script, tmp_path / "rods.h5"], capture_output=True, text=True, check=False, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "8 Rod(area=10.0)\n"

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import re
+import runpy
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,8 @@ from typer.testing import CliRunner
 
 import creepkit as ck
 from creepkit.cli.app import app
-from creepkit.cli.demo import PLANTED
+from creepkit.cli.demo import PLANTED, PLANTED_BULGE
+from helpers.paths import EXAMPLES
 
 CURVES = sorted(str(p) for p in PLANTED.glob("*.csv"))
 
@@ -112,3 +114,13 @@ def test_demo_identifies_measured_curves_then_the_law_of_a_virtual_bulge_test(tm
     again = creepkit("run", path, "--to", tmp_path / "again", "--only", "quality")
     assert again.exit_code == 0, again.output
     assert "all numbers are those of" in again.stdout
+
+
+def test_the_virtual_bulge_test_is_what_its_script_makes(tmp_path):
+    """To a third of its noise: the solver may change within its tolerance."""
+    script = EXAMPLES / "00_make_a_virtual_bulge_test.py"
+    runpy.run_path(str(script))["main"](tmp_path)
+    (made,), (shipped,) = (ck.read_histories(folder / "virtual_bulge_test.csv") for folder in (tmp_path, PLANTED_BULGE))
+    for name, noise in (("amplitude", 1.5e-3), ("width", 0.02), ("shape", 0.02)):
+        assert made.outputs[name] == pytest.approx(shipped.outputs[name], abs=noise / 3)
+    assert (tmp_path / "truth.json").read_text() == (PLANTED_BULGE / "truth.json").read_text()

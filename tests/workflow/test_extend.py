@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 import creepkit as ck
-from creepkit.errors import SolveError
+from creepkit.errors import LawError, SolveError
 from creepkit.records import Dimension, LawWithValues
 from creepkit.registry import Plugin, Registry, default_registry
 from helpers.command_line import creepkit, one_line
@@ -137,6 +137,19 @@ def test_the_cantilever_is_that_of_beam_theory() -> None:
         )
 
 
+def test_its_central_differences_are_the_derivatives_of_the_closed_form() -> None:
+    """The deflection goes with A and with h^-(2 n + 1)."""
+    from creepkit.inverse.composite_predictor import predict_with_sensitivities
+
+    beam, norton = contributed("specimen")[-1], ck.law("norton")
+    test = ck.History("beam", np.array([3.6e6]), {}, ck.constant_load("force", 12.0), 300.0, specimen="cantilever")
+    theta = norton.to_internal({"A": 1e-16, "n": 4.0})[0]
+    found = predict_with_sensitivities(beam, norton, theta, [test], {"height": np.array([[2.0]])})
+    deflection = found.values[0, 0, 0, 0]
+    assert found.jacobian[0, 0, 0, 0, 0] == pytest.approx(deflection, rel=3e-6)
+    assert found.nuisance_jacobian["height"][0, 0, 0, 0] == pytest.approx(-9.0 / 2.0 * deflection, rel=1e-3)
+
+
 def test_the_cantilever_is_used_by_name() -> None:
     Path("cantilever.py").write_text(examples("specimen")[-1])
     (use,) = (block for block in blocks("write_a_specimen") if "load_plugin" in block)
@@ -144,6 +157,35 @@ def test_the_cantilever_is_used_by_name() -> None:
     exec(compile(use, "write_a_specimen.md", "exec"), space)
     assert space["fit"].values["n"] == pytest.approx(4.0, rel=1e-3)
     assert space["fit"].values["A"] == pytest.approx(1e-16, rel=1e-2)
+
+
+def test_a_bar_by_a_formula_is_the_bar_that_ships() -> None:
+    given = dict(loading=ck.constant_stress(90.0, "stress"), times=np.geomspace(1e3, 1e5, 9))
+    values = {"A": 1e-16, "n": 4.5}
+    found = ck.simulate("norton", contributed("specimen")[0], values, **given)
+    np.testing.assert_allclose(
+        found.outputs["strain"], ck.simulate("norton", "uniaxial", values, **given).outputs["strain"], rtol=1e-6
+    )
+
+
+def test_three_specimens_are_identified_together() -> None:
+    """Planted values lie in every interval, and the tests of others find the dimensions of a test piece."""
+    Path("cantilever.py").write_text(examples("specimen")[-1])
+    space: dict = {}
+    (program,) = blocks("joint_identification")
+    exec(compile(program, "joint_identification.md", "exec"), space)
+    fits, truth = space["fits"], space["TRUTH"]
+    for fit in fits.values():
+        for estimate in fit.estimates:
+            assert estimate.low < truth[estimate.name] < estimate.high
+    width = {g: {e.name: np.log(e.high / e.low) for e in fit.estimates} for g, fit in fits.items()}
+    for name in ("A", "n"):
+        assert width["all"][name] < 1.1 * min(width[group][name] for group in ("bar", "dimple", "beams"))
+    assert width["all"]["A"] < 0.3 * width["beams"]["A"] < 0.3 * width["bar"]["A"]
+    text = str(fits["all"])
+    height, sd = map(float, re.search(r"height of all(?:, mm)?: (\S+) \+- (\S+)", text).groups())
+    assert abs(height - 2.012) < 4 * sd < 0.002, "the beams are 2.012 mm high"
+    assert "the law is not contradicted by the tests at their stated noise" in text
 
 
 # ---- readers -------------------------------------------------------------------------------------------------------
@@ -212,7 +254,56 @@ def test_exporters_write_what_is_shown() -> None:
     assert table.text(source).splitlines() == ["# a note", "name,value,unit", "A,1e-16,1/s", "n,5.0,1"]
 
 
+@pytest.mark.parametrize(
+    ("name", "values", "rate"),
+    [
+        ("norton", {"A": 1e-16, "n": 5.0}, 1e-16 * 90.0**5),
+        ("strain-hardening", {"A": 1e-16, "n": 4.4, "m": -0.35}, 1e-16 * 90.0**4.4 * 0.003**-0.35),
+    ],
+)
+def test_the_function_of_octave_is_the_law(name: str, values: dict, rate: float) -> None:
+    """Its lines are Python's but for the signs of operators, which stand for those of arrays."""
+    text = contributed("exporter")[-1].text(LawWithValues(ck.law(name), values, notes=("a note",)))
+    head, *body, end = [line for line in text.splitlines() if not line.startswith("%")]
+    assert "% a note" in text
+    assert head == f"function rate = {name.replace('-', '_')}(stress, strain, time, temperature)"
+    assert end == "end"
+    space = {"stress": 90.0, "strain": 0.003, "time": 7e4, "temperature": 1000.0}
+    for line in body:
+        exec(line.strip().rstrip(";").replace(".*", "*").replace(".^", "**").replace("^", "**"), space)
+    assert space["rate"] == pytest.approx(rate, rel=1e-12)
+
+
 # ---- temperature forms ---------------------------------------------------------------------------------------------
+
+
+def strain_at(law, values: dict, temperature: float) -> float:
+    """Creep strain of 1 h at a held stress of 100 MPa."""
+    loading = ck.constant_stress(100.0, "stress")
+    run = ck.simulate(law, "uniaxial", values, loading=loading, times=[3600.0], temperature=temperature)
+    return float(run.outputs["strain"][0])
+
+
+def test_rates_double_in_the_interval_of_doubling() -> None:
+    doubling = contributed("temperature_form")[0]
+    law, values = ck.law("norton").times(doubling(1050.0)), {"A": 1e-16, "n": 4.0, "D": 15.0}
+    assert strain_at(law, values, 1050.0) == pytest.approx(1e-16 * 100.0**4 * 3600, rel=1e-9)
+    assert strain_at(law, values, 1080.0) == pytest.approx(4e-16 * 100.0**4 * 3600, rel=1e-9)
+    assert ck.check_law(law, samples=16).passed
+
+
+def test_an_exponent_steps_between_two_values() -> None:
+    transition = contributed("temperature_form")[-1]
+    law = ck.law("norton").with_temperature(n=transition(1050.0, width=30.0))
+    values = {"A": 1e-16, "n": 4.0, "n_S": 0.5, "n_Ts": 1100.0}
+    assert strain_at(law, values, 1050.0) == pytest.approx(1e-16 * 100.0**4 * 3600, rel=1e-9)
+    ratio = strain_at(law, values, 1140.0) / strain_at(law, values, 1060.0)
+    assert ratio == pytest.approx(100.0 ** (0.5 * 0.8), rel=1e-9), "40 K of 50 K, the sides being 30, 40 and 50"
+    assert ck.check_law(law, samples=16).passed
+    with pytest.raises(LawError, match="'A' has a log scale"):
+        ck.law("norton").with_temperature(A=transition())
+    with pytest.raises(LawError, match="width is 0"):
+        transition(width=0)
 
 
 # ---- commands ------------------------------------------------------------------------------------------------------

@@ -71,6 +71,14 @@ def tests_folder(request, tmp_path_factory):
     return folder, "dimple" if request.param is dimples else None
 
 
+@pytest.fixture(scope="module")
+def bars_folder(tmp_path_factory):
+    """Bars alone, for options that go the same way whatever the tests are."""
+    folder = tmp_path_factory.mktemp("bars")
+    curves(folder)
+    return folder, None
+
+
 def predictor(name):
     return None if name is None else ck.surrogate(name)
 
@@ -123,8 +131,54 @@ def test_identify(tests_folder, tmp_path, words, options, excluded):
     assert any("suspect frames were left out: 1 of" in note for note in fit.notes) == excluded
 
 
+def test_select(tests_folder, tmp_path):
+    selected(tests_folder, tmp_path, (), {})
+
+
+def test_select_with_other_options(bars_folder, tmp_path):
+    selected(bars_folder, tmp_path, ("--no-sums", "--seed", "2"), {"sums": False, "seed": 2})
+
+
+def selected(tests_folder, tmp_path, words, options):
+    """Compare a selection by Python with one by these words."""
+    folder, surrogate = tests_folder
+    tests, laws = ck.read_histories(folder), ("norton", "strain-hardening")
+    candidates = [ck.with_arrhenius(ck.law(name), tests) for name in laws]
+    ranking = ck.select(candidates, tests, predictor(surrogate), **QUICK, **options)
+    named = [word for name in laws for word in ("--law", name)]
+    result = command(
+        "identify", folder, *named, "--to", tmp_path, "--json", *surrogate_words(surrogate), *QUICK_WORDS, *words
+    )
+    answer = json.loads(result.stdout)
+    assert answer["verdict"] == ranking.verdict
+    assert [law["weight"] for law in answer["laws"]] == [ranked.weight for ranked in ranking.laws]
+    for ranked in ranking.laws:
+        assert same(ck.load(tmp_path / f"{ranked.fit.law.name.replace('*', '-')}.json"), ranked.fit)
+
+
+def test_screen(tests_folder, tmp_path):
+    folder, surrogate = tests_folder
+    settings = ck.IdentificationSettings(starts=1, sobol_points=64, frames=14)
+    options = ck.ScreeningOptions(settings=settings, dense=None, confirm=False)
+    tests = [test.replace(alloy="A") for test in ck.read_histories(folder)]
+    (tmp_path / "tests").mkdir()
+    for test in tests:
+        ck.write_history(test, tmp_path / "tests" / f"{test.name}.csv")
+    plate = ck.screen(tests, ["norton"], predictor(surrogate), options=options, workers=1)
+    words = ("--law", "norton", "--dense", "none", "--confirm", "never", "--workers", "1", *QUICK_WORDS)
+    command("screen", tmp_path / "tests", "--to", tmp_path / "out", *words, *surrogate_words(surrogate))
+    (result,) = plate.results
+    assert same(ck.load(tmp_path / "out" / "fits" / "A.json"), result.best)
+    assert any("suspect frames were left out: 1 of" in note for note in result.notes)
+
+
 def test_discover(tests_folder, tmp_path):
     discovered(tests_folder, tmp_path, (), {})
+
+
+def test_discover_with_other_options(bars_folder, tmp_path):
+    words = ("--seed", "5", "--suspect-frames", "keep")
+    discovered(bars_folder, tmp_path, words, {"seed": 5, "suspect_frames": "keep"})
 
 
 def discovered(tests_folder, tmp_path, words, changes):

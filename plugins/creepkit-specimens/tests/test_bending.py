@@ -18,7 +18,7 @@ import creepkit as ck
 from creepkit.records import Program, Status
 
 sys.path.insert(0, str(Path(__file__).parent))
-from beam_tests import ELASTIC, E, planted
+from beam_tests import ELASTIC, E, planted, three_point
 
 WIDTH, HEIGHT = 8.0, 4.0
 INERTIA = WIDTH * HEIGHT**3 / 12
@@ -119,6 +119,15 @@ def test_late_relaxation_follows_the_steady_law(beam):
     fall = -np.diff(force)[0] / 2e6
 
     assert fall * elastic_compliance(beam) == pytest.approx(steady_rate(beam, A, n, mean), rel=0.1)
+
+
+def test_a_hardening_law_against_another_discretisation():
+    """Midpoint fibres and stations, an explicit Runge-Kutta method: p' = A s^3 p^-0.6."""
+    values, times = {"A": 1e-14, "n": 3.0}, np.geomspace(1e3, 1e6, 8)
+    run = simulated(ThreePointBend(), {**values, "m": -0.6}, times, law="strain-hardening")
+    other = three_point(values, 200.0, times, fibres=60, stations=40, strain_power=-0.6)
+
+    np.testing.assert_allclose(run.outputs["deflection"], other, rtol=1e-3)
 
 
 def test_a_step_and_a_ramp_of_force_at_changing_temperature():

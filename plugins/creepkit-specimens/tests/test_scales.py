@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from creepkit_specimens.notched_bar import NotchedBar
+from creepkit_specimens.notched_bar import NotchedBar, NotchedRelaxation
 from creepkit_specimens.plate_bulge import DomeBulge, PlateBulge
 from creepkit_specimens.tube import OpenTube, Tube
 
@@ -42,3 +42,15 @@ def test_a_piece_grows_as_it_says(piece: str) -> None:
     )  # fmt: skip
     grown = np.diff(run.outputs[specimen.outputs[0]])[0]
     assert grown / (1.5e-4 * growth) == pytest.approx(1.0, abs=0.35)
+
+
+def test_a_held_bar_knows_its_elastic_force() -> None:
+    """Sections in a row are softer than a notch that they cannot follow, by some percent."""
+    bar = NotchedRelaxation()
+    plan = plan_of(bar, "displacement", 0.02, 150e3)
+    run = ck.simulate(
+        "norton", bar, {"A": 1e-40, "n": 1.0}, loading=plan.loading, elastic=plan.elastic, temperature=1000.0,
+        times=[1.0],
+    )  # fmt: skip
+    stress = run.outputs["force"][0] / (16.0 * np.pi * bar.constraint)
+    assert bar.reference_stress(plan)[0] == pytest.approx(stress, rel=0.1)

@@ -121,7 +121,7 @@ class CommandGroup(TyperGroup):
             failed: tuple[str, ...] = ()
         except PluginError as error:
             failed = (str(error),)
-        added, problems = _plugin_commands(set(self.commands), listed_only=True)
+        added, problems = _plugin_commands(set(self.commands))
         shown = {name: command for name, command in sorted(added.items()) if not command.hidden}
         if shown:
             limit = formatter.width - 6 - max(map(len, shown))
@@ -226,13 +226,13 @@ def _load_plugin_files(files: list[Path] | None) -> None:
                 tell(f"creepkit: {sentence}", err=True)
 
 
-def _plugin_commands(own_names: set[str], *, listed_only: bool = False) -> tuple[dict[str, Any], list[str]]:
+def _plugin_commands(own_names: set[str]) -> tuple[dict[str, Any], list[str]]:
     """Return {name: command} of what plugins add, and a sentence for each plugin or command that cannot be used."""
     from creepkit import registry
 
     added: dict[str, Any] = {}
     problems: list[str] = []
-    for plugin, app in registry.default_registry().command_lines(listed_only=listed_only):
+    for plugin, app in registry.default_registry().command_lines():
         try:
             commands = typer.main.get_group(app).commands
         except Exception as error:  # of the signature of somebody else's command

@@ -50,8 +50,8 @@ def command(
 def _resolved(words: list[str]) -> tuple[PageSource, list[History]]:
     """The source of the page, and the measured tests; a word that is no file is a law."""
     import creepkit as ck
+    from creepkit.cli.law_sources import read_law_file
     from creepkit.errors import FitError
-    from creepkit.exporters.law_files import read_law_file
     from creepkit.inverse.ranking_document import RANKING, read_ranking
 
     sources: list[PageSource] = []

@@ -162,12 +162,54 @@ def test_a_point_without_a_number_is_lost(word: str, tmp_path: Path) -> None:
     assert list(np.flatnonzero(~frame.valid)) == [2, *LOST]
 
 
+def test_decimal_commas_in_quotes(tmp_path: Path) -> None:
+    rows = [
+        ",".join(f'"{cell}"' for cell in line.split(";"))
+        for line in ["X [mm];Y [mm];Z [mm];U [mm];V [mm];W [mm];sigma", "1,5;2;3;0,25;0;-1,25e-1;0,01"]
+    ]
+    frame = ck.read_frames(written(tmp_path, "\n".join(rows).encode(), "a.csv"))[0]
+    assert frame.points[0].tolist() == [1.5, 2.0, 3.0]
+    assert frame.displacements[0].tolist() == [0.25, 0.0, -0.125]
+
+
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
 @pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
 def test_encodings_and_ends_of_lines(encoding: str, newline: str, tmp_path: Path) -> None:
     text = dice().decode().replace("\n", newline).encode(encoding)
     frame = ck.read_frames(written(tmp_path, text, "DICe_solution_1.txt"))[0]
     np.testing.assert_allclose(frame.displacements[30], dome().displacements[30], rtol=1e-9)
+
+
+def test_columns_named_by_the_user(tmp_path: Path) -> None:
+    head = b"time_s;PosX (m);PosY (m);PosZ (m);dx (mm);dy (mm);dz (mm);quality\n"
+    path = written(tmp_path, head + b"12,5;1;2;3;4;5;6;0,9\n12,5;1;2;3;4;5;7;0,1\n", "lab.csv")
+    names = {"x": "PosX", "y": "PosY", "z": "PosZ", "u": "dx", "v": "dy", "w": "dz", "time": "time"}
+    with pytest.raises(HistoryError, match="no camera format has its columns"):
+        ck.read_frames(path)
+
+    frames = ck.read_frames(path, format=names)
+    assert frames[0].points[0].tolist() == [1000.0, 2000.0, 3000.0]
+    assert frames.times.tolist() == [12.5]
+    assert frames[0].time == 12.5
+
+    ours = ck.CameraFormat(
+        "ours", "ours", {**names, "confidence": "quality"}, lost={"quality": "< 0.5"}, axes=(1, -1, -1)
+    )
+    frames = ck.read_frames(path, format=ours)
+    assert frames[0].valid.tolist() == [True, False]
+    assert frames[0].displacements[0].tolist() == [4.0, -5.0, -6.0]
+    assert ck.read_frames(path, format={**names, "x": "posx"})[0].points[0, 0] == 1000.0  # other capitals do
+
+
+def test_two_formats_for_one_head(tmp_path: Path) -> None:
+    from creepkit.cameras.formats import FORMATS
+    from creepkit.cameras.reading import read_frames
+
+    twin = dataclasses.replace(ck.available("cameras")["zeiss"], name="twin")
+    path = written(tmp_path, zeiss(), "nodemap.txt")
+    with pytest.raises(HistoryError, match="the camera formats 'zeiss' and 'twin' both fit it; say which one"):
+        read_frames(path, [*FORMATS, twin])
+    assert len(read_frames(path, [*FORMATS, twin], "twin")) == 1
 
 
 def test_arrays_of_matlab_written_in_other_ways(tmp_path: Path) -> None:

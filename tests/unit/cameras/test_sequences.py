@@ -10,7 +10,7 @@ import pytest
 import creepkit as ck
 from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import HistoryError
-from helpers.camera_samples import dice, dome, pyvale
+from helpers.camera_samples import dice, dice_blanks, dome, pyvale, vic_3d, zeiss
 
 
 def folder_of(path: Path, names: list[str], write=dice) -> Path:
@@ -53,6 +53,24 @@ def test_a_broken_frame_is_missed_when_it_is_read(content: bytes, tmp_path: Path
     assert frames[2].valid.size == 49
     with pytest.raises(HistoryError, match="f_2.txt"):
         frames[1]
+
+
+def test_frames_of_other_columns(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "test", ["f_1.txt", "f_2.txt", "f_3.txt"])
+    (folder / "f_2.txt").write_bytes(dice_blanks())  # the same columns, with blanks
+    (folder / "f_3.txt").write_bytes(dice().replace(b"GAMMA", b"GAMMA_2"))
+    frames = ck.read_frames(folder)
+
+    assert frames[1].valid.size == 49
+    with pytest.raises(HistoryError, match=r"f_3.txt:5: its columns are not those of f_1.txt \('GAMMA'"):
+        frames[2]
+
+
+def test_an_image_that_comes_twice_in_a_file_of_a_folder(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "test", ["f_1.csv", "f_2.csv"], vic_3d)
+    (folder / "f_2.csv").write_bytes(vic_3d() + vic_3d())
+    with pytest.raises(HistoryError, match="f_2.csv:53: the line of columns comes again"):
+        ck.read_frames(folder)[1]
 
 
 @pytest.mark.parametrize(
@@ -101,6 +119,20 @@ def test_times_given(tmp_path: Path) -> None:
     ]:
         with pytest.raises(HistoryError, match=message):
             ck.read_frames(folder, times=times)
+
+
+def test_times_in_heads_and_names(tmp_path: Path) -> None:
+    import dataclasses
+
+    folder = folder_of(tmp_path / "test", ["map_100.txt", "map_350.txt"], zeiss)
+    for k, file in enumerate(sorted(folder.iterdir())):
+        file.write_bytes(file.read_bytes().replace(b"# force :", f"# clock: {k + 2} min\n# force :".encode()))
+    system = ck.available("cameras")["zeiss"]
+    assert np.isnan(ck.read_frames(folder).times).all()
+    by_head = dataclasses.replace(system, time=("head", "clock", "min"))
+    assert ck.read_frames(folder, format=by_head).times.tolist() == [120.0, 180.0]
+    by_name = dataclasses.replace(system, time=("name", "", "ms"))
+    assert ck.read_frames(folder, format=by_name).times.tolist() == pytest.approx([0.1, 0.35])
 
 
 def test_a_test_of_pyvale(tmp_path: Path) -> None:

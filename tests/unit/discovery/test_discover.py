@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.discovery.discover import discover, group_by_temperature, temperature_study
+from creepkit.discovery.discover import discover, group_by_temperature, isothermal_tests, temperature_study
+from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identify import identify
-from creepkit.inverse.reference_conditions import ReferencePoint
+from creepkit.inverse.reference_conditions import ReferencePoint, spans_temperatures
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.kernels import lower
 from creepkit.language import Elastic, arrhenius, linear, temperature
 from creepkit.laws.norton import NORTON
-from creepkit.records import PressureJump
+from creepkit.records import PressureJump, Program
 from helpers.steady_rate_predictor import Steady, planted
 
 T_REF = 1023.15
@@ -86,6 +87,13 @@ def test_parameters_that_may_not_depend_on_temperature(alone):
     assert list(found.prior_odds["n"]) == ["constant"]
 
 
+def test_beyond_its_range_a_law_is_not_asked(trend):
+    with pytest.raises(FitError, match="holds between 973 and 1083 K; it was evaluated outside"):
+        trend.parameters_at(1100.0)
+    with pytest.raises(FitError, match="has no parameter 'n_t': did you mean 'n_T'"):
+        trend.estimate("n_t")
+
+
 def test_a_study_groups_tests_and_finds_the_same(tests, trend):
     found = temperature_study(NORTON, tests, Steady(), settings=QUICK, forms=FEW)
     assert found.moduli_fit is None
@@ -93,6 +101,24 @@ def test_a_study_groups_tests_and_finds_the_same(tests, trend):
     assert found.joint_fit.law.names == ("A", "n", "Q")
     assert found.temperature_law.forms == trend.forms
     assert "Norton power law (PL) with Arrhenius temperature dependence" in str(found)
+
+
+def stepped(test, kelvin):
+    """The test with a step of temperature in the middle of its frames, which its strains do not follow."""
+    middle = float(test.times[test.times.size // 2])
+    T = Program.steps([(0.0, test.temperature), (middle, test.temperature + kelvin)])
+    return test.replace(name=f"step of {kelvin:g} K", temperature=T)
+
+
+def test_a_test_with_a_step_of_temperature_is_left_out_by_its_name(tests, trend):
+    """The law is that of the other tests alone, digit by digit, and the note says which test is missing and why."""
+    step = stepped(tests[7], 20.0)
+    found = temperature_study(NORTON, [*tests, step], Steady(), settings=QUICK, forms=FEW)
+    assert found.notes == ("step of 20 K (755 to 775 °C) is left out, for it is not at one temperature",)
+    assert found.temperature_law.values == trend.values
+    assert [h.name for h in found.tests] == [h.name for h in tests]
+    with pytest.raises(FitError, match="no test is at one temperature: step of 20 K"):
+        temperature_study(NORTON, [step], Steady(), settings=QUICK)
 
 
 def test_tests_of_several_specimens_are_studied_together(tests, trend):
@@ -103,6 +129,18 @@ def test_tests_of_several_specimens_are_studied_together(tests, trend):
     assert found.temperature_law.forms == trend.forms
     for name, value in trend.values.items():
         assert found.temperature_law.values[name] == pytest.approx(value, rel=1e-3)
+
+
+def test_what_happened_after_the_last_used_frame_does_not_count(tests):
+    """A test that is cut at its step is one at a single temperature for all that is said of temperatures."""
+    step = stepped(tests[7], 20.0)
+    cut = step.replace(used=np.arange(step.times.size) <= step.times.size // 2)
+    assert isothermal_tests([cut]) == ([cut], "")
+    assert isothermal_tests([step], 30.0) == ([], isothermal_tests([step])[1])
+    assert np.ptp(cut.followed_temperatures) == 0.0
+    before = step.replace(used=np.arange(step.times.size) < step.times.size // 2)
+    assert before.mean_temperature == tests[7].temperature
+    assert not spans_temperatures([before])
 
 
 def test_a_form_is_where_it_should_be_at_its_reference_temperature():

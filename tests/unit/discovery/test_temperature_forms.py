@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 import sympy
 
+import creepkit as ck
+from creepkit.discovery.forms import candidate_forms, law_with_forms
 from creepkit.kernels import lower
 from creepkit.language import (
     GAS_CONSTANT,
@@ -17,6 +19,7 @@ from creepkit.language import (
 )
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
+from helpers.literature_laws import EQUATIONS
 
 T_REF = 1000.0
 EVERY = (boltzmann, curved, logarithmic, modified_arrhenius, t_log_t, wachtman_form)
@@ -46,6 +49,11 @@ def test_straight_lines_in_ln_t_and_t_ln_t():
     assert np.allclose(value(logarithmic(T_REF), n=4.0, n_L=-6.0), 4.0 - 6.0 * np.log(T / T_REF), rtol=1e-12)
     expected = 4.0 - 0.7 * (T * np.log(T) - T_REF * np.log(T_REF)) / 1000
     assert np.allclose(value(t_log_t(T_REF), n=4.0, n_TL=-0.7), expected, rtol=1e-12)
+
+
+def test_on_a_log_scale_a_straight_line_in_ln_t_is_a_power():
+    found = value(logarithmic(T_REF), HYPERBOLIC_SINE, "B", B=80.0, B_L=-2.5)
+    assert np.allclose(found, 80.0 * (WARM / T_REF) ** -2.5, rtol=1e-12)
 
 
 def test_exponentials_of_reciprocal_temperature():
@@ -89,3 +97,11 @@ def test_bounds_let_a_parameter_move_by_half_its_range_in_a_hundred_kelvin(form)
     rest = {s: (300.0 if s.name.endswith("T0") else 0.0) for s in extra if s != first}
     slope = sympy.diff(expression.subs(rest), temperature).subs({temperature: T_REF, first: extra[first].bounds[1]})
     assert abs(float(slope)) == pytest.approx(7.0 / 200.0, rel=1e-6)
+
+
+def test_energies_of_creep_and_of_damage_have_names_of_their_own():
+    """As those of law.times(arrhenius()): Q of the rate of creep, Q_B of that of damage."""
+    law, T = EQUATIONS["Kachanov-Rabotnov"], np.array([850.0, 900.0, 950.0])
+    forms = [candidate_forms(law, name, True, 900.0, T, ["arrhenius"])[0] for name in ("A", "B")]
+    assert [form.parameter_names for form in forms] == [("A", "Q"), ("B", "Q_B")]
+    assert set(law_with_forms(law, forms).names) == set(law.times(ck.arrhenius(T_ref=900.0)).names)

@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import frame_times, grid_of_rig, variations_of_tests
 from creepkit.experiments.rig import Rig, rigs_of
@@ -91,3 +92,18 @@ def test_variations_of_bulge_tests_change_pressure_and_thickness():
     assert any(text.startswith("8 MPa to ") and " h, then 14 MPa to " in text for text in told)
     thicknesses = {h.geometry["apex_thickness"] for c in told.values() for h in c.histories}
     assert thicknesses == {0.45, 0.5, 0.55}
+
+
+def test_any_load_is_varied_in_its_unit_after_the_ramp_that_was_made():
+    base = ck.History(
+        "beam", np.linspace(3600.0, 36000.0, 10), {}, ck.constant_load("force", 200.0, ramp=30.0), 1000.0,
+        "three-point-bend", ck.Elastic(150e3),
+    )  # fmt: skip
+    found = grid_of_rig(Rig("three-point-bend", (100.0, 400.0), 20.0, (1000.0,)), base)
+    assert any(c.description.startswith("400 N for ") for c in found)
+    assert any("100 N to " in c.description and " h, then 141 N to " in c.description for c in found)
+    for candidate in found:
+        loading = candidate.histories[0].loading
+        assert loading.quantity == "force"
+        assert loading.program().values[0] == 0.0
+        assert loading.program().times[1] == 30.0

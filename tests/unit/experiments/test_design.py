@@ -1,10 +1,12 @@
 """Designs of experiments against closed forms of linear regression, and what a test tells once it is made."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.experiments.design import design
+from creepkit.experiments.design import design, further_tests
 from creepkit.experiments.rig import Rig
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection import rank
@@ -95,6 +97,19 @@ def test_expected_precision_is_met_when_the_test_is_made():
     assert np.log(high / low) / (2 * after._quantile) == pytest.approx(found.best.expectation.sd, rel=0.15)
 
 
+def test_what_is_known_before_a_test_is_what_the_fit_states():
+    """Also of values that were not found by likelihood, whose covariance is a sandwich."""
+    tests = bars(STRAIN_HARDENING, SPL, [constant_stress(s, "stress") for s in (45.0, 50.0, 55.0, 60.0)], seed=3)
+    fit = identify(STRAIN_HARDENING, tests, BAR, settings=IdentificationSettings(starts=4, sobol_points=32))
+    found = design(fit, goal=rate_at(50.0))
+    _, low, high = fit.rate(50.0)
+    assert found.best.expectation.current_sd == pytest.approx(np.log(high / low) / (2 * fit._quantile), rel=1e-3)
+    known = found.best.expectation.current_parameter_sd
+    to_theta = fit.coordinates.jacobian(fit.u)
+    stated = np.sqrt(np.diag(to_theta @ fit.covariance @ to_theta.T))
+    assert [known[name] for name in ("ln A", "n", "m")] == pytest.approx(stated, rel=1e-3)
+
+
 # ---- the law ---------------------------------------------------------------------------------------------------------
 
 
@@ -179,7 +194,21 @@ def test_the_expected_chi_square_is_met_when_the_test_is_made(hardening):
     assert 1 / 1.5 < met / expected < 1.5
 
 
+def test_where_one_law_remains_nothing_is_proposed(hardening):
+    alone = rank([hardening.best])
+    assert further_tests(alone).tests == ()
+    assert "one law remains, " in design(alone, goal="law").sentence
+
+
 # ---- records ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_test_that_hardly_decides_is_not_advised(hardening):
+    found = design(hardening)
+    poor = tuple(replace(t, expectation=replace(t.expectation, probability=0.1)) for t in found.tests)
+    said = replace(found, tests=poor, plan=(), expected=None).sentence
+    assert said.startswith(f"none of the {len(poor)} tests considered is likely to tell")
+    assert "with probability 0.10" in said
 
 
 def test_work_that_is_stopped_gives_the_best_so_far(hardening):

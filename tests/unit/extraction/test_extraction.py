@@ -9,7 +9,7 @@ import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.records import CameraFrame, Frames
-from helpers.virtual_camera import VirtualCamera, simulated_dimple
+from helpers.virtual_camera import Dimple, VirtualCamera, simulated_dimple
 
 REST = 14
 CAMERA = VirtualCamera(seed=4, points=1700)
@@ -121,6 +121,16 @@ def test_bad_frames_are_flagged_and_change_no_other(extraction, frames):
     assert np.isfinite(found.outputs["amplitude"][35])  # a bump is taken off: the frame is there for who wants it
 
 
+def test_points_in_another_order_are_the_same_points(extraction, frames):
+    def shuffled(frame):
+        order = np.random.default_rng(3).permutation(np.flatnonzero(frame.valid))
+        parts = (frame.points, frame.displacements, frame.valid, frame.confidence)
+        return CameraFrame(*(part[order] for part in parts), frame.time, frame.source)
+
+    (found,) = ck.extract(changed(frames, dict.fromkeys(range(1, len(frames)), shuffled)), subset=CAMERA.subset)
+    np.testing.assert_allclose(found.outputs["amplitude"], extraction.outputs["amplitude"], atol=1e-7)
+
+
 @pytest.mark.parametrize("given", [False, True])
 def test_axes_that_point_away_from_the_cameras_are_turned(extraction, frames, given, tmp_path):
     """As DICe exports them: x to the right, y down, z away; a dome then falls."""
@@ -140,3 +150,18 @@ def test_axes_that_point_away_from_the_cameras_are_turned(extraction, frames, gi
     assert "  assumed: z of the frames points away from the cameras" in str(found)
     (again,) = ck.read_histories(ck.write_history(found.history, tmp_path / "D1.csv"))
     assert again.labels["assumed"].startswith("z of the frames points away from the cameras")
+
+
+def test_several_dimples_are_named_by_rows(dimple):
+    few = [0, 1, 2, 3, 4, 5, 6, 7, *range(REST, REST + 34, 6)]
+    short = Dimple(150.0 * np.arange(len(few)), dimple.radii, dimple.rise[few], dimple.widening[few])
+    camera = VirtualCamera(seed=2, points=62 * 62, spacing=0.9, centers=((-13.0, 11.0), (12.0, 13.0), (0.0, -12.0)))
+    frames = held(camera.frames(short, short, short))
+    found = ck.extract(frames, subset=camera.subset)
+    assert [one.name for one in found] == ["D1", "D2", "D3"]
+    places = np.array([one.center for one in found]) - [12.0, -7.0]
+    np.testing.assert_allclose(places, camera.centers, atol=0.05)
+    (given,) = ck.extract(frames, subset=camera.subset, centers={"E5": tuple(found[1].center)})
+    assert given.name == "E5"
+    assert given.center_given
+    np.testing.assert_allclose(given.outputs["amplitude"][8:], short.truth()[8:, 0], atol=4e-3)

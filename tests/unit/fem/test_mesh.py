@@ -8,13 +8,17 @@ import pytest
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import (
     CORNERS,
+    GAUSS_POINTS,
     Mesh,
     discretize,
     geometry_derivative,
+    half_bandwidth,
     mesh_quality,
+    outline,
     shape_functions,
     shape_gradients,
     strip_mesh,
+    strip_nodes,
 )
 
 MIDDLES = 0.5 * (CORNERS + np.roll(CORNERS, -1, axis=0))
@@ -53,6 +57,13 @@ def test_shape_gradients_are_the_differences_of_the_values():
         np.testing.assert_allclose(shape_gradients(PLACES)[:, :, k], slope, atol=1e-9)
 
 
+def test_points_are_those_of_gauss_near_the_corner_of_their_number():
+    for i, j in [(0, 0), (1, 0), (3, 2), (2, 2), (3, 3)]:
+        exact = (2 / (i + 1) if i % 2 == 0 else 0) * (2 / (j + 1) if j % 2 == 0 else 0)
+        assert (GAUSS_POINTS[:, 0] ** i * GAUSS_POINTS[:, 1] ** j).sum() == pytest.approx(exact, abs=1e-15)
+    assert (np.sign(GAUSS_POINTS) == CORNERS).all()
+
+
 def test_a_linear_field_has_its_gradient_at_every_point_of_a_curved_mesh():
     mesh = ring(5, 3)
     at = discretize(mesh)
@@ -87,6 +98,15 @@ def test_geometry_change_is_the_derivative_of_what_the_mesh_becomes():
     np.testing.assert_allclose(-np.einsum("epaj,epji->epai", slopes, change.gradient), moved, atol=1e-6)
 
 
+@pytest.mark.parametrize(("columns", "layers"), [(1, 1), (5, 3), (12, 4)])
+def test_a_strip_is_numbered_across(columns, layers):
+    mesh = ring(columns, layers)
+    assert len(mesh.elements) == columns * layers
+    assert len(mesh.nodes) == (columns + 1) * (2 * layers + 1) + columns * (layers + 1)
+    assert set(mesh.elements.ravel()) == set(range(len(mesh.nodes)))
+    assert half_bandwidth(mesh.elements) == 6 * layers + 9
+
+
 def test_sides_of_a_strip_lie_on_its_lines_with_the_solid_to_their_left():
     angle = np.linspace(np.pi / 2, 0, 9)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -101,6 +121,18 @@ def test_sides_of_a_strip_lie_on_its_lines_with_the_solid_to_their_left():
     np.testing.assert_allclose(body.nodes[body.first][:, 0], 3.0, atol=1e-15)
     np.testing.assert_allclose(body.nodes[body.last][:, 1], 0.0, atol=1e-15)
     np.testing.assert_allclose(body.nodes[body.last][:, 0], [4, 4.1, 4.2, 4.6, 5.0], rtol=1e-14)
+
+
+def test_nodes_of_a_strip_are_linear_in_its_sides():
+    rng, breaks = np.random.default_rng(3), np.array([0, 0.3, 1.0])
+    a, b, c, d = rng.normal(size=(4, 7, 2))
+    both = strip_nodes(a + 2 * c, b + 2 * d, breaks)
+    np.testing.assert_allclose(both, strip_nodes(a, b, breaks) + 2 * strip_nodes(c, d, breaks), atol=1e-14)
+
+
+def test_the_outline_of_a_strip_are_its_four_sides():
+    mesh = ring(5, 3)
+    assert len(outline(mesh.elements)) == 2 * (5 + 3)
 
 
 def test_quality_is_one_of_a_rectangle_and_the_sine_of_a_parallelogram():

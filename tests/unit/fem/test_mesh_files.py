@@ -132,6 +132,10 @@ def test_a_deck_becomes_the_same_mesh(tmp_path, pressed):
     check(deck(tmp_path, DECK, pressed=pressed))
 
 
+def test_a_deck_may_press_elements_one_by_one(tmp_path):
+    check(deck(tmp_path, DECK.replace("*Dsload\n Low, P, 8.", "*DLOAD\n1, P1, 1.\n_Low_S4, P4, 1.")))
+
+
 def check(mesh: Mesh) -> None:
     """Two squares, pressed from below, held at r = 2."""
     assert (len(mesh.elements), len(mesh.nodes)) == (2, 13)

@@ -70,6 +70,21 @@ def test_a_jump_has_the_value_before_it_and_time_zero_the_one_after():
     assert np.isnan(line.interpolate(values, 130.1)).all()
 
 
+def test_a_short_last_step_does_not_turn_its_small_errors_into_a_slope():
+    times = np.append(doubling(0, 40000), 40003.0)
+    line = TimeInterpolation.from_steps(times, np.zeros(times.size, int), program((0, 40003, 8, 8)))
+    values = np.log1p(times / 500)
+    values[-2] += 1e-4
+    asked = np.array([22000.0, 28000, 35000, 39000])
+    np.testing.assert_allclose(line.interpolate(values, asked), np.log1p(asked / 500), rtol=5e-4)
+
+
+def test_a_ramp_taken_in_one_step_is_straight():
+    line = TimeInterpolation.from_steps(np.array([0.0, 5.0]), np.zeros(2, int), program((0, 5, 0, 8)), 0.1)
+    asked = np.array([0, 0.1, 2.5, 5])
+    np.testing.assert_allclose(line.interpolate(np.array([0.0, 1.0]), asked), asked / 5, atol=1e-15)
+
+
 def test_moving_all_steps_moves_the_curve():
     steps = doubling(100.0, 5000.0)
     line = TimeInterpolation.from_steps(
@@ -117,3 +132,9 @@ def test_the_seconds_of_a_ramp_are_right_within_two_percent_of_its_end(law):
     few, many = apex(law, JUMP, times, True), apex(law, JUMP, times, False)
     assert np.abs(few - many)[:6].max() < 0.02 * many[5]
     assert np.abs(few - many)[6:].max() < 0.005 * many[-1]
+
+
+@pytest.mark.parametrize("law", ["strain-hardening", "time-hardening"])
+def test_the_first_seconds_after_loading_at_once_are_right(law):
+    times = np.array([1e-3, 0.01, 0.1, 1, 3, 10])
+    np.testing.assert_allclose(apex(law, AT_ONCE, times, True), apex(law, AT_ONCE, times, False), rtol=5e-3)

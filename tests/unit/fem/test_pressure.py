@@ -11,6 +11,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 
 CLAMPED = DimpleGeometry()
+FILLET = DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",))
 E, NU, PRESSURE = 150e3, 0.3, 8.0
 CURVED = np.array([[1.0, 1.6, 2.0], [0.5, 0.7, 1.5]])
 """Radii and heights of the nodes of a curved side."""
@@ -75,6 +76,21 @@ def test_load_stiffness_is_symmetric_where_the_ends_are_held() -> None:
     np.testing.assert_allclose(inner, inner.T, atol=1e-13)
 
 
+def test_load_stiffness_is_skew_at_a_free_end() -> None:
+    """p V less p r^2 dz/2 at the foot of the wall: what is skew is r there, between its r and z alone."""
+    body, u = deformed(FILLET)
+    free = body.equations >= 0
+    whole = surface_stiffness(body, u)
+    foot = int(body.pressed[-1, 2])
+    assert body.nodes[foot] == pytest.approx([5.0, 0.0])
+    skew = whole - whole.T
+    expected = np.zeros_like(skew)
+    expected[2 * foot + 1, 2 * foot] = body.nodes[foot, 0] + u[2 * foot]
+    expected -= expected.T
+    np.testing.assert_allclose(abs(skew[np.ix_(free, free)]), abs(expected[np.ix_(free, free)]), atol=1e-13)
+    assert skew[2 * foot + 1, 2 * foot] != 0.0
+
+
 def tangents(geometry: DimpleGeometry) -> tuple[FiniteElementModel, np.ndarray, np.ndarray, np.ndarray]:
     """Body, displacements, the tangent that Newton's method takes, and differences of the residual, (size, size)."""
     body, u = deformed(geometry)
@@ -98,3 +114,18 @@ def test_the_tangent_is_exact_on_a_clamped_dimple() -> None:
     """Elastic, at large displacements; differences of 1e-6 mm, exact to 5e-8 of the largest entry."""
     _, _, tangent, slopes = tangents(CLAMPED)
     np.testing.assert_allclose(tangent, slopes, atol=5e-8 * np.abs(tangent).max())
+
+
+def test_the_tangent_is_exact_but_for_the_foot_of_a_fillet() -> None:
+    """There the symmetric part leaves out p r/2 on both sides of the diagonal, with opposite signs."""
+    body, u, tangent, slopes = tangents(FILLET)
+    foot = int(body.pressed[-1, 2])
+    radial, axial = body.equations[2 * foot], body.equations[2 * foot + 1]
+    left_out = 0.5 * PRESSURE * (body.nodes[foot, 0] + u[2 * foot])
+    rest = slopes - tangent
+    scale = 5e-8 * np.abs(tangent).max()
+    assert abs(rest[axial, radial]) == pytest.approx(left_out, abs=scale)
+    assert rest[radial, axial] == pytest.approx(-rest[axial, radial], abs=scale)
+    rest[axial, radial] = rest[radial, axial] = 0.0
+    np.testing.assert_allclose(rest, 0.0, atol=scale)
+    assert left_out > 20 * scale

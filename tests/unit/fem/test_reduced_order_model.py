@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -11,14 +12,15 @@ import pytest
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import geometry_derivative
 from creepkit.fem.reduced_order_model import ReducedBasis, ReducedOrderModel, full_basis, mode_gradients
-from creepkit.fem.reduced_order_training import non_negative_least_squares
+from creepkit.fem.reduced_order_training import non_negative_least_squares, principal_modes, snapshots
 from creepkit.fem.simulation import LoadHistory, Simulation, sensitivity_directions, simulate
-from creepkit.fem.solver import SolverSettings
+from creepkit.fem.solver import SolverSettings, StageConditions, assemble
 from creepkit.language import CreepLaw, mean_stress, parameters, stress
 from creepkit.laws.norton import NORTON
 from creepkit.records import Program, Status
-from creepkit.specimens.reduced_order_training import trained_basis
-from helpers.fem_cases import FREE, block, left_of, lowered, mesh_of
+from creepkit.specimens import reduced_order_training
+from creepkit.specimens.reduced_order_training import power_law_runs, trained_basis
+from helpers.fem_cases import FREE, STILL, block, left_of, lowered, mesh_of
 from helpers.literature_laws import RATE, damage, number, omega
 
 TIGHT = SolverSettings(newton=1e-12, **FREE)
@@ -139,6 +141,35 @@ def moved_tube(by):
     return replace(mesh_of(body, r=bottom, z=bottom, pressed=left_of(body), top=TUBE.top), nodes=body.nodes + by)
 
 
+def test_stresses_of_snapshots_are_those_of_the_core() -> None:
+    """Without pressure, elastic forces of the core are the integral of the stresses times the gradients."""
+    runs = power_law_runs([TUBE], 2)
+    data = snapshots([replace(runs[0], theta=np.array([-np.inf, 1.0, 0.0]))], SolverSettings())
+    modulus = 1e5
+    conditions = StageConditions(0.0, 0.0, 1.0, 900.0, modulus / 1.2, modulus / 2.6, 0.0)
+    unit = mode_gradients(TUBE, full_basis(TUBE).modes, np.arange(TUBE.weights.size))
+    for row in range(1, len(data.mesh), 5):
+        forces = np.einsum("psm,ps,p->m", unit, data.stresses[row], TUBE.weights.ravel())
+        exact, _ = assemble(lowered(NORTON), NORTON.to_internal(STILL)[0], TUBE, conditions,
+                            data.displacements[row].ravel())  # fmt: skip
+        np.testing.assert_allclose(forces, exact, atol=1e-8 * np.abs(exact).max())
+
+
+def test_modes_span_the_snapshots() -> None:
+    """Orthonormal in the elastic energy, zero where displacements are held, and enough of them leave nothing."""
+    data = snapshots(power_law_runs([TUBE], 8), SolverSettings())
+    modes = principal_modes(data, 12, 3.0)
+    assert np.abs(modes.reshape(len(modes), -1)[:, TUBE.equations < 0]).max() == 0.0
+    flat = data.displacements.reshape(len(data.mesh), -1)
+    errors = []
+    for count in (2, 6, 12):
+        span = modes[:count].reshape(count, -1).T
+        left = flat.T - span @ np.linalg.lstsq(span, flat.T, rcond=None)[0]
+        errors.append(np.linalg.norm(left) / np.linalg.norm(flat))
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 1e-3
+
+
 def test_non_negative_least_squares() -> None:
     """A sparse vector above zero is found from its image; where one is below zero, the optimum has it at zero."""
     numbers = np.random.default_rng(1)
@@ -173,6 +204,28 @@ def test_a_trained_model_is_near_its_finite_elements(tmp_path, monkeypatch) -> N
     times = np.linspace(10.0, 9e3, 40)
     exact, found = (run.at(run.displacements, times) for run in runs)
     assert np.abs(found - exact).max() < 5e-3 * np.abs(exact).max()
+
+
+def test_a_kept_basis_that_was_changed_is_trained_and_written_anew(tmp_path, monkeypatch) -> None:
+    """A changed byte of a mode leaves a readable file of finite numbers; its checksum tells."""
+    monkeypatch.setenv("CREEPKIT_CACHE", str(tmp_path))
+    monkeypatch.setattr(reduced_order_training, "snapshots", lambda *_: None)
+    monkeypatch.setattr(reduced_order_training, "power_law_runs", lambda *_: [])
+    trained = []
+    monkeypatch.setattr(reduced_order_training, "train", lambda *_: trained.append(few()) or trained[-1])
+
+    def trainings() -> int:
+        reduced_order_training._in_memory().clear()
+        trained_basis([TUBE], SolverSettings(), modes=4, points=8)
+        return len(trained)
+
+    monkeypatch.setattr(reduced_order_training, "_in_memory", cache(dict))
+    assert [trainings(), trainings()] == [1, 1]
+    (path,) = tmp_path.glob("reduced_bases/*.safetensors")
+    content, modes = path.read_bytes(), trained[0].modes.tobytes()
+    assert modes in content
+    path.write_bytes(content.replace(modes, modes[:-8] + np.float64(0.5).tobytes()))
+    assert [trainings(), trainings()] == [2, 2]
 
 
 def test_gradients_of_modes_are_those_of_a_linear_field() -> None:

@@ -33,6 +33,14 @@ def top_of(section: Section, made: Simulation) -> np.ndarray:
     return made.displacements[-1, np.unique(section.sides["top"]), 1]
 
 
+def test_a_rectangle_has_its_sides_and_corners() -> None:
+    for name, (axis, value) in {"bottom": (1, 0.0), "top": (1, 3.0), "left": (0, 0.0), "right": (0, 2.0)}.items():
+        assert (BAR.nodes[np.unique(BAR.sides[name]), axis] == value).all()
+    assert [len(BAR.sides[name]) for name in ("bottom", "top", "left", "right")] == [3, 3, 2, 2]
+    np.testing.assert_array_equal(BAR.nodes[BAR.points["top_right"]], (2.0, 3.0))
+    np.testing.assert_array_equal(BAR.nodes[BAR.points["bottom_left"]], (0.0, 0.0))
+
+
 def test_a_dead_force_stretches_a_bar_as_hooke_says() -> None:
     """The force is Kirchhoff stress times area over stretch, whether the face is a plane or not."""
     force = 1e-3 * E * 4.0 * np.pi
@@ -72,6 +80,17 @@ def test_a_moved_side_needs_the_force_that_moves_it() -> None:
     back = bar.plane("top").pull("top")
     again = simulated(back, [], load=2 * np.pi * float(made.reactions[-1]))
     np.testing.assert_allclose(top_of(back, again), 0.01, rtol=1e-6)
+
+
+def test_observed_displacements_do_not_change_a_simulation() -> None:
+    """Which are observed decides what errors are measured by, so the steps, but no equation."""
+    bar, values = BAR.hold("bottom", z=True).pull("top"), {"A": 1e-12, "n": 3.0}
+    ends = [
+        simulated(bar, observed, load=500.0, values=values, end=1e4).displacements[-1]
+        for observed in ([], [2 * BAR.points["top_left"] + 1], [2 * BAR.points["bottom_right"]])
+    ]
+    for end in ends[1:]:
+        np.testing.assert_allclose(end, ends[0], rtol=1e-4, atol=1e-9)
 
 
 def test_joined_sections_are_one_body() -> None:

@@ -41,3 +41,27 @@ def test_splines_are_those_of_scipy(steps, exponent):
     variable = lambda t: np.log1p((t / OFFSET) ** exponent)  # noqa: E731
     expected = CubicSpline(variable(times), values)(variable(asked))
     np.testing.assert_allclose(line.interpolate(values, asked), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_one_step_is_constant_and_two_are_straight_in_time():
+    line, times = one_segment(np.array([0.7]))
+    np.testing.assert_array_equal(line.interpolate(np.array([[2.0, 3.0]]), [0.0, times[0]]), [[2.0, 3.0]] * 2)
+    line, times = one_segment(np.array([0.0, 0.7]))
+    asked = np.linspace(0.0, times[1], 5)
+    np.testing.assert_allclose(line.interpolate(np.array([1.0, 3.0]), asked), 1.0 + 2.0 * asked / times[1], rtol=1e-15)
+
+
+def test_what_is_not_a_number_spoils_its_column_and_segment_alone():
+    line, times = one_segment(np.linspace(0.0, 2.0, 7))
+    values = np.ones((7, 3))
+    values[4, 1] = np.nan
+    got = line.interpolate(values, times)
+    assert np.isnan(got[:, 1]).any()
+    np.testing.assert_allclose(got[:, [0, 2]], 1.0, rtol=1e-15)
+    assert np.isnan(line.interpolate(values, [np.nan, 1.1 * times[-1]])).all()
+
+
+def test_no_times_and_no_columns_are_empty():
+    line, times = one_segment(np.linspace(0.0, 2.0, 7))
+    assert line.interpolate(np.zeros((7, 2)), []).shape == (0, 2)
+    assert line.interpolate(np.zeros((7, 0)), times).shape == (7, 0)

@@ -7,7 +7,7 @@ import sympy
 from creepkit import kernels
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.simulation import REASONS, LoadHistory, Simulation, simulate
-from creepkit.fem.solver import DEFLECTION_LIMIT, LIMIT_LOAD, TOO_MANY_STEPS, SolverSettings
+from creepkit.fem.solver import DEFLECTION_LIMIT, LIMIT_LOAD, STRAIN_LIMIT, TOO_MANY_STEPS, SolverSettings
 from creepkit.language import CreepLaw, Elastic, strain, stress, time
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
@@ -55,6 +55,23 @@ def test_burst_by_deflection(body) -> None:
     history_is_kept(made, body)
 
 
+def test_the_time_of_a_burst_does_not_depend_on_the_steps(body) -> None:
+    """The limit is located within a step: to a thousandth of itself, whatever the tolerance of the steps."""
+    coarse, fine = (run(body, NORTON, FAST, deflection_limit=1.0, tolerance=t, newton=1e-2 * t) for t in (3e-2, 3e-4))
+    for made in (coarse, fine):
+        assert made.displacements[-1, body.top[0], 1] == pytest.approx(1.0, rel=2e-3)
+    assert coarse.times.size < fine.times.size / 3
+    assert coarse.end_time == pytest.approx(fine.end_time, rel=5e-3)
+
+
+def test_burst_by_strain(body) -> None:
+    made = run(body, NORTON, FAST, strain_limit=0.05)
+    largest = made.values[:, :, 3].max(axis=1)
+    assert (made.status, made.reason) == (Status.RUPTURED, REASONS[STRAIN_LIMIT])
+    assert largest[-2] < 0.05 <= largest[-1]
+    history_is_kept(made, body)
+
+
 def test_a_burst_lies_where_the_unlimited_run_passes_the_limit(body) -> None:
     """Limits change no step before the one that passes them, which they cut."""
     limited, free = run(body, NORTON, FAST, deflection_limit=1.0), run(body, NORTON, FAST, deflection_limit=2.0)
@@ -86,6 +103,13 @@ def test_limit_load(body) -> None:
     assert made.end_time < 5.0
     assert made.mises.max() < 30.0
     history_is_kept(made, body)
+
+
+def test_an_elastic_roof_that_buckles_has_a_limit_load_too(body) -> None:
+    """Suction of 5e5 MPa, at once: no equilibrium, and no row but that of rest."""
+    made = run(body, NORTON, {"A": 1e-40, "n": 1.0}, Program.constant(-5e5), deflection_limit=np.inf)
+    assert (made.status, made.reason) == (Status.RUPTURED, REASONS[LIMIT_LOAD])
+    assert made.times.tolist() == [0.0]
 
 
 WILD = {

@@ -44,6 +44,15 @@ def test_new_curves_lie_inside_as_often_as_stated():
     assert ((new >= result.low) & (new <= result.high)).mean() == pytest.approx(0.9, abs=0.02)
 
 
+def test_where_many_have_ruptured_there_is_no_upper_end():
+    curves = np.tile(np.linspace(0.0, 1.0, 5), (1000, 1)) + 0.01 * RNG.standard_normal((1000, 1))
+    curves[:100, 3:] = np.nan
+    result = band(curves)
+    assert np.isfinite(result.high[:3]).all()
+    assert np.isinf(result.high[3:]).all()
+    assert np.isfinite(result.low).all()
+
+
 def test_new_curves_lie_inside_while_they_last():
     times = np.linspace(0.1, 1.6, 25)
 
@@ -56,3 +65,11 @@ def test_new_curves_lie_inside_while_they_last():
     assert np.isinf(result.median[-1])
     inside = (np.isnan(new) | ((new >= result.lowest) & (new <= result.highest))).all(axis=1).mean()
     assert inside == pytest.approx(0.92, abs=0.05)
+
+
+def test_an_output_that_ends_says_nothing_after_most_have_ended():
+    curves = 1.0 + 0.01 * RNG.standard_normal((1000, 4))
+    curves[:600, 3] = np.nan
+    result = band(curves, grows=False)
+    assert np.isnan(result.low[3])
+    assert np.isfinite(result.low[:3]).all()

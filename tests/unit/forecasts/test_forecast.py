@@ -11,6 +11,7 @@ from creepkit.errors import FitError
 from creepkit.forecasts.draws import law_draws
 from creepkit.forecasts.forecast import forecast
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.records import Status
 from helpers.rupture_tests import BAR
 
 TIMES = np.geomspace(3.6e3, 3.6e5, 40)
@@ -115,6 +116,16 @@ def test_the_time_to_a_strain_is_that_of_the_measured_strain(fit):
     assert half[1] == pytest.approx(np.hypot(half[0], norm.ppf(0.975) * offset / 0.01), rel=0.06)
 
 
+def test_a_target_below_the_offset_is_reached_at_once(fit):
+    """Where half of the draws of the offset lie above the target, the test begins beyond it."""
+    noise = replace(fit.noise_model, outputs={"strain": replace(fit.noise_model["strain"], offset=1e-3)})
+    plan = bar("plan", 100.0, noise=0.0)
+    (time,) = replace(fit, noise_model=noise).forecast(plan, targets={"strain": [1e-8]}, draws=2000).tests[0].times
+    assert time.low == 0.0
+    assert time.chance > 0.98
+    assert time.high < TIMES[-1]
+
+
 def test_a_drift_of_the_rate_over_a_test_widens_the_band_by_half_of_it(fit):
     """Strain at the end is the mean of exp(d t / end) times the strain without drift: 1 + d / 2 to first order."""
     plan = bar("plan", 100.0, noise=0.0)
@@ -123,6 +134,12 @@ def test_a_drift_of_the_rate_over_a_test_widens_the_band_by_half_of_it(fit):
         band = fit.forecast(plan, draws=8000, tolerances=tolerances).tests[0].outputs["strain"].band
         half.append(np.log(band.high[-1] / band.low[-1]) / 2)
     assert half[1] == pytest.approx(np.hypot(half[0], norm.ppf(0.975) * 0.1), rel=0.05)
+
+
+def test_a_likely_test_is_inside(fit):
+    one = fit.forecast(bar("another", 95.0, factor=1.02, seed=6)).tests[0]
+    assert one.score.whole_inside == {"strain": True}
+    assert min(one.score.p_value, one.score.departure_p_value) > 0.05
 
 
 @pytest.mark.parametrize("label", ["heat", "laboratory"])
@@ -140,6 +157,27 @@ def test_a_known_heat_or_laboratory_narrows_the_band(label):
     assert b.median / a.median == pytest.approx(np.exp(0.8), rel=0.1)
     assert np.log(a.high / a.low) < 0.25
     assert np.log(new.high / new.low) > 0.8
+
+
+def test_a_known_heat_is_where_its_tests_were_and_departures_are_judged_by_its_own_scatter():
+    """Heat a creeps exp(0.5) times as fast as the law; a test of it 3 standard deviations off is an unlikely one."""
+    rng = np.random.default_rng(8)
+    made = [
+        bar(f"{heat} {k}", 80 + 10 * k, np.exp(effect + rng.normal(0.0, 0.05)), seed=k, labels={"heat": heat})
+        for heat, effect in {"a": 0.5, "b": -0.5, "c": 0.2}.items()
+        for k in range(5)
+    ]
+    fit = ck.identify("norton", made, using=BAR, starts=2)
+    usual, far = (
+        fit.forecast(bar("x", 95.0, np.exp(0.5 + b), seed=9, labels={"heat": "a"})).tests[0] for b in (0.0, 0.25)
+    )
+    strain = usual.outputs["strain"]
+    assert strain.band.low[-1] < strain.value[-1] < strain.band.high[-1]
+    assert strain.shares["scatter between tests"][-1] > 0.5
+    assert usual.score.departure_p_value > 0.1
+    assert far.score.departure_p_value < 0.01
+    (rate,) = [n for n in far.score.nuisances if n.kind == "rate"]
+    assert rate.value == pytest.approx(0.25, abs=0.08)
 
 
 def test_what_tests_share_is_at_its_estimate_in_forecast_and_score():
@@ -190,6 +228,18 @@ def test_the_stress_of_a_relaxing_bar_is_reached_from_above(fit):
     assert time.low < time.value < time.high
 
 
+def test_early_times_are_those_of_the_curve_not_of_its_first_frame(fit):
+    plan = bar("plan", 100.0, noise=0.0).replace(times=np.array([1.8e8, 3.6e8]))
+    time = fit.forecast(plan, targets={"strain": [1e-5]}).tests[0].times[0]
+    assert time.value == pytest.approx(1e-5 / float(fit.rate(100.0)[0]), rel=1e-3)
+    assert np.log(time.high / time.low) > 0.2
+
+
+def test_a_broken_test_is_not_scored_by_its_life_where_no_life_was_fitted(fit):
+    broken = bar("broken", 100.0, seed=5).replace(rupture_time=3.65e5)
+    assert fit.forecast(broken).tests[0].score.p_value > 1e-3
+
+
 def test_curves_with_noise_of_their_own_lie_inside(fit):
     """Stated noise ten times that of the fitted tests: 40 whole curves inside at 0.95, give or take 0.035."""
     made = []
@@ -199,6 +249,19 @@ def test_curves_with_noise_of_their_own_lie_inside(fit):
         made.append(history.replace(standard_deviation={"strain": np.full(TIMES.size, 2e-5)}))
     inside = [t.score.whole_inside["strain"] for t in fit.forecast(made).tests]
     assert np.mean(inside) >= 0.85
+
+
+def test_draws_that_the_solver_does_not_finish_are_left_out_and_said(fit):
+    class Weak(type(BAR)):
+        def predict(self, law, theta, histories, **options):
+            made = super().predict(law, theta, histories, **options)
+            if len(theta) > 20:
+                made.status[:10] = Status.NOT_CONVERGED
+            return made
+
+    one = forecast(fit, bar("plan", 100.0, noise=0.0), using=Weak()).tests[0]
+    assert np.isfinite(one.outputs["strain"].band.high).all()
+    assert any("the solver did not finish 10 of the draws" in note for note in one.notes)
 
 
 def test_a_test_of_another_heat_than_all_that_were_fitted_has_the_usual_scatter(tests):

@@ -69,6 +69,17 @@ def test_where_nothing_decides_it_is_said() -> None:
         ck.align_clocks(record, "P", frames[:3], apex[:3])
 
 
+def test_equal_steps_fit_at_several_lags_unless_the_search_says_which() -> None:
+    times = np.array([0.0, *(t + dt for t in range(60, 260, 40) for dt in (0, 1, 20, 21)), 300.0])
+    square = Program(times, np.array([0.0, *(p for _ in range(5) for p in (0.0, 4.0, 4.0, 0.0)), 0.0]))
+    record, frames, apex = planted(3.0, program=square, creep=0.0)
+    part = slice(20, 45)
+    with pytest.raises(HistoryError, match=r"lags of .* s and .* s fit about as well"):
+        ck.align_clocks(record, "P", frames[part], apex[part], drift=0.0)
+    found = ck.align_clocks(record, "P", frames[part], apex[part], drift=0.0, search=(-10.0, 10.0))
+    assert found.lag == pytest.approx(3.0, abs=1.0)
+
+
 def test_a_stated_alignment() -> None:
     stated = ClockAlignment.stated(10.0, drift=1e-3, zero=100.0)
     assert stated.record_time(1100.0) == pytest.approx(1011.0)

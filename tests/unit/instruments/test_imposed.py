@@ -57,6 +57,13 @@ def test_a_simulation_takes_what_was_imposed() -> None:
     assert history.loading.program().values.max() == pytest.approx(8.0, abs=0.02)
 
 
+def test_a_record_in_the_zone_of_the_frames_needs_no_alignment() -> None:
+    known = InstrumentRecord("test", TIMES, record().channels, 1.7e9, record().channel_patterns)
+    assert ck.imposed(known, "D1", FRAMES + 1.7e9).time_zero == pytest.approx(1.7e9 + 500.0, abs=1.5)
+    with pytest.raises(HistoryError, match="not known to agree"):
+        ck.imposed(record(), "D1", FRAMES)
+
+
 def test_records_are_cut_and_thinned_and_gaps_are_found() -> None:
     one = record()
     part = one.between(490.0, 600.0)

@@ -9,6 +9,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
+from creepkit.instruments.column_heads import split_head
 from helpers.instrument_samples import samples
 from helpers.paths import SHARED, needs_shared_data
 
@@ -92,6 +93,23 @@ def test_a_date_that_may_be_two_is_asked_for(tmp_path: Path, order: str, day: st
     assert record.start == np.datetime64(day).astype("datetime64[s]").astype(float)
 
 
+def test_other_rows_decide_on_the_order_of_a_date(tmp_path: Path) -> None:
+    by_number = ck.read_record(written(tmp_path, table(["12/8/2025 23:59:00", "13/8/2025 00:00:00"])))
+    by_order = ck.read_record(written(tmp_path, table(["3/4/2025 23:59:00", "3/5/2025 00:00:00"])))
+    assert by_number.times.tolist() == by_order.times.tolist() == [0.0, 60.0]
+    assert "its dates have the day first" in by_number.notes
+    assert any("month first" in note for note in by_order.notes)
+
+
+def test_clocks_that_are_put_back_for_winter(tmp_path: Path) -> None:
+    stamps = [f"2025-11-02 {hour}:{minute:02d}:00" for hour in ("00", "01", "01", "02") for minute in (0, 30)]
+    path = written(tmp_path, table(stamps))
+    with pytest.raises(HistoryError, match=r"x.csv:6: time falls by 1800 s; .*state time_zone"):
+        ck.read_record(path)
+    record = ck.read_record(path, time_zone="America/Chicago")
+    np.testing.assert_array_equal(np.diff(record.times), 1800.0)
+
+
 def test_absolute_pressures_become_gauge_only_by_a_stated_ambient_pressure(tmp_path: Path) -> None:
     path = written(tmp_path, "time_s,p_bara\n0,1.013\n1,11.013\n")
     assert ck.read_record(path).channel("p").reference == "absolute"
@@ -109,6 +127,18 @@ def test_rows_are_averaged_and_channels_left_out_on_reading(tmp_path: Path) -> N
         part.channel("D1: Press.").values, whole.channel("D1: Press.").values.reshape(-1, 8).mean(axis=1)
     )
     np.testing.assert_allclose(np.diff(part.times), 0.8, atol=1e-9)
+
+
+def test_files_of_several_parts_are_read_as_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from creepkit.instruments import record_tables
+
+    path = written(tmp_path, FILES["plate.csv"].replace(b"\n", b"\r\n"))
+    whole = ck.read_record(path)
+    for size in (700, 1023, 1500):
+        monkeypatch.setattr(record_tables, "PART_BYTES", size)
+        parts = ck.read_record(path)
+        np.testing.assert_array_equal(parts.times, whole.times)
+        np.testing.assert_array_equal(parts.channel("D1: Temp.").values, whole.channel("D1: Temp.").values)
 
 
 @pytest.mark.parametrize(
@@ -170,6 +200,19 @@ def test_whether_a_pressure_is_absolute_stands_in_its_unit_or_its_name(
 ) -> None:
     (channel,) = ck.read_record(written(tmp_path, f"time_s,{names}\n0,1\n1,2\n")).channels.values()
     assert (channel.quantity, channel.reference) == ("pressure", reference)
+
+
+def test_a_row_of_units_that_says_more_than_the_names(tmp_path: Path) -> None:
+    record = ck.read_record(written(tmp_path, "time_s,p [bar],T (upper)\ns,barg,K\n0,1,800\n1,2,800\n"))
+    assert [(c.reference, c.quantity) for c in record.channels.values()] == [("gauge", "pressure"), ("", "temperature")]
+
+
+def test_units_in_heads() -> None:
+    assert split_head("A1: Press.(PSIG)") == ("A1: Press.", "PSIG")
+    assert split_head("P1 [bar(g)]") == ("P1", "bar(g)")
+    assert split_head("p / kPa") == ("p", "kPa")
+    assert split_head("furnace_temperature_C") == ("furnace_temperature", "C")
+    assert split_head("set_point") == ("set_point", "")
 
 
 @needs_shared_data

@@ -62,6 +62,15 @@ def test_steady_curvature_rate_of_a_rectangle(n):
     assert np.abs(found.recorded[:, 0]).max() < 1e-9 * found.recorded[-1, 1]
 
 
+def test_linear_creep_spreads_no_stress():
+    """Under Norton with n = 1 stresses stay elastic, and the curvature grows by A E of the elastic one a second."""
+    law, theta = norton(1.0)
+    times = np.geomspace(1, 1e6, 9)
+    found = integrate_fibres(law, theta, bent(FibreModel.section(*rectangle(3)), times))
+
+    np.testing.assert_allclose(found.recorded[:, 1], 1e-8 / 60 * MOMENT / INERTIA * times, rtol=1e-9)
+
+
 @pytest.mark.parametrize("tableau", [SDIRK2, SDIRK4])
 def test_order_of_convergence_in_time(tableau):
     """Errors fall with the length of equal steps to the order of the method."""
@@ -217,6 +226,38 @@ def test_load_steps_ramps_and_reversal_against_an_explicit_integration():
     assert np.all(np.diff(exact[3:]) < 0)
 
 
+def test_a_modulus_that_falls_with_temperature_against_an_explicit_integration():
+    law, theta = norton(3.0)
+    model, times = FibreModel.section(*rectangle(4)), np.array([1e5, 2e5, 3e5])
+    modulus = Program([0.0, 3e5], [E, 0.6 * E])
+    found = integrate_fibres(law, theta, bent(model, times, modulus=modulus), settings=IntegrationSettings(rtol=1e-7))
+    m = model.fibres
+
+    def slope(t, c):
+        stress = modulus.at(t) * (model.modes @ (model.projection @ c) - c) + MOMENT * model.stress[1]
+        return 1e-8 / 60**3 * np.abs(stress) ** 3 * np.sign(stress)
+
+    exact = solve_ivp(slope, (0, 3e5), np.zeros(m), "LSODA", times, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(found.recorded[:, 1], (model.observed @ exact.y)[1], rtol=1e-5)
+
+
+def test_a_threshold_leaves_the_middle_of_the_section_elastic():
+    """Fibres below the threshold do not creep; the curvature comes to rest where elastic fibres can carry no more."""
+    law, theta = of("threshold-stress", A=1e-12, n=3.0, s_0=70.0)
+    model = FibreModel.section(*rectangle(10))
+    test = bent(model.observing(np.eye(model.fibres)), np.geomspace(1e3, 1e10, 20))
+    found = integrate_fibres(law, theta, test)
+    stress = model.stresses([0.0, MOMENT], E, found.recorded)
+
+    assert found.status is Status.COMPLETE
+    assert np.abs(stress[-1]).max() == pytest.approx(70.0, abs=0.1)
+    # plastic hinge of a rectangle: M = s b h^2/4 (1 - (c/h)^2/3), c the height that stays elastic
+    left = np.sqrt(3 * (1 - MOMENT / (70.0 * WIDTH * HEIGHT**2 / 4)))
+    crept = np.abs(found.recorded[-1]) > 1e-9
+    places = np.abs(rectangle(10)[0])
+    assert places[~crept].max() < left * HEIGHT / 2 < places[crept].min()
+
+
 def test_sensitivities_are_the_derivatives_of_what_is_recorded():
     """Of a law with a state, to its parameters, the moment, the temperature and the modulus, by central differences."""
     law_record = kachanov(ck.principal_stress, 0.99).times(ck.arrhenius(T_ref=1000.0))
@@ -245,6 +286,20 @@ def test_sensitivities_are_the_derivatives_of_what_is_recorded():
     columns.append((recorded(modulus=1.0001 * E) - recorded(modulus=0.9999 * E)) / 2e-4)
     for k, column in enumerate(columns):
         np.testing.assert_allclose(exact[..., k], column, rtol=1e-4, atol=1e-5 * np.abs(column).max())
+
+
+def test_the_first_fibre_at_a_limit_ends_the_test():
+    law, theta = of(kachanov(ck.stress, 0.99), A=1e-8 / 60**3, n=3.0, C=3e-6 / 60**2, v=2.0)
+    found = integrate_fibres(law, theta, bent(FibreModel.section(*rectangle(4)), np.linspace(1e4, 1e7, 50)))
+
+    assert found.status is Status.RUPTURED
+    assert found.reason == "an internal variable reached its limit"
+    assert np.isfinite(found.recorded[:, 1]).sum() == (np.linspace(1e4, 1e7, 50) <= found.end_time).sum()
+
+    short = IntegrationSettings(max_steps=5)
+    stopped = integrate_fibres(*norton(5.0), bent(FibreModel.section(*rectangle(4)), [1e7]), settings=short)
+    assert stopped.status is Status.NOT_CONVERGED
+    assert stopped.reason == "the cap on steps was reached"
 
 
 @pytest.mark.parametrize("name", ["norton", "damage"])

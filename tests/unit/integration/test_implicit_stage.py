@@ -14,6 +14,7 @@ from creepkit.integration.implicit_stage import (
     BY_TIME,
     BY_TRIAL,
     INPUTS,
+    NO_SOLUTION,
     SOLVED,
     UNIAXIAL,
     Axes,
@@ -90,6 +91,15 @@ def test_constant_load_has_a_solution_only_up_to_the_turning_point() -> None:
     assert flag == SOLVED
     assert increment == pytest.approx(0.9 * last * 1e-9 * 50**4 * np.exp(4 * increment), rel=1e-10)
     assert solved(kernel, theta, StageProblem(50.0, 0.0, 1.0, 1.1 * last, 0.0))[1] != SOLVED
+
+
+def test_no_stress_no_creep() -> None:
+    kernel = lower(NORTON, "compiled")
+    theta = NORTON.to_internal({"A": 1e-9, "n": 4.0})[0]
+    assert solved(kernel, theta, StageProblem(0.0, 0.0, 0.0, 1e3, 0.1))[:2] == (0.0, SOLVED)
+    assert solved(kernel, theta, StageProblem(-1.0, 1e5, 0.0, 1e3, 0.1))[1] == NO_SOLUTION
+    off = NORTON.to_internal({"A": 0.0, "n": 4.0})[0]
+    assert solved(kernel, off, StageProblem(100.0, 0.0, 0.0, 1e3, 0.1))[:2] == (0.0, SOLVED)
 
 
 DAMAGE_VALUES = {"A": 1e-14, "n": 4.0, "C": 1e-12, "v": 3.5, "a": 0.4}

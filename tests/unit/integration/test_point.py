@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from creepkit.integration import IntegrationSettings, PointTest, integrate
-from creepkit.integration.event_location import DIVERGED, STATE_LIMIT, STRAIN_LIMIT, TOO_MANY_STEPS
+from creepkit.integration.event_location import DIVERGED, REACHED_END, STATE_LIMIT, STRAIN_LIMIT, TOO_MANY_STEPS
 from creepkit.integration.time_discretisation import SDIRK2
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Param, State, parameters, stress
@@ -67,6 +67,15 @@ def test_a_rate_that_diverges_is_a_burst_not_an_error() -> None:
     )
     assert result.terminations[0, 0] == DIVERGED
     assert result.end_times[0, 0] == pytest.approx(1 / (4 * rate), rel=1e-4)
+
+
+def test_an_instant_burst_ends_within_the_cap() -> None:
+    values = {"A": 1e-5, "n": 8.0}
+    for load in (False, True):
+        result = run(NORTON, values, Program.constant(1000.0), [1e6], constant_load=load)
+        assert result.status[0, 0] == Status.RUPTURED
+        assert result.end_times[0, 0] < 1e-10
+        assert result.steps.sum() < 100
 
 
 def test_damage_ends_at_its_limit_when_the_closed_form_says() -> None:
@@ -131,6 +140,28 @@ def test_many_tests_and_candidates_in_one_call_equal_one_by_one() -> None:
             np.testing.assert_array_equal(together.jacobian[c, frames], alone.jacobian[0])
 
 
+def test_the_cap_on_steps_is_that_of_a_tests_own_programs() -> None:
+    kernel, theta = lower(NORTON, "compiled"), NORTON.to_internal({"A": 1e-12, "n": 3.0})
+    times = np.linspace(0.0, 1e4, 60)
+    plain = PointTest(Program.constant(100.0), ROOM, times)
+    pieces = Program(times, 100.0 + np.arange(60.0))
+    logged = PointTest(pieces, ROOM, times)
+    settings = IntegrationSettings(max_steps=2)
+    together = integrate(kernel, theta, [plain, logged], settings=settings)
+    alone = integrate(kernel, theta, [plain], settings=settings)
+    assert alone.terminations[0, 0] == TOO_MANY_STEPS
+    assert together.end_times[0, 0] == alone.end_times[0, 0]
+    assert together.status[0, 1] == Status.COMPLETE, "each further piece may take steps of its own"
+
+
+def test_answers_do_not_depend_on_when_they_are_asked_for() -> None:
+    times = np.geomspace(1.0, 1e5, 60)
+    dense = run(COMBINED, VALUES, Program.constant(100.0), times).strain[0]
+    for k in range(0, 60, 7):
+        alone = run(COMBINED, VALUES, Program.constant(100.0), times[k : k + 1]).strain[0, 0]
+        assert dense[k] == pytest.approx(alone, rel=1e-4)
+
+
 def test_the_two_tableaux_agree() -> None:
     times = np.linspace(1e3, 1e5, 20)
     fine = run(COMBINED, VALUES, Program.constant(100.0), times, settings=IntegrationSettings(rtol=1e-9)).strain
@@ -150,6 +181,36 @@ def test_the_cap_on_steps_keeps_the_history_so_far() -> None:
     alive = np.isfinite(result.strain[0])
     assert 0 < alive.sum() < 100
     assert times[alive].max() <= result.end_times[0, 0] < 1e5
+
+
+def test_a_candidate_that_is_not_a_number_ends_as_not_converged() -> None:
+    kernel = lower(NORTON, "compiled")
+    theta = np.array([[np.nan, 4.0], [np.log(1e-15), np.nan], [np.log(1e-15), 4.0]])
+    result = integrate(kernel, theta, [PointTest(Program.constant(100.0), ROOM, np.array([10.0]))])
+    assert result.status[:2, 0].tolist() == [Status.NOT_CONVERGED] * 2
+    assert result.terminations[2, 0] == REACHED_END
+
+
+def test_no_times_and_time_zero() -> None:
+    kernel = lower(NORTON, "compiled")
+    theta = NORTON.to_internal({"A": 1e-15, "n": 4.0})
+    empty = PointTest(Program.constant(100.0), ROOM, np.zeros(0))
+    start = PointTest(Program.constant(100.0), ROOM, np.zeros(1))
+    result = integrate(kernel, theta, [empty, start], jacobian=True)
+    assert result.strain.tolist() == [[0.0]]
+    assert result.status.tolist() == [[Status.COMPLETE] * 2]
+
+
+def test_derivatives_without_output_times() -> None:
+    """Norton: p = A s^n t, so that ln t at a strain, and at the strain limit, falls by 1 a ln A and by ln s an n."""
+    kernel, theta = lower(NORTON, "compiled"), NORTON.to_internal({"A": 1e-12, "n": 3.0})
+    test = PointTest(Program.constant(100.0), ROOM, np.zeros(0), levels=np.array([1e-3, 0.1]), until=1e9)
+    result = integrate(kernel, theta, [test], jacobian=True)
+    expected = [-1.0, -np.log(100.0)]
+    assert result.terminations[0, 0] == STRAIN_LIMIT
+    np.testing.assert_allclose(result.level_times[0], [1e3, 1e5], rtol=1e-9)
+    np.testing.assert_allclose(result.level_time_jacobian[0], [expected, expected], rtol=1e-9)
+    np.testing.assert_allclose(result.end_jacobian[0, 0], expected, rtol=1e-9)
 
 
 def test_threads_and_single_calls_agree_to_the_last_digit() -> None:

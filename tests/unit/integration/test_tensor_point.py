@@ -148,6 +148,23 @@ def test_temperature_follows_its_program() -> None:
     assert result.equivalent[0] == pytest.approx(quad(rate, 0, 3600)[0], rel=1e-5)
 
 
+def test_outputs_at_a_jump_show_what_holds_from_then_on() -> None:
+    controls = {"11": prescribed_stress(Program.steps([(0.0, 50.0), (100.0, 80.0)]))}
+    result = run(NORTON, {"A": 1e-12, "n": 3}, controls, [0.0, 100.0, 100.0, 150.0])
+    np.testing.assert_allclose(result.stress[:, 0], [50.0, 80.0, 80.0, 80.0])
+    np.testing.assert_allclose(result.creep_strain[:, 0], 1e-12 * 50**3 * 100 * np.array([0, 1, 1, 1 + 0.5 * 1.6**3]))
+    np.testing.assert_allclose(
+        result.strain[:, 1], -0.5 * result.creep_strain[:, 0] - 0.3 * result.stress[:, 0] / 150e3
+    )
+
+
+def test_without_load_nothing_happens() -> None:
+    result = run(DAMAGING, {"A": 1e-14, "n": 4.0, "C": 1e-12, "v": 3.5}, {"13": prescribed_strain(0.0)}, [1e3])
+    assert result.status == Status.COMPLETE
+    assert not result.stress.any()
+    assert not result.strain.any()
+
+
 class TestEnds:
     def test_a_state_at_its_limit(self) -> None:
         """Kachanov: (1 - damage)^(v+1) = 1 - (v+1) C s^v t; outputs beyond are left out."""

@@ -98,6 +98,14 @@ def test_false_alarms_of_a_true_law_are_one_in_a_hundred(stated):
     assert alarms <= 14
 
 
+def test_p_values_of_one_output_are_uniform(stated):
+    """200 draws under the stated noise: Kolmogorov and Smirnov's bound at one in a thousand is 1.95 / sqrt(200)."""
+    tests, problem, linear = stated
+    draws = white_draws(problem, linear, 200, 3)
+    p = np.sort([judged(tests, problem, linear, values)["width"].p_value for values in draws])
+    assert np.abs(p - (np.arange(200) + 0.5) / 200).max() < 1.95 / np.sqrt(200)
+
+
 @pytest.mark.parametrize(("repeats", "most"), [(1, 6), (3, 6)])
 def test_false_alarms_with_noise_estimated_from_neighbours_are_few(repeats, most, monkeypatch):
     """Three and nine whole tests drawn 150 times without stated noise: 1 % is 1.5, and four sigma more 6."""
@@ -145,6 +153,28 @@ def test_a_planted_discrepancy_is_measured_in_its_unit(stated):
     assert found.largest.time == pytest.approx(times[1, np.abs(bump[1]).argmax()], rel=0.5)
     assert found.largest.deviation == pytest.approx(bump.max(), rel=0.4)
     assert found.largest.noises == pytest.approx(found.largest.deviation / 2e-3)
+
+
+def test_what_is_left_is_stated_in_the_outputs_own_unit_where_noise_varies(stated):
+    """A bump where half of the frames are ten times as exact: the rms of numpy's weighted fit."""
+    tests, _, _ = stated
+    sd = np.where(np.arange(40) < 20, 2e-4, 2e-3)
+    tests = [h.replace(standard_deviation={**h.standard_deviation, "amplitude": sd}) for h in tests]
+    problem, linear = at_the_truth(tests)
+    mask = problem.observations.output_index == 0
+    share = problem.observations.times / problem.observations.times.max(axis=1, keepdims=True)
+    bump = np.where(mask, 3e-3 * np.sin(12 * share), 0.0)
+    bump[[0, 2]] = 0.0
+    found = judged(tests, problem, linear, bump * linear.residuals.offset_sensitivity)
+    unit, sizes = linear.residuals.offset_sensitivity, np.where(mask, np.tile(np.r_[sd, sd], (3, 1)), NOISE["width"])
+    design = (linear.residuals.jacobian / (unit * sizes)[..., None]).reshape(-1, 2)
+    moved = np.linalg.lstsq(design, -(bump / sizes).ravel(), rcond=None)[0]
+    left = bump + (linear.residuals.jacobian @ moved) / unit
+    beyond_noise = (left[mask] ** 2).mean() * (1.0 - 1.0 / found["amplitude"].chi_square)
+    assert found["amplitude"].discrepancy == pytest.approx(np.sqrt(beyond_noise), rel=0.02)
+    assert found["amplitude"].discrepancy_in_noises == pytest.approx(np.sqrt(found["amplitude"].chi_square - 1.0))
+    assert found.largest.test == tests[1].name
+    assert found.largest.rms == pytest.approx(np.sqrt((left[1][mask[1]] ** 2).mean()), rel=0.01)
 
 
 def test_what_the_values_can_follow_is_no_discrepancy(stated):
@@ -209,9 +239,39 @@ def test_without_any_noise_nothing_can_be_judged():
 # ---- sentences ---------------------------------------------------------------------------------------------------
 
 
+def test_noise_from_few_frames_says_what_chi_square_a_right_law_has():
+    """The mean of F is nu / (nu - 2), with nu a fifth of 40 frames a test."""
+    found = judged(tests := gauged(12, stated=False), *at_the_truth(tests))
+    nu = FREEDOM_PER_FRAME * 40
+    assert found.expected_chi_square == pytest.approx(nu / (nu - 2.0))
+    assert f"; expected {nu / (nu - 2.0):.3g} for a correct law, as the noise itself is estimated)" in str(found)
+
+
+def test_outputs_that_only_together_are_beyond_chance_have_left_something(stated):
+    """Noise of 1.17 times what is stated: two p-values of a few per mille, and one far below."""
+    tests, problem, linear = stated
+    draws = 1.19 * white_draws(problem, linear, 40, 13)
+    found = [judged(tests, problem, linear, values) for values in draws]
+    left = [a for a in found if not a.explains]
+    assert left
+    assert all(a.discrepancy_in_noises > 0 for a in left)
+
+
 @pytest.mark.parametrize("freedom", [[np.inf, np.inf], [8.0], [8.0, 8.0, 12.0], [np.inf, 8.0]])
 def test_the_critical_chi_square_is_exceeded_with_the_probability_that_it_is_for(freedom):
     mask = np.ones((len(freedom), 40), bool)
     known = KnownNoise(mask, np.ones(mask.shape), np.repeat(np.array(freedom)[:, None], 40, axis=1))
     critical = known.critical(0.003, 0.95, mask)
     assert known.chance_of_larger(critical, 0.95, mask) == pytest.approx(0.003, rel=1e-6)
+
+
+def test_few_tests_whose_noise_is_estimated_contradict_only_what_misses_them_by_far():
+    """Of 40 frames each, noise known to 8 degrees of freedom: quantiles of F and of the sum over six, in the docs."""
+
+    def critical(tests):
+        mask = np.ones((tests, 40), bool)
+        return KnownNoise(mask, np.ones(mask.shape), np.full(mask.shape, 8.0)).critical(0.003, 1.0, mask)
+
+    assert critical(1) == pytest.approx(f.isf(0.003, 40, 8), rel=1e-9)
+    assert critical(1) == pytest.approx(7.0, abs=0.3)
+    assert critical(6) == pytest.approx(2.7, abs=0.2)

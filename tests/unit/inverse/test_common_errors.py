@@ -69,6 +69,14 @@ def test_a_law_without_temperature_takes_the_usual_energy_and_says_so():
     )
 
 
+def test_a_law_with_temperature_takes_its_own_energy():
+    fit = identified(planted_at())
+    effect = common(fit)["temperature"]
+    assert effect.activation_energy == pytest.approx(fit.values["Q"], rel=1e-3)
+    assert not effect.assumed
+    assert "assumed" not in effect.sentence
+
+
 def test_a_nuisance_parameter_of_all_tests_stands_for_the_temperature_and_one_of_each_test_does_not():
     bar, tests = Uniaxial(), planted_at()
     for scope, expected in (("all", {"load"}), ("test", {"load", "temperature"})):

@@ -7,7 +7,8 @@ import pytest
 from scipy.stats import chi2, f
 
 import creepkit as ck
-from creepkit.inverse.confirmation import Confirmation, ConfirmedTest, _confirmed_output, confirm
+from creepkit.inverse.confirmation import Confirmation, ConfirmedTest, _confirmed_output, confirm, outside_domain
+from creepkit.inverse.identification_document import read_identification
 from creepkit.records import Status
 from creepkit.records.history import EVERY_FRAME
 from helpers.planted_alloys import bars
@@ -69,6 +70,28 @@ def test_a_simulation_that_ends_early_confirms_nothing(fit, status, words):
     told = confirm(fit, TESTS, Stranger(status=status))
     assert not told.confirmed
     assert told.verdict.startswith(f"not confirmed: by stranger, {words} of test 'X-60'")
+
+
+def test_only_the_guard_of_a_surrogate_doubts(fit):
+    assert not outside_domain(fit)
+    assert outside_domain(replace(fit, predictor=Stranger(status=Status.OUTSIDE_DOMAIN)))
+    assert not outside_domain(replace(fit, predictor=None))
+
+
+def test_a_fit_from_a_file_is_held_against_the_misfit_it_tells(fit, tmp_path):
+    found = read_identification(replace(fit, predictor=None).save(tmp_path / "fit.json"))
+    told = confirm(found, TESTS, BAR)
+    assert np.isnan(told["X-60", "strain"].rms_difference)
+    assert told.noise_ratio == pytest.approx(0.0, abs=1e-3)
+    far = confirm(found, TESTS, Stranger(100 * SD))
+    assert far.noise_ratio == pytest.approx(100.0, rel=0.05)
+
+
+def test_other_tests_are_predicted_without_a_misfit_of_the_fit(fit):
+    others = [h.replace(name=f"new {h.name}") for h in TESTS]
+    told = confirm(replace(fit, predictor=None), others, {"uniaxial": BAR})
+    assert told.tests[0].outputs[0].fit_errors is None
+    assert np.isnan(told.noise_ratio)
 
 
 # ---- the uncertainty of the noise itself ---------------------------------------------------------------------------

@@ -6,7 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from creepkit.inverse.defect_correction import correct_defect, shift_of_values
+from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.inverse.defect_correction import (
+    correct_defect,
+    difference_of_predictors,
+    shift_of_values,
+    with_cheaper_predictor,
+    with_correction_at_frames,
+)
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
 from creepkit.inverse.identify import identify
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -14,6 +21,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Prediction, Predictor, Status
+from creepkit.reports.prediction_bands import fitted_curves
 from helpers.steady_rate_predictor import planted
 from helpers.two_outputs_predictor import TwoOutputs, with_two_outputs
 
@@ -125,6 +133,17 @@ def test_an_error_that_depends_on_the_values_is_corrected_to_second_order(fits):
     assert abs(np.log(rate / true)) < 0.1 * abs(np.log(plain / true))
 
 
+def test_the_curves_of_a_report_are_the_corrected_ones(fits):
+    """The exact predictor at the planted values; the predictor of the fit alone is off by up to 0.02 mm."""
+    fit = fits["corrected"]
+    curves = fitted_curves(fit)
+    exact = EXACT.predict(NORTON, THETA[None], fit.histories)
+    for k, test in enumerate(fit.tests):
+        amplitude = exact.of(k)[:, 0]
+        np.testing.assert_allclose(curves.of(k, "amplitude")[0] - test["amplitude"].offset, amplitude, atol=1e-3)
+        assert np.abs(fit.predict().of(k)[:, 0] - test["amplitude"].offset - amplitude).max() > 0.015
+
+
 def test_what_was_found_is_reported(fits):
     found, plain = fits["corrected"].numerical_error, fits["plain"]
     assert plain.numerical_error is None
@@ -138,6 +157,13 @@ def test_what_was_found_is_reported(fits):
     assert found.sentence in fits["corrected"].notes
     assert "at the optimum coarse differs from two outputs by 0.01" in found.sentence
     assert fits["corrected"].noise_model["amplitude"].drift > 0
+
+
+def test_measured_and_predicted_frames_agree_after_the_correction(fits):
+    """The misfit that is reported is that of the corrected prediction."""
+    for test in fits["corrected"].tests:
+        assert test["amplitude"].errors.relative_rms_error < 1e-3
+    assert max(t["amplitude"].errors.relative_rms_error for t in fits["plain"].tests) > 0.01
 
 
 def test_a_loaded_identification_builds_the_corrected_problem_again(fits):
@@ -183,3 +209,36 @@ def test_a_test_that_the_exact_predictor_does_not_finish_is_not_corrected():
     assert error.incomplete == (BARS[0].name,)
     assert not corrected.correction[0].any()
     assert np.abs(corrected.correction[1:]).max() == pytest.approx(0.02, rel=0.01)
+
+
+def test_of_several_predictors_those_are_refined_that_can_be():
+    both = CompositePredictor({"uniaxial": Refinable(), "other": EXACT})
+    tests = [h.replace(specimen="other") if k == 2 else h for k, h in enumerate(measured())]
+    problem, x = problem_of(both, tests)
+    corrected, _ = correct_defect(problem, x)
+    assert np.abs(corrected.correction[:2]).max() == pytest.approx(0.02, rel=0.01)
+    assert np.abs(corrected.correction[2]).max() < 1e-12
+
+
+def test_at_all_frames_the_correction_is_interpolated_in_time():
+    """Of 24 frames 12 are compared; between them the smooth error is interpolated to a tenth of itself."""
+    settings = replace(SETTINGS, frames=12)
+    problem = LeastSquaresProblem.from_histories(NORTON, measured(), Refinable(), settings)
+    x = problem.coordinates.u(THETA)
+    corrected, _ = correct_defect(problem, x)
+    plain = Coarse().predict(NORTON, THETA[None], BARS)
+    found = with_correction_at_frames(corrected, BARS, plain)
+    exact = EXACT.predict(NORTON, THETA[None], BARS)
+    assert np.nanmax(np.abs(found.values - exact.values)) < 0.1 * 0.02
+    assert with_correction_at_frames(problem, BARS, plain) is plain
+
+
+def test_a_cheaper_predictor_agrees_where_it_is_corrected():
+    problem, x = problem_of(EXACT)
+    cheap = with_cheaper_predictor(problem, x, Coarse(relative))
+    assert cheap.predictor == Coarse(relative)
+    np.testing.assert_allclose(cheap.residuals(x).values, problem.residuals(x).values, atol=1e-10)
+    difference = difference_of_predictors(problem, x, Coarse())
+    mask = problem.observations.output_index == 0
+    share = problem.observations.times / problem.observations.times.max(axis=1, keepdims=True)
+    np.testing.assert_allclose(difference[mask], -0.02 * np.sin(2.5 * share[mask]), atol=1e-10)

@@ -16,6 +16,10 @@ def test_three_means():
     assert relative_squared_error(MEASURED, PREDICTED, about="frame") == pytest.approx(5 / 16)
 
 
+def test_the_mean_itself_has_an_error_of_one():
+    assert relative_squared_error(MEASURED, [np.full(2, 4.0)] * 2) == pytest.approx(1.0)
+
+
 def test_errors_of_one_output():
     found = output_errors(np.array([1.0, 3.0]), np.array([1.0, 4.0]), np.array([0.5, 0.5]))
     assert (found.frames, found.mean_squared_error, found.mean_absolute_error) == (2, 0.5, 0.5)

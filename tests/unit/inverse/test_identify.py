@@ -52,6 +52,12 @@ def test_rate_band_contains_the_truth(fit):
     assert ((low < rate) & (rate < high)).all()
 
 
+def test_local_exponent_of_a_power_law_is_its_exponent(fit):
+    n, low, high = fit.local_exponent(50.0, 1050.0)
+    assert float(n) == pytest.approx(fit.values["n"], rel=1e-6)
+    assert low < n < high
+
+
 def test_one_stress_leaves_the_exponent_undetermined():
     tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(50.0, 1050.0)] * 4, seed=2, rate=0.1, noise=1e-5)
     fit = identify(NORTON, tests, Steady(), settings=QUICK)
@@ -146,3 +152,26 @@ def test_scatter_of_rates_is_found_when_the_coefficient_is_fixed():
     fit = identify(NORTON.fix(A=1e-14), tests, Steady(), settings=QUICK)
     assert fit.noise_model.rate < 0.02
     assert fit.values["n"] == pytest.approx(4.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("fixed", [{"A_1": 1e-16, "A_2": 1e-17}, {"A_1": 1e-16, "n_1": 5.0}])
+def test_sums_with_fixed_parts_are_identified(fixed):
+    law = (NORTON + NORTON).fix(**fixed)
+    tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1050.0) for s in (30, 50, 80)], seed=3, noise=1e-5)
+    assert np.isfinite(identify(law, tests, Steady(), settings=QUICK).rms)
+
+
+def test_refit_keeps_the_nuisances(tests):
+    plain = identify(LAW, tests, Steady(), settings=replace(QUICK, nuisances=()))
+    again = refit(plain, tests[:-1])
+    assert again.noise_model.rate == again.noise_model["strain"].offset == 0.0
+
+
+def test_noise_of_a_smooth_sparse_curve_is_small():
+    """Primary creep t^0.1 without noise at 12 frames even in ln t: under 0.1 % of the end strain is taken for noise."""
+    from creepkit.inverse.frame_noise import frame_noise
+    from creepkit.records import History, constant_stress
+
+    times = np.geomspace(1e2, 1e6, 12)
+    curve = History("smooth", times, {"strain": 0.01 * (times / 1e6) ** 0.1}, constant_stress(100.0), 1000.0)
+    assert frame_noise(curve, "strain") < 1e-5

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
+from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
@@ -77,6 +78,16 @@ def test_without_thickness_the_answer_is_worse_and_says_so(fit, tests):
     assert widths[0] > widths[1]
 
 
+def test_predictions_of_fitted_tests_have_their_own_nuisances(fit, tests):
+    found = fit.predict()
+    for k, test in enumerate(tests):
+        np.testing.assert_allclose(found.of(k)[:, 0], test.outputs["amplitude"], atol=6 * 1.5e-3)
+    stranger = fit.predict([tests[0].replace(name="another")])
+    alike = fit.predict([tests[0]], own_nuisances=False)
+    np.testing.assert_array_equal(stranger.values, alike.values)
+    assert fit.nuisance_values([tests[0].replace(name="another")])["thickness"] == MEAN
+
+
 def test_an_unknown_spread_is_estimated():
     """The spread of seven draws about a known mean: a standard error of 27 %, so a factor of two is three of them."""
     many = planted(LAW, TRUTH, plans(seed=8), seed=5, frames=24)
@@ -96,6 +107,13 @@ def test_one_temperature_error_of_all_tests():
     assert warmth.owner == "all"
     assert abs(warmth.value - 8.0) < 4 * warmth.sd
     assert warmth.sd < 2.0
+
+
+def test_bounds_of_a_nuisance_hold(tests):
+    narrow = Nuisance("thickness", mean=MEAN, sd=SPREAD, bounds=(0.49, 0.50))
+    fit = identify(LAW, tests, EXACT, settings=replace(QUICK, nuisances=(*BOTH, narrow)))
+    assert all(0.49 <= n.value <= 0.50 for n in fit.nuisances)
+    assert any("lies at its bound" in note for note in fit.notes)
 
 
 def test_intervals_cover_where_thicknesses_and_rates_scatter():
@@ -170,6 +188,11 @@ def test_a_history_may_lack_outputs_and_frames(fit, tests):
     assert all(inside(some).values())
 
 
+def test_derivatives_by_differences_give_the_same_answer(fit, tests):
+    other = identify(LAW, tests, OneDegree(exact=False), settings=WITH_THICKNESS)
+    assert (np.abs(other.u - fit.u) < 1e-2 * np.sqrt(np.diag(fit.covariance))).all()
+
+
 def test_an_expensive_predictor_is_searched_with_its_stand_in(fit, tests):
     """The stand-in creeps 10 % too fast: the answer must not, and few evaluations may be of the real one."""
     other = identify(LAW, tests, OneDegree(exact=True, stand_in=True), settings=WITH_THICKNESS)
@@ -192,6 +215,15 @@ def test_bars_and_bulges_are_fitted_together(tests):
 
 
 # ---- what comes out ------------------------------------------------------------------------------------------------
+
+
+def test_a_test_that_was_left_out_is_predicted(fit, tests):
+    """Thicknesses of unseen tests are only known to 4 %, which is a quarter of the rate: errors far above the noise."""
+    held = cross_validate(fit, tests[:3], by="test")
+    assert list(held.errors) == [h.name for h in tests[:3]]
+    assert all(len(fold.fit.tests) == 2 for fold in held.folds)
+    assert all(np.isfinite(errors["amplitude"].relative_squared_error) for errors in held.errors.values())
+    assert held.pooled_error("amplitude") > fit.errors["amplitude"].relative_squared_error
 
 
 # ---- what cannot be ------------------------------------------------------------------------------------------------

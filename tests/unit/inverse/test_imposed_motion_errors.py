@@ -46,6 +46,13 @@ def test_the_rate_moves_as_identifications_with_these_errors_say(share, how, tol
     assert effects["modulus"].sentence.endswith("with Young's moduli 2 % above those stated, in all 3 tests")
 
 
+def test_creep_tests_have_neither():
+    how = {"times": np.geomspace(1e3, 1e6, 12), "elastic": ck.Elastic(E=E), "loading": ck.constant_stress(150.0)}
+    curve = ck.simulate("norton", "uniaxial", {"A": A, "n": N}, **how)
+    kinds = {e.kind for e in ck.identify("norton", [curve], starts=1).unmodelled}
+    assert not {"modulus", "imposed strain"} & kinds
+
+
 def test_a_nuisance_parameter_of_all_tests_stands_for_the_modulus():
     fit = ck.identify("norton", _relaxation(), starts=1, nuisances=[ck.Nuisance("modulus", scope="all", sd=0.02)])
     kinds = {e.kind for e in fit.unmodelled if e.common}

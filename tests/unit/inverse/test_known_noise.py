@@ -31,6 +31,17 @@ def test_noise_in_proportion_to_strain_is_seen_as_such():
     assert ratio[-1] / ratio[10] == pytest.approx(1.0, abs=0.4)
 
 
+def test_constant_noise_stays_constant():
+    sd = known(history(2e-5)).sd[0]
+    assert np.ptp(sd) == 0.0
+    assert sd[0] == pytest.approx(2e-5, rel=0.3)
+
+
+def test_each_test_has_its_own_noise():
+    sd = known(history(1e-5), history(4e-5, "b")).sd
+    assert np.median(sd[1]) / np.median(sd[0]) == pytest.approx(4.0, rel=0.05)
+
+
 def test_stated_noise_is_known_exactly_and_short_tests_are_not_judged():
     stated = history(1e-5, standard_deviation={"strain": 3e-5})
     assert known(stated).sd[0] == pytest.approx(3e-5)

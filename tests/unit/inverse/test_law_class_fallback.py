@@ -1,10 +1,13 @@
 """Laws that a surrogate does not know are identified with its specimen: alone, in a mixed list, and on the way."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import creepkit as ck
 from creepkit.inverse.composite_predictor import CompositePredictor, outside_class, predictor_for_law
+from creepkit.inverse.confirmation import confirm
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection.select import select
 from creepkit.inverse.settings import IdentificationSettings
@@ -58,6 +61,13 @@ def test_on_the_way_it_is_left_out(tests: list[History]) -> None:
     assert found.notes[-1] == "identified without 'narrow' on the way: law 'norton' is none of its laws"
 
 
+def test_a_law_that_it_knows_is_left_to_it(tests: list[History]) -> None:
+    surrogate = Narrow(unknown=())
+    found = identify(NORTON, tests, surrogate, through=surrogate, settings=settings())
+    assert found.predictor is surrogate
+    assert not any("narrow" in note for note in found.notes)
+
+
 def test_a_mixed_list_is_ranked_on_the_same_data(tests: list[History]) -> None:
     found = select([NORTON, HARDENING], tests, Narrow(), settings=settings(frames=12))
     true = select([NORTON, HARDENING], tests, BARS, settings=settings(frames=12))
@@ -68,6 +78,21 @@ def test_a_mixed_list_is_ranked_on_the_same_data(tests: list[History]) -> None:
     assert fits["norton"].provenance["specimen"] == "uniaxial"
     assert fits["strain-hardening"].provenance["specimen"] == "narrow"
     assert "in the place of 'narrow'" in fits["norton"].notes[-1]
+
+
+def test_select_through_it_takes_the_specimen_for_the_others(tests: list[History]) -> None:
+    found = select([NORTON, HARDENING], tests, BARS, through=Narrow(), settings=settings(frames=12))
+    assert not found.failed
+    assert found.best.law.name == "norton"
+    assert found.best.values["n"] == pytest.approx(TRUTH["n"], rel=0.05)
+
+
+def test_it_confirms_nothing_of_a_law_that_it_does_not_know(tests: list[History]) -> None:
+    """A loaded fit may be given any predictor; what the specimen says is then compared with what the fit reported."""
+    fit = identify(NORTON, tests, BARS, settings=settings())
+    found = confirm(replace(fit, predictor=Narrow()), tests, BARS)
+    assert found.confirmed
+    assert found.noise_ratio == pytest.approx(0.0, abs=1e-3)
 
 
 def test_each_specimen_of_several_has_its_own_answer() -> None:

@@ -4,10 +4,15 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.errors import FitError
+from creepkit.inverse.cross_validation import cross_validate
+from creepkit.inverse.duration import STRAIN_OF_UNKNOWN_DURATION, followed_duration
 from creepkit.inverse.minimum_rates import with_minimum_rates
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
-from creepkit.records import UNKNOWN_DURATION, History, constant_stress
+from creepkit.records import UNKNOWN_DURATION, History, Nuisance, constant_stress
 from creepkit.specimens.uniaxial import Uniaxial
 from helpers.literature_laws import EQUATIONS
 from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, rate_table, whole_life_table
@@ -71,6 +76,12 @@ def test_derivatives_are_those_of_the_rate():
     np.testing.assert_allclose(jacobian, (moved[: theta.size] - moved[theta.size :]) / 2e-4, rtol=1e-3)
     _, rough = minimum_rate(law, values, test)
     np.testing.assert_allclose(rough, jacobian, rtol=0.02)
+
+
+def test_a_test_of_unknown_duration_is_followed_to_a_strain_at_its_rate():
+    assert followed_duration(stated(rate=1e-9)) == STRAIN_OF_UNKNOWN_DURATION / 1e-9
+    assert followed_duration(stated(duration=3e6)) == 3e6
+    assert followed_duration(stated(duration=3e6, rupture_time=3e6)) == 3e6
 
 
 # ---- identification -----------------------------------------------------------------------------------------------
@@ -140,6 +151,27 @@ def test_the_answer_says_rates_and_ends(whole_life, tmp_path):
     assert back.with_histories(tests).least_squares_problem.observations.count == 20
 
 
+def test_a_run_out_moves_nothing_that_it_does_not_contradict(whole_life):
+    tests, fit = whole_life
+    problem = fit.least_squares_problem
+    residuals = problem.residuals(fit.x)
+    censored = [k for k, h in enumerate(tests) if h.unruptured]
+    assert len(censored) == 2
+    assert not (residuals.present & problem.observations.rupture_mask)[censored].any()
+
+
+def test_a_condition_is_held_out_of_a_table():
+    tests = whole_life_table(np.random.default_rng(3), lives=False)[2:6]
+    fit = ck.identify(NORTON, tests, starts=1)
+    validation = cross_validate(fit, by="condition")
+    held = [values["minimum rate"] for values in validation.single_values.values()]
+    assert len(held) == len(tests)
+    assert sum(one.low <= one.measured <= one.high for one in held) >= 3
+    assert "minimum rate predicted over measured" in str(validation)
+    with pytest.raises(FitError, match="these tests have none; take by='test'"):
+        cross_validate(fit, by="time")
+
+
 def curve(stress, factor=1.0):
     times = np.geomspace(1e3, 3e5, 12)
     return History(f"curve {stress:g}", times, {"strain": factor * 1e-16 * stress**4 * times},
@@ -159,6 +191,30 @@ def test_rates_beside_curves_narrow_the_interval():
         assert exponent.low < 4.0 < exponent.high
         widths.append(exponent.high - exponent.low)
     assert widths[1] < 0.5 * widths[0]
+
+
+def test_a_rate_beside_the_readings_of_its_test_is_not_counted_twice():
+    tests = [curve(s) for s in (80.0, 100.0, 120.0)]
+    with_rates = [h.replace(minimum_rate=3e-9) for h in tests]
+    plain, both = (ck.identify(NORTON, each, starts=1) for each in (tests, with_rates))
+    assert both.values == plain.values
+    assert any("minimum rate" in note and "readings" in note for note in both.notes)
+    assert not any("minimum rate" in note for note in plain.notes)
+
+
+def test_explicit_nuisances_move_the_rate():
+    """A test 10 K too warm creeps faster by Q/R (1/T - 1/(T + 10))."""
+    law = NORTON.times(ck.arrhenius(T_ref=1000.0)).fix(Q=4e5)
+    tests = [stated(s, rate=1e-16 * s**4).replace(name=f"{s:g}") for s in (60.0, 80.0, 100.0, 120.0)]
+    settings = IdentificationSettings(nuisances=(Nuisance("temperature", sd=5.0),))
+    problem = LeastSquaresProblem.from_histories(law, tests, BAR, settings)
+    u = problem.coordinates.u(law.to_internal({"A": 1e-16, "n": 4.0})[0])
+    warm = np.concatenate([u, [10.0, 0.0, 0.0, 0.0]])
+    change = problem.residuals(warm).values - problem.residuals(np.concatenate([u, np.zeros(4)])).values
+    expected = 4e5 / GAS_CONSTANT * (1.0 / 1000.0 - 1.0 / 1010.0)
+    np.testing.assert_allclose(change[:, 0], [expected, 0.0, 0.0, 0.0], atol=1e-4)
+    slope = problem.residuals(warm).jacobian[0, 0, u.size]
+    assert slope == pytest.approx(4e5 / GAS_CONSTANT / 1010.0**2, rel=1e-2)
 
 
 def test_rates_of_unknown_duration_do_not_judge_hardening():

@@ -5,8 +5,9 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
-from creepkit.inverse.noise_covariance import CovarianceFactor, NoiseLikelihood
+from creepkit.inverse.noise_covariance import CovarianceFactor, NoiseLikelihood, log_likelihood
 from creepkit.inverse.noise_model import (
     OUTPUT_COMPONENTS,
     SHARED_COMPONENTS,
@@ -176,6 +177,20 @@ def test_value_and_gradient_are_those_of_fifty_digits(restricted, correlated):
         assert found == pytest.approx(slope, rel=1e-10, abs=1e-12), key
 
 
+@pytest.mark.usefixtures("fifty_digits")
+@pytest.mark.parametrize("noise_of_offsets", [1e-3, 1e-5])
+def test_offsets_far_above_the_noise_cost_no_digits(noise_of_offsets):
+    """A condition of up to 1e10: the matrix itself, in double precision, would leave six digits."""
+    residuals, noise = example(seed=1)
+    small = {
+        name: replace(output, noise=noise_of_offsets, misfit=noise_of_offsets) for name, output in noise.outputs.items()
+    }
+    noise = replace(noise, outputs=small)
+    value, _ = likelihood_of(residuals, noise)(noise.components)
+    exact = exact_restricted_cost(residuals, exact_sizes(noise), (0.1, 0.0, 2.0), (0.2, 0.0, -0.4))
+    assert value == pytest.approx(float(exact), rel=1e-10)
+
+
 # ---- one factor ------------------------------------------------------------------------------------------------------
 
 
@@ -208,6 +223,27 @@ def test_correlations_are_those_of_their_factors():
     assert SharedNoise.of_correlations(np.tile(np.eye(3), (3, 1, 1)), output, frame) is None
 
 
+def test_correlated_noise_at_a_correlation_of_zero_is_no_other():
+    """The states by frame and by output give one likelihood."""
+    residuals, noise = example(frames=9)
+    none = np.zeros((*residuals.values.shape, 1))
+    frame = np.tile([*range(9), *range(9), 0], (3, 1))
+    by_frame = replace(residuals, shared_noise=SharedNoise(frame, none))
+    ends = [likelihood_of(one, noise)(noise.components) for one in (residuals, by_frame)]
+    assert ends[0][0] == pytest.approx(ends[1][0], rel=1e-12)
+    np.testing.assert_allclose(ends[0][1], ends[1][1], rtol=1e-9)
+
+
+def test_the_likelihood_is_scipys():
+    residuals, noise = example(frames=12)
+    c = covariance(residuals, noise)
+    truth = sum(
+        multivariate_normal(np.zeros(p.sum()), c[k][np.ix_(p, p)]).logpdf(residuals.values[k, p])
+        for k, p in enumerate(residuals.present)
+    )
+    assert log_likelihood(residuals, noise) == pytest.approx(truth, rel=1e-10)
+
+
 @pytest.mark.parametrize("correlated", [False, True])
 def test_the_order_of_observations_does_not_matter(correlated):
     """Frames shuffled, and outputs among each other: the same likelihood, and a whitening of the same squares."""
@@ -226,6 +262,25 @@ def test_the_order_of_observations_does_not_matter(correlated):
     assert (factor.whiten(shuffled.values) ** 2).sum() == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.parametrize("correlated", [False, True])
+def test_an_observation_without_data_is_left_as_it_is(correlated):
+    residuals, noise = example(correlated=correlated)
+    values = np.ones(residuals.values.shape)
+    for found in (CovarianceFactor.of_residuals(residuals, noise).whiten(values),
+                  CovarianceFactor.of_residuals(residuals, noise).inverse_times(values)):  # fmt: skip
+        np.testing.assert_array_equal(found[~residuals.present], 1.0)
+    nothing = replace(residuals, present=np.zeros_like(residuals.present))
+    assert CovarianceFactor.of_residuals(nothing, noise).log_determinant == 0.0
+
+
+def test_counted_twice_is_the_square_twice():
+    residuals, noise = example()
+    factor = CovarianceFactor.of_residuals(residuals, noise)
+    counts = np.full(residuals.values.shape, 2.0)
+    once, twice = ((f.whiten(residuals.values) ** 2).sum() for f in (factor, factor.with_counts(counts)))
+    assert twice == pytest.approx(2.0 * once, rel=1e-12)
+
+
 def test_components_go_into_a_noise_model_and_out():
     _, noise = example()
     assert noise.with_components(noise.components) == noise
@@ -238,3 +293,39 @@ def test_components_go_into_a_noise_model_and_out():
 
 
 # ---- restricted likelihood -------------------------------------------------------------------------------------------
+
+FLAT = (0.0, 0.0, 0.0)
+
+
+def test_what_the_unknowns_can_explain_changes_nothing():
+    """Patterson & Thompson (1971): y + X b has the same restricted likelihood, and the same gradient."""
+    residuals, noise = example(frames=9)
+    moved = replace(residuals, values=residuals.values + residuals.jacobian @ np.array([3.0, -2.0, 5.0]))
+    plain, other = (likelihood_of(one, noise, FLAT, FLAT)(noise.components) for one in (residuals, moved))
+    assert other[0] == pytest.approx(plain[0], rel=1e-11)
+    np.testing.assert_allclose(other[1], plain[1], rtol=1e-9, atol=1e-11)
+
+
+def test_other_coordinates_of_the_unknowns_shift_it_by_their_determinant():
+    residuals, noise = example(frames=9)
+    T = np.random.default_rng(5).normal(size=(3, 3))
+    changed = replace(residuals, jacobian=residuals.jacobian @ T)
+    plain, other = (likelihood_of(one, noise, FLAT, FLAT)(noise.components) for one in (residuals, changed))
+    assert other[0] - plain[0] == pytest.approx(np.log(abs(np.linalg.det(T))), rel=1e-10)
+    np.testing.assert_allclose(other[1], plain[1], rtol=1e-9, atol=1e-11)
+
+
+def test_a_prior_is_an_observation_of_the_unknown():
+    """Precision 1 / v about m: one more observation m of variance v, apart from ln v."""
+    residuals, noise = example(frames=6)
+    own = {
+        name: np.concatenate([v, np.zeros((1, *v.shape[1:]), v.dtype)])
+        for name, v in vars(residuals).items()
+        if isinstance(v, np.ndarray)
+    }
+    own["present"][-1, 0], own["test_weights"][-1] = True, 1.0
+    own["values"][-1, 0], own["jacobian"][-1, 0, 0], own["output_index"][-1] = -0.7, 1.0, 2
+    variance = noise["rupture_time"].misfit ** 2 + 1e-10
+    stated = likelihood_of(residuals, noise, (1.0 / variance, 0.0, 0.0), (-0.7, 0.0, 0.0))(noise.components)[0]
+    observed = likelihood_of(Residuals(**own), noise, FLAT, FLAT)(noise.components)[0]
+    assert observed == pytest.approx(stated + 0.5 * np.log(variance), rel=1e-11)

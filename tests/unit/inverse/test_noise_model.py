@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.inverse.noise_covariance import effective_sample_size, predicted_random_effects
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
+from creepkit.inverse.noise_covariance import effective_sample_size, log_likelihood, predicted_random_effects
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, autocorrelated_components, covariance
 from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.records import Nuisance
 
@@ -46,6 +46,14 @@ def test_planted_scatter_is_found():
     assert found.rate == pytest.approx(truth.rate, rel=0.25)
     assert found["strain"].drift == pytest.approx(truth["strain"].drift, rel=0.25)
     assert found["strain"].correlation_length == pytest.approx(truth["strain"].correlation_length, rel=0.5)
+
+
+def test_a_given_prior_stays():
+    residuals = made(20, 20, 3, sizes(2e-5, 0, 1e-4, 0.4, 0.1, 1.5))
+    found = estimate_variance_components(
+        residuals, sizes(2e-5, 0, 7e-5, 0.5, 0.1, 1.5), (Nuisance("offset", sd=7e-5), Nuisance("rate"))
+    )
+    assert found["strain"].offset == 7e-5
 
 
 def test_effective_size_counts_a_test_once_when_its_residuals_move_together():
@@ -90,6 +98,26 @@ def test_a_test_of_little_trust_scatters_more():
     )
     np.testing.assert_allclose(doubted[0], plain[0])
     np.testing.assert_allclose(doubted[1], 4 * plain[1])
+
+
+def test_slopes_of_the_likelihood_are_its_differences():
+    from creepkit.inverse.variance_components import _Likelihood
+
+    residuals, scatter = two_outputs()
+    free = [(o, n) for o in scatter.outputs for n in ("misfit", "offset", "drift", "correlation_length")] + [
+        ("", "rate")
+    ]
+    residuals = residuals.with_test_weights(np.array([1.0, 0.3]))
+    likelihood = _Likelihood(residuals, scatter, free)
+    x = np.log([*(getattr(scatter[o], n) for o, n in free[:-1]), scatter.rate])
+    slope = likelihood.cost(x)[1]
+    for k in range(x.size):
+        step = np.zeros(x.size)
+        step[k] = 1e-5
+        difference = (likelihood.cost(x + step)[0] - likelihood.cost(x - step)[0]) / 2e-5
+        assert slope[k] == pytest.approx(difference, rel=1e-5, abs=1e-7)
+    ends = [likelihood.cost(x + d)[0] + log_likelihood(residuals, likelihood.noise_model(x + d)) for d in (0, 1)]
+    assert ends[0] == pytest.approx(ends[1], rel=1e-12)
 
 
 # ---- model discrepancy ---------------------------------------------------------------------------------------------
@@ -167,3 +195,19 @@ def test_stated_noise_is_a_lower_bound_with_a_prior(actual, stated):
     cost = 25 * np.log(s) + 0.5 * (values**2).sum() / s**2 + 0.5 * (np.log(s / stated) / 0.2) ** 2
     assert found == pytest.approx(s[np.argmin(cost)], rel=1e-3)
     assert found >= stated * (1 - 1e-9)
+
+
+def test_noise_that_nobody_stated_may_be_smaller_than_its_estimate():
+    """The root mean square of the residuals, whatever the third differences said."""
+    values = 0.1 * np.random.default_rng(10).normal(size=(1, 400))
+    ones = np.ones_like(values)
+    residuals = residuals_of(values, ones, ones > 0, np.linspace(1.0, 2.0, 400)[None], 0 * ones)
+    found = estimate_variance_components(residuals, sizes(0.2), (), fixed=())["strain"].noise
+    assert found == pytest.approx(np.sqrt((values**2).mean()), rel=1e-3)
+
+
+def test_autocorrelated_parts_are_counted():
+    scatter = NoiseModel({"amplitude": OutputNoise(0.1, drift=0.2), "width": OutputNoise(0.1, drift=1e-4)})
+    assert autocorrelated_components(scatter) == 2
+    assert autocorrelated_components(replace(scatter, discrepancy=1.0)) == 4
+    assert autocorrelated_components(replace(scatter, discrepancy=0.01)) == 2

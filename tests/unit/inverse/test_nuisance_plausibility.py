@@ -44,6 +44,13 @@ def test_a_law_that_needs_a_large_offset_explains_only_with_it():
     assert f"{named.standard_deviations:.2g} times" in note
 
 
+@pytest.mark.parametrize("jump", [0.0, 0.008])
+def test_a_small_offset_is_not_named(jump):
+    adequacy = fitted(jump)[0].adequacy
+    assert adequacy.explains_plausibly
+    assert "only with" not in str(adequacy)
+
+
 def test_a_stated_prior_decides_what_is_plausible():
     wide = fitted(0.3, Nuisance("offset", output="amplitude", sd=0.2))[0].adequacy
     assert wide.explains_plausibly

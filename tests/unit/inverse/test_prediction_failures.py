@@ -9,6 +9,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
+from creepkit.inverse.prediction_failures import tests_without_prediction as missing_tests
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import Status
@@ -69,3 +70,20 @@ def test_a_reduced_order_model_that_works_does_not_hide_that_its_predictor_fails
 
     with pytest.raises(FitError, match="could be predicted"):
         identify(NORTON, TESTS, WithReducedModel(), settings=SETTINGS)
+
+
+def test_a_test_of_which_nothing_is_predicted_is_named() -> None:
+    def last_fails(theta, tests):
+        return np.tile([h.name == TESTS[-1].name for h in tests], (len(theta), 1))
+
+    found = identify(NORTON, TESTS, Failing(last_fails), settings=SETTINGS)
+    assert f"nothing is predicted of test '{TESTS[-1].name}': not converged" in found.notes
+
+
+def test_the_start_alone_is_no_prediction() -> None:
+    """At rest, at time zero, every predictor has a number."""
+    history = TESTS[0].replace(times=np.linspace(0.0, 100.0, 12))
+    values = np.full((1, 1, 12, 1), np.nan)
+    values[..., 0, :] = 0.0
+    prediction = replace(Steady().predict(NORTON, np.array([[-30.0, 4.0]]), [history]), values=values)
+    assert missing_tests(prediction, [history]).tolist() == [[True]]

@@ -10,6 +10,12 @@ import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
+from creepkit.inverse.predictor_documents import (
+    missing_predictor,
+    predictor_documents,
+    predictor_from_documents,
+    registered_specimens,
+)
 from helpers.planted_alloys import bars
 
 BAR = ck.specimen("uniaxial").replace(strain_limit=0.7, max_steps=5000)
@@ -46,6 +52,11 @@ def test_it_predicts_without_using(fit, tmp_path):
     assert ck.confirm(back, TESTS).verdict == ck.confirm(fit).verdict
 
 
+def test_a_specimen_of_changed_settings_confirms_its_own_fit(fit):
+    assert registered_specimens(fit.predictor) == {"uniaxial": BAR}
+    assert ck.confirm(fit).noise_ratio == 0.0
+
+
 def test_several_specimens_come_back_each_with_its_settings(fit):
     several = replace(fit, predictor=CompositePredictor({"uniaxial": BAR, "relaxation": ck.specimen("relaxation")}))
     back = identification_from_json(json.loads(json.dumps(identification_to_json(several))))
@@ -71,3 +82,16 @@ def test_a_predictor_that_no_file_holds_is_named(fit, tmp_path):
     with pytest.raises(FitError, match="made with 'foreign', which a file cannot hold: give using="):
         back.predict(TESTS)
     assert back.predict(TESTS, Foreign()).values.shape[1] == len(TESTS)
+
+
+def test_a_reduced_order_model_is_found_again_with_the_fields_of_its_specimen():
+    dimple = ck.surrogate("dimple")
+    coarse = dimple.specimen.replace(refinement=0.5).reduced_order_model()
+    for model in (dimple, coarse):
+        documents = predictor_documents(model)
+        assert documents[""].kind == "reduced-order model"
+        assert predictor_from_documents(documents) == model
+
+    gone = {"": replace(documents[""], name="torsion-tube")}
+    assert predictor_from_documents(gone) is None
+    assert "made with specimen 'torsion-tube', which is not known here" in missing_predictor(gone)

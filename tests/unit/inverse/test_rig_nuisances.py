@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities
+from creepkit.inverse.composite_predictor import CompositePredictor, predict, predict_with_sensitivities
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify, refit
-from creepkit.language import arrhenius
+from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
-from creepkit.records import History, Nuisance, constant_stress
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.records import History, Nuisance, PressureJump, constant_stress
+from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.uniaxial import Uniaxial
 
 T_REF, R = 1048.15, 8.314462618
@@ -62,6 +64,40 @@ def test_steps_and_drifts_of_a_steady_rate_have_closed_forms():
     np.testing.assert_allclose(strain({"rate drift": 0.3}), rate() * np.expm1(growth * t) / growth, rtol=1e-6)
 
 
+def test_a_rate_step_reaches_internal_variables_and_hardening_laws():
+    """Strain hardening, rate = A s^n e^m: e^(1-m)/(1-m) grows as A s^n times the integral of the factor."""
+    law = STRAIN_HARDENING
+    values = dict(zip(law.names, (1e-15, 4.0, -0.5), strict=True))
+    t, factor = bar("one").times, np.exp(0.7)
+    found = strain({"rate step@8250": 0.7}, law=law, theta=law.to_internal(values)[0])
+    time = np.minimum(t, START + 2.5) + factor * np.maximum(t - START - 2.5, 0.0)
+    away = np.abs(t - START) > 10
+    expected = (1.5 * 1e-15 * 90.0**4 * time) ** (1 / 1.5)
+    np.testing.assert_allclose(found[away], expected[away], rtol=2e-4)
+
+
+def test_a_drift_of_temperature_is_the_recorded_ramp():
+    test = bar("one")
+    recorded = test.replace(temperature=test.temperature_program())
+    np.testing.assert_allclose(
+        strain({"temperature drift": 5.0}), strain({"temperature drift": 5.0}, recorded), rtol=1e-12
+    )
+    assert strain({"temperature drift": 5.0})[-1] > 1.05 * strain({})[-1]
+
+
+def test_candidates_and_specimens_may_differ_in_what_the_rig_did():
+    tests = [bar("one"), bar("two", 70.0).replace(specimen="other")]
+    both = CompositePredictor({"uniaxial": BAR, "other": BAR})
+    nuisances = {"temperature step@8250": np.array([[-5.0, 0.0], [8.0, 3.0]]), "rate drift": np.array([[0.1, 0.2]])}
+    theta = np.array([THETA, LAW.to_internal({**VALUES, "A": 5e-16})[0]])
+    found = predict(both, LAW, theta, tests, nuisances=nuisances).values
+    for c in range(2):
+        for k, test in enumerate(tests):
+            own = {key: values[min(c, len(values) - 1), k] for key, values in nuisances.items()}
+            expected = strain(own, test, both, theta=theta[c])
+            np.testing.assert_allclose(found[c, k, :, 0], expected, rtol=1e-9)
+
+
 # ---- derivatives -------------------------------------------------------------------------------------------------
 
 
@@ -78,6 +114,26 @@ def test_derivatives_of_bars_are_those_of_differences(key):
     np.testing.assert_allclose(found.nuisance_jacobian[key][present], expected[present], atol=1e-3 * largest)
     plain = predict_with_sensitivities(BAR, LAW, THETA, tests, {key: 0.0 * values[key]})
     assert plain.jacobian.shape == found.jacobian.shape == (1, 2, 24, 1, 3)
+
+
+@pytest.mark.parametrize("key", STEPS)
+def test_derivatives_of_finite_elements_are_those_of_differences(key):
+    """Against differences of runs with a hundredth of the step tolerance; the modulus depends on temperature."""
+    from creepkit.language import temperature
+
+    test = History(
+        "one", np.linspace(1200.0, 14400.0, 12), {}, PressureJump(8.0, 8.0, 10800.0), 1040.0, "bulge",
+        elastic=Elastic(210e3 - 100 * temperature),
+    )  # fmt: skip
+    (value, step), coarse, fine = STEPS[key], Bulge(refinement=0.5), Bulge(refinement=0.5, tolerance=1e-4)
+    values = {key: np.array([[value]])}
+    found = predict_with_sensitivities(coarse, LAW, THETA, [test], values).nuisance_jacobian[key][0, 0, :, 0]
+    up, down = (
+        predict(fine, LAW, THETA[None], [test], nuisances={key: values[key] + s}).values[0, 0, :, 0]
+        for s in (step, -step)
+    )
+    expected = (up - down) / (2 * step)
+    np.testing.assert_allclose(found, expected, atol=5e-3 * np.abs(expected).max())
 
 
 # ---- identification ----------------------------------------------------------------------------------------------
@@ -137,6 +193,23 @@ def test_a_prior_holds_a_step_that_the_tests_do_not_show(fit):
     tight = replace(GROUPS[0], mean=-3.0, sd=0.01)
     held = identify(LAW, planted(), BAR, settings=replace(QUICK, nuisances=(tight, GROUPS[1])))
     assert abs(held.nuisances[0].value + 3.0) < 0.5
+
+
+def test_a_rate_step_takes_the_place_where_a_law_has_no_temperature():
+    plain = LAW.fix(Q=VALUES["Q"]).at(1040.0)
+    rng, tests = np.random.default_rng(5), []
+    for k, name in enumerate(NAMES):
+        plan = bar(name, (70.0, 90.0, 110.0)[k % 3])
+        clean = strain({"temperature step@8250": -24.0 if name in FAST else -11.0}, plan)
+        tests.append(plan.replace(outputs={"strain": clean + 2e-6 * rng.normal(size=clean.size)}))
+    with pytest.raises(FitError, match=r"has no temperature and cannot follow a temperature step; take a 'rate step'"):
+        identify(plain, tests, BAR, settings=QUICK)
+    steps = tuple(replace(n, kind="rate step", sd=1.0) for n in GROUPS)
+    found = identify(plain, tests, BAR, settings=replace(QUICK, nuisances=steps))
+    for n, kelvin in zip(found.nuisances, (-11.0, -24.0), strict=True):
+        expected = -VALUES["Q"] / R * (1 / (1040.0 + kelvin) - 1 / 1040.0)
+        assert abs(n.value - expected) < 4 * n.sd
+        assert n.sd < 0.05
 
 
 # ---- what cannot be told apart -----------------------------------------------------------------------------------

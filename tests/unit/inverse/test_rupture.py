@@ -5,13 +5,19 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitWarning
-from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
+from creepkit.inverse.composite_predictor import CompositePredictor, predict_to_rupture
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.cross_validation import cross_validate, times_to_rupture
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
-from creepkit.records import History, constant_stress
+from creepkit.records import History, constant_strain, constant_stress
+from creepkit.specimens.relaxation import Relaxation
 from helpers.literature_laws import EQUATIONS
-from helpers.rupture_tests import BAR, campaign
+from helpers.rupture_tests import BAR, OMEGA, campaign
 
 KACHANOV, LIU = (EQUATIONS[name] for name in ("Kachanov-Rabotnov", "Liu-Murakami"))
 LIU = LIU.fix(a=1)  # in tension the largest principal stress is the stress: its share cannot be seen
@@ -79,6 +85,14 @@ def test_the_answer_says_how_tests_ended(planted, tmp_path):
     np.testing.assert_array_equal(back.rupture_time(80.0), fit.rupture_time(80.0))
 
 
+def test_rupture_times_scatter_as_planted(planted):
+    """Rate and life scatter by .15 and .08 in ln: Z = 10^(2.5 x .17/ln 10) = 1.5 for any law."""
+    _, _, tests, fit = planted
+    found = times_to_rupture(fit.law, fit.values, tests, BAR)
+    assert found.names == tuple(h.name for h in tests if h.rupture_time)
+    assert found.z_factor < 2.0
+
+
 @pytest.mark.parametrize("planted", ["Liu-Murakami"], indirect=True)
 def test_what_tension_cannot_tell_costs_the_other_parameters_nothing(planted):
     """The share of the largest principal stress moves nothing in tension: freeing it says that, and no more."""
@@ -94,6 +108,17 @@ def test_what_tension_cannot_tell_costs_the_other_parameters_nothing(planted):
         inner, free_one = law.table[e.name].to_internal, found[e.name]
         width = inner(free_one.high) - inner(free_one.low)
         assert width == pytest.approx(inner(e.high) - inner(e.low), rel=0.05)
+
+
+def test_a_condition_left_out_is_predicted():
+    tests = campaign(OMEGA, {"A": 1e-16, "n": 4.0, "m": 20.0}, [60, 80, 100, 120], 3)
+    fit = ck.identify(OMEGA, tests, using=BAR, starts=3, frames=16)
+    folds = cross_validate(fit, by="condition")
+    held = folds.times_to_rupture()
+    assert len(folds.folds) == 4
+    assert sorted(held.names) == ["t0", "t1", "t2", "t3"]
+    assert held.z_factor < 3.0
+    np.testing.assert_array_equal(sorted(held.measured), sorted(h.rupture_time for h in tests))
 
 
 # ---- the objective ------------------------------------------------------------------------------------------------
@@ -134,6 +159,59 @@ def test_ruptures_count_in_ln_time_and_stopped_tests_only_where_they_outlasted()
         assert residuals.values[1, last[1]] == pytest.approx(max(outlasted, 0.0), abs=0.01)
         assert residuals.present[1, last[1]] == (outlasted > 0)
     np.testing.assert_allclose(residuals.log_rate_sensitivity[last], 1.0, atol=0.01)
+
+
+def test_histories_that_say_nothing_of_their_end_are_compared_as_ever():
+    law, values = PLANTED["Kachanov-Rabotnov"]
+    tests = campaign(law, values, [60, 80], 1)
+    cut = [h.up_to("strain", 0.01) for h in tests]
+    assert not any(h.end_known for h in cut)
+    assert RUPTURE_OUTPUT not in problem(law, cut).observations.outputs
+    assert RUPTURE_OUTPUT in problem(law, tests).observations.outputs
+
+
+def test_a_coordinate_is_the_log_of_the_rate_of_damage():
+    law = PLANTED["Kachanov-Rabotnov"][0]
+    coordinates = Coordinates(law, ReferencePoint(80.0, 0.1, 1e6, 1000.0))
+    theta = np.array([np.log(1e-16), 4.0, np.log(1e-15), 3.5, 4.0])
+    u = coordinates.u(theta)
+    assert (coordinates.term_rates, coordinates.state_rates) == ((0,), (2,))
+    assert u[2] == pytest.approx(np.log(1e-15) + 3.5 * np.log(80.0))
+    np.testing.assert_allclose(coordinates.theta(u), theta, rtol=1e-13)
+    step = 1e-6 * np.eye(5)
+    slopes = [(coordinates.theta(u + h) - coordinates.theta(u - h)) / 2e-6 for h in step]
+    np.testing.assert_allclose(coordinates.jacobian(u), np.transpose(slopes), atol=1e-6)
+
+
+def test_bars_are_followed_to_rupture_beside_tests_that_are_not():
+    law, values = PLANTED["Kachanov-Rabotnov"]
+    bars = campaign(law, values, [60, 80], 1)
+    held = History(
+        "held", np.array([10.0, 1e6]), {"stress": [100.0, 90.0]}, constant_strain(0.001), 1000.0, "relaxation",
+        Elastic(E=150e3), rupture_time=2e6,
+    )  # fmt: skip
+    both = CompositePredictor({"uniaxial": BAR, "relaxation": Relaxation()})
+    given = {name: np.array([value]) for name, value in values.items()}
+    found = predict_to_rupture(
+        both, law, law.to_internal(given), [bars[0], held, bars[1]], sensitivities=True
+    ).times_to_strain
+    alone = BAR.predict_to_rupture(law, law.to_internal(given), bars, sensitivities=True).times_to_strain
+    np.testing.assert_array_equal(found.rupture_times[0, [0, 2]], alone.rupture_times[0])
+    for name in ("times", "log_time_derivatives", "time_jacobian"):
+        joined, own = (getattr(life, name)[0] for life in (found, alone))
+        np.testing.assert_array_equal(joined[[0, 2], : own.shape[1]], own)
+    assert np.isnan(found.rupture_times[0, 1])
+    entries = ObservationVector.from_histories([bars[0], held, bars[1]], both)
+    assert entries.followed_to_rupture.tolist() == [True, False, True]
+
+
+def test_a_plan_is_followed_to_its_rupture_however_short_it_is():
+    """Ends 300 to 10^4 times beyond the last time given, as where a law is far from a test: late, and not never."""
+    values = {"A": 1e-14, "n": 4.0}
+    fit = ck.identify(NORTON, campaign(NORTON, values, [60, 80, 110], 1), using=BAR, starts=2, frames=10)
+    expected = fit.rupture_time(80.0)[0]
+    plans = [History(f"{k}", expected / [k], {}, constant_stress(80.0), 1000.0) for k in (3e2, 1e4)]
+    np.testing.assert_allclose(fit.rupture_times(plans)[0], expected, rtol=1e-3)
 
 
 # ---- bad input ----------------------------------------------------------------------------------------------------

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.errors import FitError
 from creepkit.inverse.rupture_use import has_tertiary_creep
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, constant_stress
 from helpers.literature_laws import EQUATIONS
-from helpers.rate_tables import GAS_CONSTANT
+from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, whole_life_table
 
 KACHANOV = EQUATIONS["Kachanov-Rabotnov"]
 REFERENCE = 873.15
@@ -71,3 +72,17 @@ def test_rates_and_lives_that_contradict_one_another_reject_a_law():
     assert fit.adequacy.contradicting.p_value < 1e-6
     assert "contradict one another by this law: predicted over measured is" in str(fit)
     assert str(fit).splitlines()[1].startswith("  this law does not fit the tests")
+
+
+def test_laws_are_compared_from_the_same_values():
+    """Norton's law is rejected beside damage by lives of its tests, and alone identified from rates."""
+    tests = whole_life_table(np.random.default_rng(2))
+    ranking = ck.select([NORTON, KACHANOV.fix(r=KACHANOV_VALUES["r"])], tests, starts=1, sums=False)
+    best, other = (ranked.fit for ranked in ranking.laws)
+    assert best.law.name.startswith(KACHANOV.name)
+    assert not best.adequacy.rejects
+    for e in best.estimates:
+        assert e.low <= KACHANOV_VALUES[e.name] <= e.high
+    assert other.settings.rupture_times == "use"
+    with pytest.raises(FitError, match="rupture_times='use' or 'ignore' for all laws"):
+        ck.rank([ck.identify(NORTON, tests, starts=1), best])

@@ -36,6 +36,17 @@ def test_a_stiffer_bar_has_less_elastic_strain():
     np.testing.assert_allclose(plain - stiffer, 1e-4, rtol=1e-9)
 
 
+def test_candidates_may_differ_in_their_effects():
+    values = {"A": np.array([1e-16, 2e-16]), "n": 5.2, "Q": 350e3}
+    nuisances = {"temperature": np.array([[5.0], [-5.0]])}
+    both = BAR.predict(LAW, LAW.to_internal(values), [bar()], nuisances=nuisances, sensitivities=True)
+    for k, A in enumerate(values["A"]):
+        own = {"temperature": nuisances["temperature"][k][None]}
+        one = BAR.predict(LAW, LAW.to_internal({**VALUES, "A": A}), [bar()], nuisances=own, sensitivities=True)
+        np.testing.assert_allclose(both.values[k], one.values[0], rtol=1e-10)
+        np.testing.assert_allclose(both.nuisance_jacobian["temperature"][k], one.nuisance_jacobian["temperature"][0])
+
+
 def test_planted_temperature_errors_are_found():
     """Nine bars, each a few kelvin off; Q = 350 kJ/mol at 1050 K makes 5 K 20 % of the rate. Law known but for n."""
     rng = np.random.default_rng(4)

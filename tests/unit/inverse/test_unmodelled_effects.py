@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from creepkit.inverse.common_errors import USUAL_ACTIVATION_ENERGY
 from creepkit.inverse.composite_predictor import predict
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.unmodelled_effect import DRIFT, unmodelled_note
@@ -20,6 +21,7 @@ from creepkit.inverse.unmodelled_effects import (
     _rate_changes,
     _with_scatter_of,
     unmodelled_effects,
+    with_random_effects,
 )
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
@@ -96,6 +98,18 @@ def test_the_clock_argument_is_a_simulation_with_a_program_of_temperature(law, l
     assert expected.max() > 20 * NOISE
 
 
+def test_a_law_without_temperature_has_the_usual_activation_energy():
+    """At constant stress the strain of a steady rate changes by rate x Q / R T^2 x 5 K x t^2 / 2 t_end."""
+    plain = NORTON_AT.fix(Q=420e3).at(1040.0)
+    VALUES[plain.name] = {name: value for name, value in VALUES[NORTON_AT.name].items() if name != "Q"}
+    tests = [h.replace(temperature=1040.0) for h in bars(plain)]
+    effects, problem, linear = effects_of(plain, tests)
+    rate = BAR.predict(plain, theta(plain)[None], tests).values[0, 0, -1, 0] / END
+    expected = rate * USUAL_ACTIVATION_ENERGY / (R * 1040.0**2) * USUAL_DRIFT * problem.observations.times**2 / 2 / END
+    found = effects[DRIFT].residual_change / linear.residuals.offset_sensitivity
+    np.testing.assert_allclose(found, expected, rtol=0.02, atol=1e-8)
+
+
 def test_a_recorded_temperature_leaves_no_drift_and_a_nuisance_neither():
     tests = bars(NORTON_AT, [constant_stress(s, "stress") for s in (70.0, 90.0, 110.0)])
     assert set(effects_of(NORTON_AT, tests)[0]) == {DRIFT, "offset of strain"}
@@ -167,6 +181,24 @@ def test_independent_errors_of_rates_average_out_as_in_least_squares_of_equal_we
     assert np.sqrt(np.mean(np.square(moved))) == pytest.approx(found, rel=0.25)
 
 
+def test_values_of_frames_of_equal_weight_move_as_these_are_weighted():
+    """weights="noise", against identifications with the offset in one test after the other; few frames weigh little."""
+    tests = [
+        planted(NORTON, {"A": 1e-15, "n": 4.0}, [(s, 1000.0)], seed=k, rate=0.2, noise=2e-5, frames=frames)[0]
+        for k, (s, frames) in enumerate([(60.0, 120), (64.0, 12), (68.0, 120), (72.0, 12)])
+    ]
+    settings = replace(SETTINGS, weights="noise", nuisances=(Nuisance("rate"),))
+    fit = identify(NORTON, tests, Steady(), settings=settings)
+    effect = next(e for e in fit.unmodelled if e.kind == "offset of strain")
+    stress, changes = fit.reference.stress, []
+    for k in range(len(tests)):
+        shifted = [h.replace(outputs={"strain": h.outputs["strain"] + effect.size * (k == j)})
+                   for j, h in enumerate(tests)]  # fmt: skip
+        again = identify(NORTON, shifted, Steady(), settings=settings)
+        changes.append(np.log(again.rate(stress)[0] / fit.rate(stress)[0]))
+    assert effect.rate_change == pytest.approx(np.linalg.norm(changes), rel=0.1)
+
+
 # ---- lengths of the test piece ------------------------------------------------------------------------------------
 
 
@@ -209,6 +241,12 @@ def test_a_change_that_is_the_hardening_itself_has_correlation_one():
     assert _likeness_of_hardening(problem, x, linear, factor, -0.5 * hardening + 7.0 * other)[1] == pytest.approx(1.0)
 
 
+def test_a_law_that_does_not_harden_is_like_no_drift():
+    problem, x, linear = at_the_truth(NORTON_AT, bars(NORTON_AT))
+    factor = CovarianceFactor.of_residuals(linear.residuals, NoiseModel({"strain": OutputNoise(NOISE)}))
+    assert np.isnan(_likeness_of_hardening(problem, x, linear, factor, np.ones_like(linear.residuals.values))).all()
+
+
 def test_cooling_looks_like_strain_hardening_and_is_said_with_its_sign():
     """One test at one stress, the exponents and energy fixed: a furnace that cools slows creep as hardening does."""
     law = HARDENING_AT.fix(n=4.0, Q=420e3)
@@ -222,3 +260,16 @@ def test_cooling_looks_like_strain_hardening_and_is_said_with_its_sign():
 
 
 # ---- random effects and sentences ---------------------------------------------------------------------------------
+
+
+def test_an_effect_in_the_covariance_is_a_rank_of_one_in_each_test():
+    tests = bars(NORTON_AT, [constant_stress(s, "stress") for s in (70.0, 90.0)])
+    effects, _, linear = effects_of(NORTON_AT, tests)
+    noise = NoiseModel({"strain": OutputNoise(NOISE)})
+    with_both = with_random_effects(linear, [*effects.values()])
+    columns = np.stack([e.residual_change for e in effects.values()], axis=-1)
+    expected = covariance(linear.residuals, noise) + columns @ np.swapaxes(columns, 1, 2)
+    found = CovarianceFactor.of_residuals(with_both.residuals, noise).inverse_times(expected)
+    np.testing.assert_allclose(found, np.broadcast_to(np.eye(len(expected[0])), found.shape), atol=1e-5)
+    again = with_random_effects(with_both, [effects[DRIFT]])
+    assert again.residuals.random_effect_sensitivities.shape[-1] == 3

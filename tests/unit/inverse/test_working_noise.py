@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, autocorrelated_components, covariance
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.variance_components import LONGEST_DRIFT, LinearisedProblem
@@ -106,3 +107,21 @@ def test_the_error_of_the_predictor_is_a_drift_that_is_not_estimated():
     assert found["amplitude"] == plain["amplitude"]
     estimator = WorkingNoiseEstimator(LIKELIHOOD, observations(), {"width": 0.06})
     assert estimator.unestimated_drift_components(found) == {("width", "drift"), ("width", "correlation_length")}
+
+
+def test_stated_noise_is_bounded_and_estimated_noise_is_not():
+    linear = drawn(5)
+    quiet = replace(linear, residuals=replace(linear.residuals, values=0.5 * linear.residuals.values))
+    assert [working(quiet)[name].noise for name in NAMES] == pytest.approx(NOISE, rel=1e-6)
+    free = working(quiet, stated=False)
+    assert [free[name].noise for name in NAMES] == pytest.approx([0.5 * sd for sd in NOISE], rel=0.1)
+    assert [free[name].stated for name in NAMES] == [0.0, 0.0]
+
+
+def test_a_rupture_time_has_no_drift():
+    estimator = WorkingNoiseEstimator(LIKELIHOOD, observations(names=("strain", RUPTURE_OUTPUT)))
+    start = NoiseModel({"strain": OutputNoise(0.02), RUPTURE_OUTPUT: OutputNoise(0.05)})
+    found = estimator._initial_components(start, drift=True, discrepancy=True)
+    assert found["strain"].drift > 0
+    assert found[RUPTURE_OUTPUT].drift == 0.0
+    assert found.discrepancy > 0

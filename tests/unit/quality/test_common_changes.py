@@ -58,6 +58,19 @@ def test_one_test_alone_is_no_event_of_the_rig():
     assert not events(tests)
 
 
+def test_changes_at_unlike_times_are_no_event_of_the_rig():
+    rng = np.random.default_rng(3)
+    tests = [dimple(rng, k, event=3900.0 + 1500.0 * k, factor=0.6) for k in range(1, 5)]
+    assert not events(tests)
+
+
+def test_a_raise_of_the_pressure_in_all_tests_is_no_event():
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        tests = [dimple(rng, k, P2=10.0) for k in range(2, 8)]
+        assert not [flag for flag in check_data_quality(tests) if flag.kind in ("rate change", "jump")]
+
+
 def test_a_jump_of_the_camera_is_one_finding_for_all_tests():
     rng = np.random.default_rng(5)
     tests = [dimple(rng, k, event=6000.0, jump=0.02) for k in range(2, 8)]
@@ -66,6 +79,13 @@ def test_a_jump_of_the_camera_is_one_finding_for_all_tests():
     assert (flag.earliest, flag.latest) == (6000.0, 6150.0)
     assert all(abs(size - 0.02) < 4 * NOISE for size in flag.jumps.values())
     assert not events(tests)
+
+
+def test_a_step_of_the_load_without_a_record_is_called_one():
+    rng = np.random.default_rng(6)
+    tests = [dimple(rng, k, event=9000.0, factor=2.0, jump=0.02) for k in range(2, 8)]
+    (flag,) = events(tests)
+    assert '"load step"' in flag.proposal
 
 
 def test_slopes_and_steps_of_a_curve_are_those_planted():

@@ -1,5 +1,6 @@
 """Times of clocks: elapsed times are read, time stamps count from the first row, what may be either is asked for."""
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -76,3 +77,23 @@ def test_what_is_refused(name: str, cells: list[str], head: str, message: str, t
         read(name, cells, tmp_path / "x.csv", head)
     assert "x.csv" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_cells_of_a_spreadsheet(tmp_path: Path):
+    """A spreadsheet keeps an elapsed time above a day as a day of the year 1900."""
+    openpyxl = pytest.importorskip("openpyxl")
+    for name, times in (
+        ("durations", [timedelta(hours=7 * k) for k in range(6)]),
+        ("stamps", [datetime(2025, 3, 4, 8) + timedelta(hours=7 * k) for k in range(6)]),
+        ("days", [0.0, *(datetime(1899, 12, 31) + timedelta(hours=24 + 7 * k) for k in range(5))]),
+    ):
+        book = openpyxl.Workbook()
+        sheet = book.active
+        for row in (["# stress_MPa: 60"], ["# temperature_C: 850"], ["Time", "Strain (%)"]):
+            sheet.append(row)
+        for k, time in enumerate(times):
+            sheet.append([timedelta(0) if time == 0.0 else time, 0.3 * k])
+        book.save(tmp_path / f"{name}.xlsx")
+        (history,) = ck.read_histories(tmp_path / f"{name}.xlsx")
+        expected = [7.0 * k for k in range(6)] if name != "days" else [0, *(24 + 7.0 * k for k in range(5))]
+        np.testing.assert_allclose(history.times / 3600, expected, rtol=1e-9, err_msg=name)

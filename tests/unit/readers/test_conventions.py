@@ -49,6 +49,15 @@ def test_held_strain_in_the_head(read):
     np.testing.assert_allclose(history.outputs["stress"], RELAXING)
 
 
+def test_held_strain_without_a_unit(read):
+    body = "time_s,stress_MPa\n" + rows(TIMES, RELAXING)
+    history = read(HOT + "# modulus_GPa: 150\n# strain: 0.002\n" + body)
+    assert history.loading == StrainSteps(((0.0, 0.002),))
+    assert "strain 0.002 as a fraction" in assumed(history)
+    with pytest.raises(HistoryError, match="x.csv:3: 'strain' is 0.2 without a unit; write strain_pct"):
+        read(HOT + "# modulus_GPa: 150\n# strain: 0.2\n" + body)
+
+
 def test_a_held_column_of_strain_beside_a_falling_stress_is_a_relaxation(read):
     """Until now it was read as creep under a stress that fell."""
     body = "time_s,strain_pct,stress_MPa\n" + rows(TIMES, np.full(6, 0.2), RELAXING)
@@ -76,6 +85,20 @@ def test_nominal_levels_of_a_column_are_steps_and_no_ramp(read):
     history = read(HOT + "time_s,strain_pct,stress_MPa\n" + rows(STEP_TIMES, STRAIN, LEVELS))
     assert history.loading == StressSteps(((0.0, 100.0), (50.5 * 3600, 120.0)))
     assert "steps of stress from the first frame of each level on" in assumed(history)
+
+
+def test_a_step_between_distant_frames_is_asked_for(read):
+    kept = STEP_TIMES != 50.5 * 3600
+    body = "time_s,strain_pct,stress_MPa\n" + rows(STEP_TIMES[kept], STRAIN[kept], LEVELS[kept])
+    message = (
+        "x.csv:9: the stress changes from 100 MPa to 120 MPa between 180000 s and 216000 s; state when, such as "
+        "'# stress_steps: 0 s 100 MPa; 180000 s 120 MPa'"
+    )
+    with pytest.raises(HistoryError, match=message):
+        read(HOT + body)
+    stated = read(HOT + "# stress_steps: 0 s 100 MPa; 52 h 120 MPa\n" + body)
+    assert stated.loading == StressSteps(((0.0, 100.0), (52 * 3600.0, 120.0)))
+    assert dict(stated.stated) == {}
 
 
 def test_two_readings_at_the_time_of_a_step_state_it(read):
@@ -150,3 +173,43 @@ def test_primary_creep_is_no_loading(read, exponent):
     strain = 8e-4 * (times / 100.0) ** exponent
     history = read(LOADED + "time_s,strain_pct\n" + rows(times, 100 * strain))
     assert (history.includes_elastic, history.used.all()) == (False, True)
+
+
+def test_strain_at_time_zero(read):
+    times = np.append(0.0, AFTER)
+    elastic = read(LOADED + "time_s,strain_pct\n" + rows(times, 100 * (8.2e-4 + 1e-8 * times)))
+    assert elastic.includes_elastic
+    assert "the strain at time 0 is 1.03 of stress over modulus" in assumed(elastic)
+    plastic = read(LOADED + "time_s,strain_pct\n" + rows(times, 100 * (3e-3 + 1e-8 * times)))
+    assert not plastic.includes_elastic
+    np.testing.assert_allclose(plastic.outputs["strain"], 1e-8 * times, atol=1e-12)
+    assert "loading strain 0.003 at time 0 subtracted" in assumed(plastic)
+    # elastic and plastic: 1.57 of stress over modulus
+    partly = read(LOADED + "time_s,strain_pct\n" + rows(times, 100 * (1.256e-3 + 1e-8 * times)))
+    assert not partly.includes_elastic
+    np.testing.assert_allclose(partly.outputs["strain"], 1e-8 * times, atol=1e-12)
+
+
+def test_stated_loading_strain(read):
+    body = "time_s,strain_pct\n" + rows(AFTER, 100 * (3e-3 + CREEP))
+    told = read(LOADED + "# loading_strain_pct: 0.3\n# includes_loading: yes\n" + body)
+    np.testing.assert_allclose(told.outputs["strain"], CREEP, atol=1e-12)
+    assert told.labels["loading_strain"] == "0.003"
+    found = read(LOADED + "# loading_strain_pct: 0.3\n" + body)
+    np.testing.assert_allclose(found.outputs["strain"], CREEP, atol=1e-12)
+    assert "loading strain contained" in assumed(found)
+    beside = read(LOADED + "# loading_strain_pct: 0.3\ntime_s,strain_pct\n" + rows(AFTER, 100 * CREEP))
+    np.testing.assert_allclose(beside.outputs["strain"], CREEP, atol=1e-12)
+    assert "loading strain not contained" in assumed(beside)
+
+
+def test_stated_end_of_loading(read):
+    history = read(LOADED + "# loading_time_s: 30\n# includes_loading: yes\n" + total(elastic=3e-3))
+    assert history.used.tolist() == [False, False, *[True] * 8]
+    np.testing.assert_allclose(history.outputs["strain"][2:], CREEP - CREEP[0], atol=1e-12)
+    with pytest.raises(HistoryError, match="x.csv:6: every frame lies before 'loading_time_h'"):
+        read(LOADED + "# loading_time_h: 100\n" + total())
+    with pytest.raises(HistoryError, match="includes_loading is yes, but not by how much; state loading_strain_pct"):
+        read(LOADED + "# includes_loading: yes\ntime_s,strain_pct\n" + rows(AFTER, 100 * (3e-3 + CREEP)))
+    with pytest.raises(HistoryError, match="no elastic strain is left; leave out includes_elastic: yes"):
+        read(LOADED + "# includes_loading: yes\n# includes_elastic: yes\n# loading_strain_pct: 0.3\n" + total())

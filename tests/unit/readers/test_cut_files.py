@@ -6,6 +6,7 @@ import pytest
 import creepkit as ck
 from creepkit.files.delimited_text import Dialect
 from creepkit.readers.cut_files import cut_number
+from helpers.command_line import creepkit
 
 BARS = sorted(ck.example_data("planted creep curves").glob("*.csv"))
 
@@ -51,3 +52,31 @@ def test_honest_files_without_a_last_line_end_are_left_alone(form, rows):
         lines = [f"{t:.1f},{FORMS[form](x)}" for t, x in zip(times, values, strict=True)]
         named += cut_number("time_h,strain_pct\n" + "\n".join(lines), Dialect()) is not None
     assert named <= 0.005 * trials
+
+
+def test_decimal_commas_and_one_column_a_test(tmp_path):
+    """The note is that of the test whose column is the last."""
+    rows = [f"{k}\t0,{1000 + 17 * k}\t0,{2000 + 19 * k}" for k in range(30)]
+    path = tmp_path / "two.txt"
+    path.write_text(
+        "# specimen: uniaxial\n# stress_MPa: 100\n# temperature_C: 750\n# includes_elastic: no\n"
+        "Time (h)\tA1 strain (%)\tB2 strain (%)\n" + "\n".join(rows)[:-2]
+    )
+    flags = ck.check_data_quality(ck.read_histories([path]))
+    assert [flag.tests for flag in flags if flag.kind == "cut"] == [("B2",)]
+
+
+@pytest.mark.parametrize("lost", [0, 4, 5, 6])
+def test_the_last_test_of_a_table_of_rates(lost, tmp_path):
+    """A rate that lost its exponent lies millions of times from the others; it is said whence it may come."""
+    rows = [f"A{k},{90 + k},750,{2.1e-6 * 1.03**k:.3e}" for k in range(30)]
+    path = tmp_path / "rates.csv"
+    text = "test,stress_MPa,temperature_C,min creep rate (1/h)\n" + "\n".join(rows)
+    path.write_text(text[: len(text) - lost])
+    *others, last = ck.read_histories([path])
+    assumed = [history.labels["assumed"] for history in others]
+    assert not any("is whole" in one for one in assumed)
+    written = path.read_text().rpartition(",")[2]
+    assert (f"{written} in line 31 is whole" in last.labels["assumed"]) == (lost > 0)
+    said = " ".join(creepkit("read", str(path)).stdout.split())
+    assert ("fewer digits than the numbers above have" in said) == (lost > 0)

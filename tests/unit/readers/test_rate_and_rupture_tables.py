@@ -4,6 +4,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
+from creepkit.readers.rate_and_rupture_tables import key_of_column
 from creepkit.records import UNKNOWN_DURATION, constant_stress
 
 TABLE = """# alloy: Alloy X
@@ -60,6 +61,27 @@ def test_a_sheet_of_a_spreadsheet(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("sigma (ksi)", ("stress", "ksi")),
+        ("T_C", ("temperature", "C")),
+        ("t (h)", ("end_time", "h")),
+        ("MCR, h^-1", ("minimum_rate", "1/h")),
+        ("steady-state creep rate (s-1)", ("minimum_rate", "1/s")),
+        ("min rate per h", ("minimum_rate", "1/h")),
+        ("minimum_rate_%/h", ("minimum_rate", "pct/h")),
+        ("tr_h", ("rupture", "h")),
+        ("rupture life, hr", ("rupture", "h")),
+        ("elongation (%)", ("label elongation_pct", "")),
+        ("Heat No", ("label heat", "")),
+        ("strain rate (1/s)", ("", "")),
+    ],
+)
+def test_names_of_columns(written, meant):
+    assert key_of_column(written) == meant
+
+
+@pytest.mark.parametrize(
     ("change", "said"),
     [
         (("[%/h]", ""), r"table.csv:3: column 'min creep rate' has no unit; allowed: 1/s, 1/min, 1/h"),
@@ -108,3 +130,43 @@ def test_a_head_without_frames(tmp_path):
         read(tmp_path, "# temperature_C: 700\n# stress_MPa: 100\n")
     with pytest.raises(HistoryError, match=r"'minimum_rate_sd_1/h' stands there without a minimum_rate; give both"):
         read(tmp_path, text.replace("# minimum_rate_%/h: 1e-4\n", "# rupture_h: 5\n"))
+
+
+@pytest.mark.parametrize(
+    ("row", "unknown"),
+    [
+        ("A,120,750,,900,", ["minimum_rate unknown (empty cell)", "ended ruptured (empty cell)"]),
+        ("A,120,750,2e-6,,", ["rupture unknown (empty cell)", "ended unknown (empty cell)"]),
+        ("A,120,750,2e-6,>900,", []),
+        ("A,120,750,,>900,stopped", ["minimum_rate unknown (empty cell)"]),
+        ("A,120,750,2e-6,900,ruptured", []),
+    ],
+)
+def test_what_an_empty_cell_leaves_unknown_is_said(row, unknown, tmp_path):
+    (history,) = read(tmp_path, f"test,stress_MPa,temperature_C,min creep rate (1/h),t_r (h),ended\n{row}\n")
+    assumed = history.labels["assumed"].split(", ")
+    assert [text for text in assumed if "cell" in text] == unknown
+
+
+def test_a_column_of_specimens_names_the_tests(tmp_path):
+    path = tmp_path / "raten.csv"
+    path.write_text("Specimen;Spannung [MPa];Temperatur [°C];minimale Kriechgeschwindigkeit [1/h]\nP1;100;700;1E-6\n"
+                    "P2;120;700;2E-6\n", encoding="utf-8")  # fmt: skip
+    assert [h.name for h in ck.read_histories(path)] == ["P1", "P2"]
+
+
+def test_rows_that_state_nothing_but_ignored_columns_are_left_out(tmp_path):
+    text = "test,stress_MPa,T (C),minimum_rate_1/h,t_r (h)\nA,100,700,1e-6,1000\nB,80,700,,5000\nC,90,700,,>9000\n"
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    assert [h.name for h in ck.read_histories(path)] == ["A", "B", "C"]
+    (rate,) = ck.read_histories(path, ignore=["t_r (h)"])
+    assert (rate.name, rate.end_known) == ("A", False)
+    assert "without B C (nothing but ignored columns)" in rate.labels["assumed"]
+    ends = ck.read_histories(path, ignore=["minimum_rate_1/h"])
+    assert [h.minimum_rate for h in ends] == [None] * 3
+    with pytest.raises(HistoryError, match="no row states a minimum creep rate or an end of its test once the ignored"):
+        ck.read_histories(path, ignore=["minimum_rate_1/h", "t_r (h)"])
+    path.write_text(text.replace(",,5000", ",,"))
+    with pytest.raises(HistoryError, match="no minimum creep rate and no end"):
+        ck.read_histories(path)

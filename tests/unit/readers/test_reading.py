@@ -61,6 +61,15 @@ def test_equal_names_get_their_folder_in_front(tests_in_folders):
     assert names(f"{tests_in_folders}/*/*.csv", READERS) == ["one/a", "b", "two/a"]
 
 
+def test_indexed_folder_reached_by_a_pattern_over_its_files(tmp_path):
+    (tmp_path / "index.csv").write_text("test,temperature_C,stress_MPa\nA,980,230\nB,980,140\n")
+    for name in "AB":
+        text = "time_h,creep_extension_pct,T_top_C,T_mid_C,T_bot_C\n0,0,980,980,980\n2,0.5,980,980,980\n"
+        (tmp_path / f"{name}_creep.csv").write_text(text)
+    assert names(f"{tmp_path}/*", READERS) == ["A", "B"]
+    assert names(f"{tmp_path}/B*", READERS) == ["B"]
+
+
 def test_general_reader_yields_to_another_one(tests_in_folders):
     assert names(tests_in_folders / "two", [*READERS, Always("lab")]) == ["lab a"]
 

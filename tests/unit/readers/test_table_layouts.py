@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.records import History
@@ -103,6 +104,13 @@ def test_titles_comments_blank_lines_and_footers(read):
     assert "line 14 is a remark (End of the record)" in history.labels["assumed"]
 
 
+def test_what_a_name_of_a_column_states(read):
+    (history,) = read("# T_C: 850\n# stress_MPa: 60\nTime (h),True strain (%)\n0,0\n1,0.5\n")
+    assert history.strain_measure == "logarithmic"
+    with pytest.raises(HistoryError, match="x.csv:3: strain_measure is 'engineering', but .*x.csv:4, column .True s"):
+        read("# T_C: 850\n# stress_MPa: 60\n# strain_measure: engineering\nTime (h),True strain (%)\n0,0\n1,1\n")
+
+
 WIDE = {
     "one column a test": "Stress (MPa);60;80\nTemperature (°C);850;860\nTime (h);A1 strain (%);A2 strain (%)\n"
     "0;0;0\n1;0,5;0,7\n2;0,9;\n3;;1,5\n",
@@ -133,6 +141,13 @@ def test_two_tests_side_by_side(read, layout: str):
     np.testing.assert_allclose(first.outputs["strain"], [0, 0.005, 0.009], rtol=1e-15)
     np.testing.assert_allclose(second.outputs["strain"], [0, 0.007, 0.015], rtol=1e-15)
     assert first.source.endswith("x.csv (A1)")
+
+
+def test_one_value_for_all_tests_is_told(read):
+    text = "Stress (MPa);60;80\nTemperature (°C);850;\nTime (h);A1 strain (%);A2 strain (%)\n0;0;0\n1;0,5;0,7\n"
+    first, second = read(text)
+    assert second.temperature == pytest.approx(1123.15)
+    assert "Temperature (°C) in line 2 holds for all tests" in first.labels["assumed"]
 
 
 def test_texts_in_columns_are_conditions_and_labels(read):
@@ -225,3 +240,36 @@ def test_a_canonical_file_that_a_spreadsheet_saved(read):
     (history,) = read(text + "0;0\n2,5;0,5\n")
     assert history.loading.steps == ((0.0, 60.5), (3600.0, 70.0))
     assert history.labels["note"] == "a, b"
+
+
+def test_large_tables_read_as_small_ones_do(read):
+    rows = [f"{k},{k * 1e-3!r}\n" for k in range(8000)]
+    (large,) = read(HEAD + "time_h,strain_pct\n" + "".join(rows))
+    np.testing.assert_array_equal(large.outputs["strain"], [0.01 * float(row.split(",")[1]) for row in rows])
+    (german,) = read(HEAD + "Time (h);Strain (%)\n" + "".join(rows).replace(",", ";").replace(".", ","))
+    np.testing.assert_array_equal(german.outputs["strain"], large.outputs["strain"])
+    rows[7000] = "# a remark\n\n7000,7\n"
+    (remarked,) = read(HEAD + "time_h,strain_pct\n" + "".join(rows))
+    np.testing.assert_array_equal(remarked.outputs["strain"], large.outputs["strain"])
+    with pytest.raises(HistoryError, match="x.csv:7006: time falls from"):
+        read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("7000,7\n", "6998,7\n"))
+    with pytest.raises(HistoryError, match="x.csv:7004: 'stress_MPa' stands below"):
+        read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("# a remark", "# stress_MPa: 3"))
+    rows[7000] = "7000,a lot\n"
+    with pytest.raises(HistoryError, match="x.csv:7004: 'strain_pct' is 'a lot'"):
+        read(HEAD + "time_h,strain_pct\n" + "".join(rows))
+    rows[7000] = "6999,1e9\n"
+    with pytest.raises(HistoryError, match="x.csv:7004: 'time_h' is"):
+        read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("6999,1e9", "-1,7"))
+
+
+def test_what_empty_cells_of_conditions_leave_unknown_is_said(tmp_path):
+    path = tmp_path / "x.csv"
+    path.write_text(
+        "test,stress_MPa,temperature_C,modulus_GPa,heat,time_h,strain_pct\n"
+        "A,60,850,150,X7,0,0\nA,60,850,150,X7,1,0.1\nB,70,850,,,0,0\nB,70,850,,,1,0.1\n"
+    )
+    first, second = ck.read_histories(path)
+    assert "cell" not in first.labels["assumed"]
+    assert "modulus_GPa unknown (empty cell)" in second.labels["assumed"].split(", ")
+    assert "heat" not in second.labels

@@ -4,8 +4,10 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
+from creepkit.readers.unbroken_words import unbroken_words
 
 TABLE = "test,stress_MPa,T (C),t_r (h),{name}\nA,200,800,1200,{a}\nB,220,800,800,{b}\n"
+HEAD = "# specimen: uniaxial\n# stress_MPa: 100\n# temperature_C: 750\n# control: load\n"
 
 
 def _read(tmp_path, text, name="t.csv"):
@@ -27,6 +29,27 @@ def test_a_remark_that_a_test_did_not_break_makes_no_rupture(tmp_path, name, tex
     assert (stopped.unruptured, stopped.rupture_time) == (True, None)
     ruptured = _read(tmp_path, both.format(text, "ruptured"))[1]
     assert (ruptured.unruptured, ruptured.rupture_time) == (False, 800 * 3600.0)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["ruptured in gauge length", "necking", "breakthrough of oxide", "heat X7", "failure outside gauge", "Bruch"],
+)
+def test_other_remarks_are_labels(tmp_path, text):
+    assert unbroken_words(text) == ""
+    assert _read(tmp_path, TABLE.format(name="remark", a="", b=text))[1].labels["remark"] == text
+
+
+@pytest.mark.parametrize("mark", ["n.a.", "n/a", "NA", "n.b.", "-", "--", "k.A.", ""])
+def test_marks_of_missing_values_are_empty_where_empty_is_allowed(tmp_path, mark):
+    table = f"test,stress_MPa,T (C),min creep rate (1/h),t_r (h)\nA,200,800,1e-6,{mark}\nB,220,800,2e-6,800\n"
+    first, second = _read(tmp_path, table)
+    assert (first.rupture_time, second.rupture_time) == (None, 800 * 3600.0)
+    beside = f"Time (h),A1 strain (%),B1 strain (%)\n1,0.1,0.2\n2,{mark},0.3\n3,0.3,0.4\n"
+    head = HEAD + "# strain_measure: engineering\n# includes_elastic: no\n"
+    assert [one.times.size for one in _read(tmp_path, head + beside)] == [2, 3]
+    with pytest.raises(HistoryError, match="leave the row out"):
+        _read(tmp_path, head + f"time_h,strain_pct\n1,0.1\n2,{mark}\n3,0.3\n4,0.4\n")
 
 
 @pytest.mark.parametrize("text", ["nan", "NaN", "inf", "none"])

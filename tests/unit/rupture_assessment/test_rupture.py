@@ -6,6 +6,8 @@ from scipy.stats import t as student
 
 import creepkit as ck
 from creepkit.errors import FitError, HistoryError
+from creepkit.rupture_assessment.checks import physical_realism
+from creepkit.rupture_assessment.observed_tests import rupture_tests
 from helpers.planted_rupture import (
     HOUR,
     TENSILE,
@@ -139,6 +141,38 @@ def test_monkman_grant_predicts_by_rates_and_by_a_rate_law():
     )
 
 
+def test_laboratories_scatter_beside_heats():
+    rng = np.random.default_rng(4)
+    effect = {"north": -0.2, "south": 0.0, "west": 0.2}
+    tests = []
+    for k in range(54):
+        T, stress, laboratory = (850.0, 900.0)[k % 2], rng.uniform(80.0, 160.0), [*effect][k % 3]
+        log_time = larson_miller(np.log10(stress), T) + effect[laboratory] + 0.05 * rng.standard_normal()
+        labels = {"heat": f"H{k // 9}", "laboratory": laboratory}
+        tests.append(rupture_test(f"t{k}", stress, T, 10**log_time, labels=labels))
+    fit = ck.rupture(
+        tests, "larson-miller", hours=[1e3], temperatures=[850.0], settings=ck.RuptureSettings(degrees=(1,))
+    ).best
+    assert fit.scatter["laboratory"] == pytest.approx(np.sqrt(2 / 3) * 0.2, rel=0.15)
+    assert fit.scatter["heat"] < 0.05
+
+
+def test_a_weibull_distribution_gives_the_same_strength(with_heats):
+    tests = planted(larson_miller, count=48, seed=7)
+    options = {"methods": "larson-miller", "hours": [1e3], "temperatures": [873.15]}
+    normal = ck.rupture(tests, **options, settings=NO_POLYNOMIAL_BUT_2).strength(873.15, hours=1e3)
+    settings = ck.RuptureSettings(degrees=(2,), distribution="weibull")
+    weibull = ck.rupture(tests, **options, settings=settings).strength(873.15, hours=1e3)
+    assert weibull.value == pytest.approx(normal.value, rel=0.01)
+    assert (
+        weibull.bounds_of_test[0]
+        < weibull.bounds_of_mean[0]
+        < weibull.value
+        < weibull.bounds_of_mean[1]
+        < weibull.bounds_of_test[1]
+    )
+
+
 def test_a_method_is_not_decisive_where_a_check_fails():
     """Most tests are short, and the long ones break far too early: a tenth of the tests decides over the strength."""
     tests = planted(larson_miller, count=60, scatter=0.02, seed=3)
@@ -168,6 +202,18 @@ def test_isotherms_that_turn_back_within_the_tests_are_not_ranked():
     assert all(one.fit.degree == 1 for one in assessment.ranked)
 
 
+def test_crossing_isotherms_fail_a_check():
+    """T_a = 850 K lies among the temperatures tested: above it times rise with temperature."""
+    tests, _, _ = rupture_tests(planted(larson_miller, count=30))
+    assessment = ck.rupture(
+        planted(manson_haferd, count=30), "manson-haferd", settings=ck.RuptureSettings(degrees=(1,))
+    )
+    fit = assessment.best
+    object.__setattr__(fit, "curvature", 1.0 / (fit.centre.temperature - 850.0))
+    checks = physical_realism(fit, tests, lambda T: np.full(np.shape(T), np.nan), None)
+    assert not all(check.passed for check in checks)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -192,3 +238,19 @@ def test_what_cannot_be_assessed_is_refused(arguments, message):
     with pytest.raises((FitError, HistoryError), match=message.replace("(", r"\(")) as error:
         ck.rupture(planted(larson_miller, count=20), **arguments)
     assert "\n" not in str(error.value)
+
+
+def test_degrees_that_few_tests_cannot_hold_are_not_offered():
+    """Seven tests: four constants and the scatter leave two degrees of freedom or more, six do not."""
+    assessment = ck.rupture(planted(larson_miller, count=7, seed=5), "larson-miller")
+    assert {one.fit.degree for one in assessment.ranked} <= {1, 2, 3}
+    fewer = ck.rupture(planted(larson_miller, count=6, seed=5), "larson-miller")
+    assert "larson-miller, degree 3" in fewer.rejected
+    assert "6 tests broke, and 5 constants with a scatter take 7 or more" in fewer.rejected["larson-miller, degree 3"]
+
+
+def test_bounds_of_a_test_lie_outside_those_of_its_heat():
+    """However few heats: a test scatters about the median time of its heat."""
+    one = ck.rupture(planted(larson_miller, count=32, heats=4, between=0.12, seed=8)).strength(873.15, hours=1e3)
+    assert one.bounds_of_test[0] < one.bounds_of_heat[0]
+    assert one.bounds_of_test[1] > one.bounds_of_heat[1]

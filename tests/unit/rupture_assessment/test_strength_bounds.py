@@ -50,3 +50,12 @@ def test_wider_quantiles_give_wider_bounds():
                 _bound(STRESS, median(STRESS) + sign * width, 1e5, 100.0, upper=upper)[0] for width in (half, wider)
             )
             assert wide is None or (narrow is not None and sign * (wide - narrow) > -1e-9 * wide)
+
+
+def test_where_no_stress_is_excluded_there_is_no_bound():
+    never_long = np.minimum(median(STRESS) - 0.5, 4.8)
+    assert _bound(STRESS, never_long, 1e5, 100.0, upper=False)[0] is None
+    turning = np.where(STRESS > 40.0, median(STRESS) - 2.0, median(np.array(40.0)) - 2.0 + np.log2(STRESS / 40.0))
+    bound, reason = _bound(STRESS, turning, 1e5, 100.0, upper=False)
+    assert bound is None
+    assert "predicted times get shorter again below 39.8 MPa" in reason

@@ -5,10 +5,11 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
+from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.reference_conditions import detect_creep
-from creepkit.screening.alloys import Alloy, check_tests, group_by_alloy
+from creepkit.screening.alloys import Alloy, check_tests, group_by_alloy, limitations
 from creepkit.specimens.bulge.outputs import profile_displacement
-from helpers.planted_alloys import bulge
+from helpers.planted_alloys import bars, bulge
 
 BULGE = ck.specimen("bulge")
 
@@ -39,6 +40,22 @@ def test_elastic_data_have_no_creep_to_identify():
         FitError, match="alloy 'X': elastic only, there is no creep to identify: its amplitude grows by"
     ):
         check_tests(Alloy("X", (bulge("a", "X", rise=0.0),)), BULGE)
+
+
+def test_tests_of_another_specimen_need_a_predictor_of_their_own():
+    mixed = Alloy("X", (bulge("a", "X"), *bars("X")))
+    with pytest.raises(FitError, match=r"its tests are of different specimens \(bulge, uniaxial\) and using= predicts"):
+        check_tests(mixed, BULGE)
+    with pytest.raises(FitError, match="using= names predictors for bulge; add it"):
+        check_tests(mixed, CompositePredictor({"bulge": BULGE}))
+    both = CompositePredictor({"bulge": BULGE, "uniaxial": ck.specimen("uniaxial")})
+    check_tests(mixed, both)
+    assert "tests of several specimens (bulge, uniaxial) are identified together" in limitations(mixed, both)
+
+
+def test_without_the_leading_output_creep_cannot_be_told():
+    with pytest.raises(FitError, match="test 'a' has no amplitude, without which creep cannot be seen; it has width"):
+        check_tests(Alloy("X", (bulge("a", "X", outputs=("width",)),)), BULGE)
 
 
 def test_displacement_at_a_radius_is_equation_3():

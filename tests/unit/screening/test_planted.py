@@ -8,12 +8,16 @@ import pytest
 import creepkit as ck
 from creepkit.inverse.frame_noise import frame_noise
 from creepkit.screening.alloys import read_compositions
-from creepkit.screening.planted import FIGURE_7A, mix_base_alloys, planted_plate
+from creepkit.screening.planted import BASE_ALLOYS, FIGURE_7A, mix_base_alloys, planted_plate
 
 
 @pytest.fixture(scope="module")
 def planted():
     return planted_plate(2)
+
+
+def test_base_alloys_are_whole():
+    assert [sum(weights.values()) for weights in BASE_ALLOYS.values()] == pytest.approx([100.0] * 4)
 
 
 def test_a_mixture_of_one_is_that_base_and_mixes_by_weight():
@@ -61,3 +65,8 @@ def test_the_files_read_back_as_they_were(planted, tmp_path):
     with (tmp_path / "truth.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert [row["law"] for row in rows] == [t.law for t in planted.truth.values()]
+
+
+def test_a_thickness_that_is_not_known_is_not_told():
+    (history,) = planted_plate(1, thickness_known=False).histories
+    assert history.geometry == {}

@@ -13,7 +13,8 @@ from creepkit.readers.history_csv import write_history
 from creepkit.screening import files
 from creepkit.screening.alloys import Compositions
 from creepkit.screening.screen import ScreeningOptions, screen
-from helpers.planted_alloys import NORTON, Deadly, bars, bulge
+from helpers.narrow_predictor import Narrow
+from helpers.planted_alloys import NORTON, Deadly, Doubting, bars, bulge
 
 QUICK = IdentificationSettings(starts=2, sobol_points=16)
 COMPOSITIONS = Compositions({"X": {"Fe": 70.0, "Cr": 30.0}, "Y": {"Ni": 40.0, "Co": 38.0, "Cr": 22.0}})
@@ -59,6 +60,16 @@ def test_the_numbers_file_holds_tests_and_covariances(plate, tmp_path):
         np.testing.assert_allclose(predicted, measured, rtol=0.2)
 
 
+def test_a_confirmation_that_fails_is_a_note_and_no_failure(monkeypatch):
+    def fail(fit, tests, using):
+        raise FitError("the mesh is torn")
+
+    monkeypatch.setattr("creepkit.screening.job.confirm", fail)
+    found = screened(TWO[:3], confirm=True)["X"]
+    assert found.identified
+    assert "not confirmed: the mesh is torn" in found.notes
+
+
 def test_confirmed_by_the_specimen_itself():
     found = screened(TWO[:3], confirm=True)["X"]
     assert found.confirmation.confirmed
@@ -66,7 +77,28 @@ def test_confirmed_by_the_specimen_itself():
     assert screened(TWO[:3])["X"].confirmation is None
 
 
+@pytest.mark.parametrize(("excess", "holds"), [(0.0, True), (0.5, False)])
+def test_where_a_guard_doubts_the_specimen_is_asked(excess, holds):
+    """A stand-in that is off by half of every strain is found out, one that is right is confirmed."""
+    found = screened(TWO[:3], using=Doubting(excess))
+    assert found["X"].confirmation.confirmed is holds
+    assert found["X"].confirmation.predictor_name == "uniaxial"
+    assert ("X: not confirmed: uniaxial differs from the fit by" in str(found)) is not holds
+    assert screened(TWO[:3], using=Doubting(excess), confirm=False)["X"].confirmation is None
+
+
 # ---- kept, and done again ------------------------------------------------------------------------------------------
+
+
+def test_laws_outside_the_class_of_a_surrogate_are_the_specimens_own():
+    """Values, curves and the place of the law among the others are those of the bars; a note says by what."""
+    narrow, itself = (screened(TWO[:3], using=using)["X"] for using in (Narrow(), specimen("uniaxial")))
+    assert narrow.best.law.name == "norton"
+    assert narrow.best.values == itself.best.values
+    assert "identified with 'uniaxial' in the place of 'narrow': law 'norton' is none of its laws" in narrow.notes
+    for name, outputs in itself.predicted.items():
+        assert np.isfinite(narrow.predicted[name]["strain"]).all()
+        assert narrow.predicted[name]["strain"] == pytest.approx(outputs["strain"])
 
 
 def test_an_answer_is_read_back_as_it_was(plate, tmp_path):
@@ -105,6 +137,13 @@ def test_only_what_changed_is_done_again(tmp_path):
         TWO[3:], to=tmp_path, settings=dataclasses.replace(QUICK, seed=5), progress=lambda *t: seen.append(t[3][0])
     )
     assert seen == ["Y"]
+
+
+def test_a_damaged_answer_is_worked_out_again(tmp_path, caplog):
+    screened(TWO[:3], to=tmp_path)
+    (tmp_path / "X.json").write_text("{}")
+    assert screened(TWO[:3], to=tmp_path)["X"].identified
+    assert "X.json: this is not the result of an alloy that creepkit wrote" in caplog.text
 
 
 def test_workers_find_what_this_process_finds_and_one_that_dies_costs_one_alloy():

@@ -1,12 +1,13 @@
 """Specimens of plugins that say nonsense, or do it, are refused in one sentence and harm no other."""
 
 import sys
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import PluginError, SolveError
+from creepkit.errors import FitError, PluginError, SolveError
 
 NORTON = ck.law("norton")
 THETA = NORTON.to_internal({"A": 1e-16, "n": 4.0})
@@ -78,3 +79,50 @@ def test_what_one_returns_is_judged_where_it_is_written(returned, said):
     with pytest.raises(SolveError, match=said) as raised:
         Piece(returned).predict(NORTON, THETA, [plan()])
     assert "specimen 'returning', test 'test'" in str(raised.value)
+
+
+@dataclass(frozen=True)
+class Rod(ck.PerTest):
+    """A rod whose length has two names."""
+
+    thickness: float = ck.dimension(2.0, (1.0, 4.0), tolerance=0.02, alias="t")
+    name, title = "rod", "A rod"
+    outputs, loads = (ck.Output("sag", "angle"),), (ck.Load("push", "force"),)
+
+    def reference_stress(self, history):
+        return history.loading.program().values.max() / self.thickness**2
+
+    def one(self, law, values, history, nuisances):
+        return {"sag": values["A"] * self.reference_stress(history) ** values["n"] * history.times}
+
+
+def rods(*pushes, **changes):
+    rng = np.random.default_rng(1)
+    times = np.geomspace(600.0, 3.6e5, 15)
+    values, found = {"A": 1e-16, "n": 4.0}, []
+    for push in pushes:
+        plan = {"loading": ck.constant_load("push", push), "times": times, "temperature": 1000.0}
+        run = ck.simulate(NORTON, Rod(), values, **plan)
+        sag = run.outputs["sag"] * (1.0 + 1e-3 * rng.standard_normal(15))
+        found.append(run.replace(name=f"{push:g}", outputs={"sag": sag}, **changes))
+    return found
+
+
+def test_a_length_by_its_name_has_the_tolerance_of_its_specimen():
+    fit = ck.identify("norton", rods(200.0, 300.0), Rod(), starts=1, nuisances=["thickness"])
+    assert [n.prior_sd for n in fit.nuisances] == pytest.approx([0.04, 0.04])
+
+
+def test_beyond_its_bounds_a_length_counts_as_at_them():
+    plans = rods(200.0)
+    at, beyond = (
+        Rod().predict(NORTON, THETA, plans, nuisances={"thickness": np.array([[value]])}).values for value in (4.0, 5.0)
+    )
+    np.testing.assert_array_equal(at, beyond)
+
+
+def test_outputs_of_one_name_in_other_units_are_not_fitted_together():
+    length = Piece({"sag": TIMES})
+    other = plan().replace(outputs={"sag": TIMES})
+    with pytest.raises(FitError, match="'sag' is a angle of specimen 'rod' and a length of 'returning'"):
+        ck.identify("norton", [*rods(200.0), other], {"rod": Rod(), "returning": length}, starts=1)

@@ -5,9 +5,11 @@ import pytest
 
 import creepkit as ck
 from creepkit.integration.tensor_point import proportional_loading
+from creepkit.inverse.identification import IdentificationSettings
+from creepkit.inverse.identify import identify
 from creepkit.language import CreepLaw, mean_stress, principal_stress, stress
 from creepkit.laws.norton import NORTON
-from creepkit.records import History, PointLoading, Status
+from creepkit.records import History, PointLoading, Program, Status
 from creepkit.specimens.material_point import MaterialPoint, PointRun
 from helpers.kachanov_law import A, kachanov, n
 
@@ -55,6 +57,16 @@ def test_measured_strains_may_include_the_elastic_part():
     expected = {"strain": 0.0, "strain_11": 60 / E, "strain_33": -NU * 60 / E, "strain_12": 40 * (1 + NU) / E}
     for name, elastic in expected.items():
         np.testing.assert_allclose(found[name] - creep[name], elastic, atol=1e-15)
+
+
+def test_plane_strain_ends_with_the_axial_stress_in_the_middle():
+    """Norton in plane strain: s33 tends to (s11 + s22)/2, and the rate to that of q = sqrt(3)/2 s."""
+    times = np.array([0.0, 9e5, 1e6])
+    found = shown(PointLoading(stress={"11": 80}, strain={"33": 0.0}), times=times)
+    assert found["stress_33"][0] == pytest.approx(NU * 80)
+    assert found["stress_33"][-1] == pytest.approx(40.0, rel=1e-5)
+    q = np.sqrt(0.75) * 80
+    assert np.diff(found["strain"])[-1] / 1e5 == pytest.approx(1e-14 * q**4, rel=1e-5)
 
 
 def test_a_held_twist_relaxes():
@@ -177,6 +189,22 @@ def test_creep_under_stresses_needs_no_elastic_data():
     assert np.isnan(run.total_strain).all()
 
 
+def test_programmes_are_taken_as_they_are():
+    ramp = Program([0.0, 100.0], [0.0, 80.0])
+    found = shown(PointLoading(stress={"11": ramp, "22": ramp}), times=[100.0])
+    assert found["strain"][0] == pytest.approx(1e-14 * 80.0**4 * 100 / 5, rel=1e-7)
+
+
+def test_frames_and_rows_of_programmes_do_not_use_up_the_steps():
+    """Every frame ends a step of a stress that turns: the cap is on what the law needs beside them."""
+    turning = PointLoading(stress={"11": 60.0, "12": [(0.0, 0.0), (5e3, 35.0)]})
+    test = plan(turning, times=np.linspace(0.0, 1e4, 101))
+    found = MaterialPoint(max_steps=10).predict(NORTON, NORTON.to_internal(VALUES), [test])
+    assert found.status[0, 0] == Status.COMPLETE
+    later = (60.0**2 + 3 * 35.0**2) ** 2
+    assert found.of(0)[-1, 0] == pytest.approx(1e-14 * 5e3 * (60.0**4 + later), rel=1e-4)
+
+
 def measured(loading, outputs, rng, noise=2e-6, times=None):
     test = plan(loading, times=np.geomspace(60, 3e4, 25) if times is None else times)
     found = shown(loading, law=KACHANOV, values=BRITTLE, times=test.times)
@@ -194,3 +222,28 @@ def test_planted_values_of_a_damage_law_are_found_from_tension_and_torsion():
     fit = ck.identify(KACHANOV, [*tension, *twisted], starts=2, frames=25)
     assert all(e.low <= BRITTLE[e.name] <= e.high for e in fit.estimates)
     assert fit.values["n"] == pytest.approx(4.0, abs=0.05)
+
+
+def test_planted_values_are_found_where_a_twist_is_held():
+    rng = np.random.default_rng(4)
+    times, tests = np.geomspace(10, 3e4, 20), []
+    for twist in (4e-4, 8e-4):
+        loading = PointLoading(strain={"12": twist})
+        clean = shown(loading, times=times)["stress_12"]
+        outputs = {"stress_12": clean + rng.normal(0, 0.2, times.size)}
+        tests.append(plan(loading, times=times).replace(name=f"{twist}", outputs=outputs))
+    fit = ck.identify(NORTON, tests, starts=2)
+    assert all(e.low <= VALUES[e.name] <= e.high for e in fit.estimates)
+    assert fit.values["n"] == pytest.approx(4.0, abs=0.1)
+
+
+def test_planted_values_are_found_by_differences():
+    """Plane strain has no scalar problem: one parameter, from a start close by."""
+    times, loading = np.array([1e3, 1e4, 1e5]), PointLoading(stress={"11": 80}, strain={"33": 0.0})
+    clean = shown(loading, times=times, specimen=MaterialPoint())["strain"]
+    test = plan(loading, times=times).replace(outputs={"strain": clean})
+    law = NORTON.fix(n=4.0)
+    fit = identify(
+        law, [test], MaterialPoint(), settings=IdentificationSettings(starts=1, sobol_points=2, nuisances=())
+    )
+    assert fit.values["A"] == pytest.approx(VALUES["A"], rel=1e-3)

@@ -9,6 +9,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import SolveError
+from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.records import Status
 from creepkit.specimens.per_test import OneTest, PerTest
 
@@ -111,6 +112,13 @@ def test_an_author_is_told_which_test_values_and_line(given, sentence):
         SolveError, match=f"specimen 'closed-form-bar', test 'bar 60' with A = 1e-16, n = 4: .*{sentence}"
     ):
         Wrong().predict(NORTON, NORTON.to_internal(TRUTH), plans(60.0))
+
+
+def test_differences_leave_a_coefficient_off_that_is_off():
+    """-inf has no neighbours: its derivative is zero, and nothing is warned of."""
+    theta = NORTON.to_internal({"A": 0.0, "n": 4.0})
+    found = predict_with_sensitivities(Bar(), NORTON, theta[0], plans(60.0), {})
+    np.testing.assert_array_equal(found.jacobian, np.zeros_like(found.jacobian))
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.errors import SolveError
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.records import History, Status, StrainSteps
+from creepkit.records import History, Program, RecordedLoading, Status, StrainSteps
 from creepkit.specimens.relaxation import Relaxation
 from creepkit.specimens.uniaxial import Uniaxial
 
@@ -52,6 +53,23 @@ def test_a_step_of_strain_adds_its_elastic_stress_and_relaxation_begins_anew():
     np.testing.assert_allclose(stress(plan).of(0)[:, 0], expected, rtol=1e-7)
 
 
+def test_a_step_of_temperature_changes_the_rate():
+    """At twice the rate the clock runs twice as fast: sigma depends on the integral of A dt alone."""
+    law = NORTON.times(ck.arrhenius(T_ref=1000.0))
+    Q = np.log(2.0) * 8.314462618 / (1 / 1000 - 1 / 1050)
+    plan = held(temperature=Program.steps([(0.0, 1000.0), (1e3, 1050.0)]))
+    aged = np.where(TIMES < 1e3, TIMES, 1e3 + 2 * (TIMES - 1e3))
+    found = stress(plan, law=law, values={**VALUES, "Q": Q}).of(0)[:, 0]
+    np.testing.assert_allclose(found, relaxed(START, aged), rtol=1e-7)
+
+
+def test_a_ramp_of_strain_ends_in_steady_creep():
+    """At a constant rate e' of strain the stress tends to (e'/A)^(1/n)."""
+    rate = A * 150.0**N
+    ramp = RecordedLoading(Program([0.0, 2e6], [0.0, 2e6 * rate]), "strain")
+    assert stress(held(loading=ramp, times=[2e6])).of(0)[-1, 0] == pytest.approx(150.0, rel=1e-6)
+
+
 def test_strain_hardening_relaxes_as_quadrature_says():
     """t(sigma) = int dsigma' / (E f(sigma', (s0 - sigma')/E)), by Gauss-Legendre in ln of the strain."""
     values = {"A": 1e-15, "n": 4.0, "m": -0.5}
@@ -62,6 +80,11 @@ def test_strain_hardening_relaxes_as_quadrature_says():
     time = float(0.5 * weights @ (2 * p * 0.5 * (nodes + 1) / rates))
     found = stress(held(times=[time]), law=STRAIN_HARDENING, values=values).of(0)[0, 0]
     assert found == pytest.approx(START - E * p, rel=1e-7)
+
+
+def test_an_engineering_strain_is_taken_as_its_logarithm():
+    plan = held(0.01, times=[0.0], strain_measure="engineering")
+    assert stress(plan).of(0)[0, 0] == pytest.approx(E * np.log(1.01), rel=1e-12)
 
 
 def test_temperature_and_modulus_may_be_off():
@@ -82,6 +105,26 @@ def test_a_bar_that_would_be_compressed_ends_and_says_so():
     assert run.end_time == pytest.approx(1e4)
     assert run.times.tolist() == [0.0, 1e3]
     assert "compress" in run.reason
+
+
+def test_a_ramp_down_that_compresses_says_so_however_far_the_last_frame_is():
+    """All but 13 MPa has relaxed when the strain begins to fall, 1 MPa in 3 s; the last frame is at 1 s."""
+    down = StrainSteps(((0, START / E), (1e7, 0.0)), ramp=3 * START)
+    run = ck.simulate(NORTON, TIGHT, VALUES, loading=down, times=[1.0, 2e7], elastic=ck.Elastic(E))
+    assert "compress" in run.reason
+    assert run.end_time == pytest.approx(1e7 + 3 * relaxed(START, 1e7), abs=0.5)
+
+
+def test_a_bar_that_begins_in_compression_is_not_complete():
+    """Later frames would show a stress, though what the bar crept before is unknown."""
+    ramp = RecordedLoading(Program(np.array([0.0, 1000.0]), np.array([-1e-4, 1e-3])), "strain")
+    plan = held(times=np.array([0.0, 500.0, 1000.0]), loading=ramp)
+    prediction = stress(plan, held())
+    assert prediction.status[0].tolist() == [Status.NOT_CONVERGED, Status.COMPLETE]
+    assert np.isnan(prediction.of(0)).all()
+    assert prediction.end_times[0, 0] == 0.0
+    with pytest.raises(SolveError, match="a compressed bar needs the specimen point"):
+        TIGHT.run(NORTON, VALUES, plan)
 
 
 def noisy(plan, specimen, output, noise, rng):

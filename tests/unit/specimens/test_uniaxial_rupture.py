@@ -66,6 +66,34 @@ def test_norton_under_constant_load_runs_away(measure):
     np.testing.assert_allclose(life.rupture_times[0, 0], (1 - np.exp(-3)) / (3 * rate), rtol=1e-6)
 
 
+def test_what_never_comes_is_not_a_number():
+    life = FINE.predict_to_rupture(NORTON, NORTON.to_internal({"A": 1e-20, "n": 3.0}), [bar()]).times_to_strain
+    assert np.isnan(life.rupture_times).all()
+    assert np.isnan(life.times[0, 0, 1:]).all()
+    assert life.times[0, 0, 0] == 0.0
+    assert life.horizon[0] == 1e5
+
+
+def test_what_breaks_at_once_breaks_at_a_time_that_has_a_logarithm():
+    life = FINE.predict_to_rupture(
+        NORTON, NORTON.to_internal({"A": 1e30, "n": 3.0}), [bar(control="load")], sensitivities=True
+    ).times_to_strain
+    assert life.rupture_times[0, 0] == pytest.approx(1e-12)
+    assert (life.times[0, 0, 1:] <= 1e-12).all()
+
+
+def test_the_rest_is_that_of_predict():
+    """Following a bar further changes nothing about its frames, those lost in a burst included."""
+    values = {"A": np.array([1e-12, 1e-9]), "n": 3.0, "m": 20.0}
+    tests = [bar(), bar(40.0, times=np.linspace(1.0, 1e7, 6))]
+    theta = OMEGA.to_internal(values)
+    plain, whole = (predict(OMEGA, theta, tests) for predict in (FINE.predict, FINE.predict_to_rupture))
+    np.testing.assert_array_equal(plain.status, whole.status)
+    np.testing.assert_allclose(plain.end_times, whole.end_times, rtol=1e-6)
+    np.testing.assert_allclose(plain.values, whole.values, rtol=1e-6)
+    assert (plain.status == Status.RUPTURED).any()
+
+
 def test_a_load_program_is_followed_beyond_its_last_step():
     """Robinson's rule is exact for one damage variable of separable rate: life fractions add up to one."""
     values = {"A": 1e-18, "n": 3.0, "B": 1e-15, "k": 3.0, "r": 3.0}

@@ -9,7 +9,7 @@ from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.search.derivative_free import ParticleSwarm
 from creepkit.inverse.search.term_mask import TermMask
 from creepkit.inverse.settings import IdentificationSettings
-from helpers.cost_functions import SUM, Known, cube, quadratic, rastrigin, rosenbrock
+from helpers.cost_functions import SUM, TRIPLE, Known, cube, quadratic, rastrigin, rosenbrock
 
 BARE = ParticleSwarm(refined_candidates=0)
 SMALL = ParticleSwarm(particles=40, iterations=30)
@@ -161,6 +161,34 @@ def test_minima_are_the_best_of_each_subset_and_more_terms_fit_no_worse():
     assert len(costs) == len(found)
     assert set(costs) == {(), (POWER,), (HARDENING,)}
     assert costs[()] < min(costs[(HARDENING,)], costs[(POWER,)])
+
+
+def test_of_subsets_that_fit_alike_the_simplest_comes_first():
+    """Data without waves of a single term: the sum of both is not better by more than its bottom allows."""
+    flat = Known(
+        lambda u: 0.5 * np.exp(u[:, 2]) + (u[:, 0] - 1) ** 2 + 0.01 * (u[:, 1] - 3) ** 2, BOX, law=SUM, rates=(0, 2)
+    )
+    found = CAREFUL.minima(flat).minima
+    assert found[0].terms_off == (HARDENING,)
+    assert found[0].cost == pytest.approx(0.0, abs=1e-4)
+
+
+def test_only_what_may_be_off_is():
+    landscape = planted(POWER)
+    found = ParticleSwarm(particles=40, iterations=20, maskable_terms=POWER).minima(landscape)
+    assert all(HARDENING not in m.terms_off for m in found.minima)
+    assert ParticleSwarm(particles=40, iterations=20).minima(landscape).minima[0].terms_off == ()
+
+
+def test_masks_of_three_terms_are_never_empty_and_reach_every_subset():
+    landscape = Known(quadratic, cube(len(TRIPLE.names)), law=TRIPLE, rates=(0, 2, 5))
+    switches, rng = TermMask.from_problem(landscape, "any"), np.random.default_rng(0)
+    masks = switches.initial_masks(2000, rng)
+    assert masks.any(axis=1).all()
+    assert len(np.unique(masks, axis=0)) == 7
+    later = switches.recombined(np.zeros((2000, 3), bool), np.zeros(3, bool), rng)
+    assert later.any(axis=1).all()
+    assert len(np.unique(later, axis=0)) == 7
 
 
 def test_a_parameter_shared_with_another_term_does_not_rest():

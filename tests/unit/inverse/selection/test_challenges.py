@@ -116,6 +116,28 @@ def test_the_share_is_held_in_the_fit(power_law_narrow):
     assert NOT_EXCLUDED == pytest.approx(1.96**2, abs=1e-3)
 
 
+def test_the_share_is_that_of_all_terms_of_a_law():
+    """30 % of the sum of two terms against one of the other law, and derivatives as differences say."""
+    share = ShareResidual([0, 1], [3], float(np.log(0.3 / 0.7)))
+    x = np.array([np.log(0.2), np.log(0.5), 7.0, np.log(0.3)])
+    assert share.residuals(x) == pytest.approx(0.0, abs=1e-9)
+    step = 1e-6 * np.eye(4)
+    differences = [(share.residuals(x + d) - share.residuals(x - d)) / 2e-6 for d in step]
+    np.testing.assert_allclose(share.jacobian(x), np.transpose(differences), rtol=1e-6, atol=1e-6)
+
+
+def test_values_by_equal_weights_are_judged_where_their_own_chi_square_is_least():
+    """A law cannot be beaten by itself: refined from elsewhere under the same covariance it is not lower."""
+    tests = steady(NORTON, POWER, WIDE, noise=2e-4)
+    fit = identify(
+        NORTON, tests, Steady(), settings=replace(SETTINGS, weights="noise", nuisances=(ck.Nuisance("rate"),))
+    )
+    best = FittedLaw.at_least_chi_square(fit)
+    least = _chi_square(best.problem, best.x)
+    assert least < _chi_square(best.problem, fit.x)
+    assert _least_chi_square(best, best.problem, fit.x + 0.05)[0] == pytest.approx(least, abs=0.02)
+
+
 # ---- thresholds --------------------------------------------------------------------------------------------------
 
 

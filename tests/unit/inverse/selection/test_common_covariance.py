@@ -36,6 +36,13 @@ def test_little_trust_in_a_test_does_not_make_a_law_better():
     assert found.chi_square[2] == pytest.approx(found.chi_square[1], rel=1e-12)
 
 
+def test_rates_that_matter_more_to_a_law_do_not_excuse_it():
+    best, poor = law(0), law(1, size=3.0)
+    excusing = law(1, size=3.0, log_rate_sensitivity=np.full((TESTS, ENTRIES), 20.0))
+    found = under_common_covariance([best, poor, excusing])
+    assert found.chi_square[2] == pytest.approx(found.chi_square[1], rel=1e-12)
+
+
 def test_chi_square_between_laws_is_that_of_their_difference_under_the_covariance():
     """One law whose residuals are the other's and one more everywhere but in the mean of all, which is fitted."""
     one, other = law(0), law(0)
@@ -45,3 +52,19 @@ def test_chi_square_between_laws_is_that_of_their_difference_under_the_covarianc
     other.linearised = replace(other.linearised, residuals=residuals)
     white = under_common_covariance([one, other]).whitened
     assert ((white[0] - white[1]) ** 2).sum() == pytest.approx(12.0, rel=1e-9)
+
+
+def test_a_law_that_has_nothing_to_say_of_an_entry_is_compared_by_the_others():
+    present = np.ones((TESTS, ENTRIES), bool)
+    present[2, -1] = False
+    silent = law(1)
+    r = silent.linearised.residuals
+    blank = {
+        name: np.where(present, getattr(r, name), 0.0)
+        for name in ("values", "offset_sensitivity", "log_rate_sensitivity")
+    }
+    residuals = replace(r, present=present, jacobian=present[..., None].astype(float), **blank)
+    silent.linearised = replace(silent.linearised, residuals=residuals)
+    found = under_common_covariance([law(0), silent])
+    assert found.whitened.shape == (2, TESTS * ENTRIES)
+    assert found.whitened[1, -1] == 0.0

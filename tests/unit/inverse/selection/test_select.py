@@ -11,8 +11,8 @@ import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.selection import rank
-from creepkit.inverse.selection.select import _richer_laws, reductions
-from creepkit.language import Param, strain, temperature, time
+from creepkit.inverse.selection.select import _richer_laws, reductions, sums_of_two
+from creepkit.language import Param, arrhenius, strain, temperature, time
 from creepkit.records import History, Program
 
 TIMES = np.geomspace(600.0, 4e5, 40)
@@ -71,6 +71,15 @@ def test_the_criteria_are_their_formulas(ranking):
     assert [r.excess for r in rank(fits, "aicc").laws] == pytest.approx(np.sort(aicc - aicc.min()), abs=1e-6)
 
 
+def test_a_law_and_its_special_case_are_not_told_apart():
+    ranking = ck.select(
+        LAWS[:2], measured("norton", {"A": 1e-16, "n": 4.2}, seed=2), "uniaxial", nuisances=[], starts=3
+    )
+    assert ranking.best.law.name == "norton"
+    assert ranking.laws[1].chi_square == pytest.approx(ranking.laws[0].chi_square, abs=6.0)
+    assert "strain-hardening" in str(ranking)
+
+
 def test_hold_out_and_sums_are_asked_for_by_name():
     values = {"A_1": 2e-17, "n_1": 4.5, "A_2": 1e-16, "n_2": 4.0, "m": -0.5}
     law = ck.law("norton") + ck.law("strain-hardening")
@@ -90,6 +99,11 @@ def form(law):
     """The rate with its parameters renamed in the law's order."""
     names = {symbol: f"p{k}" for k, symbol in enumerate(law.params)}
     return sum(law.terms.values()).subs(names)
+
+
+def test_sums_leave_out_what_is_there_already():
+    laws = [ck.law("norton"), ck.law("norton"), ck.law("strain-hardening")]
+    assert [law.fingerprint for law in sums_of_two(laws)] == [(laws[0] + laws[2]).fingerprint]
 
 
 def test_a_law_that_cannot_be_identified_is_named_and_the_others_go_on():
@@ -150,6 +164,13 @@ def test_sums_with_the_best_come_first_then_laws_with_a_memory_that_none_of_the_
     assert not any(law.uses(temperature) for law in richer)
     remembering = [len(law.params) for law in richer[1 : 1 + sum(has_memory)]]
     assert remembering == sorted(remembering)
+
+
+def test_with_temperatures_all_of_them_have_one():
+    laws = [ck.law(name).times(arrhenius(T_ref=1000.0)) for name in ("norton", "strain-hardening")]
+    plain = measured("norton", {"A": 1e-16, "n": 4.2})
+    tests = [h.replace(temperature=T) for h, T in zip(plain, (950.0, 1000.0, 1050.0), strict=True)]
+    assert all(law.uses(temperature) for law in _richer_laws(tried(LEAVES, LEAVES, laws=laws), tests))
 
 
 def softening():

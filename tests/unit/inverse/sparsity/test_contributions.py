@@ -9,7 +9,8 @@ from creepkit.inverse.sparsity.contributions import STRESS_FACTORS, EvaluationPo
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
-from creepkit.records import History, PressureJump, constant_stress
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.records import History, PressureJump, StressSteps, constant_stress
 from helpers.term_contributions import bar, contributions, internal
 
 HOUR = 3600.0
@@ -28,6 +29,23 @@ def test_two_power_laws_at_one_stress_have_the_closed_form():
     assert own.by_term(u) == pytest.approx(dict(zip(law.terms, wanted, strict=True)))
 
 
+def test_equal_rates_everywhere_are_equal_shares():
+    law = NORTON + NORTON
+    own = contributions(law, [bar(30.0), bar(60.0, "other")])
+    u = own.coordinates.u(internal(law, A_1=1e-14, n_1=4.0, A_2=1e-14, n_2=4.0))
+    assert_allclose(own.values(u[None])[0], [0.5, 0.5], rtol=1e-12)
+
+
+def test_an_arrhenius_factor_on_all_terms_changes_no_share():
+    plain = NORTON + STRAIN_HARDENING
+    warm = plain.times(arrhenius(T_ref=1000.0))
+    tests = [bar(30.0, T=950.0), bar(30.0, "hot", T=1050.0)]
+    values = dict(A_1=1e-14, n_1=4.0, A_2=1e-17, n_2=3.0, m=-0.5)
+    first, second = contributions(plain, tests), contributions(warm, tests)
+    u, v = first.coordinates.u(internal(plain, **values)), second.coordinates.u(internal(warm, **values, Q=3e5))
+    assert_allclose(second.values(v[None]), first.values(u[None]), rtol=1e-9)
+
+
 def test_factors_of_single_terms_shift_shares_between_temperatures():
     """Q of 200 kJ/mol in one term: its rate over the other's grows by exp(Q/R (1/T_1 - 1/T_2)) from test to test."""
     law = NORTON.times(arrhenius(T_ref=1000.0)) + NORTON
@@ -37,6 +55,14 @@ def test_factors_of_single_terms_shift_shares_between_temperatures():
     ratio = np.exp(-2e5 / 8.314462618 * (1 / np.array([950.0, 1050.0]) - 1 / 1000.0))
     share = ratio / (1 + ratio)
     assert_allclose(own.values(u[None])[0, 0], np.sqrt(np.mean(share**2)), rtol=1e-9)
+
+
+def test_candidates_are_taken_at_once():
+    own = contributions(COMBINED, [bar(40.0)])
+    rng = np.random.default_rng(2)
+    u = own.coordinates.u(internal(COMBINED, **COMBINED.center())) + rng.normal(0, 0.3, (7, len(COMBINED.params)))
+    assert own.values(u).shape == (7, 3)
+    assert_allclose(own.values(u)[4], own.values(u[4:5])[0], rtol=1e-13)
 
 
 def test_the_jacobian_is_that_of_the_closed_form():
@@ -93,6 +119,13 @@ def dimple(**more):
 def test_stress_follows_the_jump_of_pressure():
     times = np.array([1 * HOUR, 3.9 * HOUR, 4.1 * HOUR, 12 * HOUR])
     assert_allclose(stress_history(dimple(), Dimple(), times)[:, 0], [100.0, 100.0, 125.0, 125.0])
+
+
+def test_stress_of_a_bar_follows_its_steps():
+    steps = StressSteps(((0.0, 30.0), (5 * HOUR, 60.0), (8 * HOUR, 30.0)), "stress")
+    test = bar(30.0).replace(loading=steps)
+    times = np.array([1.0, 6.0, 9.0]) * HOUR
+    assert_allclose(stress_history(test, None, times)[:, 0], [30.0, 60.0, 30.0])
 
 
 def test_strain_of_a_dimple_is_its_growth_over_that_of_a_unit_of_strain():

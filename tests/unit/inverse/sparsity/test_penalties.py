@@ -83,7 +83,33 @@ def test_with_weights_kept_residuals_touch_at_that_point_and_lie_above_elsewhere
     assert_allclose(kept.jacobian(u), slopes, atol=3e-6)
 
 
+def test_unknowns_of_tests_cost_nothing(combined):
+    own, u = combined
+    found, x = PenalisedTerms(own, Sqrt(), 3.0), np.append(u, [0.02, -0.1])
+    assert_allclose(found.residuals(x), found.residuals(u))
+    assert found.values(x[None]) == found.values(u[None])
+    assert found.jacobian(x).shape == (6, u.size + 2)
+    assert (found.jacobian(x)[:, -2:] == 0).all()
+
+
 def test_exponents_that_can_be_off_are_those_of_memory():
     """n of 1 to 8 has {0} outside its bounds; m of -1 to 0 can get there."""
     assert [COMBINED.names[k] for k, _ in switchable_exponents(COMBINED)] == ["m_1", "m_2"]
     assert switchable_exponents(NORTON) == []
+
+
+def test_a_simple_term_costs_less_than_one_with_memory(combined):
+    own, u = combined
+    simple = u.copy()
+    simple[COMBINED.names.index("m_1")] = 0.0
+    both = np.stack([u, simple])
+    same = PenalisedTerms(own, Sqrt(exponents=0.0), 1.0).values(both)
+    dearer = PenalisedTerms(own, Sqrt(), 1.0).values(both) - same
+    assert dearer[0] > dearer[1]
+
+
+def test_a_law_without_such_exponents_is_penalised_too():
+    law = NORTON + NORTON
+    own = contributions(law, [bar(40.0)])
+    u = own.coordinates.u(internal(law, A_1=2e-13, n_1=3.0, A_2=1e-16, n_2=5.0))
+    assert PenalisedTerms(own, Sqrt(), 1.0).residuals(u).shape == (3,)

@@ -1,12 +1,14 @@
 """A sum reduced to the terms that planted bulge tests need: single laws, two-term laws, paths and draws."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from creepkit.inverse.search.derivative_free import ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.bootstrap import binomial_interval, bootstrap_weights, selection_frequencies
-from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Sqrt
+from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Sqrt, Subsets
 from creepkit.inverse.sparsity.reduced_laws import terms_above
 from creepkit.inverse.sparsity.term_selection import (
     TermChoice,
@@ -51,6 +53,12 @@ def test_a_planted_single_law_is_found(reduced):
     assert reduced.sparsity.p_value > 0.01
 
 
+def test_subsets_find_it_too(hardening):
+    choice = choose_terms(hardening[1], Subsets())
+    assert choice.kept_terms == (STRAIN,)
+    assert choice.contributions[STRAIN] == pytest.approx(1.0, abs=1e-3)
+
+
 def test_a_swarm_searches_the_penalised_landscape(hardening):
     """Its cost at the optimum is what least squares has there, penalty included."""
     _, reductions = hardening
@@ -81,6 +89,16 @@ def test_memory_that_is_not_there_is_switched_off():
     assert len(fit.law.params) == 2
     assert fit.sparsity.exponents_off in (("m_1",), ("m_2",))
     assert next(v for k, v in fit.values.items() if k.startswith("n")) == pytest.approx(3.5, abs=0.2)
+
+
+def test_two_terms_are_kept_where_three_pressures_need_them():
+    law = NORTON + TIME_HARDENING
+    values = {"A_1": 1.5e-20, "n_1": 6.5, "A_2": 3.3e-9, "n_2": 2.0, "m": -0.6}
+    plans = [Plan(760, P, 1.15 * P) for P in (6, 8, 10.5)]
+    tests = planted(law, values, plans, seed=7, frames=12)
+    fit = identify_sparse(law, tests, EXACT, penalty=Sqrt(), settings=QUICK)
+    assert fit.sparsity.kept_terms == ("power law", "time hardening")
+    assert fit.values["n_1"] == pytest.approx(6.5, abs=0.3)
 
 
 # ---- the path, and draws -------------------------------------------------------------------------------------------
@@ -118,6 +136,15 @@ def test_draws_weigh_all_frames_alike(hardening):
     np.testing.assert_allclose(weights[present], 1.0, atol=0.1)
 
 
+def test_of_several_tests_whole_ones_are_drawn():
+    """As many as there are, each as likely as another; all entries of a test together."""
+    observations = SimpleNamespace(present=np.ones((5, 7), bool), frame_index=np.tile(np.arange(7), (5, 1)))
+    drawn = np.array(list(bootstrap_weights(observations, 2000, np.random.default_rng(0))))
+    assert (drawn == drawn[:, :, :1]).all()
+    np.testing.assert_array_equal(drawn[:, :, 0].sum(axis=1), 5)
+    np.testing.assert_allclose(drawn.mean(axis=0), 1.0, atol=0.1)
+
+
 def test_intervals_of_frequencies_are_exact():
     """Clopper and Pearson: none of n gives 1 - (.025)^(1/n)."""
     assert binomial_interval(0, 20) == pytest.approx((0.0, 1 - 0.025 ** (1 / 20)))
@@ -133,3 +160,8 @@ def test_a_term_that_is_needed_comes_back(hardening):
     _, reductions = hardening
     wrong = TermChoice((SINE,), {SINE: 0.6, STRAIN: 0.3, TIME: 0.1}, reductions.problem.start)
     assert STRAIN in confirmed_law(reductions, wrong).kept_terms
+
+
+def test_the_largest_term_stays_whatever_the_least_share():
+    assert terms_above({"a": 0.6, "b": 0.04}) == ("a",)
+    assert terms_above({"a": 0.03, "b": 0.04}) == ("b",)

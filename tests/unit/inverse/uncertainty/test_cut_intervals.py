@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import creepkit as ck
@@ -36,6 +37,16 @@ def test_an_interval_that_ends_at_a_bound_is_named(name: str, end: int) -> None:
     assert cut_interval_notes(NORTON, estimates(ends, "not determined")) == ()
 
 
+def test_a_rate_far_below_1e_8_is_not_taken_for_its_bound() -> None:
+    """The same number to within an absolute tolerance of 1e-8, and a factor of ten apart."""
+    ends = {one: inside(one) for one in NORTON.table}
+    name = next(one for one in NORTON.table if NORTON.table[one].bounds[0] < 1e-12)
+    ends[name] = (NORTON.table[name].bounds[0] * 10, 1e-10)
+    assert ends[name][0] < 1e-8
+    assert cut_intervals(NORTON, estimates(ends)) == {}
+    assert cut_interval_notes(NORTON, estimates(ends)) == ()
+
+
 @pytest.mark.parametrize(
     ("value", "interval", "verdict"),
     [
@@ -51,3 +62,10 @@ def test_an_interval_that_ends_at_a_bound_is_named(name: str, end: int) -> None:
 )
 def test_one_rule_says_what_is_determined(value: float, interval: tuple[float, float], verdict: str) -> None:
     assert verdict_of_interval(value, interval, (0.0, 1.0)) == verdict
+
+
+def test_nearly_equal_intervals_from_near_zero_to_a_bound_have_one_verdict() -> None:
+    """Two transients that the tests cannot tell apart: of each the interval goes over ten decades up to its bound."""
+    bounds = (np.log(1e-14), np.log(0.01))
+    for low in (5.132e-13, 5.195e-13):
+        assert verdict_of_interval(np.log(8.2e-6), (np.log(low), bounds[1]), bounds) == "not determined"

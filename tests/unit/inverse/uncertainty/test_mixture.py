@@ -1,10 +1,12 @@
 """Mixtures over laws, and bands over an uncertain temperature, against closed forms."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.stats import norm
+from scipy.stats import t as student
 
 from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution, ModelAverage, rate_band
 from creepkit.language import arrhenius
@@ -20,6 +22,13 @@ def parts(weight, middle, sd, freedom=1e9):
     columns = (np.array(v, float) for v in (weight, np.full(len(weight), freedom), middle, sd))
     weight, freedom, middle, sd = columns
     return MixtureDistribution(weight, freedom, middle, sd)
+
+
+def test_one_part_has_its_own_quantiles():
+    for freedom in (1e9, 3.0):
+        found = parts([1.0], [2.0], [0.5], freedom)
+        for p in (0.025, 0.5, 0.9):
+            assert float(found.quantile(p)) == pytest.approx(2.0 + 0.5 * student.ppf(p, freedom), abs=1e-9)
 
 
 def test_two_parts_far_apart():
@@ -63,6 +72,17 @@ def test_two_laws_that_disagree_widen_the_interval(fit):
     assert "norton (0.5), norton (0.5)" in str(mixture)
 
 
+def test_a_ranking_is_a_mixture_of_its_laws(fit):
+    other = replace(fit, u=fit.u + np.array([0.0, 3.0]))
+    weighed = [SimpleNamespace(fit=fit, weight=0.75), SimpleNamespace(fit=other, weight=0.25)]
+    ranking = SimpleNamespace(laws=[*weighed, SimpleNamespace(fit=None, weight=0.0)])
+    found = ModelAverage.from_ranking(ranking)
+    assert found.weights == (0.75, 0.25)
+    sd = float(np.sqrt(fit.covariance[1, 1]))
+    assert float(found.local_exponent(60.0)[1]) == pytest.approx(fit.u[1] + sd * norm.ppf(0.025 / 0.75), abs=1e-4)
+    assert rate_band(ranking, [60.0], 1000.0, temperature_uncertainty=0.0).low == pytest.approx(found.rate([60.0])[1])
+
+
 @pytest.fixture(scope="module")
 def warm(fit):
     """Norton times Arrhenius, Q = 300 kJ/mol known exactly: only the temperature is uncertain."""
@@ -82,3 +102,15 @@ def test_the_band_over_temperature_is_arrhenius(warm, shape, edge):
         assert end == pytest.approx(expected, rel=0.02)
     assert found.rate == pytest.approx(TRUTH["A"] * np.array([40.0, 60.0]) ** 4, rel=1e-3)
     assert found.notes == ()
+
+
+def test_without_uncertainty_of_temperature_it_is_the_band_of_the_law(fit):
+    found = rate_band(fit, [40.0, 60.0], 1000.0, temperature_uncertainty=0.0)
+    assert np.array([found.rate, found.low, found.high]) == pytest.approx(np.array(fit.rate([40.0, 60.0])), rel=1e-6)
+    assert np.array(found.parameter_band) == pytest.approx(np.array([found.low, found.high]))
+
+
+def test_a_law_without_temperature_cannot_know(fit):
+    found = rate_band(fit, [40.0, 60.0], 1000.0)
+    assert found.low == pytest.approx(found.parameter_band[0])
+    assert "without a temperature in the law norton the band cannot hold what 10 K do" in found.notes[0]

@@ -45,6 +45,14 @@ def test_of_a_linear_problem_it_is_the_normal_interval(fit, tests):
         assert found.notes == ()
 
 
+def test_points_lie_on_the_parabola(fit, tests):
+    best, covariance = least_squares(tests, SD)
+    found = profile(fit, "n")
+    expected = (found.values - best[1]) ** 2 / covariance[1, 1]
+    assert np.allclose(found.chi_square, expected, atol=0.02)
+    assert (np.diff(found.values) > 0).all()
+
+
 def test_of_a_rate_and_a_local_exponent(fit, tests):
     """ln rate at s is (1, ln s) . (ln A, n): its variance follows; the exponent of a power law is n."""
     best, covariance = least_squares(tests, SD)
@@ -99,3 +107,12 @@ def test_scatter_between_few_tests_counts_as_in_laplaces_intervals():
     assert found.high - found.low == pytest.approx(found.laplace[1] - found.laplace[0], rel=0.2)
     known = replace(fit, settings=replace(fit.settings, nuisances=(Nuisance("offset"), Nuisance("rate", sd=0.2))))
     assert interval_noise_model(known).rate == fit.noise_model.rate
+
+
+def test_an_interval_cut_by_a_bound_is_open_on_that_side(tests):
+    """The truth lies at n = 4 and the law allows n up to 4.1: only the lower end can be found."""
+    A, n = NORTON.params
+    short = replace(NORTON, params={A: NORTON.params[A], n: replace(NORTON.params[n], bounds=(1.0, 4.1))})
+    found = profile(known_scatter(short, tests, SD), "n")
+    assert found.high is None
+    assert found.low == pytest.approx(profile(known_scatter(NORTON, tests, SD), "n").low, abs=0.02)

@@ -113,6 +113,15 @@ def test_each_test_says_its_own_factor():
     assert sd == pytest.approx(0.1 / np.sqrt(6), rel=0.02)
 
 
+def test_heats_and_laboratories_are_read_from_labels():
+    tests, _ = bars(6, 0.1, 3)
+    labelled = [h.replace(labels={"heat": "ab"[k % 2], "lab": "one"}) for k, h in enumerate(tests)]
+    scatter = ck.identify(ck.law("norton").fix(n=5.0), labelled, using=BAR, starts=1).rate_scatter
+    assert scatter.levels == ("heat", "test")
+    assert scatter.members["heat"] == ("a", "b", "a", "b", "a", "b")
+    assert scatter.common == {"laboratory": "one"}
+
+
 def heats_of(*heats):
     tests, _ = bars(len(heats), 0.1, 3)
     labelled = [h.replace(labels={"heat": heat} if heat else {}) for h, heat in zip(tests, heats, strict=True)]
@@ -126,3 +135,19 @@ def test_a_test_without_a_heat_makes_no_second_heat_beside_one_that_is_named():
     assert [(e.value, e.low, e.high) for e in fit.estimates] == [(e.value, e.low, e.high) for e in labelled.estimates]
     assert f"{fit.histories[4].name} states no heat: taken for one of heat b, as the others are" in fit.notes
     assert not any("states no heat" in one for one in labelled.notes)
+
+
+def test_a_test_without_a_heat_is_one_of_its_own_beside_two_that_are_named():
+    fit = heats_of(*"aabb", "", "b")
+    assert fit.rate_scatter.levels == ("heat", "test")
+    assert len(set(fit.rate_scatter.members["heat"])) == 3
+    assert not fit.rate_scatter.common
+    assert any(one.endswith("taken for a heat of its own") for one in fit.notes)
+
+
+def test_a_new_test_of_the_named_heat_has_the_same_band_with_and_without_the_unlabelled_test():
+    fit, labelled = heats_of(*"bbbb", "", "b"), heats_of(*"bbbbbb")
+    new = labelled.histories[0].replace(name="new")
+    assert fit.rate_scatter.new_test(new) == labelled.rate_scatter.new_test(new)
+    assert fit.rate_scatter.new_test(new).unseen == ()
+    assert fit.rate_scatter.new_test(new.replace(labels={"heat": "c"})).unseen == ("heat",)

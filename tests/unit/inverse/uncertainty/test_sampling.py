@@ -60,6 +60,14 @@ def test_intervals_of_rate_and_exponent(samples, tests):
     assert samples.interval(exponent_at(60.0)) == pytest.approx(samples.interval("n"), rel=1e-6)
 
 
+def test_poorly_known_scatter_widens_them(fit, tests):
+    """With 4 degrees of freedom the marginal of n is Student's t, whose 95 % interval is 2.78 standard errors."""
+    best, covariance = least_squares(tests, SD)
+    found = sample_posterior(replace(fit, freedom=4.0), walkers=32, steps=500, seed=4)
+    half = student.ppf(0.975, 4.0) * np.sqrt(covariance[1, 1])
+    assert found.interval("n") == pytest.approx((best[1], best[1] - half, best[1] + half), abs=0.15 * half)
+
+
 def test_rates_that_scatter_between_tests_count_once_a_test():
     """ln rate of 12 tests on ln stress is a regression: the slope's standard error is sd / sqrt(sum of squares).
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.fem.mesh import Mesh
 
 AREA = 4.0 * np.pi
 LAWS = {
@@ -128,6 +129,39 @@ def test_a_length_that_moves_the_mesh_alone() -> None:
     elastic = 700.0 / AREA / 9e7
     exact = -(10.0 * (strain - elastic) * np.exp(5.0 * strain) + 2.0 * elastic) / 2.0  # of -ln(1 - n A s^n t)/n + s/E
     assert found.nuisance_jacobian["radius"][0, 0, 0, 0] == pytest.approx(exact, rel=1e-3)
+
+
+def test_a_mesh_from_elsewhere() -> None:
+    """The same mesh, given as one from a file would be: what is held comes with it, sides and points are named."""
+    made = RoundBar().section("force")
+    held = np.zeros(made.nodes.shape, bool)
+    held[np.unique(made.sides["bottom"]), 1] = True
+    mesh = Mesh(made.nodes, made.elements, held, made.sides["right"], np.zeros(0, int))
+
+    @dataclass(frozen=True)
+    class ReadBar(RoundBar):
+        grid: Mesh = field(default=mesh)
+
+        def section(self, load: str) -> ck.Section:
+            bar = ck.Section.of_mesh(self.grid).with_side("top", lambda r, z: z > 3.999).with_point("top_left", 0, 4)
+            return bar.plane("top").pull("top")
+
+    plan = plan_of(RoundBar(), ck.constant_load("force", 700.0), [1e3, 1e5])
+    one, other = (predicted(bar, "norton", LAWS["norton"], [plan]).of(0) for bar in (RoundBar(), ReadBar()))
+    np.testing.assert_allclose(one, other, rtol=1e-12)
+
+
+def test_a_bar_ends_in_tertiary_creep() -> None:
+    """A dead load leads to infinite strain at 1/(n A s^n), which is a result; the strain limit comes just before."""
+    values = {"A": 1e-16, "n": 5.0}
+    end = 1.0 / (5.0 * 1e-16 * 80.0**5)
+    run = ck.simulate(
+        "norton", RoundBar(tolerance=1e-3), values, loading=ck.constant_load("force", 80.0 * AREA), temperature=1000.0,
+        elastic=ck.Elastic(E=150e3), times=np.linspace(0.1, 2.0, 20) * end,
+    )  # fmt: skip
+    assert run.status is ck.Status.RUPTURED
+    assert run.rupture_time == pytest.approx(end, rel=0.01)
+    assert run.reason in ("creep strain reached the strain limit", "equilibrium was lost while the load did not rise")
 
 
 @dataclass(frozen=True)

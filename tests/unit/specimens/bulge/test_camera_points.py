@@ -6,7 +6,7 @@ import pytest
 from creepkit.errors import FitError
 from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.records import SurfacePoints
-from creepkit.specimens.bulge.camera_points import observe_surface
+from creepkit.specimens.bulge.camera_points import observe_surface, surface_center
 from creepkit.specimens.bulge.field_fit import fit_field, paper_parameters
 from creepkit.specimens.bulge.observation import Observation
 from helpers.bulge_profiles import NODES, plates
@@ -50,6 +50,31 @@ def test_gains_are_the_derivatives_of_the_outputs():
         expected = np.einsum("fn,fn->f", seen.gains[:, k], change)
         missed = changed.outputs[name] - seen.outputs[name] - expected
         assert np.sqrt((missed**2).mean() / (expected**2).mean()) < 0.5  # 12 % of the standard deviation
+
+
+def test_one_centre_serves_all_frames():
+    center, covariance = surface_center(grid(0.5, center=(0.6, -0.4)), 7.5)
+    np.testing.assert_allclose(center, [0.6, -0.4], atol=3e-3)
+    assert np.sqrt(np.diag(covariance)).max() < 0.01
+
+
+def test_lost_points_are_not_filled():
+    points = grid(0.4)
+    heights = np.array(points.heights)
+    heights[:, np.hypot(*(points.places - [2.0, 1.0]).T) < 1.5] = np.nan
+    seen = observe_surface(SurfacePoints(points.places, points.areas, heights), "field 0-7.5 mm")
+    assert (seen.gains[:, :, np.isnan(heights[0])] == 0.0).all()
+    truth = Observation("field").observe(NODES, PROFILES)[:, 0]
+    np.testing.assert_allclose(seen.outputs["amplitude"], truth, rtol=0.01)
+
+
+@pytest.mark.parametrize("subset", [0.0, 1.2])
+def test_rings_from_points(subset):
+    radii = [0.0, 0.8, 2.0, 4.0, 6.0]
+    seen = observe_surface(grid(0.5, subset), "rings 0, 0.8, 2, 4, 6 mm")
+    truth = PROFILES @ surface_interpolation(NODES, radii).T
+    got = np.stack(list(seen.outputs.values()), axis=1)
+    assert np.abs(got - truth).max() < 2e-3 * truth.max()
 
 
 def test_eight_parameters_as_those_of_the_paper():

@@ -36,6 +36,15 @@ def test_standard_errors_of_a_field_are_its_scatter():
     np.testing.assert_allclose([f.residual_sd for f in fits], 0.02, rtol=0.15)
 
 
+def test_lost_and_wild_points():
+    x, y = pixels()
+    surface = cross(x - 0.7, y + 0.4, 0.35, 3.6, 2.3)
+    surface[3, 4], surface[9:12, 9] = 2.0, np.nan
+    fit = fit_field(x, y, surface)
+    assert fit.points == 2497
+    np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], [0.35, 3.6, 2.3], rtol=0.005)
+
+
 @needs_shared_data
 def test_field_and_operator_see_the_same():
     nodes, profile = profile_with_apex(0.81)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from creepkit.fem.mesh import discretize, mesh_quality, refuse_inverted, strip_nodes
+from creepkit.fem.mesh import discretize, half_bandwidth, mesh_quality, refuse_inverted, strip_nodes
 from creepkit.specimens.bulge.geometry import DimpleGeometry, column_lines, mesh_layout
 
 TAPERED = DimpleGeometry()
@@ -37,11 +37,38 @@ def errors(g: DimpleGeometry, refinement: float) -> np.ndarray:
     return np.abs(found / [area(g), volume(g)] - 1)
 
 
+def test_the_production_meshes():
+    tapered, fillet = TAPERED.mesh(), FILLET.mesh()
+    assert [len(m.elements) for m in (tapered, fillet)] == [50, 75]
+    assert [half_bandwidth(m.elements) for m in (tapered, fillet)] == [39, 39]
+    assert tapered.nodes.size == 362
+    layers = np.array([0, 0.16, 0.38, 0.57, 0.68, 1])
+    np.testing.assert_allclose(tapered.nodes[:11:2, 1], 3.5 + 0.5 * layers, rtol=1e-14)
+    np.testing.assert_allclose(fillet.nodes[:11:2, 1], [3, 3.17, 3.4, 3.6, 3.83, 4], rtol=1e-14)
+    np.testing.assert_allclose(fillet.nodes[fillet.pressed[:8, 2], 0], 0.5 * np.arange(1, 9), rtol=1e-13)
+    assert mesh_quality(tapered).sine.min() > 0.6
+    assert mesh_quality(fillet).sine.min() > 0.7
+
+
+def test_twice_the_refinement_is_twice_the_elements_each_way():
+    for g in (TAPERED, FILLET, THIN, NO_WALL):
+        coarse, fine = g.mesh(), g.mesh(2)
+        assert len(fine.elements) == 4 * len(coarse.elements)
+        assert len(fine.top) - 1 == 2 * (len(coarse.top) - 1)
+    assert len(TAPERED.mesh(1.5).elements) == (12 + 3) * 8
+    assert len(TAPERED.mesh(0.5).elements) == (4 + 1) * 2
+
+
 @pytest.mark.parametrize("g", FAMILY, ids=range(len(FAMILY)))
 def test_area_and_volume_converge_with_the_fourth_order(g):
     coarse, fine = errors(g, 2), errors(g, 4)
     assert coarse.max() < 1e-4
     assert g is SHORT_WALL or (np.log2(coarse / fine) > 3.5)[fine > 1e-12].all()  # its wall has no column before 5.5
+
+
+def test_a_short_wall_gets_a_column_when_columns_are_short_enough():
+    coarse, fine = errors(SHORT_WALL, 6), errors(SHORT_WALL, 12)
+    assert (np.log2(coarse / fine) > 3.5).all()
 
 
 @pytest.mark.parametrize("g", FAMILY, ids=range(len(FAMILY)))

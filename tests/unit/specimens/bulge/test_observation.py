@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import curve_fit
 
 from creepkit.specimens.bulge.observation import Observation
-from helpers.bulge_profiles import FINE, LOOKED_AT, NODES, bell, cross, plates, richardson, table
+from helpers.bulge_profiles import FINE, LOOKED_AT, NODES, bell, cross, plates, profile_with_apex, richardson, table
 from helpers.paths import needs_shared_data
 
 FORMS = [Observation(), Observation("field"), Observation("profile", 5.3, 51), Observation("field", 4.7)]
@@ -118,6 +118,26 @@ def test_a_frame_without_a_fit_is_nan_and_leaves_its_neighbours_alone(name):
     np.testing.assert_allclose(slopes[[0, 1, 3]], alone_slopes, rtol=1e-8, atol=1e-11)
 
 
+@pytest.mark.parametrize("operator", FORMS, ids=str)
+def test_noise_is_averaged_and_no_frame_leans_on_the_one_before(operator):
+    noise = np.random.default_rng(5).normal(size=(200, 41))
+    frames = bell(NODES, 0.1, 3.8, 2.2) + 0.003 * noise  # negative far out, in a good part of the nodes
+    together = operator.observe(NODES, frames)
+    alone = np.vstack([operator.observe(NODES, frame[None]) for frame in frames])
+    np.testing.assert_allclose(together, alone, rtol=1e-10)
+    clean, slopes = operator.observe_with_derivatives(NODES, [bell(NODES, 0.1, 3.8, 2.2)])
+    expected = 0.003 * np.sqrt((slopes[0] ** 2).sum(axis=1))  # what the slopes say of the scatter
+    np.testing.assert_allclose(together.std(axis=0), expected, rtol=0.2)
+    np.testing.assert_allclose(together.mean(axis=0), clean[0], atol=0.4 * expected.max())
+
+
+def test_scale_does_not_matter():
+    for size in (1e-7, 1e3, 1e150):
+        seen = Observation().observe(NODES, size * plates(NODES))
+        expected = Observation().observe(NODES, plates(NODES)) * [size, 1.0, 1.0]
+        np.testing.assert_allclose(seen, expected, rtol=1e-12)
+
+
 # Derivatives
 
 
@@ -130,6 +150,37 @@ def test_slopes_against_differences(operator):
         change = 0.1 * profiles[:, :1] * direction
         expected = richardson(lambda h, change=change: operator.observe(NODES, profiles + h * change), 1e-3)
         np.testing.assert_allclose(np.einsum("fvn,fn->fv", slopes, change), expected, rtol=1e-8, atol=1e-9)
+
+
+def test_slopes_hold_far_from_a_perfect_fit():
+    ragged = bell(NODES, 0.5, 3.8, 2.2) * (1 + 0.2 * np.cos(2.1 * NODES))
+    seen, slopes = Observation().observe_with_derivatives(NODES, [ragged])
+    for node in (0, 3, 11, 20):
+        expected = richardson(lambda h, k=node: Observation().observe(NODES, [ragged + h * np.eye(41)[k]])[0], 2e-4)
+        np.testing.assert_allclose(slopes[0, :, node], expected, rtol=1e-7, atol=1e-8)
+    assert np.isfinite(seen).all()
+
+
+def test_slopes_of_a_planted_bell_are_those_of_linear_least_squares():
+    nodes = np.linspace(0.0, 7.5, 151)
+    D, S, p = 0.4, 3.6, 2.3
+    _, slopes = Observation().observe_with_derivatives(nodes, [bell(nodes, D, S, p)])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = np.where(LOOKED_AT > 0, np.log(LOOKED_AT / S), 0.0)
+    power, high = (LOOKED_AT / S) ** p, bell(LOOKED_AT, D, S, p)
+    jacobian = np.stack([high / D, high * power * p / S, -high * power * far], axis=1)
+    np.testing.assert_allclose(slopes[0][:, ::2], np.linalg.pinv(jacobian), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("operator", FORMS, ids=str)
+def test_what_is_observed_is_smooth_in_the_window(operator):
+    profiles = plates(NODES)
+    slopes = operator.window_derivatives(NODES, profiles)
+    expected = richardson(lambda h: operator.replace(window=operator.window + h).observe(NODES, profiles), 1e-5)
+    np.testing.assert_allclose(slopes, expected, rtol=1e-6, atol=1e-7)  # radii on nodes: the kinks there cost a digit
+    steps = np.linspace(operator.window - 0.2, operator.window, 81)
+    seen = np.array([operator.replace(window=window).observe(NODES, profiles)[-1] for window in steps])
+    assert np.abs(np.diff(seen, axis=0)).max() < 4 * np.abs(slopes[-1]).max() * (steps[1] - steps[0])
 
 
 @pytest.mark.parametrize("operator", FORMS, ids=str)
@@ -153,6 +204,26 @@ def test_fits_of_calculix_profiles(name):
     # radii .1 mm apart instead: the two ends of the window weigh a little less
     error = np.abs(Observation().observe(nodes, profiles) - fits).max(axis=0)
     assert (error < [2e-4, 8e-4, 2e-3]).all()
+
+
+@needs_shared_data
+def test_window_at_an_apex_of_two_thirds_of_a_mm():
+    # printed to three digits with the sentence "the window matters" of the notes on the true dimple
+    nodes, profile = profile_with_apex(0.66)
+    for window, share, shape in ((7.5, 0.992, 2.18), (5.0, 0.997, 2.11), (4.0, 0.999, 2.07)):
+        D, _, p = Observation("profile", window, round(10 * window) + 1).observe(nodes, profile)[0]
+        assert abs(D / 0.66 - share) < 6e-4
+        assert abs(p - shape) < 6e-3
+
+
+@needs_shared_data
+def test_the_two_forms_part_on_a_real_profile():
+    # Eq. (3) .805, 3.853, 2.203 and Eq. (7) .814, 3.789, 2.133 are quoted for another law at the same apex
+    nodes, profile = profile_with_apex(0.81)
+    one, other = (Observation(form, 5.0).observe(nodes, profile)[0] for form in ("profile", "field"))
+    np.testing.assert_allclose(one, [0.805, 3.853, 2.203], atol=0.017)
+    np.testing.assert_allclose(other, [0.814, 3.789, 2.133], atol=0.008)
+    np.testing.assert_allclose(other - one, [0.009, -0.064, -0.07], atol=0.01)
 
 
 # The operator as text

@@ -22,6 +22,13 @@ def profiles(growth=1.0, width=3.6):
     return np.where(np.arange(TIMES.size)[:, None] == 0, 0.0, moved)
 
 
+@pytest.mark.parametrize("operator", [Observation(), Observation("field"), Observation("profile", 5.3, 51)], ids=str)
+def test_one_call_does_what_two_do(operator):
+    got = operator.observe_at_times(NODES, profiles(), STEPS, FRAMES)
+    np.testing.assert_allclose(got, STEPS.interpolate(operator.observe(NODES, profiles()), FRAMES), rtol=1e-14)
+    assert np.isnan(got[-1]).all()
+
+
 @pytest.mark.parametrize("lanes", ["2", "4", "8"])
 def test_every_width_of_vectors_gives_the_same(monkeypatch, lanes):
     expected, derivatives = Observation("field").observe_with_derivatives(NODES, profiles())

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sympy import Piecewise
+from sympy import Piecewise, tanh
 
 import creepkit as ck
 from creepkit.kernels.rate_jumps import find_rate_jump
@@ -39,6 +39,12 @@ def test_a_jump_in_stress_is_the_reason() -> None:
     assert found.status is ck.Status.NOT_CONVERGED
     assert "the law's creep rate jumps from 4.1e-08 to 4.1e-07 1/s at a stress of 80 MPa" in found.reason
     assert "blend them" in found.reason
+
+
+def test_the_same_factor_blended_is_solved() -> None:
+    found = run(law(1 + 9 * (1 + tanh((stress - 80) / 5)) / 2, "blended"))
+
+    assert found.status is ck.Status.COMPLETE
 
 
 @pytest.mark.parametrize("factor", [0.1, 1.01, 10.0])

@@ -15,8 +15,11 @@ from creepkit.fem.simulation import sensitivity_directions, simulate
 from creepkit.inverse.composite_predictor import prediction_errors_of, refined_of
 from creepkit.language import Elastic, parameters, principal_stress, strain, stress
 from creepkit.laws.combined import COMBINED
+from creepkit.laws.norton import NORTON
 from creepkit.records import History, PressureJump, Status
 from creepkit.specimens.bulge.finite_elements import solver_settings
+from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
 from creepkit.specimens.bulge.setup import set_up_test
 from creepkit.specimens.bulge.specimen import Bulge
 from helpers.fem_cases import lowered
@@ -105,8 +108,35 @@ def test_thickness() -> None:
 
 
 @pytest.mark.long_when_sanitized
+def test_another_dimple_and_its_mesh_from_files() -> None:
+    """A plate with a fillet, meshed and as a mesh from elsewhere, within one per cent: nothing knows the dimple."""
+    fillet = Bulge(geometry=DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",)), threads=1, tolerance=1e-4)
+    theta = NORTON.to_internal({"A": 1e-13, "n": 4.3})
+    for specimen in (fillet, fillet.replace(mesh=with_top(fillet))):
+        exact, found = (p.predict(NORTON, theta, [history()]) for p in (specimen, specimen.reduced_order_model()))
+        error = np.abs(found.values - exact.values)[0, 0, :, 0].max() / np.abs(exact.values[..., 0]).max()
+        assert error < 0.01
+
+
+def with_top(specimen: Bulge):
+    """The specimen's own mesh, as if it were read from files."""
+    return specimen.geometry.mesh(1.0)
+
+
+@pytest.mark.long_when_sanitized
 def test_stated_error_enters_the_covariance_and_the_specimen_corrects_it() -> None:
     errors = prediction_errors_of(REDUCED)
     assert set(errors) == set(SPECIMEN.optional_outputs)
     assert 1e-5 < errors["amplitude"] < 0.01
     assert refined_of(REDUCED) == SPECIMEN.refined()
+
+
+@pytest.mark.long_when_sanitized
+def test_fewer_modes_err_more() -> None:
+    creep, values = CASES["combined"]
+    theta = creep.to_internal(values)
+    errors = [
+        np.abs(BulgeReducedOrderModel(SPECIMEN, modes=count, points=200).prediction_error(creep, theta, [history()]))
+        for count in (4, 24)
+    ]
+    assert errors[0][..., 0].max() > 3.0 * errors[1][..., 0].max()

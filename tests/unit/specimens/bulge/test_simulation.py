@@ -5,8 +5,10 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import SolveError
+from creepkit.language import stress
 from creepkit.records import Program, RecordedLoading, Status
 from creepkit.specimens.bulge.run import BulgeRun
+from helpers.literature_laws import POWER, RATE, A, B, damage, k, n
 
 N3 = {"A": 5e-13, "n": 3.0}
 TIMES = np.array([0.0, 150, 600, 1800, 3600, 7200, 14400, 28800, 43200])
@@ -33,9 +35,39 @@ def burst() -> BulgeRun:
 # ---- displacements -------------------------------------------------------------------------------------------------
 
 
+def test_displacement_has_an_axis_for_times_and_one_for_several_radii(run: BulgeRun) -> None:
+    assert run.displacement().shape == (9,)
+    assert run.displacement([0, 2, 4]).shape == (9, 3)
+    assert run.displacement(2.0, 3600).shape == ()
+    assert run.displacement([2.0], 3600).shape == (1,)
+    np.testing.assert_array_equal(run.displacement([0, 2])[:, 0], run.displacement())
+
+
+def test_displacement_at_nodes_is_that_of_the_profile_and_quadratic_between_them(run: BulgeRun) -> None:
+    radii, rise = run.profile()
+    np.testing.assert_allclose(run.displacement(radii), rise, atol=1e-15)
+    assert (radii[0], radii[-1]) == (0.0, 10.0)
+    halfway = np.array([0.375, 0.75, -0.125])
+    found = run.displacement(halfway @ radii[2:5])
+    np.testing.assert_allclose(found, rise[:, 2:5] @ halfway, rtol=1e-9)
+
+
+def test_the_apex_rises_most_and_the_rim_not_at_all(run: BulgeRun) -> None:
+    rise = run.profile().displacement
+    assert (rise[0] == 0.0).all()
+    assert (np.diff(rise[1:], axis=0) >= -1e-12)[:, :5].all()
+    assert (rise.argmax(axis=1)[1:] == 0).all()
+    np.testing.assert_array_equal(rise[:, -1], 0.0)
+
+
 def test_the_answer_does_not_depend_on_the_times_asked_for(run: BulgeRun) -> None:
     few = simulated(times=[7200.0, 43200.0])
     np.testing.assert_allclose(few.displacement(), run.displacement(times=[7200.0, 43200.0]), rtol=1e-12)
+
+
+def test_a_run_says_what_prediction_says(run: BulgeRun) -> None:
+    found = ck.specimen("bulge").predict(ck.law("norton"), ck.law("norton").to_internal(N3), [run])
+    np.testing.assert_allclose(found.of(0), np.stack(list(run.outputs.values()), axis=1), rtol=1e-9)
 
 
 # ---- stresses and strains ------------------------------------------------------------------------------------------
@@ -62,6 +94,24 @@ def test_creep_redistributes_the_elastic_stress(run: BulgeRun) -> None:
     later = run.mises_range(3600.0)
     assert elastic.high > 1.5 * later.high
     assert elastic.low < later.low
+
+
+def test_creep_strain_only_grows(run: BulgeRun) -> None:
+    """To what the interpolation between steps costs, where next to nothing creeps."""
+    _, strain = run.field("creep strain")
+    assert strain.shape == (9, len(run.point_coordinates))
+    assert (strain[0] == 0).all()
+    assert (np.diff(strain, axis=0) > -1e-4 * strain.max()).all()
+
+
+def test_states_of_a_law_are_fields() -> None:
+    law = damage(A * stress**n, B * stress**k, {A: RATE, n: POWER, B: RATE, k: POWER})
+    run = simulated(law, {**N3, "B": 1e-12, "k": 3.0}, times=[0.0, 3600.0])
+    _, damaged = run.field("omega", 3600.0)
+    _, strain = run.field("creep strain", 3600.0)
+    np.testing.assert_allclose(damaged, 2 * strain, rtol=1e-6)
+    with pytest.raises(SolveError, match="a bulge run has no field 'omga'; did you mean 'omega'"):
+        run.field("omga")
 
 
 # ---- how it ends ---------------------------------------------------------------------------------------------------
