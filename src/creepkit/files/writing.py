@@ -1,7 +1,7 @@
 """Writing files: whole or not at all, never through links or into devices, and never over what creepkit did not write.
 
 What is written takes a temporary name in the same folder, then its own. RECORD lists what creepkit wrote in a folder,
-a line of JSON for each content: [name, SHA-256, what it was made from]. A file is creepkit's own while its content is
+a line of JSON for each content: [name, bytes and SHA-256, what it was made from]. A file is creepkit's own while its content is
 listed under its name; any other file is replaced by force alone, and so is one that was made from another study or
 measured file than the new one. Without the list nothing is lost: its files then need force.
 
@@ -83,7 +83,7 @@ def replace_on_success(
         if not internal:
             with suppress(OSError):
                 shutil.copymode(path, temporary)
-            _note_written(path, sha256_of(temporary, _ANY_FILE))
+            _note_written(path, f"{temporary.stat().st_size} {sha256_of(temporary, _ANY_FILE)}")
         os.replace(temporary, path)
     except OSError as failure:
         message = os.strerror(failure.errno) if failure.errno else " ".join(str(failure).split())
@@ -201,10 +201,11 @@ def written_files(folder: Path, pattern: str = "*") -> list[Path]:
 
 def _recorded_origin(path: Path) -> str | None:
     """What a file was made from, "" where that was not noted; None of a file that creepkit did not write as it is."""
+    size = path.stat().st_size
     with suppress(CreepkitError):
-        if is_listed(path):
-            digest = sha256_of(path, _ANY_FILE)  # before the list is read: it names a content before that is there
-            return _written(path.parent)[path.name].get(digest)
+        if any(content.startswith(f"{size} ") for content in _written(path.parent).get(path.name, ())):
+            content = f"{size} {sha256_of(path, _ANY_FILE)}"
+            return _written(path.parent)[path.name].get(content)  # read anew: it names a content before that is there
     return None
 
 
@@ -224,19 +225,19 @@ def _origin_seen_from(folder: Path) -> str:
 
 
 def _written(folder: Path) -> dict[str, dict[str, str]]:
-    """{name: {SHA-256: origin}} of what creepkit wrote in a folder; lines that say something else are passed over."""
+    """{name: {bytes and SHA-256: origin}} of what creepkit wrote in a folder; lines that say something else are passed over."""
     contents: dict[str, dict[str, str]] = {}
     with suppress(CreepkitError):
         for line in read_text(folder / RECORD, _RECORD_FILE).splitlines():
             with suppress(ValueError, TypeError):
-                name, digest, origin = json.loads(line)
-                contents.setdefault(name, {})[digest] = origin
+                name, content, origin = json.loads(line)
+                contents.setdefault(name, {})[str(content)] = origin
     return contents
 
 
-def _note_written(path: Path, digest: str) -> None:
+def _note_written(path: Path, content: str) -> None:
     """List a content; before it takes its place, so that a process that dies in between leaves no foreign file."""
     origin = _origin_seen_from(path.parent)
-    if _written(path.parent).get(path.name, {}).get(digest) != origin:
+    if _written(path.parent).get(path.name, {}).get(content) != origin:
         with suppress(OSError), open(path.parent / RECORD, "a", encoding="utf-8") as record:
-            record.write(json.dumps([path.name, digest, origin]) + "\n")
+            record.write(json.dumps([path.name, content, origin]) + "\n")
