@@ -93,6 +93,7 @@ def test_a_worker_that_is_killed_is_replaced(whole, tmp_path, caplog):
     assert "a worker process died (signal SIGKILL); its shard 1 is done again" in caplog.text
 
 
+@pytest.mark.nightly
 def test_a_sample_that_kills_its_worker_each_time_is_said(tmp_path):
     deadly = Deadly(stress_of(strong_enough(range(20, 32))))
     with pytest.raises(DatasetError, match="shard 1: its worker process died 3 times, the last time by signal SIGKILL"):
@@ -132,6 +133,7 @@ def wait_for(what, seconds=60.0):
 
 
 @pytest.mark.parametrize("workers_too", [True, False])
+@pytest.mark.nightly
 def test_a_generation_that_is_killed_goes_on_where_it_was(whole, tmp_path, workers_too):
     to, log = tmp_path / "a.h5", tmp_path / "log"
     first = started(to, log, seconds=0.03, workers=1)
@@ -150,6 +152,7 @@ def test_a_generation_that_is_killed_goes_on_where_it_was(whole, tmp_path, worke
     assert left_behind(tmp_path) == ["generating.lock"]
 
 
+@pytest.mark.nightly
 def test_ctrl_c_ends_the_workers(tmp_path):
     to = tmp_path / "a.h5"
     first = started(to, seconds=0.1, workers=1)
@@ -173,6 +176,7 @@ def test_two_generations_in_one_folder_do_not_do_the_work_twice(whole, tmp_path)
 # ---- a cluster -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_a_dask_cluster_makes_the_same_data_set(whole, tmp_path):
     from distributed import LocalCluster
 

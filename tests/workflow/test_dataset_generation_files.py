@@ -42,6 +42,7 @@ def test_a_shard_of_another_data_set_is_not_counted(whole, tmp_path, caplog):
     assert "a shard of another data set; it is simulated again" in caplog.text
 
 
+@pytest.mark.nightly
 def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
     """A limit on the size of files stands for the room on the disk: the answer is EFBIG in the place of ENOSPC."""
     to, other = tmp_path / "a.h5", tmp_path / "other.h5"

@@ -1,9 +1,9 @@
 """Writing files: whole or not at all, never through links or into devices, and never over what creepkit did not write.
 
 What is written takes a temporary name in the same folder, then its own. RECORD lists what creepkit wrote in a folder,
-a line of JSON for each content: [name, bytes and SHA-256, what it was made from]. A file is creepkit's own while its content is
-listed under its name; any other file is replaced by force alone, and so is one that was made from another study or
-measured file than the new one. Without the list nothing is lost: its files then need force.
+a line of JSON for each content: [name, bytes and SHA-256, what it was made from]. A file is creepkit's own while its
+content is listed under its name; any other file is replaced by force alone, and so is one that was made from another
+study or measured file than the new one. Without the list nothing is lost: its files then need force.
 
 Files in folders that creepkit keeps for itself (shards, caches) are `internal`: always replaced, and listed nowhere.
 """
@@ -225,7 +225,7 @@ def _origin_seen_from(folder: Path) -> str:
 
 
 def _written(folder: Path) -> dict[str, dict[str, str]]:
-    """{name: {bytes and SHA-256: origin}} of what creepkit wrote in a folder; lines that say something else are passed over."""
+    """{name: {bytes and SHA-256: origin}} of what creepkit wrote in a folder; other lines are passed over."""
     contents: dict[str, dict[str, str]] = {}
     with suppress(CreepkitError):
         for line in read_text(folder / RECORD, _RECORD_FILE).splitlines():

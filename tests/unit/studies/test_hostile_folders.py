@@ -49,7 +49,6 @@ def test_the_files_of_another_study_stay_and_those_of_the_same_are_made_again(st
 def test_holes_beside_a_study_take_no_time(study: Path, plain_pages: None) -> None:
     study.write_text(ONE_FIT + "[report]\n")
     result = ck.Study.load(study).run(only="quality")
-    begin = time.process_time()
     enlarge(study.parent / "report.html")
     enlarge(study.parent / "study.results" / "quality.json")
     again = ck.Study.load(study).run(only="quality")
