@@ -121,9 +121,9 @@ def _starts_processes(module: str) -> bool:
 
 
 def test_processes_are_started_in_one_place() -> None:
-    """`worker_pools` waits for workers and ends them; `browser_page` asks the desktop for its browser."""
+    """`worker_pools` waits for workers and ends them; `app_page` asks the desktop for its browser."""
     starting = {module for module in source_tree.modules() if _starts_processes(module)}
-    assert starting <= {"creepkit.jobs.worker_process", "creepkit.jobs.worker_pools", "creepkit.cli.browser_page"}
+    assert starting <= {"creepkit.jobs.worker_process", "creepkit.jobs.worker_pools", "creepkit.cli.app_page"}
     pools = source_tree.tree("creepkit.jobs.worker_pools")
     called = {
         node.func.attr
