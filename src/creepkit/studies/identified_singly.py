@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from creepkit.api.searches import penalty_of_name, search_of_name
+from creepkit.inverse.search_options import SearchOptions
 from creepkit.studies.model import IdentificationPart
 
 if TYPE_CHECKING:
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 def search_of(part: IdentificationPart) -> tuple[Any, Any]:
     """The search and the penalty of an identification, None for the default and for none."""
-    return search_of_name(part.search), None if part.penalty is None else penalty_of_name(part.penalty)
+    how = SearchOptions(part.search, part.penalty)
+    return how.global_search, how.term_penalty
 
 
 def identified_laws(

@@ -11,8 +11,6 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
-from creepkit.api.searches import PenaltyName, SearchName
-
 MOST_ITEMS = 1000
 """In a list of a study file."""
 
@@ -224,8 +222,8 @@ class IdentificationPart(Part):
     loss: Text | None = None
     test_loss: Text | None = None
     rupture_times: Literal["auto", "use", "ignore"] | None = None
-    search: SearchName = "multi-start"
-    penalty: PenaltyName | None = None
+    search: Literal["multi-start", "swarm", "cma-es"] = "multi-start"
+    penalty: Literal["l2", "group-l2", "sqrt", "subsets"] | None = None
 
 
 class SelectionPart(Part):

@@ -67,7 +67,7 @@ def test_a_sweep_is_a_table_and_a_picture_and_is_not_redone(file: Path, tmp_path
 
 def test_a_sweep_judges_every_number_of_samples_by_the_same_rows(tmp_path: Path) -> None:
     data, recipe = bars(60), ck.ParameterGru(4, 1, training=ck.Training(epochs=2))
-    entries = sweeping.size_study(data, recipe, sweeping.NetworkSizes(samples=(10, 20, 48)), to=tmp_path)
+    entries = sweeping.size_study(data, recipe, NetworkSizes(samples=(10, 20, 48)), to=tmp_path)
     judged = [evaluate(ck.surrogate(tmp_path / e.file), data) for e in entries]
     for entry, one in zip(entries, judged, strict=True):
         assert one.comparison.index.tolist() == judged[0].comparison.index.tolist()
@@ -79,7 +79,7 @@ def test_a_sweep_judges_every_number_of_samples_by_the_same_rows(tmp_path: Path)
 
 def test_the_best_of_a_sweep_stands_on_top(file: Path, tmp_path: Path) -> None:
     recipe = ck.ParameterGru(4, 1, training=ck.Training(epochs=2))
-    entries = sweeping.size_study(bars(60), recipe, sweeping.NetworkSizes(hidden=(2, 8)), to=tmp_path)
+    entries = sweeping.size_study(bars(60), recipe, NetworkSizes(hidden=(2, 8)), to=tmp_path)
     _, rows = size_study_rows(entries)
     losses = [float(row[5]) for row in rows]
     assert losses == sorted(losses)
