@@ -3,9 +3,7 @@
 from . import errors as errors
 from .api.extraction import extract as extract
 from .api.identification import confirm as confirm
-from .api.identification import export as export
 from .api.identification import identify as identify
-from .api.identification import law_with_values as law_with_values
 from .api.identification import moduli as moduli
 from .api.identification import rank as rank
 from .api.identification import select as select
@@ -32,6 +30,8 @@ from .discovery.discover import group_by_temperature as group_by_temperature
 from .discovery.discover import temperature_study as temperature_study
 from .experiments.design import design as design
 from .experiments.rig import Rig as Rig
+from .exporters.exporting import export as export
+from .exporters.exporting import law_with_values as law_with_values
 from .fem.mesh_files import read_mesh as read_mesh
 from .fem.section import Section as Section
 from .files.writing import overwriting as overwriting
@@ -107,9 +107,9 @@ from .records.prediction import Status as Status
 from .records.specimen_record import Dimension as Dimension
 from .records.specimen_record import Load as Load
 from .records.specimen_record import Output as Output
-from .registry.arguments import read_frames as read_frames
-from .registry.arguments import read_histories as read_histories
-from .registry.arguments import read_record as read_record
+from .registry.reading import read_frames as read_frames
+from .registry.reading import read_histories as read_histories
+from .registry.reading import read_record as read_record
 from .rupture_assessment.assess import rupture as rupture
 from .rupture_assessment.assessment import RuptureSettings as RuptureSettings
 from .sampling.conditions import TimeGrid as TimeGrid

@@ -63,7 +63,9 @@ def _message(text: str) -> str:
 class ArgumentError(CreepkitError, TypeError, ValueError):
     """An argument of a public function or record is not what the annotation says. argument : its name."""
 
-    argument = ""
+    def __init__(self, sentence: str, argument: str = "") -> None:
+        super().__init__(sentence)
+        self.argument = argument
 
 
 class LawError(CreepkitError):

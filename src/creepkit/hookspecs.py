@@ -62,6 +62,5 @@ def creepkit_temperature_forms() -> Mapping[str, Any]:  # type: ignore[empty-bod
 def creepkit_commands(app: typer.Typer) -> None:
     """Add commands to the command line.
 
-    `creepkit --help` lists them. It imports those plugins alone whose module has this name, creepkit_commands, in its
-    text: of an installed plugin the module of its entry point.
+    `creepkit --help` lists them, and so imports the modules that the entry points `creepkit.commands` name.
     """

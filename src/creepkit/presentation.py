@@ -47,6 +47,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
     "Identification": {
         "text": "creepkit.reports.identification_text:identification_text",
         "plot": "creepkit.reports.identification_plot:identification_figure",
+        "comments": "creepkit.reports.identification_text:identification_comments",
         "save": "creepkit.inverse.identification_document:write_identification",
         "profile": "creepkit.inverse.uncertainty.profile_likelihood:profile",
         "sample": "creepkit.inverse.uncertainty.posterior:sample_posterior",

@@ -1,16 +1,13 @@
 """Generations that meet damaged files, a full disk, or a wish that cannot be met: nothing is lost, and it is said."""
 
-import os
 import re
 import resource
 
 import h5py
 import pytest
 
-from creepkit.dataset import storage
 from creepkit.errors import DatasetError
 from helpers.dataset_runs import ROWS, assert_same, left_behind, run_here, shards_of, whole_of
-from helpers.planted_sampling import Planted, Raising
 
 
 @pytest.fixture(scope="module")
@@ -45,32 +42,6 @@ def test_a_shard_of_another_data_set_is_not_counted(whole, tmp_path, caplog):
     assert "a shard of another data set; it is simulated again" in caplog.text
 
 
-def test_a_target_that_is_something_else_is_refused_before_any_work(tmp_path, whole):
-    to = tmp_path / "a.h5"
-    to.write_text("precious")
-    with pytest.raises(DatasetError, match=r"a\.h5: not an HDF5 file"):
-        run_here(to)
-    assert to.read_text() == "precious"
-    to.unlink()
-    storage.write_dataset(whole, to)
-    with pytest.raises(
-        DatasetError, match=r"holds another data set \(there and here seed is 0 and 1\); choose another name"
-    ):
-        run_here(to, seed=1)
-    with pytest.raises(DatasetError, match="is a folder"):
-        run_here(tmp_path)
-    with pytest.raises(DatasetError, match="no shards can be written there"):
-        run_here(to / "b.h5")
-    assert [name for name in os.listdir(tmp_path) if name[0] != "."] == ["a.h5"]
-
-
-def test_a_damaged_record_of_the_generation_is_said(tmp_path):
-    (tmp_path / "a.h5.parts").mkdir()
-    (tmp_path / "a.h5.parts" / "generation.json").write_text('{"seed": ')
-    with pytest.raises(DatasetError, match=r"generation\.json, line 1: not JSON.*remove it"):
-        run_here(tmp_path / "a.h5")
-
-
 def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
     """A limit on the size of files stands for the room on the disk: the answer is EFBIG in the place of ENOSPC."""
     to, other = tmp_path / "a.h5", tmp_path / "other.h5"
@@ -99,16 +70,3 @@ def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
 
 
 # ---- what cannot be asked for --------------------------------------------------------------------------------------
-
-
-def test_a_design_of_which_nothing_is_accepted_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr("creepkit.jobs.shard_progress.MOST_DRAWS_WITHOUT_ACCEPTED", 64)
-    with pytest.raises(
-        DatasetError, match="none of the first 64 draws was accepted; see 'creepkit generate --dry-run'"
-    ):
-        run_here(tmp_path / "a.h5", Planted(low=130.0))
-
-
-def test_a_design_of_which_everything_fails_is_given_up(tmp_path):
-    with pytest.raises(DatasetError, match="the first 8 simulations all failed: ZeroDivisionError"):
-        run_here(tmp_path / "a.h5", Planted((Raising(),)))

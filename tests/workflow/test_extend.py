@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 import creepkit as ck
-from creepkit.errors import ExportError, HistoryError, LawError, SolveError
+from creepkit.errors import LawError, SolveError
 from creepkit.records import Dimension, LawWithValues
 from creepkit.registry import Plugin, Registry, default_registry
 from helpers.command_line import creepkit, one_line
@@ -212,15 +212,6 @@ def test_readers_read_the_files_that_are_shown() -> None:
     assert not recorder.accepts(Path("ours/b7.csv"))
 
 
-@pytest.mark.parametrize(("line", "wrong"), [(1, "RECORDER 3  hot"), (3, "120")])
-def test_the_recorders_reader_says_where_a_file_is_wrong(line: int, wrong: str) -> None:
-    lines = blocks("write_a_reader", "text")[-1].splitlines()
-    lines[line - 1] = wrong
-    Path("b7.log").write_text("\n".join(lines))
-    with pytest.raises(HistoryError, match=f"b7.log, line {line}: found '{wrong}'"):
-        contributed("reader")[-1].read(Path("b7.log"))
-
-
 # ---- camera formats ------------------------------------------------------------------------------------------------
 
 
@@ -281,15 +272,6 @@ def test_the_function_of_octave_is_the_law(name: str, values: dict, rate: float)
     for line in body:
         exec(line.strip().rstrip(";").replace(".*", "*").replace(".^", "**").replace("^", "**"), space)
     assert space["rate"] == pytest.approx(rate, rel=1e-12)
-
-
-def test_the_exporter_refuses_what_octave_cannot_have() -> None:
-    octave, damaged = contributed("exporter")[-1], contributed("law")[-1]
-    values = {"A": 1e-17, "B": 1e-17, "n": 4.0, "e0": 0.01, "C": 1e-14, "v": 4.0}
-    with pytest.raises(ExportError, match="internal variables"):
-        octave.text(LawWithValues(damaged, values))
-    with pytest.raises(ExportError, match="found Pa and h"):
-        octave.text(LawWithValues(ck.law("norton"), {"A": 1e-16, "n": 5.0}, units=ck.Units("Pa", "h")))
 
 
 # ---- temperature forms ---------------------------------------------------------------------------------------------

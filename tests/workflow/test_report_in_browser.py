@@ -83,15 +83,6 @@ def test_the_law_answers_to_its_sliders(browser, address, width) -> None:
     page.context.close()
 
 
-def test_without_scripts_the_sliders_say_that_they_need_them_and_paper_has_none(browser, address) -> None:
-    page, _, _ = opened(browser, address, java_script_enabled=False)
-    assert "needs scripts" in page.locator("#sliders noscript").inner_text()
-    page.emulate_media(media="print")
-    assert not page.locator("#sliders").is_visible()
-    assert page.locator("#findings").is_visible()
-    page.context.close()
-
-
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_its_window_and_is_drawn(browser, address, width, scheme, tmp_path) -> None:
@@ -107,19 +98,6 @@ def test_it_fits_its_window_and_is_drawn(browser, address, width, scheme, tmp_pa
     mean = sum(level * count for level, count in enumerate(levels)) / sum(levels)
     assert mean > 220 if scheme == "light" else mean < 60
     assert sum(count > 0 for count in levels) > 50  # letters, not a blank page
-    page.context.close()
-
-
-def test_the_keyboard_reaches_everything(browser, address) -> None:
-    page, _, _ = opened(browser, address)
-    page.keyboard.press("Tab")
-    assert page.evaluate("document.activeElement.textContent") == "Skip to the findings"
-    page.keyboard.press("Enter")
-    assert page.evaluate("location.hash") == "#main"
-    beyond = page.evaluate(
-        "[...document.querySelectorAll('a, .scroll, pre')].filter(e => e.tabIndex < 0).map(e => e.className)"
-    )
-    assert beyond == []
     page.context.close()
 
 

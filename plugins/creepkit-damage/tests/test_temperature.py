@@ -68,12 +68,3 @@ def test_one_activation_energy_for_both_does_not_explain_them() -> None:
 
     assert ck.rank(fits).best.law.name == LAW.name
     assert fits[1].rms > 5 * fits[0].rms
-
-
-def test_damage_without_temperature_is_said_and_printed() -> None:
-    """A factor on creep alone: the answer prints both equations and names the one that knows no temperature."""
-    law = ck.law("kachanov-rabotnov").fix(alpha=0, m=0).times(ck.arrhenius(T_ref=T_REF), states=())
-    text = str(ck.identify(law, measured(noise=5e-5), using=BAR, starts=1, sobol_points=8, frames=10))
-
-    assert "dv/dt = B*Max(0, stress)**chi, from 0, broken at 0.99999999" in text
-    assert "note: the rate of v knows no temperature, as that of creep does" in text

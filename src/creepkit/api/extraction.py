@@ -9,14 +9,14 @@ import numpy as np
 
 from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import HistoryError
-from creepkit.records import Loading, Program, RecordedLoading, SupportsSurfaceObservation
+from creepkit.extraction.domes import Centers
+from creepkit.records import Loading, Program, RecordedLoading, Specimen, SupportsSurfaceObservation
 from creepkit.registry.arguments import resolve_predictor
 
 if TYPE_CHECKING:
     from creepkit.extraction import Extraction
-    from creepkit.extraction.domes import Centers
     from creepkit.instruments.imposed import Imposed
-    from creepkit.records import Frames, History, InstrumentRecord, Specimen
+    from creepkit.records import Frames, History, InstrumentRecord
 
 WATCHED = "bulge"
 """The specimen that cameras are taken to watch where none is named."""

@@ -1,29 +1,27 @@
-"""Identification and selection of laws, their confirmation by simulation, and their export."""
+"""Identification and selection of laws, and their confirmation by simulation."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from creepkit import registry
 from creepkit.checked_arguments import checked
-from creepkit.errors import ExportError, FitError, quoted
+from creepkit.errors import FitError, quoted
+from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
 from creepkit.options import takes_options
-from creepkit.records import History, LawWithValues, Predictor, Units, exported_text
-from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictors
+from creepkit.records import History, Predictor
+from creepkit.registry import resolve_law
+from creepkit.registry.arguments import check_histories, resolve_predictors
 
 if TYPE_CHECKING:
     from creepkit.discovery.elastic_moduli import ModulusEstimates
-    from creepkit.discovery.temperature_law import TemperatureLaw
     from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.search.global_search import GlobalSearch
     from creepkit.inverse.selection import Ranking
-    from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
-    from creepkit.language import CreepLaw, Elastic
+    from creepkit.language import CreepLaw
 
 
 @takes_options(IdentificationSettings)
@@ -197,89 +195,3 @@ def _resolve_through(
         )
     reduced = None if isinstance(predictor, Mapping) else reduced_order_model_of(predictor)
     return reduced if reduced is not None and prediction_errors_of(reduced) else None
-
-
-@checked
-def export(
-    source: CreepLaw | Identification | Ranking | TemperatureLaw | LawWithValues | str,
-    target: str,
-    values: Mapping[str, float] | None = None,
-    *,
-    units: Units | Mapping[str, str] | None = None,
-    temperature: float | None = None,
-    name: str = "",
-    to: str | Path | None = None,
-    force: bool = False,
-) -> str:
-    """Return a law with its values as text for a target (latex, python, abaqus ...), and write it to a file if asked.
-
-    source : a law, which needs `values` {parameter: value}, or an identification or a temperature law, whose intervals
-        and range of validity become comments, or a ranking, whose best law is written with the verdict on it, or the
-        record of law_with_values(), which may have elastic constants and notes as well.
-    target : one of `available("exporters")`. units : of stress and time in the text, Units("Pa", "h") or
-        {"stress": "Pa"}.
-    temperature : K, puts a number in the place of the temperature, for targets that know none.
-    name : what the target calls the law. to, force : the file to write, and whether one that exists may be replaced.
-
-    ExportError, with the reason, when the target cannot express the law.
-    """
-    from creepkit.exporters.law_files import write_export
-
-    exporter = registry.default_registry().exporter(target)
-    record = law_with_values(source, values, name=name)
-    if units is not None:
-        record = record.replace(units=_resolve_units(units))
-    if temperature is not None:
-        record = record.replace(notes=(*record.notes, f"taken at a temperature of {temperature:g} K")).at(temperature)
-    if to is not None:
-        write_export(record, exporter, to, force=force)
-    return exported_text(exporter, record)
-
-
-@checked
-def law_with_values(
-    source: CreepLaw | Identification | Ranking | TemperatureLaw | LawWithValues | str,
-    values: Mapping[str, float] | None = None,
-    *,
-    elastic: Elastic | None = None,
-    name: str = "",
-    notes: Sequence[str] = (),
-) -> LawWithValues:
-    """Return a law with its values and what goes with them into every export.
-
-    source, values, name : as export() takes them; notes say which values were set by hand in the place of others.
-    elastic : E in MPa, and nu, for targets that state them. notes : lines that become comments.
-    """
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection import Ranking
-
-    resolved: Any = getattr(source, "valued", source)  # a temperature law has one
-    verdict = ""
-    if isinstance(resolved, Ranking):
-        verdict, resolved = resolved.verdict if len(resolved.laws) > 1 else "", resolved.best
-    if isinstance(resolved, Identification):
-        from creepkit.reports.identification_text import identification_comments
-
-        resolved = LawWithValues(
-            resolved.law, resolved.values, tuple(identification_comments(resolved, verdict)), ranges=resolved.ranges
-        )
-    if not isinstance(resolved, LawWithValues):
-        return LawWithValues(resolve_law(resolved), values or {}, tuple(notes), elastic=elastic, name=name)
-    record = resolved if values is None else resolved.replace(values=values)
-    changed = [
-        f"{parameter} = {value:.8g} was set by hand, in place of {resolved.values[parameter]:.8g}"
-        for parameter, value in record.values.items()
-        if value != resolved.values[parameter]
-    ]
-    return record.replace(
-        notes=(*resolved.notes, *changed, *notes), elastic=elastic or record.elastic, name=name or record.name
-    )
-
-
-def _resolve_units(units: Units | Mapping[str, str]) -> Units:
-    if isinstance(units, Units):
-        return units
-    unknown = sorted({*units} - {"stress", "time"})
-    if unknown:
-        raise ExportError(f"units have no '{unknown[0]}'; write units={{'stress': 'Pa', 'time': 'h'}}")
-    return Units(**units)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from creepkit import registry
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, PluginError, nearest
-from creepkit.registry.arguments import resolve_law
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -25,7 +24,7 @@ EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
 @checked
 def law(name: str) -> CreepLaw:
     """Return the law called `name`: one of `available("laws")`, or a sum of them as in "norton+strain-hardening"."""
-    return resolve_law(name)
+    return registry.default_registry().law(name)
 
 
 @checked

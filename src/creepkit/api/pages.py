@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from creepkit.app.contents import PageSource
 from creepkit.checked_arguments import checked
 from creepkit.errors import ExportError
 from creepkit.files.writing import check_target, write_text
+from creepkit.records import Predictor
 
 if TYPE_CHECKING:
-    from creepkit.app.contents import PageContents, PageSource
-    from creepkit.records import History, Predictor
+    from creepkit.app.contents import PageContents
+    from creepkit.records import History
 
 
 LARGE_NETWORK = 300_000

@@ -10,9 +10,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from creepkit.api.identification import export, law_with_values, rank
+from creepkit.api.identification import rank
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, ReportError
+from creepkit.exporters.exporting import export, law_with_values
+from creepkit.reports.contents import ReportSource
 
 if TYPE_CHECKING:
     from creepkit.discovery.discover import TemperatureStudy
@@ -24,30 +26,14 @@ if TYPE_CHECKING:
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.records import History
-    from creepkit.reports.contents import (
-        Exclusion,
-        ExportedFile,
-        ReportContents,
-        ReportGroup,
-        ReportProvenance,
-        ReportSource,
-    )
+    from creepkit.reports.contents import Exclusion, ExportedFile, ReportContents, ReportGroup, ReportProvenance
     from creepkit.rupture_assessment.assessment import RuptureAssessment
     from creepkit.screening.results import AlloyResult, ScreeningResult
 
-    Reported: TypeAlias = (
-        Identification
-        | Ranking
-        | ModelAverage
-        | AlloyResult
-        | ScreeningResult
-        | TemperatureStudy
-        | TemperatureLaw
-        | Forecast
-        | Design
-        | RuptureAssessment
-        | Extraction
-    )
+Reported: TypeAlias = (
+    "Identification | Ranking | ModelAverage | AlloyResult | ScreeningResult | TemperatureStudy | TemperatureLaw "
+    "| Forecast | Design | RuptureAssessment | Extraction"
+)
 
 EXPORT_TARGETS = ("json", "python", "latex", "abaqus")
 """Of the best law of each material, to download."""
@@ -304,7 +290,7 @@ def _commands(group: ReportGroup, histories: Sequence[History]) -> Iterator[str]
     """Lines of Python that repeat an identification, where names and settings alone determine it."""
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.settings import IdentificationSettings
-    from creepkit.registry.arguments import resolve_law
+    from creepkit.registry import resolve_law
     from creepkit.reports.html.findings import findings_of
 
     found = findings_of(group)

@@ -8,23 +8,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from creepkit.arrays import ArrayLike
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import DatasetError, SolveError, SurrogateError
+from creepkit.jobs.shard_progress import ProgressCallback
 from creepkit.language import symbols
 from creepkit.records import History, Loading, Predictor, Program, Specimen, Status, call_of_plugin, predict_with
-from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictor
+from creepkit.registry import resolve_law
+from creepkit.registry.arguments import check_histories, resolve_predictor
+from creepkit.sampling.domains import SamplingDesign
 from creepkit.specimens.run import Run, Runnable, run_from_outputs, unusual_values, with_explanation
+from creepkit.surrogates.surrogate import Recipe
 
 if TYPE_CHECKING:
-    from creepkit.arrays import ArrayLike
     from creepkit.dataset.dataset import Dataset
-    from creepkit.jobs.shard_progress import ProgressCallback
     from creepkit.jobs.worker_pools import ParallelExecution
     from creepkit.language import CreepLaw, Elastic
     from creepkit.quality import DataQuality
-    from creepkit.sampling.domains import SamplingDesign
     from creepkit.surrogates.recipe import Training
-    from creepkit.surrogates.surrogate import Recipe, Surrogate
+    from creepkit.surrogates.surrogate import Surrogate
 
 
 ROOM_TEMPERATURE = 293.15

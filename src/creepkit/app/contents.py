@@ -19,7 +19,8 @@ from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.language import temperature
 from creepkit.records import History, LawWithValues, Predictor, Specimen, dimensions_of, known_specimens, predict_with
 from creepkit.records.units import celsius_text
-from creepkit.registry.arguments import check_histories, resolve_law
+from creepkit.registry import resolve_law
+from creepkit.registry.arguments import check_histories
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification

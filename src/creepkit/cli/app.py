@@ -165,7 +165,7 @@ class CommandGroup(TyperGroup):
             _load_plugin_files(ctx.params.get("plugin"))
         except PluginError as error:
             failed = [str(error)]
-        added, problems = _plugin_commands(listed_only=True)
+        added, problems = _plugin_commands()
         shown = [(name, one.get_short_help_str(80)) for name, one in sorted(added.items()) if not one.hidden]
         if shown:
             with formatter.section("Commands of plugins"):
@@ -221,13 +221,13 @@ def _load_plugin_files(files: list[Path] | None) -> None:
                 say(sentence)
 
 
-def _plugin_commands(*, listed_only: bool = False) -> tuple[dict[str, Any], list[str]]:
+def _plugin_commands() -> tuple[dict[str, Any], list[str]]:
     """Return {name: command} of what plugins add, and a sentence for each plugin or command that cannot be used."""
     from creepkit import registry
 
     added: dict[str, Any] = {}
     problems: list[str] = []
-    for plugin, commands_of_plugin in registry.default_registry().command_lines(listed_only=listed_only):
+    for plugin, commands_of_plugin in registry.default_registry().command_lines():
         try:
             commands = typer.main.get_group(commands_of_plugin).commands
         except Exception as error:  # of the signature of somebody else's command

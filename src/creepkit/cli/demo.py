@@ -135,7 +135,7 @@ def _with_installed_laws(path: Path) -> StudyFile:
     from dataclasses import replace
 
     import creepkit as ck
-    from creepkit.registry.plugin_registry import package_with_law
+    from creepkit.registry.plugin_registry import MORE_LAWS
     from creepkit.studies.study_file import read_study_file
 
     file = read_study_file(path)
@@ -145,9 +145,8 @@ def _with_installed_laws(path: Path) -> StudyFile:
     missing = [name for name in part.laws if name not in available]
     if not missing:
         return file
-    packages = " ".join(sorted(set(map(package_with_law, missing))))
     tell(
-        f"without {' and '.join(missing)}, the laws that have tertiary creep: 'pip install {packages}' brings them;\n"
+        f"without {' and '.join(missing)}, the laws that have tertiary creep; {MORE_LAWS};\n"
         "Norton's law alone breaks by loss of section, and does not explain these curves"
     )
     laws = [ck.law(name) for name in part.laws if name in available]

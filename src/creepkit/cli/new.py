@@ -59,7 +59,7 @@ readme = "README.md"
 requires-python = ">=3.11"
 dependencies = ["creepkit"]
 
-[project.entry-points.creepkit]
+[project.entry-points."creepkit.${noun}s"]
 $name = "$module"
 
 [tool.hatch.build]
@@ -369,7 +369,7 @@ def _write_package(kind: PackageKind, name: str) -> str:
     use = "".join(f"    {line}\n" for line in _filled(kind.use, name).splitlines())
     texts = {
         f"{module}.py": _filled(kind.module, name),
-        "pyproject.toml": _filled(PROJECT, name),
+        "pyproject.toml": _filled(PROJECT, name, noun=kind.noun),
         "README.md": _filled(README, name, use=use.rstrip("\n")),
         f"tests/test_{name.replace('-', '_')}.py": _filled(kind.test, name),
     }

@@ -52,13 +52,24 @@ def is_file_name(word: str) -> bool:
     return (Path(word).suffix != "" or Path(word).name != word) and not is_law_name(word)
 
 
+def read_law_file(path: str | Path) -> Identification | LawWithValues:
+    """What a file holds that creepkit wrote: an identification, or a law with its values."""
+    from creepkit.exporters.law_files import VALUED_LAW, valued_law_from_json
+    from creepkit.files.json_documents import read_json
+
+    data = read_json(Path(path), VALUED_LAW.kind)
+    if isinstance(data, dict) and data.get("format") == VALUED_LAW.name:
+        return valued_law_from_json(data, str(path))
+    from creepkit.inverse.identification_document import identification_from_json
+
+    return identification_from_json(data, str(path))
+
+
 def law_source(text: str) -> CreepLaw | Identification | LawWithValues:
     """A law by name, or else what a file holds: an identification, or a law with values."""
     import creepkit as ck
 
     if is_file_name(text):
-        from creepkit.exporters.law_files import read_law_file
-
         return read_law_file(text)
     try:
         return ck.law(text)

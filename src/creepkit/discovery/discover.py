@@ -31,7 +31,8 @@ from creepkit.options import Options, option, takes_options
 from creepkit.presentation import Presentable
 from creepkit.records import History, Predictor
 from creepkit.records.units import celsius_text
-from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictor, resolve_predictors
+from creepkit.registry import resolve_law
+from creepkit.registry.arguments import check_histories, resolve_predictor, resolve_predictors
 
 Forms = Sequence[str] | Mapping[str, Sequence[str]]
 """Names of temperature forms, or {parameter: names}."""

@@ -22,8 +22,9 @@ from creepkit.exporters.creep_forms import (
     temperature_span,
 )
 from creepkit.exporters.law_code import Identifiers
+from creepkit.hookspecs import hookimpl
 from creepkit.language.symbols import GAS_CONSTANT
-from creepkit.records import LawWithValues
+from creepkit.records import Exporter, LawWithValues
 
 _ALTERNATIVE = "export it as 'abaqus', a CREEP subroutine"
 
@@ -247,3 +248,9 @@ def _optional_value(T: float | None) -> list[float]:
 def _data_line(*values: float) -> str:
     """A data line; Abaqus reads at most 20 characters of a number."""
     return ", ".join(map(format_number, values))
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporter of this module."""
+    return [AbaqusCards()]

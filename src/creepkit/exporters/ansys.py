@@ -18,7 +18,8 @@ from creepkit.exporters.creep_forms import (
     exp_in_range,
     format_number,
 )
-from creepkit.records import LawWithValues
+from creepkit.hookspecs import hookimpl
+from creepkit.records import Exporter, LawWithValues
 
 _ALTERNATIVE = "export it as 'c' or 'abaqus', and call that rate in a USERCREEP subroutine"
 
@@ -42,6 +43,7 @@ class AnsysCards:
     lowest_temperature, highest_temperature : K, of a table of moduli where no tests are known.
     """
 
+    serves = ("usercreep", "tb-creep", "apdl")
     name: str = "ansys"
     title: str = "Ansys Mechanical APDL commands with one of its implicit creep laws (TB,CREEP)"
     suffix: str = ".mac"
@@ -152,3 +154,9 @@ def _elastic_commands(rows: Sequence[ElasticConstants]) -> Iterator[str]:
 
 def _comma_separated(values: Sequence[float]) -> str:
     return ",".join(map(format_number, values))
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporter of this module."""
+    return [AnsysCards()]

@@ -14,9 +14,10 @@ import sympy
 
 from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, factor_text
 from creepkit.exporters.law_description import comment_lines, comment_safe, heading, printable_text
+from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
-from creepkit.records import LawWithValues
+from creepkit.records import Exporter, LawWithValues
 
 _KEYWORDS = """
 auto break case char const continue default do double else enum extern float for goto if inline int long register
@@ -178,6 +179,7 @@ _LINE_LENGTH = 120
 class CExporter:
     """A C file: NAME_rate, NAME_log_rate with slopes and, for laws with internal variables, NAME_state_rates."""
 
+    serves = ("c++", "cpp")
     name: str = "c"
     title: str = "C99 file with the rate and its derivatives"
     suffix: str = ".c"
@@ -343,3 +345,9 @@ class _CFile:
 def _factor_operand(expression: sympy.Expr, factor: float) -> str:
     """An expression after a factor, in brackets where that is needed."""
     return f"({c_expression(expression)})" if factor != 1 and expression.is_Add else c_expression(expression)
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporter of this module."""
+    return [CExporter()]

@@ -23,7 +23,8 @@ from creepkit.exporters.creep_forms import (
     format_number,
 )
 from creepkit.exporters.law_code import Identifiers
-from creepkit.records import LawWithValues
+from creepkit.hookspecs import hookimpl
+from creepkit.records import Exporter, LawWithValues
 
 _ALTERNATIVE = "export it as 'mfront', which code_aster reads with RELATION='MFRONT'"
 
@@ -42,6 +43,7 @@ _RESERVED = (*keyword.kwlist, "_F", "DEFI_CONSTANTE", "DEFI_MATERIAU", "FORMULE"
 class CodeAsterMaterial:
     """A material for COMPORTEMENT=_F(RELATION='LEMAITRE')."""
 
+    serves = ("aster",)
     name: str = "code_aster"
     title: str = "code_aster DEFI_MATERIAU with LEMAITRE (and Norton's law as its limit)"
     suffix: str = ".comm"
@@ -111,3 +113,9 @@ def _elastic_keywords(source: LawWithValues, label: str) -> tuple[list[str], lis
     named_texts = zip((f"{label}_E", f"{label}_P"), texts, strict=True)
     formulas = [f"{name} = FORMULE(NOM_PARA='TEMP', VALE='{text}')" for name, text in named_texts]
     return formulas, [f"ELAS_FO=_F(E={label}_E, NU={label}_P)"]
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporter of this module."""
+    return [CodeAsterMaterial()]

@@ -16,9 +16,10 @@ from creepkit.errors import ExportError
 from creepkit.exporters.fortran_code import FORTRAN_RESERVED, fortran_number, law_subroutine, wrapped_lines
 from creepkit.exporters.law_code import Identifiers, LawCode
 from creepkit.exporters.law_description import comment_lines, comment_safe, heading
+from creepkit.hookspecs import hookimpl
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, temperature, time
-from creepkit.records import LawWithValues
+from creepkit.records import Exporter, LawWithValues
 
 _MAX_NAME_LENGTH = 31
 """Characters of a name by any standard since Fortran 90; a longer one might not fit into a line either."""
@@ -119,6 +120,7 @@ class AbaqusCreepSubroutine(CreepSubroutine):
     """Subroutine CREEP of Abaqus/Standard."""
 
     name = "abaqus"
+    serves = ("umat", "creep")
     title = "Abaqus/Standard user subroutine CREEP (fixed-form Fortran)"
     solver = "Abaqus"
 
@@ -143,6 +145,7 @@ class CalculixCreepSubroutine(CreepSubroutine):
     """Subroutine CREEP of CalculiX."""
 
     name = "calculix"
+    serves = ("umat", "creep", "ccx")
     title = "CalculiX creep.f (fixed-form Fortran)"
     solver = "CalculiX"
     state_template = "calculix_states.f"
@@ -187,3 +190,9 @@ def _state_limits(law: CreepLaw) -> list[float | None]:
 
 def _template_text(name: str) -> str:
     return resources.files("creepkit.exporters").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporters of this module."""
+    return [AbaqusCreepSubroutine(), CalculixCreepSubroutine()]

@@ -19,9 +19,10 @@ import sympy
 from creepkit.exporters.c import STABLE_FUNCTIONS, CPrinter, stable_functions_in
 from creepkit.exporters.law_code import Assignments, CodeFunction, Identifiers, LawCode
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS
 from creepkit.language.symbols import POINT_VARIABLES
-from creepkit.records import LawWithValues
+from creepkit.records import Exporter, LawWithValues
 
 _RESERVED_WORDS = """
 abstract arguments async await boolean break byte case catch char class const continue debugger default delete do double
@@ -89,6 +90,7 @@ _LINE_LENGTH = 120
 class JavaScriptExporter:
     """An ES module with `rate`, `terms` and `stateRates` by name, the values as defaults, and `kernel`."""
 
+    serves = ("js",)
     name: str = "javascript"
     title: str = "JavaScript module with the rate, its terms and its derivatives"
     suffix: str = ".mjs"
@@ -278,3 +280,9 @@ def _json_text(value: Any) -> str:
 def _template() -> str:
     text = resources.files("creepkit.exporters").joinpath("templates", "javascript.js").read_text(encoding="utf-8")
     return text.strip()
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporter of this module."""
+    return [JavaScriptExporter()]

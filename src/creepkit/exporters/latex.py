@@ -14,10 +14,11 @@ import sympy
 
 from creepkit.exporters.law_description import ParameterRow, comment_lines, note_lines, parameter_rows, remarks
 from creepkit.exporters.unit_conversion import ConvertedValues, convert_values
+from creepkit.hookspecs import hookimpl
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import ArrheniusExponent, LatexLawPrinter, arrhenius_exponent, latex_equations
 from creepkit.language.symbols import GAS_CONSTANT
-from creepkit.records import LawWithValues
+from creepkit.records import Exporter, LawWithValues
 
 _LATEX_ESCAPES = {
     "\\": r"\textbackslash{}",
@@ -37,6 +38,7 @@ _LATEX_ESCAPES = {
 class LatexExporter:
     """Equation and table of values for a paper."""
 
+    serves = ("tex",)
     name: str = "latex"
     title: str = "LaTeX equation and table of values"
     suffix: str = ".tex"
@@ -181,6 +183,7 @@ def _infinity_symbol(name: str) -> str:
 class MarkdownExporter:
     """A section of a report."""
 
+    serves = ("md",)
     name: str = "markdown"
     title: str = "Markdown with the equation, a table of values, notes and references"
     suffix: str = ".md"
@@ -214,3 +217,9 @@ def _markdown_row(row: ParameterRow, printer: LatexLawPrinter) -> str:
 
 def _markdown_section(title: str, items: Sequence[str]) -> list[str]:
     return ["", f"## {title}", "", *(f"- {markdown_escaped(item)}" for item in items)] if items else []
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporters of this module."""
+    return [LatexExporter(), MarkdownExporter()]

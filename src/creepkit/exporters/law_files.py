@@ -1,23 +1,18 @@
-"""Laws with values as files: JSON that creepkit reads back, and the text of any exporter written to a file."""
+"""Laws with values as files: JSON that creepkit reads back, in the format creepkit-valued-law."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from creepkit.errors import ExportError, LawError, quoted
-from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, json_text, parse_json, read_json
+from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, json_text, parse_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
-from creepkit.files.writing import write_text
+from creepkit.hookspecs import hookimpl
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import GAS_CONSTANT
-from creepkit.records import Exporter, LawWithValues, exported_text
-
-if TYPE_CHECKING:
-    from creepkit.inverse.identification import Identification
-
+from creepkit.records import Exporter, LawWithValues
 
 VALUED_LAW = DocumentFormat(
     "creepkit-valued-law",
@@ -65,10 +60,11 @@ class JsonExporter:
 
 def read_valued_law(text: str, source: str = "exported law") -> LawWithValues:
     """Return what JsonExporter wrote; ExportError or LawError, naming `source`, when it is anything else."""
-    return _valued_law(parse_json(text, source, VALUED_LAW.kind), source)
+    return valued_law_from_json(parse_json(text, source, VALUED_LAW.kind), source)
 
 
-def _valued_law(data: Any, source: str) -> LawWithValues:
+def valued_law_from_json(data: Any, source: str) -> LawWithValues:
+    """Return the law of the JSON-able data of a document; errors as of read_valued_law."""
     content = check_heading(data, source, VALUED_LAW)
     problem = check_keys(content, (*_CONVENTIONS, "law", "values", "notes", "ranges"), source)
     if problem:
@@ -92,20 +88,7 @@ def _valued_law(data: Any, source: str) -> LawWithValues:
         raise ExportError(f"{source}: {error}") from error
 
 
-def read_law_file(path: str | Path) -> Identification | LawWithValues:
-    """Return what a JSON file holds: an identification that was saved, or a law that was exported."""
-    from creepkit.inverse.identification_document import identification_from_json
-
-    data = read_json(Path(path), VALUED_LAW.kind)
-    if isinstance(data, dict) and data.get("format") == VALUED_LAW.name:
-        return _valued_law(data, str(path))
-    return identification_from_json(data, str(path))
-
-
-def write_export(source: LawWithValues, exporter: Exporter, destination: str | Path, *, force: bool = False) -> Path:
-    """Write the exporter's text to a file, whole or not at all, and return its path.
-
-    force : replace a file that creepkit did not write; else that is an ExportError, and the file stays.
-    """
-    text, path = exported_text(exporter, source), Path(destination)
-    return write_text(text, path, ExportError, force=force)
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporter of this module."""
+    return [JsonExporter()]

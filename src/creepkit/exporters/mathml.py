@@ -18,10 +18,11 @@ from sympy.printing.mathml import MathMLPresentationPrinter
 from creepkit.exporters.latex import latex_number
 from creepkit.exporters.law_description import ParameterRow, note_lines, parameter_rows, printable_text, remarks
 from creepkit.exporters.unit_conversion import convert_values
+from creepkit.hookspecs import hookimpl
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import ArrheniusExponent, arrhenius_exponent
 from creepkit.language.symbols import mean_stress, principal_stress, strain, stress, temperature, time
-from creepkit.records import LawWithValues
+from creepkit.records import Exporter, LawWithValues
 
 MATHML_NAMESPACE = "http://www.w3.org/1998/Math/MathML"
 
@@ -226,3 +227,9 @@ def _html_section(title: str, items: Sequence[str]) -> list[str]:
 def _xml_escaped(text: str) -> str:
     """Text for XML, which allows no control characters."""
     return html.escape(printable_text(text))
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporter of this module."""
+    return [MathmlExporter()]

@@ -30,8 +30,9 @@ from creepkit.exporters.c import (
 from creepkit.exporters.creep_forms import elastic_expressions
 from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, factor_text
 from creepkit.exporters.law_description import comment_lines, comment_safe, heading, printable_text
+from creepkit.hookspecs import hookimpl
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, strain, stress, temperature, time
-from creepkit.records import LawWithValues
+from creepkit.records import Exporter, LawWithValues
 
 _MFRONT_RESERVED = """
 D Dt D_tdt N Type T dT dt t theta epsilon iterMax eel deel feel eto deto sig young nu lambda mu young_tdt nu_tdt
@@ -258,6 +259,7 @@ _FORMULA_NODES = (sympy.Add, sympy.Mul, sympy.Pow, sympy.exp, sympy.log, sympy.S
 class MfrontExporter:
     """An .mfront file; stress and time are in the units asked for, which are those of the solver."""
 
+    serves = ("umat", "vumat", "usermat", "usercreep")
     name: str = "mfront"
     title: str = "MFront behaviour (Implicit DSL) with its exact Jacobian"
     suffix: str = ".mfront"
@@ -381,3 +383,9 @@ def _integrator_block(behaviour: IntegratorBlock) -> Iterator[str]:
             yield f"  // ---- {title}"
             yield from (f"  {line}" for line in lines)
     yield "}"
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporter of this module."""
+    return [MfrontExporter()]

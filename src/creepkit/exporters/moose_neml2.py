@@ -24,8 +24,9 @@ from creepkit.exporters.creep_forms import (
     format_number,
 )
 from creepkit.exporters.law_code import Identifiers
+from creepkit.hookspecs import hookimpl
 from creepkit.language.symbols import GAS_CONSTANT
-from creepkit.records import LawWithValues
+from creepkit.records import Exporter, LawWithValues
 
 HitBlock = Mapping[str, "str | float | HitBlock"]
 """Entries of a block by name: a value, or another block."""
@@ -279,3 +280,9 @@ def _neml2_file(rates: dict[str, HitBlock], elasticity: HitBlock) -> HitBlock:
 def _typed_block(type: str, **entries: str) -> dict[str, str]:
     """A block of a type with quoted entries."""
     return {"type": type, **{key: f"'{value}'" for key, value in entries.items()}}
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporters of this module."""
+    return [MooseBlock(), Neml2Model()]

@@ -20,10 +20,11 @@ import sympy
 from creepkit.errors import ExportError, LawError
 from creepkit.exporters.law_code import Identifiers, factor_text
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
 from creepkit.kernels.log_form import FLOOR, TIME_FLOOR, log_form
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
-from creepkit.records import LawWithValues, Units
+from creepkit.records import Exporter, LawWithValues, Units
 
 STRESS_SYMBOLS = (stress, principal_stress, mean_stress)
 """The variables of a point that are in the units of stress."""
@@ -248,6 +249,7 @@ def _free_names_of_statement(node: ast.stmt) -> set[str]:
 class PythonExporter:
     """A Python module with `rate` (and `state_rates`), the values as defaults."""
 
+    serves = ("py",)
     name: str = "python"
     title: str = "Python module that needs nothing but the standard library"
     suffix: str = ".py"
@@ -325,3 +327,9 @@ def _array_dialect() -> PythonDialect:
         context_manager='with errstate(over="ignore", divide="ignore", invalid="ignore")',
         overflow_sentence="Arguments and parameters broadcast as arrays do. A result beyond 1.8e308 is inf.",
     )
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporters of this module."""
+    return [PythonExporter(), NumpyExporter()]

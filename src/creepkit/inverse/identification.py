@@ -31,7 +31,7 @@ from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.inverse.unmodelled_effect import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
-from creepkit.records import History, Nuisance, Prediction, Predictor
+from creepkit.records import History, LawWithValues, Nuisance, Prediction, Predictor
 from creepkit.registry.arguments import check_histories, resolve_predictors
 
 if TYPE_CHECKING:
@@ -110,6 +110,15 @@ class Identification(Presentable):
     def values(self) -> dict[str, float]:
         """{parameter: value} in the author's units."""
         return {e.name: e.value for e in self.estimates}
+
+    @property
+    def valued(self) -> LawWithValues:
+        """The law with its numbers, intervals and range of validity: what every exporter takes."""
+        return LawWithValues(self.law, self.values, tuple(self.comments()), ranges=self.ranges)
+
+    def comments(self, verdict: str = "") -> list[str]:
+        """Intervals, validity and provenance as lines, with the verdict of a comparison of laws where there was one."""
+        return present(self, "comments", verdict)
 
     @property
     def coordinates(self) -> Coordinates:

@@ -13,18 +13,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import mpmath
-import numpy as np
 import sympy
 from sympy.logic.boolalg import Boolean, BooleanAtom
 
-from creepkit.arrays import ArrayLike, Bools, Floats
 from creepkit.errors import POWER_REMEDY, LawError, nearest, quoted
 from creepkit.language.expression_cost import check_cost
 from creepkit.language.expression_trees import evaluate_multiprecision
 from creepkit.language.symbols import POINT_VARIABLES, Param, State, SymbolTuple
+
+if TYPE_CHECKING:
+    from creepkit.arrays import ArrayLike, Bools, Floats
 
 
 def validate_law(law: LawRecord) -> None:
@@ -320,6 +321,8 @@ class LawRecord:
     @property
     def log_scale(self) -> Bools:
         """Which internal values are logarithms, (parameters,)."""
+        import numpy as np
+
         return np.array([param.scale == "log" for param in self.params.values()], bool)
 
     def to_internal(self, values: Mapping[str, ArrayLike] | Floats) -> Floats:
@@ -328,6 +331,8 @@ class LawRecord:
         values : {name: number or (candidates,)}, or (candidates, parameters) in the law's order, in the author's units.
         Returns (candidates, parameters), in the law's order.
         """
+        import numpy as np
+
         if isinstance(values, Mapping):
             missing = [name for name in self.names if name not in values]
             if missing:
@@ -342,6 +347,8 @@ class LawRecord:
 
     def from_internal(self, theta: Floats) -> dict[str, Floats]:
         """Return {name: (...)} in the author's units from internal values; theta : (..., parameters)."""
+        import numpy as np
+
         with np.errstate(over="ignore"):
             return {
                 name: np.exp(theta[..., k]) if param.scale == "log" else np.array(theta[..., k], float)
@@ -351,6 +358,8 @@ class LawRecord:
     @property
     def internal_bounds(self) -> Floats:
         """(2, parameters) lower and upper bounds of the internal values."""
+        import numpy as np
+
         ends = [[param.to_internal(bound) for bound in param.bounds] for param in self.params.values()]
         return np.array(ends, float).reshape(-1, 2).T
 

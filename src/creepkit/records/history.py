@@ -13,9 +13,9 @@ from creepkit.arrays import Bools, Floats, frozen
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, quoted
 from creepkit.limits import HOTTEST
-from creepkit.records.known_specimens import load_unit
 from creepkit.records.loading import Loading, Program, loading_text
 from creepkit.records.noise_correlations import can_hold_together
+from creepkit.records.specimen_lookup import load_unit
 from creepkit.records.units import celsius_text
 
 if TYPE_CHECKING:

@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from creepkit.arrays import Floats
-from creepkit.records.history import History
-from creepkit.records.prediction import NuisanceValues, Prediction
-
 if TYPE_CHECKING:
+    from creepkit.arrays import Floats
     from creepkit.language.law import CreepLaw
+    from creepkit.records.history import History
     from creepkit.records.law_with_values import LawWithValues
+    from creepkit.records.prediction import NuisanceValues, Prediction
     from creepkit.records.surface_observation import SurfaceObservation, SurfacePoints, SurfaceRegion
 
 
@@ -41,7 +40,10 @@ class Reader(Protocol):
 
 @runtime_checkable
 class Exporter(Protocol):
-    """Writes a law with its values as text: to read, or for another program."""
+    """Writes a law with its values as text: to read, or for another program.
+
+    Optional attribute: `serves`, other words that users ask for it by, such as ("umat",).
+    """
 
     @property
     def name(self) -> str:

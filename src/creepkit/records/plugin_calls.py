@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
-from creepkit.arrays import Floats
-from creepkit.errors import CreepkitError, ExportError, HistoryError, SolveError, quoted
-from creepkit.records.history import History
-from creepkit.records.prediction import NuisanceValues, Prediction
-from creepkit.records.prediction_checks import checked_prediction, predictor_in_words
+from creepkit.errors import CreepkitError, HistoryError, quoted
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from creepkit.language.law import CreepLaw
-    from creepkit.records.interfaces import Exporter, Predictor, Reader
-    from creepkit.records.law_with_values import LawWithValues
+    from creepkit.records.history import History
+    from creepkit.records.interfaces import Reader
 
 _T = TypeVar("_T")
 
@@ -82,30 +77,6 @@ def _place(raised: BaseException, owner: object) -> str:
     return f" ({of_plugin[-1].filename}, line {of_plugin[-1].lineno})" if of_plugin else ""
 
 
-def predict_with(
-    predictor: Predictor,
-    law: CreepLaw,
-    theta: Floats,
-    histories: Sequence[History],
-    *,
-    nuisances: NuisanceValues | None = None,
-    sensitivities: bool = False,
-) -> Prediction:
-    """The prediction of any predictor, checked for shape; SolveError where it is none, or where predict() raises.
-
-    theta : (candidates, parameters) internal values. nuisances : {key: (candidates or 1, tests)}.
-    """
-    given = {"nuisances": nuisances} if nuisances else {}
-    prediction = call_of_plugin(
-        lambda: predictor.predict(law, theta, histories, sensitivities=sensitivities, **given),
-        predictor,
-        f"{predictor_in_words(predictor)}: predict()",
-        SolveError,
-    )
-    candidates = max(len(theta), *(len(values) for values in nuisances.values())) if nuisances else len(theta)
-    return checked_prediction(prediction, predictor, histories, candidates, theta.shape[1])
-
-
 def accepts_path(reader: Reader, path: Path) -> bool:
     """Whether a reader accepts a file or folder; HistoryError where accepts() raises or returns no bool."""
     accepted = call_of_reader(lambda: reader.accepts(path), reader, path, "accepts")
@@ -118,6 +89,8 @@ def accepts_path(reader: Reader, path: Path) -> bool:
 
 def histories_in(reader: Reader, path: Path) -> list[History]:
     """The histories that a reader finds in a file or folder; HistoryError where read() raises or returns others."""
+    from creepkit.records.history import History  # which needs numpy, while exports need no more than call_of_plugin
+
     what = f"{path}: read() of reader '{reader.name}'"
     histories = call_of_reader(lambda: reader.read(path), reader, path, "read")
     if not isinstance(histories, list):
@@ -126,12 +99,3 @@ def histories_in(reader: Reader, path: Path) -> list[History]:
         if not isinstance(history, History):
             raise HistoryError(f"{what} returned a {type(history).__name__} in its list; it must return histories")
     return histories
-
-
-def exported_text(exporter: Exporter, source: LawWithValues) -> str:
-    """The text of an exporter; ExportError where text() raises another error or returns no text."""
-    what = f"exporter '{exporter.name}': text()"
-    text = call_of_plugin(lambda: exporter.text(source), exporter, what, ExportError)
-    if not isinstance(text, str):
-        raise ExportError(f"{what} returned a {type(text).__name__}; it must return a str")
-    return text

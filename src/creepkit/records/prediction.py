@@ -13,7 +13,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import SolveError, nearest
-from creepkit.records.known_specimens import all_dimensions
+from creepkit.records.specimen_lookup import all_dimensions
 from creepkit.records.specimen_record import NAME_PATTERN
 
 NuisanceValues: TypeAlias = Mapping[str, Floats]

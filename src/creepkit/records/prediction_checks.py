@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.errors import SolveError
 from creepkit.records.history import History
-from creepkit.records.known_specimens import outputs_of_tests
-from creepkit.records.prediction import Prediction, Status
+from creepkit.records.plugin_calls import call_of_plugin
+from creepkit.records.prediction import NuisanceValues, Prediction, Status
+from creepkit.records.specimen_lookup import outputs_of_tests
+
+if TYPE_CHECKING:
+    from creepkit.arrays import Floats
+    from creepkit.language.law import CreepLaw
+    from creepkit.records.interfaces import Predictor
 
 _REAL, _WHOLE, _NUMERIC = "f", "iu", "fiu"
 """Kinds of numbers, as numpy names them."""
@@ -71,3 +77,27 @@ def _check_array(who: str, name: str, array: object, shape: tuple[int, ...], kin
         raise SolveError(f"{who} returned {name} of shape {array.shape}; it must be {shape} for what was asked")
     if array.dtype.kind not in kinds:
         raise SolveError(f"{who} returned {name} of type {array.dtype}; it must hold {_IN_WORDS[kinds]}")
+
+
+def predict_with(
+    predictor: Predictor,
+    law: CreepLaw,
+    theta: Floats,
+    histories: Sequence[History],
+    *,
+    nuisances: NuisanceValues | None = None,
+    sensitivities: bool = False,
+) -> Prediction:
+    """The prediction of any predictor, checked for shape; SolveError where it is none, or where predict() raises.
+
+    theta : (candidates, parameters) internal values. nuisances : {key: (candidates or 1, tests)}.
+    """
+    given = {"nuisances": nuisances} if nuisances else {}
+    prediction = call_of_plugin(
+        lambda: predictor.predict(law, theta, histories, sensitivities=sensitivities, **given),
+        predictor,
+        f"{predictor_in_words(predictor)}: predict()",
+        SolveError,
+    )
+    candidates = max(len(theta), *(len(values) for values in nuisances.values())) if nuisances else len(theta)
+    return checked_prediction(prediction, predictor, histories, candidates, theta.shape[1])

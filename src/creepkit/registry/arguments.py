@@ -1,35 +1,13 @@
-"""Arguments of the public functions: laws, predictors and histories, given themselves or by the name of a plugin's."""
+"""Arguments of public functions: laws, predictors and histories, given themselves or by the name of a plugin's."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
 
-from creepkit.arrays import ArrayLike
-from creepkit.cameras import reading as camera_reading
-from creepkit.checked_arguments import checked_with_own_words
-from creepkit.errors import FitError, LawError, SolveError, quoted
-from creepkit.instruments import reading as instrument_files
-from creepkit.instruments.reading_options import RecordOptions
-from creepkit.readers import reading
-from creepkit.records import Frames, History, InstrumentRecord, Predictor, Specimen, known_specimens, remember_specimen
+from creepkit.errors import FitError, SolveError, quoted
+from creepkit.records import History, Predictor, Specimen, known_specimens, remember_specimen
 from creepkit.registry.plugin_registry import default_registry
-
-if TYPE_CHECKING:
-    from creepkit.language.law import CreepLaw
-
-
-def resolve_law(law: CreepLaw | str) -> CreepLaw:
-    """The law itself, or the one of that name; "norton+strain-hardening" names the sum of two."""
-    if isinstance(law, str):
-        registry = default_registry()
-        names = [law] if law in registry.laws() else [name.strip() for name in law.split("+")]
-        first, *others = (registry.law(name) for name in names)
-        return sum(others, start=first)
-    if not hasattr(law, "terms"):
-        raise LawError(f"a creep law or its name is needed, found {type(law).__name__}")
-    return law
 
 
 def specimen_by_name(name: str) -> Specimen:
@@ -76,56 +54,3 @@ def check_histories(values: Sequence[History]) -> list[History]:
     if wrong_types:
         raise FitError(f"histories must be a list of them, found {wrong_types[0]} in it; use read_histories(path)")
     return histories
-
-
-@checked_with_own_words("ignore")
-def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: Collection[str] = ()) -> list[History]:
-    """Read measured histories from a file, a folder, a pattern such as "in625/*.csv", or several of these.
-
-    reader : name of the reader; by default the one that accepts the file.
-    ignore : columns that nobody needs, such as ["load_kN", "date"]; they are left out wherever they stand.
-    """
-    readers = [entry.value for entry in default_registry().readers().values()]
-    return reading.read_histories(paths, readers, reader, ignore)
-
-
-@checked_with_own_words("path", "times")
-def read_frames(
-    path: camera_reading.FramePath,
-    format: camera_reading.FormatLike = None,
-    times: ArrayLike | str | Path | None = None,
-) -> Frames:
-    """Read what cameras measured of a surface: a folder of one file a frame, a file of several images, a pattern.
-
-    Frames are read one at a time when they are asked for; one that cannot be read raises HistoryError then.
-
-    path : folder, file, pattern such as "run_3/*.csv", or a list of files in their order.
-    format : a ck.CameraFormat, the name of one of ck.available("cameras"), or {quantity: column} for x y z u v w; by
-        default the one whose columns the head of the first file names.
-    times : (frames,) s, increasing, or a file with a column of them, in s or as "time [ms]"; by default as the files
-        say, and NaN where they do not.
-    """
-    formats = [entry.value for entry in default_registry().cameras().values()]
-    return camera_reading.read_frames(path, formats, format, times)
-
-
-def frame_files(path: camera_reading.FramePath, format: camera_reading.FormatLike = None) -> list[Path]:
-    """The files that read_frames reads of a folder, a file, a pattern or a list, in order."""
-    formats = [entry.value for entry in default_registry().cameras().values()]
-    return camera_reading.frame_files(path, formats, format)
-
-
-@checked_with_own_words("format", "path", "missing", "options")
-def read_record(path: str | Path, format: str | None = None, **options: Unpack[RecordOptions]) -> InstrumentRecord:
-    """Read the record of an instrument: channels of pressure, temperature and others over one clock.
-
-    format : name of one of `available("instruments")`; by default the one whose columns are there.
-    time="", date="" : names of their columns, where they are not called so. time_unit="" : "s", "ms", "min", "h", of
-    times without a unit. date_order="" : "month first", "day first" or "year first". time_zone="" : such as
-    "America/Chicago" or "+01:00". channels=None : names of those that are kept; all by default. every=1 : rows that are
-    averaged to one. units={} : {channel: unit} of heads without one. pressure_reference="" : "gauge" or "absolute", of
-    pressures whose unit does not say. ambient_pressure=None : MPa, to be taken off absolute pressures. missing=() :
-    texts in the place of a reading, beside the usual ones.
-    """
-    formats = [entry.value for entry in default_registry().instruments().values()]
-    return instrument_files.read_record(path, formats, format, options)

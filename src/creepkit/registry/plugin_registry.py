@@ -1,8 +1,9 @@
 """The registry: all that plugins contribute (laws, specimens, readers, camera formats ...), with its provenance.
 
-Built-in and other plugins come through the same entry-point group; files come from CREEPKIT_PLUGINS and `load_file`.
-All are imported when first asked for. A plugin that cannot be used is kept with the reason and the others stand;
-only `load_file`, which was asked for that very plugin, raises.
+It is asked for one kind and one name, and imports the module that an entry point of this name states; a list of a kind
+imports those of the kind. Built-in and other plugins come through the same groups of entry points; files come from
+CREEPKIT_PLUGINS and `load_file`. A plugin that cannot be used is kept with the reason and the others stand; only
+`load_file`, which was asked for that very plugin, raises.
 """
 
 from __future__ import annotations
@@ -12,51 +13,27 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import pluggy
 
 from creepkit import hookspecs
-from creepkit.errors import PluginError, nearest
-from creepkit.registry import plugin_sources
-from creepkit.registry.plugin_sources import ContributionKind, Provenance
+from creepkit.errors import LawError, PluginError, nearest
+from creepkit.registry import contributions, plugin_sources
+from creepkit.registry.contributions import ContributionKind
+from creepkit.registry.plugin_sources import PluginFile, Provenance, Source, name_key
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
-
     import typer
 
     from creepkit.language.law import CreepLaw
     from creepkit.records import CameraFormat, Exporter, InstrumentFormat, Reader, Specimen
 
 
-LAWS_BY_PACKAGE = {
-    "creepkit-classic": (
-        "blackburn",
-        "coble",
-        "dorn",
-        "double-power",
-        "garofalo",
-        "graham-walles",
-        "mpc-omega",
-        "nabarro-herring",
-        "norton-bailey-rate",
-        "norton-bailey-strain",
-        "norton-bailey-time",
-        "theta-projection",
-        "threshold-stress",
-    ),
-    "creepkit-damage": ("kachanov-rabotnov", "liu-murakami", "sinh-damage"),
-    "creepkit-logarithmic": ("logarithmic",),
-}
-"""{package: its laws}, the packages under plugins/."""
-
-
-def package_with_law(law: str) -> str:
-    """The package that has a law of this name; empty when none is known to."""
-    return next((package for package, laws in LAWS_BY_PACKAGE.items() if law in laws), "")
+MORE_LAWS = 'plugins bring more: pip install "creepkit[plugins]"'
+"""The end of the sentence about a law that is not installed."""
 
 
 _T = TypeVar("_T")
@@ -75,43 +52,44 @@ class Plugin:
     """One plugin: where it came from, and what it offers or why it cannot be used.
 
     contributions : {kind: {name: object}} with the kinds "law", "specimen", "reader", "camera format",
-        "instrument format", "exporter",
-        "temperature form".
+        "instrument format", "exporter", "temperature form".
     commands : whether it adds commands to the command line.
     problem : one sentence when the plugin is broken, else empty.
     """
 
-    provenance: Provenance
+    source: Source
     contributions: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     commands: bool = False
     problem: str = ""
 
+    @property
+    def provenance(self) -> Provenance:
+        """Where it came from."""
+        return self.source.provenance
+
 
 class Registry:
-    """A plugin manager that records where everything came from; it loads what is installed when first used."""
+    """A plugin manager that records where everything came from; it imports what is installed when that is asked for."""
 
     def __init__(self) -> None:
         self._manager = pluggy.PluginManager(hookspecs.PROJECT)
         self._manager.add_hookspecs(hookspecs)
-        self._plugins: dict[Provenance, Plugin] = {}
-        self._loaded = False
-        self._loading_begun = False
+        self._plugins: dict[str, Plugin] = {}
+        self._being_loaded: set[str] = set()
         self._loading = threading.RLock()
-        self._being_loaded: set[Provenance] = set()
 
     # ---- what there is ---------------------------------------------------------------------------------------------
 
     def plugins(self) -> tuple[Plugin, ...]:
-        """Return every plugin, the broken ones included, in the order of loading."""
-        self._load_all()
-        return tuple(self._plugins.values())
+        """Every plugin, the broken ones included: those installed, then the files."""
+        self._load(self._sources)
+        return self._loaded()
 
     def conflicts(self) -> tuple[str, ...]:
-        """Return one sentence for each name that two plugins offer."""
+        """One sentence for each name that two plugins offer."""
+        plugins = self.plugins()
         return tuple(
-            conflict
-            for kind in plugin_sources.CONTRIBUTION_KINDS
-            for conflict in _merged_contributions(kind, self.plugins())[1].values()
+            conflict for kind in contributions.CONTRIBUTION_KINDS for conflict in _merged(kind, plugins)[1].values()
         )
 
     def replaced(self, plugin: Plugin) -> tuple[str, ...]:
@@ -121,41 +99,69 @@ class Registry:
             for kind, offered in plugin.contributions.items()
             for name in offered
             for other in self.plugins()
-            if name in other.contributions.get(kind, {}) and _replaces(plugin.provenance, other.provenance)
+            if name in other.contributions.get(kind, {}) and _replaces(plugin, other)
         )
 
     def laws(self) -> dict[str, Registered[CreepLaw]]:
-        """Return {name: registered law}."""
-        return self._all(plugin_sources.LAW)
+        """{name: registered law}."""
+        return self._all(contributions.LAW)
 
     def specimens(self) -> dict[str, Registered[Specimen]]:
-        """Return {name: registered specimen}."""
-        return self._all(plugin_sources.SPECIMEN)
+        """{name: registered specimen}."""
+        return self._all(contributions.SPECIMEN)
 
     def readers(self) -> dict[str, Registered[Reader]]:
-        """Return {name: registered reader}."""
-        return self._all(plugin_sources.READER)
+        """{name: registered reader}."""
+        return self._all(contributions.READER)
 
     def cameras(self) -> dict[str, Registered[CameraFormat]]:
-        """Return {name: registered camera format}."""
-        return self._all(plugin_sources.CAMERA_FORMAT)
+        """{name: registered camera format}."""
+        return self._all(contributions.CAMERA_FORMAT)
 
     def exporters(self) -> dict[str, Registered[Exporter]]:
-        """Return {name: registered exporter}."""
-        return self._all(plugin_sources.EXPORTER)
+        """{name: registered exporter}."""
+        return self._all(contributions.EXPORTER)
 
     def instruments(self) -> dict[str, Registered[InstrumentFormat]]:
-        """Return {name: registered instrument format}."""
-        return self._all(plugin_sources.INSTRUMENT)
+        """{name: registered instrument format}."""
+        return self._all(contributions.INSTRUMENT)
 
     def temperature_forms(self) -> dict[str, Registered[Callable[..., Any]]]:
-        """Return {name: registered function of T_ref that gives a form or a factor}."""
-        return self._all(plugin_sources.TEMPERATURE_FORM)
+        """{name: registered function of T_ref that gives a form or a factor}."""
+        return self._all(contributions.TEMPERATURE_FORM)
 
     def law(self, name: str) -> CreepLaw:
-        """Return the law called `name`; LawError with the nearest name when there is none."""
-        law: CreepLaw = self._one(plugin_sources.LAW, name)
+        """The law of a name, or the sum of several as in "norton+strain-hardening"; LawError where there is none."""
+        if "+" in name and name not in self.laws():
+            first, *others = (self.law(part.strip()) for part in name.split("+"))
+            return sum(others, start=first)
+        law: CreepLaw = self._one(contributions.LAW, name)
         return law
+
+    def specimen(self, name: str) -> Specimen:
+        """The specimen of a name; SolveError with the nearest name when there is none."""
+        specimen: Specimen = self._one(contributions.SPECIMEN, name)
+        return specimen
+
+    def reader(self, name: str) -> Reader:
+        """The reader of a name; HistoryError with the nearest name when there is none."""
+        reader: Reader = self._one(contributions.READER, name)
+        return reader
+
+    def camera(self, name: str) -> CameraFormat:
+        """The camera format of a name; HistoryError with the nearest name when there is none."""
+        camera: CameraFormat = self._one(contributions.CAMERA_FORMAT, name)
+        return camera
+
+    def exporter(self, name: str) -> Exporter:
+        """The exporter of a name; ExportError with the nearest name, or those that serve this word, without one."""
+        exporter: Exporter = self._one(contributions.EXPORTER, name)
+        return exporter
+
+    def temperature_form(self, name: str) -> Callable[..., Any]:
+        """The function of T_ref of a name; LawError with the nearest name when there is none."""
+        form: Callable[..., Any] = self._one(contributions.TEMPERATURE_FORM, name)
+        return form
 
     def distributions_of(self, law: CreepLaw) -> str:
         """Return the distributions, with versions, of the laws that a law's name says it was made of.
@@ -163,182 +169,165 @@ class Registry:
         'creepkit-damage 0.1.0' of 'kachanov-rabotnov*arrhenius'; empty when no plugin has them.
         """
         parts = set(re.split(r"[^a-z0-9-]+", law.name))
-        return ", ".join(sorted({one.provenance.origin for name, one in self.laws().items() if name in parts}))
-
-    def specimen(self, name: str) -> Specimen:
-        """Return the specimen called `name`; SolveError with the nearest name when there is none."""
-        specimen: Specimen = self._one(plugin_sources.SPECIMEN, name)
-        return specimen
-
-    def reader(self, name: str) -> Reader:
-        """Return the reader called `name`; HistoryError with the nearest name when there is none."""
-        reader: Reader = self._one(plugin_sources.READER, name)
-        return reader
-
-    def camera(self, name: str) -> CameraFormat:
-        """Return the camera format called `name`; HistoryError with the nearest name when there is none."""
-        camera: CameraFormat = self._one(plugin_sources.CAMERA_FORMAT, name)
-        return camera
-
-    def exporter(self, name: str) -> Exporter:
-        """Return the exporter called `name`; ExportError with the nearest name when there is none."""
-        exporter: Exporter = self._one(plugin_sources.EXPORTER, name)
-        return exporter
-
-    def temperature_form(self, name: str) -> Callable[..., Any]:
-        """Return the function of T_ref called `name`; LawError with the nearest name when there is none."""
-        form: Callable[..., Any] = self._one(plugin_sources.TEMPERATURE_FORM, name)
-        return form
-
-    def _all(self, kind: ContributionKind) -> dict[str, Registered[Any]]:
-        return _merged_contributions(kind, self.plugins())[0]
-
-    def _one(self, kind: ContributionKind, name: str) -> Any:
-        known, clashes = _merged_contributions(kind, self.plugins())
-        if name in known:
-            return known[name].value
-        if name in clashes:
-            raise PluginError(clashes[name])
-        package = package_with_law(name) if kind is plugin_sources.LAW else ""
-        hint = self.broken_hint()
-        if package:
-            raise kind.error(f"there is no law '{name}'; package {package} has it: pip install {package}{hint}")
-        raise kind.error(f"there is no {kind.label} '{name}': {nearest(name, known)}{hint}")
+        self._load(self._named(contributions.LAW, parts))
+        known, _ = _merged(contributions.LAW, self._loaded())
+        return ", ".join(sorted({one.provenance.origin for name, one in known.items() if name in parts}))
 
     def broken_hint(self) -> str:
         """How many plugins could not be loaded, as the end of a sentence; "" where all were."""
-        broken = sum(bool(plugin.problem) for plugin in self.plugins())
-        return f"; {broken} plugin(s) could not be loaded, see 'creepkit plugins'" if broken else ""
+        broken = sum(bool(plugin.problem) for plugin in self._loaded())
+        return f"; {broken} plugin(s) could not be loaded, see 'creepkit list plugins'" if broken else ""
+
+    def _all(self, kind: ContributionKind) -> dict[str, Registered[Any]]:
+        self._load(source for source in self._sources if source.offers(kind.group))
+        return _merged(kind, self._loaded())[0]
+
+    def _one(self, kind: ContributionKind, name: str) -> Any:
+        """What is registered under a name, whatever its capitals and hyphens, or under an alias of it."""
+        named = self._named(kind, {name})
+        for sources in (named, [source for source in self._sources if source.offers(kind.group)]):
+            self._load(sources)
+            known, clashes = _merged(kind, self._loaded())
+            by_key = {name_key(one): one for one in (*clashes, *known)}
+            found = name if name in known or name in clashes else by_key.get(name_key(name), "")
+            if found in clashes:
+                raise PluginError(clashes[found])
+            if found:
+                return known[found].value
+        for source in named:
+            offered = {} if source.is_file else self._plugins[source.place].contributions.get(kind.label, {})
+            if len(offered) == 1 and set(offered) <= set(known):
+                return known[next(iter(offered))].value
+        serving = sorted(one for one in known if name_key(name) in getattr(known[one].value, "serves", ()))
+        if len(serving) == 1:
+            return known[serving[0]].value
+        if serving:
+            raise kind.error(
+                f"there is no {kind.label} '{name}'; choose one of those that serve it: {', '.join(serving)}"
+            )
+        more = f"; {MORE_LAWS}" if kind is contributions.LAW and all(one.is_own for one in self._sources) else ""
+        raise kind.error(f"there is no {kind.label} '{name}': {nearest(name, known)}{more}{self.broken_hint()}")
+
+    def _named(self, kind: ContributionKind, names: Iterable[str]) -> list[Source]:
+        """The sources that may have an object of one of these names: by their entry points, and all files."""
+        keys = {name_key(name) for name in names}
+        return [source for source in self._sources if source.offers(kind.group, keys)]
 
     # ---- where it comes from ---------------------------------------------------------------------------------------
 
+    @cached_property
+    def _sources(self) -> tuple[Source, ...]:
+        return (*plugin_sources.installed_modules(), *plugin_sources.plugin_files_in_environment())
+
+    def _loaded(self) -> tuple[Plugin, ...]:
+        """The plugins that have been imported: creepkit's own, others that are installed, then files as they came."""
+
+        def place(plugin: Plugin) -> tuple[bool, bool, str]:
+            source = plugin.source
+            return source.is_file, not source.is_own, "" if source.is_file else source.place
+
+        return tuple(sorted(self._plugins.values(), key=place))
+
     def load_file(self, path: str | Path) -> Plugin:
         """Load one plugin file; PluginError, and nothing registered, when it cannot be used."""
-        path = Path(path)
-        provenance = plugin_sources.provenance_of_file(path)
+        source = PluginFile(Path(path))
         with self._loading:
-            known = self._plugins.get(provenance)
+            known = self._plugins.get(source.place)
             if known is None or known.problem:
-                module = plugin_sources.import_file(provenance, path)
-                self._plugins[provenance] = self._register_plugin(provenance, module)
-            return self._plugins[provenance]
+                self._plugins[source.place] = self._registered(source)
+            return self._plugins[source.place]
 
-    def command_lines(self, *, listed_only: bool = False) -> list[tuple[Plugin, typer.Typer]]:
-        """Return [(plugin, a command line with its commands)]; that of a plugin that is broken is empty.
-
-        listed_only : load those plugins alone whose text has the name of the hook, as `creepkit --help` does; else all.
-        """
+    def command_lines(self) -> list[tuple[Plugin, typer.Typer]]:
+        """[(plugin, a command line with its commands)]; that of a plugin that is broken is empty."""
         import typer
 
-        if listed_only:
-            with self._loading:
-                considered = self._load_sources(plugin_sources.mentions_commands)
-        else:
-            considered = [plugin.provenance for plugin in self.plugins()]
+        group = contributions.group_of(contributions.COMMANDS_HOOK)
+        self._load(source for source in self._sources if source.offers(group))
         results = []
-        for provenance in considered:
-            app = typer.Typer()
-            if self._add_commands(provenance, app):
-                results.append((self._plugins[provenance], app))
-            elif self._plugins[provenance].problem:
-                results.append((self._plugins[provenance], typer.Typer()))
+        for plugin in self._loaded():
+            if plugin.source.offers(group) and (plugin.commands or plugin.problem):
+                app = typer.Typer()
+                self._add_commands(plugin, app)
+                results.append((self._plugins[plugin.source.place], app))
         return results
 
-    def _add_commands(self, provenance: Provenance, app: typer.Typer) -> bool:
+    def _add_commands(self, plugin: Plugin, app: typer.Typer) -> None:
         """Let one plugin add its commands, if it has any; it is broken from then on when it raises."""
-        plugin = self._plugins[provenance]
         for implementation in self._manager.hook.creepkit_commands.get_hookimpls():
-            if implementation.plugin_name != str(provenance):
-                continue
-            try:
-                plugin_sources.call_hook(implementation, app=app)
-                return True
-            except PluginError as error:
-                self._plugins[provenance] = replace(plugin, problem=str(error))
-        return False
+            if implementation.plugin_name == plugin.source.place:
+                try:
+                    contributions.call_hook(plugin.provenance, implementation, app=app)
+                except PluginError as error:
+                    app.registered_commands.clear()
+                    self._plugins[plugin.source.place] = replace(plugin, problem=str(error))
 
-    def _load_all(self) -> None:
-        """Load what is installed and what the environment names, once.
+    def _load(self, sources: Iterable[Source]) -> None:
+        """Import these plugins, each once; of one that cannot be used the reason is kept.
 
-        Other threads wait until all is there; a plugin that asks for laws while it is loaded gets those so far.
+        Other threads wait until all are there; a plugin that asks for laws while it is imported gets those so far.
         """
-        if self._loaded:
-            return
         with self._loading:
-            if not self._loading_begun:
-                self._loading_begun = True
-                self._load_sources()
-                self._loaded = True
+            for source in sources:
+                if source.place in self._being_loaded or source.place in self._plugins:
+                    continue
+                self._being_loaded.add(source.place)
+                try:
+                    self._plugins[source.place] = self._registered(source)
+                except PluginError as error:
+                    self._plugins[source.place] = Plugin(source, problem=str(error))
+                finally:
+                    self._being_loaded.discard(source.place)
 
-    def _load_sources(self, wanted: Callable[[EntryPoint | Path], bool] = lambda source: True) -> list[Provenance]:
-        """Load the wanted ones of the installed plugins and of the files that the environment names.
-
-        Returns their provenances, and those of files that were loaded by name.
-        """
-        loaded = [provenance for provenance in self._plugins if Path(provenance.origin).is_absolute()]
-        for provenance, entry in plugin_sources.installed_entry_points():
-            if wanted(entry):
-                self._add_plugin(provenance, partial(plugin_sources.import_entry, provenance, entry))
-                loaded.append(provenance)
-        for path in plugin_sources.plugin_files_in_environment():
-            provenance = plugin_sources.provenance_of_file(path)
-            if wanted(path):
-                self._add_plugin(provenance, partial(plugin_sources.import_file, provenance, path))
-                loaded.append(provenance)
-        return list(dict.fromkeys(loaded))
-
-    def _add_plugin(self, provenance: Provenance, imported: Callable[[], object]) -> None:
-        """Enter a plugin, or else the reason why it cannot be used; not one that is being loaded, and asks for laws."""
-        if provenance in self._plugins or provenance in self._being_loaded:
-            return
-        self._being_loaded.add(provenance)
+    def _registered(self, source: Source) -> Plugin:
+        """Import a plugin and enter it whole or not at all: its hooks must exist and return what they promise."""
+        module, provenance = source.load(), source.provenance
+        contributions.check_hooks(provenance, module)
         try:
-            self._plugins[provenance] = self._register_plugin(provenance, imported())
-        except PluginError as error:
-            self._plugins[provenance] = Plugin(provenance, problem=str(error))
-        finally:
-            self._being_loaded.discard(provenance)
-
-    def _register_plugin(self, provenance: Provenance, module: object) -> Plugin:
-        """Enter a plugin whole or not at all: its hooks must exist and return what they promise."""
-        if other_name := self._manager.get_name(module):
-            raise PluginError(f"{provenance} is the same module as {other_name}; drop one of the two entry points")
-        try:
-            self._register_module(provenance, module)
-            hooks = plugin_sources.hook_implementations(self._manager, module, provenance)
-            contributions = {
-                k.label: plugin_sources.contributions_of(k, hooks[k.hook])
-                for k in plugin_sources.CONTRIBUTION_KINDS
-                if k.hook in hooks
-            }
-        except PluginError:
-            if self._manager.is_registered(module):
-                self._manager.unregister(module)
-            raise
-        return Plugin(provenance, contributions, commands=plugin_sources.COMMANDS_HOOK in hooks)
-
-    def _register_module(self, provenance: Provenance, module: object) -> None:
-        plugin_sources.check_signatures(provenance, module)
-        try:
-            self._manager.register(module, str(provenance))
+            self._manager.register(module, source.place)
         except pluggy.PluginValidationError as error:
             description = " ".join(str(error).split())
             raise PluginError(f"{provenance} does not fit the hooks of creepkit: {description}") from error
+        try:
+            callers = self._manager.get_hookcallers(module) or ()
+            hooks = {c.name: impl for c in callers for impl in c.get_hookimpls() if impl.plugin is module}
+            for hook in hooks:
+                if not source.offers(contributions.group_of(hook)):
+                    raise PluginError(
+                        f"{provenance} has the hook {hook}, but no entry point in the group "
+                        f"'{contributions.group_of(hook)}' names its module; add one"
+                    )
+            offered = {
+                kind.label: contributions.contributions_of(kind, provenance, hooks[kind.hook])
+                for kind in contributions.CONTRIBUTION_KINDS
+                if kind.hook in hooks
+            }
+        except PluginError:
+            self._manager.unregister(module)
+            raise
+        return Plugin(source, offered, commands=contributions.COMMANDS_HOOK in hooks)
 
 
 @cache
 def default_registry() -> Registry:
-    """The registry of the public functions; it loads what is installed and the environment names when first asked."""
+    """The registry of the public functions; it imports what is asked for when it is asked for."""
     return Registry()
 
 
 default_registry()  # made with the module, while there is one thread
 
 
+def resolve_law(law: CreepLaw | str) -> CreepLaw:
+    """The law itself, or the one of that name; "norton+strain-hardening" names the sum of two."""
+    if isinstance(law, str):
+        return default_registry().law(law)
+    if not hasattr(law, "terms"):
+        raise LawError(f"a creep law or its name is needed, found {type(law).__name__}")
+    return law
+
+
 def loaded_plugin_files() -> list[str]:
     """The plugin files that the registry of the public functions has loaded without a problem."""
-    plugins = list(default_registry()._plugins.values())
-    return [p.provenance.origin for p in plugins if p.provenance.origin.endswith(".py") and not p.problem]
+    return [p.provenance.origin for p in default_registry()._loaded() if p.source.is_file and not p.problem]
 
 
 def load_plugin_file(path: str) -> None:
@@ -347,27 +336,28 @@ def load_plugin_file(path: str) -> None:
         default_registry().load_file(path)
 
 
-def _replaces(file: Provenance, installed: Provenance) -> bool:
+def _replaces(plugin: Plugin, other: Plugin) -> bool:
     """Whether a file that the user names stands in for an installed plugin, which is not creepkit's own."""
-    is_file = Path(file.origin).is_absolute()
-    return is_file and not Path(installed.origin).is_absolute() and not installed.origin.startswith("creepkit ")
+    return plugin.source.is_file and not other.source.is_file and not other.source.is_own
 
 
-def _merged_contributions(
-    kind: ContributionKind, plugins: Iterable[Plugin]
-) -> tuple[dict[str, Registered[Any]], dict[str, str]]:
+def _merged(kind: ContributionKind, plugins: Iterable[Plugin]) -> tuple[dict[str, Registered[Any]], dict[str, str]]:
     """Return {name: registered} over plugins, and {name: a sentence} for each that two offer, which is left out."""
-    results: dict[str, Registered[Any]] = {}
-    conflicts: dict[str, str] = {}
+    offers: dict[str, list[Plugin]] = {}
     for plugin in plugins:
-        for name, value in plugin.contributions.get(kind.label, {}).items():
-            if name in results and _replaces(plugin.provenance, results[name].provenance):
-                results[name] = Registered(value, plugin.provenance)
-            elif name in results and not _replaces(results[name].provenance, plugin.provenance):
-                providers = f"{results[name].provenance} and by {plugin.provenance}"
-                conflicts[name] = (
-                    f"the {kind.label} '{name}' is offered twice, by {providers}; rename one or uninstall it"
-                )
-            elif name not in results:
-                results[name] = Registered(value, plugin.provenance)
-    return {name: one for name, one in results.items() if name not in conflicts}, conflicts
+        for name in plugin.contributions.get(kind.label, {}):
+            others = offers.setdefault(name, [])
+            others[:] = [other for other in others if not _replaces(plugin, other)]
+            others.append(plugin)
+    clashes = {
+        name: f"the {kind.label} '{name}' is offered twice, by {found[0].provenance} and by {found[1].provenance}; "
+        "rename one or uninstall it"
+        for name, found in offers.items()
+        if len(found) > 1
+    }
+    known = {
+        name: Registered(found[0].contributions[kind.label][name], found[0].provenance)
+        for name, found in offers.items()
+        if name not in clashes
+    }
+    return known, clashes

@@ -1,4 +1,14 @@
-"""Where plugins come from (entry points and files), and the validation of what they contribute.
+"""Where plugins come from: entry points of installed distributions, and files of Python.
+
+There is one group of entry points for each hook, `creepkit.laws` for creepkit_laws. The name of an entry point is that
+of one object which the hook of its module returns, so that this module alone is imported when the object is asked for:
+
+    [project.entry-points."creepkit.laws"]
+    norton-bailey = "my_package.laws"
+    dorn = "my_package.laws"
+
+A module with several objects has an entry point for each. An entry point of another name is an alias, where its module
+has one object of the kind; where it has more, they are found when all of the kind are asked for.
 
 Importing a plugin runs the code of somebody else, so whatever it raises becomes one sentence with its location.
 """
@@ -11,32 +21,18 @@ import importlib.util
 import os
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
-from inspect import isgeneratorfunction, signature
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
-from typing import Any
+from types import CodeType, ModuleType
 
-import pluggy
+import creepkit
+from creepkit.errors import POWER_REMEDY, CreepkitError, PluginError
 
-from creepkit import hookspecs
-from creepkit.errors import (
-    POWER_REMEDY,
-    CreepkitError,
-    ExportError,
-    HistoryError,
-    LawError,
-    PluginError,
-    SolveError,
-    nearest,
-    quoted,
-)
-from creepkit.registry.contribution_texts import missing_members, remedy, type_text
-
-ENTRY_POINT_GROUP = "creepkit"
+GROUP_PREFIX = "creepkit."
 
 
 ENVIRONMENT_VARIABLE = "CREEPKIT_PLUGINS"
@@ -53,22 +49,109 @@ class Provenance:
         return f"plugin '{self.name}' ({self.origin})"
 
 
-def installed_entry_points() -> list[tuple[Provenance, EntryPoint]]:
-    """Return the entry points of group `creepkit`: creepkit's own first, then by distribution and name."""
-    results = [
-        (Provenance(_distribution_text(entry), entry.name), entry) for entry in entry_points(group=ENTRY_POINT_GROUP)
-    ]
-    return sorted(results, key=lambda pair: (not pair[0].origin.startswith("creepkit "), pair[0]))
+@dataclass(frozen=True)
+class InstalledModule:
+    """A module of an installed distribution, with the entry points that name it.
+
+    place : the module's name.
+    """
+
+    place: str
+    entries: tuple[EntryPoint, ...]
+    is_file = False
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is one of creepkit's own."""
+        return self.place.startswith("creepkit.")
+
+    @cached_property
+    def provenance(self) -> Provenance:
+        """Distribution with version, and the name of the first entry point; metadata are read when asked."""
+        entry = self.entries[0]
+        if self.is_own:
+            return Provenance(f"creepkit {creepkit.__version__}", entry.name)
+        origin = f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else "unknown distribution"
+        return Provenance(origin, entry.name)
+
+    def offers(self, group: str, keys: Iterable[str] | None = None) -> bool:
+        """Whether an entry point is in this group, and has one of these names, see `name_key`."""
+        names = {name_key(entry.name) for entry in self.entries if entry.group == group}
+        return bool(names if keys is None else names.intersection(keys))
+
+    def load(self) -> ModuleType:
+        """Import the module; PluginError when it raises."""
+        try:
+            return import_module(self.place)
+        except (Exception, SystemExit) as error:
+            raise PluginError(f"{self.provenance} cannot be imported: {error_text(error)}") from error
 
 
-def plugin_files_in_environment() -> list[Path]:
-    """Return the files that the environment variable CREEPKIT_PLUGINS lists, separated as in PATH."""
-    return [Path(text) for text in os.environ.get(ENVIRONMENT_VARIABLE, "").split(os.pathsep) if text.strip()]
+@dataclass(frozen=True)
+class PluginFile:
+    """A file of Python that the user named; it may offer anything."""
+
+    path: Path
+    is_file = True
+    is_own = False
+
+    @cached_property
+    def place(self) -> str:
+        """The file, however it was named."""
+        return os.path.realpath(self.path)
+
+    @property
+    def provenance(self) -> Provenance:
+        """The file, and its name without ending."""
+        return Provenance(self.place, self.path.stem)
+
+    def offers(self, group: str, keys: Iterable[str] | None = None) -> bool:
+        """True: what is in a file is not known before it is run."""
+        return True
+
+    def load(self) -> ModuleType:
+        """Run the file as a module of its own name; PluginError when it is no .py, is missing or raises."""
+        if not is_plugin_file_name(self.path):
+            raise PluginError(f"plugin file {self.path} is {_NO_PLUGIN_FILE}; name a Python file with hooks in it")
+        if not self.path.is_file():
+            raise PluginError(f"plugin file {self.path} does not exist; name a Python file with hooks in it")
+        name = f"creepkit_plugin_{self.path.stem}_{hashlib.sha256(self.place.encode()).hexdigest()[:8]}"
+        loader = _UncachedSourceLoader(name, self.place)
+        spec = importlib.machinery.ModuleSpec(name, loader, origin=self.place)
+        spec.has_location = True
+        module = sys.modules[name] = importlib.util.module_from_spec(spec)
+        try:
+            loader.exec_module(module)
+        except (Exception, SystemExit) as error:
+            del sys.modules[name]
+            raise PluginError(f"{self.provenance} cannot be imported: {error_text(error)}") from error
+        return module
+
+
+Source = InstalledModule | PluginFile
+
+
+def installed_modules() -> list[InstalledModule]:
+    """The modules of plugins that are installed, creepkit's own first; none is imported."""
+    found: dict[str, dict[EntryPoint, None]] = {}
+    installed = entry_points()
+    for group in installed.groups:
+        if group.startswith(GROUP_PREFIX):
+            for entry in installed.select(group=group):
+                found.setdefault(entry.module, {})[entry] = None
+    modules = [InstalledModule(module, tuple(entries)) for module, entries in found.items()]
+    return sorted(modules, key=lambda one: (not one.is_own, one.place))
+
+
+def plugin_files_in_environment() -> list[PluginFile]:
+    """The files that the environment variable CREEPKIT_PLUGINS lists, separated as in PATH."""
+    listed = os.environ.get(ENVIRONMENT_VARIABLE, "").split(os.pathsep)
+    return [PluginFile(Path(text)) for text in listed if text.strip()]
 
 
 def check_files_in_environment() -> None:
     """PluginError, in one sentence, where the environment variable names what is no plugin file or does not exist."""
-    for path in plugin_files_in_environment():
+    for path in (one.path for one in plugin_files_in_environment()):
         advice = f"separate several files with '{os.pathsep}'" if "," in str(path) else "correct or unset it"
         if not is_plugin_file_name(path):
             raise PluginError(f"{ENVIRONMENT_VARIABLE} names {path}, which is {_NO_PLUGIN_FILE}; {advice}")
@@ -84,69 +167,9 @@ def is_plugin_file_name(path: str | Path) -> bool:
     return Path(path).suffix == ".py"
 
 
-def provenance_of_file(path: Path) -> Provenance:
-    """Return the provenance of a plugin file."""
-    return Provenance(os.path.realpath(path), path.stem)
-
-
-def mentions_commands(source: EntryPoint | Path) -> bool:
-    """Whether the text of a plugin's module or file has the name of the hook for commands; nothing is imported.
-
-    So `creepkit --help` imports no plugin but those that add commands. False where the source cannot be found.
-    """
-    path = source if isinstance(source, Path) else _module_file(source.module)
-    try:
-        return path is not None and COMMANDS_HOOK.encode() in path.read_bytes()
-    except OSError:
-        return False
-
-
-def _module_file(name: str) -> Path | None:
-    """The file of a module, found as an import would find it, without importing the packages that it is in."""
-    places: Sequence[str] | None = None
-    spec = None
-    for k in range(name.count(".") + 1):
-        full_name = ".".join(name.split(".")[: k + 1])
-        finders = (finder.find_spec for finder in sys.meta_path if hasattr(finder, "find_spec"))
-        try:
-            spec = next((found for find in finders if (found := find(full_name, places)) is not None), None)
-        except Exception:  # of a finder of somebody else: then the module is not known to add commands
-            return None
-        if spec is None:
-            return None
-        places = spec.submodule_search_locations
-    return Path(spec.origin) if spec is not None and spec.has_location and spec.origin else None
-
-
-def import_entry(provenance: Provenance, entry: EntryPoint) -> object:
-    """Import an installed plugin; PluginError when it raises."""
-    try:
-        return entry.load()
-    except (Exception, SystemExit) as error:
-        raise PluginError(f"{provenance} cannot be imported: {error_text(error)}") from error
-
-
-def import_file(provenance: Provenance, path: Path) -> ModuleType:
-    """Import a plugin file under a module name of its own; PluginError when it is no .py, is missing or raises."""
-    if not is_plugin_file_name(path):
-        raise PluginError(f"plugin file {path} is {_NO_PLUGIN_FILE}; name a Python file with hooks in it")
-    if not path.is_file():
-        raise PluginError(f"plugin file {path} does not exist; name a Python file with hooks in it")
-    digest = hashlib.sha256(provenance.origin.encode()).hexdigest()[:8]
-    name = f"creepkit_plugin_{path.stem}_{digest}"
-    spec = importlib.util.spec_from_file_location(
-        name, provenance.origin, loader=_UncachedSourceLoader(name, provenance.origin)
-    )
-    if spec is None or spec.loader is None:
-        raise PluginError(f"plugin file {path} cannot be imported; name a Python file with hooks in it")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
-        del sys.modules[name]
-        raise PluginError(f"{provenance} cannot be imported: {error_text(error)}") from error
-    return module
+def name_key(name: str) -> str:
+    """A name as it is compared: 'Strain_Hardening' and 'strain hardening' are 'strain-hardening'."""
+    return "-".join(name.casefold().replace("_", " ").replace("-", " ").split())
 
 
 def error_text(error: BaseException) -> str:
@@ -169,10 +192,6 @@ class _UncachedSourceLoader(importlib.machinery.SourceFileLoader):
         return self.source_to_code(self.get_data(path), path)
 
 
-def _distribution_text(entry: EntryPoint) -> str:
-    return f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else "unknown distribution"
-
-
 def _source_location(error: BaseException) -> str:
     """Say where the plugin's own file appears deepest in the traceback, below the frames of registry and importlib."""
     internal_paths = (os.path.dirname(__file__), os.path.dirname(importlib.__file__), "<frozen importlib")
@@ -181,203 +200,3 @@ def _source_location(error: BaseException) -> str:
         return ""
     last = [frame for frame in frames if frame.filename == frames[0].filename][-1]
     return f"{last.filename}, line {last.lineno}"
-
-
-HOOK_PREFIX = "creepkit_"
-
-
-COMMANDS_HOOK = "creepkit_commands"
-
-
-@dataclass(frozen=True)
-class ContributionKind:
-    """One kind of contribution: its name, the hook that returns it, the error when a name is unknown, and its record.
-
-    record_module : module of the record that each object must be; imported when there is one to check.
-    """
-
-    label: str
-    hook: str
-    error: type[CreepkitError]
-    record_module: str
-    record_name: str
-
-    def named_contributions(self, returned: Any) -> list[tuple[str, Any]]:
-        """Return [(name, object)] of what a hook returned; PluginError when it is not what the hook promises."""
-        if not isinstance(returned, Sequence) or isinstance(returned, str):
-            raise PluginError(
-                f"must return a list of {self.record_name} records, found {type_text(returned)}{remedy(returned)}"
-            )
-        required: Any = getattr(import_module(self.record_module), self.record_name) if returned else object
-        contribution: Any
-        for contribution in returned:
-            if isinstance(contribution, type):
-                raise PluginError(
-                    f"must return a list of {self.record_name} records, found {type_text(contribution)} in it; "
-                    f"return an instance, {contribution.__name__}()"
-                )
-            if not isinstance(contribution, required):
-                missing = missing_members(contribution, required)
-                raise PluginError(
-                    f"must return a list of {self.record_name} records, found {type_text(contribution)} in it{missing}"
-                )
-            if not (isinstance(contribution.name, str) and contribution.name.strip()):
-                raise PluginError(
-                    f"returned a {self.label} whose name is {contribution.name!r}; give it a short name in words"
-                )
-        return [(thing.name, thing) for thing in returned]
-
-
-class TemperatureFormKind(ContributionKind):
-    """Temperature forms, which are functions and so come with their names."""
-
-    def named_contributions(self, returned: Any) -> list[tuple[str, Any]]:
-        """Return [(name, function of T_ref)]."""
-        if not isinstance(returned, Mapping):
-            raise PluginError(f"must return {{name: function of T_ref}}, found {type_text(returned)}")
-        for name, form in returned.items():
-            if not callable(form):
-                raise PluginError(f"must return {{name: function of T_ref}}, found {type_text(form)} for '{name}'")
-        return list(returned.items())
-
-
-LAW = ContributionKind("law", "creepkit_laws", LawError, "creepkit.language", "CreepLaw")
-
-
-SPECIMEN = ContributionKind("specimen", "creepkit_specimens", SolveError, "creepkit.records", "Specimen")
-
-
-READER = ContributionKind("reader", "creepkit_readers", HistoryError, "creepkit.records", "Reader")
-
-
-CAMERA_FORMAT = ContributionKind("camera format", "creepkit_cameras", HistoryError, "creepkit.records", "CameraFormat")
-
-
-EXPORTER = ContributionKind("exporter", "creepkit_exporters", ExportError, "creepkit.records", "Exporter")
-
-
-INSTRUMENT = ContributionKind(
-    "instrument format", "creepkit_instruments", HistoryError, "creepkit.records", "InstrumentFormat"
-)
-
-
-TEMPERATURE_FORM = TemperatureFormKind("temperature form", "creepkit_temperature_forms", LawError, "", "function")
-
-
-CONTRIBUTION_KINDS = (LAW, SPECIMEN, READER, CAMERA_FORMAT, INSTRUMENT, EXPORTER, TEMPERATURE_FORM)
-
-
-def check_signatures(provenance: Provenance, plugin: object) -> None:
-    """PluginError for a hook that takes other parameters than creepkit gives it."""
-    for name, function in vars(plugin).items():
-        specified = getattr(hookspecs, name, None)
-        if not (name.startswith(HOOK_PREFIX) and isinstance(function, FunctionType) and callable(specified)):
-            continue
-        allowed = list(signature(specified).parameters)
-        found = list(signature(function).parameters.values())
-        unknown = [p.name for p in found if p.name not in allowed]
-        if unknown:
-            wanted = f"({', '.join(allowed)})" if allowed else "no parameters"
-            raise PluginError(
-                f"{provenance} does not fit the hooks of creepkit: {name} has the parameter '{unknown[0]}', "
-                f"creepkit calls it with {wanted}"
-                f"{hook_location(function)}"
-            )
-        if isgeneratorfunction(function):
-            raise PluginError(
-                f"{provenance}: {name} is a generator; return a list in the place of yield{hook_location(function)}"
-            )
-
-
-def hook_implementations(
-    manager: pluggy.PluginManager, plugin: object, provenance: Provenance
-) -> dict[str, pluggy.HookImpl]:
-    """Return {hook: implementation} of one registered plugin; PluginError when a hook of it could never be called.
-
-    This is pluggy's check_pending for one plugin; it names the nearest hook and sees forgotten decorators as well.
-    """
-    known = [name for name in vars(hookspecs) if name.startswith(HOOK_PREFIX)]
-    callers = manager.get_hookcallers(plugin) or []
-    for caller in callers:
-        if not caller.has_spec():
-            (unknown,) = [impl.function for impl in caller.get_hookimpls() if impl.plugin is plugin][:1]
-            raise PluginError(
-                f"{provenance} has an unknown hook '{caller.name}': {nearest(caller.name, known)}"
-                f"{hook_location(unknown)}"
-            )
-    results = {c.name: impl for c in callers for impl in c.get_hookimpls() if impl.plugin is plugin}
-    marked = {impl.function.__name__ for impl in results.values()}
-    for name in vars(plugin):
-        if name.startswith(HOOK_PREFIX) and callable(getattr(plugin, name)) and name not in marked:
-            raise PluginError(
-                f"{provenance} has a function '{name}' without @hookimpl; add the decorator"
-                f"{hook_location(getattr(plugin, name))}"
-            )
-    if not results:
-        raise PluginError(f"{provenance} offers nothing; mark one of its functions @hookimpl ({', '.join(known)})")
-    return results
-
-
-def contributions_of(kind: ContributionKind, implementation: pluggy.HookImpl) -> dict[str, Any]:
-    """Return {name: object} that one plugin's hook offers."""
-    returned, place = call_hook(implementation), hook_location(implementation.function)
-    try:
-        contributions = kind.named_contributions(returned)
-    except PluginError as error:
-        raise PluginError(f"{implementation.plugin_name}: {kind.hook} {error}{place}") from None
-    except Exception as error:  # of a property of the plugin's record
-        raise PluginError(
-            f"{implementation.plugin_name}: {kind.hook} returned a record that cannot be asked its name: "
-            f"{error_text(error)}{place}"
-        ) from error
-    for name, contribution in contributions:
-        if kind.label == "specimen" and (problem := record_problem(contribution)):
-            raise PluginError(f"{implementation.plugin_name}: specimen '{name}' {problem}{place}")
-        if [other for other, _ in contributions].count(name) > 1:
-            raise PluginError(f"{implementation.plugin_name} offers the {kind.label} '{name}' twice; rename one{place}")
-    return dict(contributions)
-
-
-def record_problem(specimen: Any) -> str:
-    """What is wrong with the record of a specimen, as the end of a sentence; "" where files and options can use it."""
-    try:
-        outputs, loads, lengths = (tuple(getattr(specimen, name, ())) for name in ("outputs", "loads", "dimensions"))
-        outputs += tuple(getattr(specimen, "optional_outputs", ())) if outputs else ()
-        known = (*(str(name) for name in outputs), *(one.name for one in loads), *(one.name for one in lengths))
-    except Exception as error:
-        return (
-            f"has a record that cannot be read: {error_text(error)}; outputs are names, loads ck.Load, lengths fields"
-        )
-    if not outputs or not all(isinstance(name, str) for name in outputs):
-        return f"has outputs {quoted(repr(outputs), 60)}; give at least one name, or ck.Output"
-    if both := {str(o) for o in outputs} & {load.name for load in loads}:
-        return f"has an output and a load called '{both.pop()}', which a file could not tell apart; rename one"
-    for name in known:
-        if name in RESERVED_NAMES or name.endswith("_sd"):
-            return f"calls something '{name}', which means something else in files or options; rename it"
-    return ""
-
-
-_RESERVED = """time used temperature modulus poisson jump_time end_time rupture ended label geometry offset rate control
-ramp specimen name alloy operator set to help points every picture end_h modulus_gpa temperature_c level draws target
-tolerance json plot"""
-
-
-RESERVED_NAMES = frozenset(_RESERVED.split())
-"""Columns and keys of files, options of commands and kinds of nuisance parameters that every specimen has."""
-
-
-def call_hook(implementation: pluggy.HookImpl, **keywords: Any) -> Any:
-    """Call one plugin's hook; PluginError when it raises."""
-    arguments = [keywords[name] for name in implementation.argnames]
-    try:
-        return implementation.function(*arguments)
-    except (Exception, SystemExit) as error:
-        name = implementation.function.__name__
-        raise PluginError(f"{implementation.plugin_name}: {name} raised {error_text(error)}") from error
-
-
-def hook_location(function: Any) -> str:
-    """Where a function of a plugin is written, as the end of a sentence; "" where that is not known."""
-    code = getattr(function, "__code__", None)
-    return f" ({code.co_filename}, line {code.co_firstlineno})" if code is not None else ""

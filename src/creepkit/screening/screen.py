@@ -24,7 +24,9 @@ from creepkit.jobs.worker_pools import ProcessWorkers, WorkerDeaths, process_cou
 from creepkit.jobs.worker_process import TaskResult, run_task
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
-from creepkit.registry.arguments import read_histories, resolve_law, resolve_predictors
+from creepkit.registry import resolve_law
+from creepkit.registry.arguments import resolve_predictors
+from creepkit.registry.reading import read_histories
 from creepkit.screening import files
 from creepkit.screening.alloys import Compositions, group_by_alloy, resolve_compositions
 from creepkit.screening.job import FITS_FOLDER, ScreeningJob

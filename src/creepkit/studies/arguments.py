@@ -322,8 +322,8 @@ def rigs_of_study(file: StudyFile, rigs: Sequence[Rig], predictor: object) -> li
 
 def tolerances_of(file: StudyFile, number: int) -> dict[str, float]:
     """{kind: standard deviation} of a forecast, in the unit of the nuisance parameter of that kind."""
-    from creepkit.records.known_specimens import all_dimensions
     from creepkit.records.prediction import GENERAL_NUISANCES
+    from creepkit.records.specimen_lookup import all_dimensions
 
     known = [*GENERAL_NUISANCES, *all_dimensions()]
     spelt = {f"{kind}_{unit}" if (unit := _unit_of_kind(kind)) else kind: kind for kind in known}

@@ -12,7 +12,7 @@ import numpy as np
 
 from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import CreepkitError
-from creepkit.registry.arguments import frame_files, read_frames, read_record
+from creepkit.registry.reading import frame_files, read_frames, read_record
 from creepkit.studies.toml_text import CITATION_LINE, comment, quoted, quoted_list, study_part
 
 if TYPE_CHECKING:

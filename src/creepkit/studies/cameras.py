@@ -12,7 +12,7 @@ from creepkit.api.planned_tests import stepped_load
 from creepkit.cameras.sequences import in_order
 from creepkit.errors import HistoryError, nearest
 from creepkit.records import Loading, Specimen, SupportsSurfaceObservation, loads_of
-from creepkit.registry.arguments import frame_files
+from creepkit.registry.reading import frame_files
 from creepkit.studies import arguments
 from creepkit.studies.inputs import resolve_paths
 from creepkit.studies.model import CameraPart

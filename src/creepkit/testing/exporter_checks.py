@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from creepkit.errors import CreepkitError, ExportError, quoted
+from creepkit.exporters.exporting import exported_text
 from creepkit.language.elastic import Elastic
 from creepkit.language.symbols import temperature
-from creepkit.records import Exporter, LawWithValues, exported_text
+from creepkit.records import Exporter, LawWithValues
 from creepkit.registry import default_registry
 from creepkit.testing.reports import ConformanceCheck
 

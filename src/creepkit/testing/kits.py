@@ -26,7 +26,6 @@ from creepkit.records import (
     remember_specimen,
 )
 from creepkit.registry import Plugin, default_registry
-from creepkit.registry.plugin_registry import package_with_law
 from creepkit.testing import (
     camera_checks,
     exporter_checks,
@@ -281,13 +280,11 @@ def check_named(name: str) -> list[ConformanceReport]:
     if name in forms:
         reports.append(check_temperature_form(name, forms[name].value))
     if not reports:
-        if package_with_law(name):
-            registry.law(name)  # says which package has it
         clashes = [sentence for sentence in registry.conflicts() if f"'{name}' is offered twice" in sentence]
         known = sorted({one for names in (*offered.values(), forms) for one in names})
         near = difflib.get_close_matches(name, known, n=1, cutoff=0.55)
         kinds = f"{', '.join(offered)} or temperature form"
-        advice = f"did you mean '{near[0]}'?" if near else "'creepkit laws', 'creepkit specimens' and so on list them"
+        advice = f"did you mean '{near[0]}'?" if near else "'creepkit list' says what there is"
         raise PluginError(clashes[0] if clashes else f"no {kinds} is called '{name}'; {advice}{registry.broken_hint()}")
     return reports
 

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import creepkit as ck
+from creepkit.cli.law_sources import read_law_file
 from creepkit.errors import CreepkitError
-from creepkit.exporters.law_files import read_law_file
 from execution_attempts import texts
 from execution_attempts.canaries import Attempt, Control, Found, left, planted
 from execution_attempts.pickles import pickle_that_runs

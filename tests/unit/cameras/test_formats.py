@@ -235,20 +235,6 @@ def test_arrays_of_matlab_written_in_other_ways(tmp_path: Path) -> None:
         ck.read_frames(written(tmp_path, vic_3d_mat()[:900], "c.mat"))
 
 
-def test_arrays_of_matlab_of_other_shapes_or_of_one_name_are_refused(tmp_path: Path) -> None:
-    from scipy.io import savemat
-
-    truth = dome()
-    arrays = dict(zip("XYZUVW", (*truth.points.T, *truth.displacements.T), strict=True))
-    savemat(tmp_path / "a.mat", {**arrays, "X": arrays["X"].reshape(7, 7)})
-    with pytest.raises(HistoryError, match=r"differ in their number of points \(X has 7 x 7, Y has 1 x 49"):
-        ck.read_frames(tmp_path / "a.mat")[0]
-    savemat(tmp_path / "b.mat", arrays)
-    content = (tmp_path / "b.mat").read_bytes()
-    with pytest.raises(HistoryError, match="two of its arrays are called 'X'; keep one of them"):
-        ck.read_frames(written(tmp_path, content + content[128:], "c.mat"))[0]
-
-
 UNKNOWN = b"xpos_um;ypos_um;zpos_um;dx_um;dy_um;dz_um\n" + b"1;2;3;4;5;6\n" * 600
 
 

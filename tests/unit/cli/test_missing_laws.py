@@ -1,8 +1,7 @@
-"""A law that is missing names its package; hard limits of parameters."""
+"""The package that a law came from; hard limits of parameters."""
 
 import json
 import math
-import tomllib
 
 import pytest
 
@@ -10,41 +9,12 @@ import creepkit as ck
 from creepkit.errors import LawError
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.language.law_codec import law_from_json, law_to_json
-from creepkit.registry import Registry, default_registry
-from creepkit.registry.plugin_registry import LAWS_BY_PACKAGE, package_with_law
-from helpers.command_line import creepkit, one_line
-from helpers.paths import ROOT
+from creepkit.registry import default_registry
 
 A, n = parameters("A n")
 
 
 pytestmark = pytest.mark.usefixtures("own_registry")
-
-
-# ---- laws that are not installed -----------------------------------------------------------------------------------
-
-
-def test_a_missing_law_names_the_package_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    from creepkit.registry import plugin_sources
-
-    own = [pair for pair in plugin_sources.installed_entry_points() if pair[0].origin.startswith("creepkit ")]
-    monkeypatch.setattr(plugin_sources, "installed_entry_points", lambda: own)
-    with pytest.raises(LawError) as raised:
-        Registry().law("kachanov-rabotnov")
-    package = "package creepkit-damage has it: pip install creepkit-damage"
-    assert str(raised.value) == f"there is no law 'kachanov-rabotnov'; {package}"
-    default_registry.cache_clear()
-    assert "pip install creepkit-classic" in one_line(creepkit("laws", "theta-projection"))
-    assert "did you mean 'norton'?" in one_line(creepkit("laws", "nortn"))
-
-
-def test_the_table_is_what_the_packages_of_this_project_offer() -> None:
-    for project in (tomllib.loads(p.read_text()) for p in sorted(ROOT.glob("plugins/*/pyproject.toml"))):
-        package = project["project"]["name"]
-        if package == "creepkit-specimens":
-            continue  # offers no law
-        assert set(LAWS_BY_PACKAGE[package]) == set(project["project"]["entry-points"]["creepkit"])
-    assert package_with_law("norton") == ""
 
 
 def test_a_law_tells_which_package_it_came_from() -> None:

@@ -25,7 +25,7 @@ def test_a_new_package_says_what_to_do_next(kind: str) -> None:
     told = creepkit(f"new-{kind}", "my-own").stdout
     project = tomllib.loads(Path("my-own", "pyproject.toml").read_text())
 
-    assert project["project"]["entry-points"]["creepkit"] == {"my-own": "creepkit_my_own"}
+    assert project["project"]["entry-points"][f"creepkit.{kind}s"] == {"my-own": "creepkit_my_own"}
     assert project["project"]["dependencies"] == ["creepkit"]
     files = {str(p.relative_to("my-own")) for p in Path("my-own").rglob("*") if p.is_file()}
     assert files == {"creepkit_my_own.py", "pyproject.toml", "README.md", "tests/test_my_own.py"}
@@ -40,11 +40,11 @@ def test_their_tests_pass_once_they_are_installed(tmp_path: Path) -> None:
     site, places = tmp_path / "site", []
     for kind in KINDS:
         creepkit(f"new-{kind}", f"my-{kind}")
-        (name, module) = next(iter(_project(kind)["entry-points"]["creepkit"].items()))
+        (name, module) = next(iter(_project(kind)["entry-points"][f"creepkit.{kind}s"].items()))
         info = site / f"{module}-0.1.0.dist-info"
         info.mkdir(parents=True)
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {_project(kind)['name']}\nVersion: 0.1.0\n")
-        (info / "entry_points.txt").write_text(f"[creepkit]\n{name} = {module}\n")
+        (info / "entry_points.txt").write_text(f"[creepkit.{kind}s]\n{name} = {module}\n")
         places.append(tmp_path / f"my-{kind}")
     path = os.pathsep.join([*map(str, places), str(site), os.environ.get("PYTHONPATH", "")])
     words = [sys.executable, "-m", "pytest", "-q", "--import-mode=importlib", "-p", "no:cacheprovider", "-W", "error"]

@@ -5,7 +5,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.discovery.discover import discover, group_by_temperature, isothermal_tests, temperature_study
-from creepkit.discovery.refitting import refit
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identify import identify
@@ -155,33 +154,6 @@ def test_a_form_is_where_it_should_be_at_its_reference_temperature():
 
 
 # ---- what cannot be known ------------------------------------------------------------------------------------------
-
-
-def test_one_temperature_says_what_it_cannot(tests, alone):
-    with pytest.raises(FitError, match="from one temperature neither an activation energy nor how any other parameter"):
-        discover(alone[:1])
-    found = temperature_study(NORTON, tests[:3], Steady(), settings=QUICK)
-    assert found.temperature_law is None
-    assert "all tests are at 973 K" in found.notes[0]
-
-
-def test_two_temperatures_have_no_form(alone):
-    with pytest.raises(FitError, match="at 973 and 1000 K alone: two temperatures give an activation energy but no"):
-        discover(alone[:2])
-
-
-def test_a_form_that_cannot_be_refitted_is_told(trend, tests, monkeypatch):
-    from creepkit.discovery import refitting
-
-    def failing(law, *given, **how):
-        if "n_I" in law.names:
-            raise FitError("this one never converges")
-        return identify(law, *given, **how)
-
-    monkeypatch.setattr(refitting, "identify", failing)
-    found = refit(trend, tests, Steady(), settings=QUICK, search_again=False)
-    assert found.forms == trend.forms
-    assert all("this one never converges" in note for note in found.notes)
 
 
 # ---- a dimple ------------------------------------------------------------------------------------------------------

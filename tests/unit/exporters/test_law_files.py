@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from creepkit import available
 from creepkit.errors import CreepkitError, ExportError, LawError
-from creepkit.exporters import write_export
-from creepkit.exporters.builtin import creepkit_exporters
+from creepkit.exporters.exporting import export
 from creepkit.exporters.latex import LatexExporter, latex_number
 from creepkit.exporters.law_files import JsonExporter, read_valued_law
 from creepkit.files.written_lists import RECORD
@@ -45,22 +45,15 @@ def text_of(law, values, exporter, notes=(), **more):
     return exporter.text(LawWithValues(law, values, notes, **more))
 
 
-def test_the_built_in_exporters_keep_the_protocol():
-    exporters = creepkit_exporters()
-    names = {e.name: e.suffix for e in exporters}
-    assert len(names) == len(exporters)
-    assert {
-        "latex": ".tex",
-        "python": ".py",
-        "json": ".json",
-        "markdown": ".md",
-        "mathml": ".xhtml",
-    }.items() <= names.items()
-    for exporter in exporters:
-        kept: Exporter = exporter
-        assert isinstance(kept, Exporter)
-        assert kept.title == kept.title.strip() != ""
-        assert re.fullmatch(r"\.\w+", kept.suffix)
+def test_the_exporters_keep_the_protocol():
+    exporters = available("exporters")
+    assert {"latex": ".tex", "python": ".py", "json": ".json", "markdown": ".md", "mathml": ".xhtml"}.items() <= {
+        name: exporter.suffix for name, exporter in exporters.items()
+    }.items()
+    for exporter in exporters.values():
+        assert isinstance(exporter, Exporter)
+        assert exporter.title == exporter.title.strip() != ""
+        assert re.fullmatch(r"\.\w+", exporter.suffix)
 
 
 def test_values_are_checked():
@@ -70,7 +63,7 @@ def test_values_are_checked():
         LawWithValues(NORTON, {"A": 1e-16, "n": "five"})
 
 
-FOR_PEOPLE = [e for e in creepkit_exporters() if e.name in ("latex", "markdown", "mathml", "json", "python")]
+FOR_PEOPLE = [available("exporters")[name] for name in ("latex", "markdown", "mathml", "json", "python")]
 
 
 @pytest.mark.parametrize("exporter", FOR_PEOPLE, ids=lambda e: e.name)
@@ -210,7 +203,8 @@ VALUED = LawWithValues(NORTON, {"A": 1e-16, "n": 5}, NOTES)
 
 
 def test_a_file_is_written_whole(tmp_path):
-    path = write_export(VALUED, JsonExporter(), tmp_path / "norton.json")
+    path = tmp_path / "norton.json"
+    export(VALUED, "json", to=path)
     assert read_valued_law(path.read_text(encoding="utf-8")).law == NORTON
     assert {p.name for p in tmp_path.iterdir()} == {RECORD, "norton.json"}
 
@@ -219,9 +213,9 @@ def test_a_file_that_exists_stays_unless_forced(tmp_path):
     path = tmp_path / "norton.json"
     path.write_text("old")
     with pytest.raises(ExportError, match="norton.json: cannot be written: it is there, and creepkit did not write it"):
-        write_export(VALUED, JsonExporter(), path)
+        export(VALUED, "json", to=path)
     assert path.read_text() == "old"
-    write_export(VALUED, JsonExporter(), path, force=True)
+    export(VALUED, "json", to=path, force=True)
     assert read_valued_law(path.read_text(encoding="utf-8")) == VALUED
     assert {p.name for p in tmp_path.iterdir()} == {RECORD, "norton.json"}
 
@@ -230,19 +224,19 @@ def test_a_refused_export_leaves_the_old_file(tmp_path):
     path = tmp_path / "norton.json"
     path.write_text("old")
     with pytest.raises(ExportError, match="JSON holds a law in MPa and s"):
-        write_export(VALUED.replace(units=Units("Pa")), JsonExporter(), path, force=True)
+        export(VALUED.replace(units=Units("Pa")), "json", to=path, force=True)
     assert path.read_text() == "old"
 
 
 def test_a_folder_that_does_not_exist_is_named(tmp_path):
     with pytest.raises(ExportError, match="missing/norton.json: cannot be written: there is no folder"):
-        write_export(VALUED, JsonExporter(), tmp_path / "missing" / "norton.json")
+        export(VALUED, "json", to=tmp_path / "missing" / "norton.json")
 
 
 def test_a_file_is_no_folder(tmp_path):
     (tmp_path / "creep.f").write_text("mine")
     with pytest.raises(ExportError, match="creep.f/norton.json: cannot be written: Not a directory"):
-        write_export(VALUED, JsonExporter(), tmp_path / "creep.f" / "norton.json")
+        export(VALUED, "json", to=tmp_path / "creep.f" / "norton.json")
     assert (tmp_path / "creep.f").read_text() == "mine"
 
 
@@ -255,5 +249,5 @@ def test_latex_tells_references_and_keeps_each_comment_a_comment():
 def test_a_folder_is_no_file(tmp_path):
     (tmp_path / "norton.json").mkdir()
     with pytest.raises(ExportError, match="cannot be written: it is a folder"):
-        write_export(VALUED, JsonExporter(), tmp_path / "norton.json", force=True)
+        export(VALUED, "json", to=tmp_path / "norton.json", force=True)
     assert [p.name for p in tmp_path.iterdir()] == ["norton.json"]

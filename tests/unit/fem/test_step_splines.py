@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from creepkit.errors import SolveError
 from creepkit.fem.time_interpolation import OFFSET, TimeInterpolation
 
 RNG = np.random.default_rng(4)
@@ -60,14 +59,6 @@ def test_what_is_not_a_number_spoils_its_column_and_segment_alone():
     assert np.isnan(got[:, 1]).any()
     np.testing.assert_allclose(got[:, [0, 2]], 1.0, rtol=1e-15)
     assert np.isnan(line.interpolate(values, [np.nan, 1.1 * times[-1]])).all()
-
-
-def test_steps_that_stand_still_are_refused():
-    line, times = one_segment(np.array([0.0, 0.5, 0.5, 1.0]))
-    with pytest.raises(SolveError, match="do not increase in time"):
-        line.interpolate(np.zeros((4, 1)), times)
-    with pytest.raises(ValueError, match="3 rows of values for 4 steps"):
-        line.interpolate(np.zeros((3, 1)), times)
 
 
 def test_no_times_and_no_columns_are_empty():

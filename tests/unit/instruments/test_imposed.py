@@ -57,25 +57,6 @@ def test_a_simulation_takes_what_was_imposed() -> None:
     assert history.loading.program().values.max() == pytest.approx(8.0, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    ("changed", "specimen", "message"),
-    [
-        (record(reference="absolute"), "D1", "holds absolute pressures"),
-        (record(reference=""), "D1", "gauge or absolute pressures is not stated"),
-        (record(quantity="number"), "D1", "'D1: T' is no temperature, for its unit is not stated"),
-        (record(), "D2", "no channel 'D2: P' of 'D2'"),
-        (record(), ("D1: P", "D1: X"), "there is no channel 'D1: X'"),
-        (record().between(0.0, 2000.0), "D1", "it covers 0 to 2000"),
-    ],
-)
-def test_what_is_not_known_is_asked_for(
-    changed: InstrumentRecord, specimen: str | tuple[str, str], message: str
-) -> None:
-    with pytest.raises(HistoryError) as caught:
-        ck.imposed(changed, specimen, FRAMES, ClockAlignment.stated(0.0))
-    assert message in str(caught.value)
-
-
 def test_a_record_in_the_zone_of_the_frames_needs_no_alignment() -> None:
     known = InstrumentRecord("test", TIMES, record().channels, 1.7e9, record().channel_patterns)
     assert ck.imposed(known, "D1", FRAMES + 1.7e9).time_zero == pytest.approx(1.7e9 + 500.0, abs=1.5)

@@ -110,12 +110,6 @@ def test_clocks_that_are_put_back_for_winter(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.diff(record.times), 1800.0)
 
 
-def test_a_time_that_no_clock_showed_is_refused(tmp_path: Path) -> None:
-    path = written(tmp_path, table(["2025-03-09 01:59:00", "2025-03-09 02:30:00"]))
-    with pytest.raises(HistoryError, match=r"x.csv:3: there was no 02:30 on 2025-03-09 in America/Chicago"):
-        ck.read_record(path, time_zone="America/Chicago")
-
-
 def test_absolute_pressures_become_gauge_only_by_a_stated_ambient_pressure(tmp_path: Path) -> None:
     path = written(tmp_path, "time_s,p_bara\n0,1.013\n1,11.013\n")
     assert ck.read_record(path).channel("p").reference == "absolute"
@@ -211,15 +205,6 @@ def test_whether_a_pressure_is_absolute_stands_in_its_unit_or_its_name(
 def test_a_row_of_units_that_says_more_than_the_names(tmp_path: Path) -> None:
     record = ck.read_record(written(tmp_path, "time_s,p [bar],T (upper)\ns,barg,K\n0,1,800\n1,2,800\n"))
     assert [(c.reference, c.quantity) for c in record.channels.values()] == [("gauge", "pressure"), ("", "temperature")]
-
-
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
-def test_a_last_line_without_an_end_is_remarked(tmp_path: Path, encoding: str) -> None:
-    content = "time_s,p_bar\n0,800\n1,800\n2,8"
-    remark = "its last line, 4, has no end; it may be cut off amid a number"
-    for text, expected in ((content, True), (f"{content}00\n", False)):
-        record = ck.read_record(written(tmp_path, text.encode(encoding)))
-        assert (remark in record.notes) is expected
 
 
 def test_units_in_heads() -> None:

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.errors import FitError
 from creepkit.inverse.cross_validation import cross_validate, times_to_strain
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify, refit
@@ -103,18 +102,6 @@ def test_leaving_conditions_out_predicts_each_once(fit, tests):
     assert found.spread < 0.4
 
 
-def test_bounds_that_exclude_the_data_are_reported():
-    """Bounds of A a factor 1e6 below the truth: the answer lies at a bound and says so."""
-    import dataclasses
-
-    A, n = NORTON.params
-    narrow = dataclasses.replace(NORTON.params[A], bounds=(1e-40, 1e-30))
-    law = dataclasses.replace(NORTON, params={A: narrow, n: dataclasses.replace(NORTON.params[n], bounds=(1, 5))})
-    tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1050.0) for s in (30, 50, 80)], seed=3, noise=1e-5)
-    with pytest.raises(FitError, match="bounds"):
-        identify(law, tests, Steady(), settings=QUICK)
-
-
 def test_a_given_offset_prior_is_used(tests):
     fit = identify(
         LAW, tests, Steady(), settings=replace(QUICK, nuisances=(Nuisance("offset", sd=5e-5), Nuisance("rate", sd=0.2)))
@@ -174,22 +161,10 @@ def test_sums_with_fixed_parts_are_identified(fixed):
     assert np.isfinite(identify(law, tests, Steady(), settings=QUICK).rms)
 
 
-def test_fits_to_different_frames_are_not_ranked(fit, tests):
-    short = identify(LAW, [h.up_to("strain", 0.01) for h in tests], Steady(), settings=QUICK)
-    with pytest.raises(FitError, match="cannot be ranked"):
-        rank([fit, short])
-
-
 def test_refit_keeps_the_nuisances(tests):
     plain = identify(LAW, tests, Steady(), settings=replace(QUICK, nuisances=()))
     again = refit(plain, tests[:-1])
     assert again.noise_model.rate == again.noise_model["strain"].offset == 0.0
-
-
-def test_attaching_histories_goes_by_name(fit, tests):
-    assert [h.name for h in fit.with_histories(tests[::-1], Steady()).histories] == [h.name for h in tests]
-    with pytest.raises(FitError, match="not among the histories"):
-        fit.with_histories(tests[:1], Steady())
 
 
 def test_noise_of_a_smooth_sparse_curve_is_small():

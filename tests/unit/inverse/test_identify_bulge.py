@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.errors import FitError, FitWarning
+from creepkit.errors import FitError
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.identification import IdentificationSettings
@@ -227,9 +227,3 @@ def test_a_test_that_was_left_out_is_predicted(fit, tests):
 
 
 # ---- what cannot be ------------------------------------------------------------------------------------------------
-
-
-def test_tests_that_were_changed_are_told_from_those_that_were_identified(fit, tests):
-    changed = [h.replace(outputs={**h.outputs, "amplitude": 1.1 * h.outputs["amplitude"]}) for h in tests]
-    with pytest.warns(FitWarning, match="the tests given differ from those that .* was identified from"):
-        fit.with_histories(changed, EXACT)

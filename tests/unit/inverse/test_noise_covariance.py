@@ -281,15 +281,6 @@ def test_counted_twice_is_the_square_twice():
     assert twice == pytest.approx(2.0 * once, rel=1e-12)
 
 
-def test_a_covariance_that_is_no_number_is_an_error():
-    residuals, noise = example()
-    broken = replace(noise, rate=float("nan"), discrepancy=float("inf"))
-    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
-        CovarianceFactor.of_residuals(residuals, broken).whiten(residuals.values)
-    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
-        likelihood_of(residuals, noise)(broken.components)
-
-
 def test_components_go_into_a_noise_model_and_out():
     _, noise = example()
     assert noise.with_components(noise.components) == noise

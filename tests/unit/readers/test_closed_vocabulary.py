@@ -37,32 +37,6 @@ def test_none_of_600_misspelt_keys_is_accepted(template: str, specimen: str, tmp
         assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        (
-            "stres_MPa: 60",
-            "x.csv:3: unknown key 'stres_MPa'; did you mean 'stress_MPa'\\? A label is written 'label st",
-        ),
-        ("furnace: 4", "x.csv:3: unknown key 'furnace'; a label is written 'label furnace'"),
-        ("lable heat: 4", "x.csv:3: unknown key 'lable heat'; "),
-        ("label: 4", "x.csv:3: unknown key 'label'; "),
-        (": 4", "x.csv:3: unknown key ''; a label is written 'label NAME'"),
-        ("strain_mesure: logarithmic", "x.csv:3: unknown key 'strain_mesure'; did you mean 'strain_measure'"),
-        (
-            "heet: 4\n# furnace: 2",
-            "x.csv:3: unknown key 'heet'; did you mean 'heat'.*; unknown too: 'furnace' in line 4",
-        ),
-        ("geometry apex_thicknes_mm: 0.4", "x.csv:3: no length of .* 'apex_thicknes'; did you mean 'apex_thickness'"),
-        ("specimen: Uniaxal", "x.csv:3: there is no specimen 'Uniaxal'; did you mean 'uniaxial'"),
-        ("heat: a\n# label heat: b", "x.csv:4: '.*heat' is given twice"),
-    ],
-)
-def test_message(line: str, message: str, tmp_path: Path):
-    with pytest.raises(HistoryError, match=message):
-        read(f"{HEAD}# {line}\n{BODY}", tmp_path / "x.csv")
-
-
 def test_heat_and_laboratory_are_labels_of_their_own(tmp_path: Path):
     history = read(HEAD + "# cast: X7\n# lab: north\n# label furnace: 4\n" + BODY, tmp_path / "x.csv")
     assert {"heat": "X7", "laboratory": "north", "furnace": "4"}.items() <= history.labels.items()

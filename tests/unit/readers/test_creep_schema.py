@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import HistoryError
 from creepkit.testing.reader_checks import history_difference
 from helpers.samples_creep_schema import LIS, SERIES_NAME, document, value
 
@@ -80,57 +79,3 @@ def test_entries_are_known_by_their_whole_name(tmp_path: Path):
 def test_a_rupture_time_without_load_control_says_what_was_assumed(tmp_path: Path):
     (test,) = ck.read_histories(write(tmp_path, document(link="", loadControlType=""), series=None))
     assert (test.loading.control, test.labels) == ("load", {"assumed": "control load"})
-
-
-STRESS_LINE = "Initial stress\tRo\tMPa\t152.5\t\t\t\n"
-NO_TIME = {"link": "", "rupture": value("")}
-TIME_LIMIT = {"endOfTestCriterium": {"endOfTestCriteriumOptions": "Time limit"}}
-BAD = {
-    "millipascal": (document(initialStress=value("152.5", "mPa")), LIS, "initialStress: the unit 'mPa' is not underst"),
-    "two stresses": (
-        document(),
-        LIS.replace(STRESS_LINE, f"{STRESS_LINE}{STRESS_LINE.replace('152.5', '15.2')}"),
-        f"{SERIES_NAME}:9: 'initial stress' stands there twice",
-    ),
-    "broke, no time": (document(**NO_TIME), None, "Options: the test piece broke, and there is no creepRuptureTime"),
-    "no criterion": (document(**NO_TIME, endOfTestCriterium=""), None, "Options: it is not stated, and there is no cr"),
-    "stopped and broke": (document(**TIME_LIMIT), LIS, "Options: it is 'time limit', and a rupture time is stated"),
-    "both, no series": (document(link="", **TIME_LIMIT), None, "it is 'time limit', and a rupture time is stated"),
-    "compression, no series": (document(link="", typeOfLoading="Compression"), None, "'Compression' is not underst"),
-    "no rupture time": (document(link="", rupture=value("0", "h")), None, "RuptureTime: it is 0 h; it must be above"),
-    "no stress": (document(initialStress=value("")), LIS, "Q7.json: no loading"),
-    "unit": (document(initialStress=value("152.5", "N")), LIS, "testParameters/initialStress: the unit 'N' is not und"),
-    "no number": (document(specifiedTemperature=value("hot", "°C")), LIS, "specifiedTemperature: 'hot' is no number"),
-    "thousands": (document(initialStress=value("1,520", "MPa")), LIS, "'1,520' may be a thousand or a decimal; write"),
-    "compression": (document(typeOfLoading="Compression"), LIS, "typeOfLoading: 'Compression' is not understood; all"),
-    "list": (document(initialStress=[152]), LIS, "initialStress: it is list; write a text or a number"),
-    "no document": ({"Measurement": {"MeasurementData": 1}}, LIS, "no object 'MeasurementData'"),
-    "other test": (document(), LIS.replace("\tQ7\t", "\tQ8\t"), f"{SERIES_NAME}: it is of the test 'Q8', and .* 'Q7'"),
-    "no series": (document(), None, f"its series stand in '{SERIES_NAME}', which is not beside it"),
-    "cut row": (document(), LIS.replace("10.5\t0.2125\t950.0\t951.25", "10.5\t0.2125"), ":20: number of cells 2, of c"),
-    "unit of time": (
-        document(),
-        LIS.replace("h\t%\t°C", "weeks\t%\t°C"),
-        "'Elapsed time from end of loading' in 'weeks' is not un",
-    ),
-    "column": (
-        document(),
-        LIS.replace("Percentage creep", "Diametral"),
-        "column 'Diametral extension' in '%' is not un",
-    ),
-    "no data": (document(), LIS.replace("[data]", ""), "no line '\\[data\\]' with rows of names"),
-    "nothing": (
-        document(link="", rupture=value(""), duration=value("")),
-        None,
-        "Q7.json: it names no series, no creepR",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_message(case: str, tmp_path: Path):
-    content, series, message = BAD[case]
-    path = write(tmp_path, content, series)
-    with pytest.raises(HistoryError, match=message) as caught:
-        ck.read_histories(path)
-    assert "\n" not in str(caught.value)

@@ -41,33 +41,3 @@ def test_columns_of_a_wide_table_and_of_a_table_of_tests(tmp_path: Path):
     table = "test,stress_MPa,T_C,t_r (h),stress ratio\nA,60,850,120,?\n"
     (history,) = read(table, tmp_path / "y.csv", ignore=["stress ratio"])
     assert "stress ratio" not in history.labels
-
-
-@pytest.mark.parametrize(
-    ("head", "columns", "message"),
-    [
-        (
-            "",
-            "load_kN",
-            "x.csv:3: column 'load_kN' is not understood; .* leave it out: write '# ignore: load_kN' above",
-        ),
-        ("# ignore: lode_kN\n", "load_kN", "x.csv:3: ignore names 'lode_kN', which is no column; the columns are: "),
-        ("# ignor: load_kN\n", "used", "x.csv:3: unknown key 'ignor'; did you mean 'ignore'"),
-        ("# decimel: comma\n", "used", "x.csv:3: unknown key 'decimel'; did you mean 'decimal'"),
-        ("# colums: strain_pct\n", "used", "x.csv:3: unknown key 'colums'; did you mean 'columns'"),
-        ("", "pressure_MPa", "x.csv:3: .* pressure .*leave it out: write '# ignore: pressure_MPa'"),
-        ("", "Pressure (furlong)", "x.csv:3: the unit 'furlong' of 'Pressure .furlong.' is not understood"),
-        (
-            "",
-            "T1_C,T2_C",
-            "x.csv:3: 'T1_C' and 'T2_C' seem to be several sensors of the temperature; name the one that",
-        ),
-        ("# ignore: T2_C\n", "T1_C,T2_C", "x.csv:4: 'T1_C' seems to be a sensor of the temperature; name it"),
-        ("# ignore: time_s, strain_pct, used\n", "used", "x.csv:4: every column is left out by ignore"),
-    ],
-)
-def test_messages_name_what_was_written(head: str, columns: str, message: str, tmp_path: Path):
-    cells = ",1" * len(columns.split(","))
-    with pytest.raises(HistoryError, match=message) as caught:
-        read(f"{HEAD}{head}time_s,strain_pct,{columns}\n0,0{cells}\n1,0.1{cells}\n", tmp_path / "x.csv")
-    assert "\n" not in str(caught.value)

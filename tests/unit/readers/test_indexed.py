@@ -76,41 +76,6 @@ def test_another_laboratory_is_a_declaration(tmp_path):
     np.testing.assert_allclose(history.outputs["strain"], [0, 0.02])
 
 
-BAD = {
-    "test twice": (INDEX + "a/1,900,25,149000,\n", CURVES, "index.csv:4: test 'a/1' already stands in line 2"),
-    "test without a name": (INDEX + ",900,25,149000,\n", CURVES, "index.csv:4: the key is empty or not printable"),
-    "test without frames": (INDEX + "a/3,900,25,149000,\n", CURVES, "index.csv:4: test 'a/3' has no frames in .*"),
-    "frames without test": (INDEX, CURVES + "b,900,25,0,0\n", "curves.csv:6: test 'b' is not in .*index.csv; add it"),
-    "no stress": (
-        INDEX.replace("stress_MPa", "weight"),
-        CURVES.replace("stress_MPa", "strain_sd_1"),
-        "index.csv:2: no l",
-    ),
-    "falling time": (INDEX, CURVES + "a/1,900,25,9,0.2\n", "curves.csv:6: time falls from 10 s to 9 s"),
-    "empty index": ("", CURVES, "index.csv: the file is empty"),
-    "no key": (INDEX.replace("key", "test"), CURVES, "index.csv:1: missing column 'key'; found: test, temperature_C"),
-    "negative stress": (INDEX.replace(",20,", ",-20,"), CURVES, "index.csv:3: 'stress_MPa' is -20; a stress must lie"),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_message_of_a_bad_table(case, tmp_path):
-    index, curves, message = BAD[case]
-    made = folder(tmp_path, {"index.csv": index, "curves.csv": curves})
-    with pytest.raises(HistoryError, match=message):
-        INDEXED_TABLE.read(made)
-
-
-def test_message_for_missing_and_extra_files(tmp_path):
-    made = folder(tmp_path, files())
-    (made / "B_creep.csv").rename(made / "C_creep.csv")
-    with pytest.raises(HistoryError, match=r"C_creep.csv: no test in .*index.csv has these frames"):
-        INDEXED_FILES.read(made)
-    (made / "C_creep.csv").unlink()
-    with pytest.raises(HistoryError, match=r"index.csv:2: test 'B' has no file B_creep.csv"):
-        INDEXED_FILES.read(made)
-
-
 def test_key_cannot_lead_out_of_the_folder(tmp_path):
     (tmp_path / "A_creep.csv").write_text("secret")
     index = "test,temperature_C,stress_MPa\nA,980,230\nB,980,140\n../A,980,1\n"

@@ -61,13 +61,6 @@ def test_equal_names_get_their_folder_in_front(tests_in_folders):
     assert names(f"{tests_in_folders}/*/*.csv", READERS) == ["one/a", "b", "two/a"]
 
 
-def test_equal_names_in_one_folder_are_refused(tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / f"{name}.csv").write_text("# name: same\n" + TEST)
-    with pytest.raises(HistoryError, match=r"two tests are called '.*/same', in .*a.csv and .*b.csv; rename one"):
-        read_histories(tmp_path, READERS)
-
-
 def test_indexed_folder_reached_by_a_pattern_over_its_files(tmp_path):
     (tmp_path / "index.csv").write_text("test,temperature_C,stress_MPa\nA,980,230\nB,980,140\n")
     for name in "AB":
@@ -79,23 +72,6 @@ def test_indexed_folder_reached_by_a_pattern_over_its_files(tmp_path):
 
 def test_general_reader_yields_to_another_one(tests_in_folders):
     assert names(tests_in_folders / "two", [*READERS, Always("lab")]) == ["lab a"]
-
-
-def test_two_readers_for_one_file_are_told(tests_in_folders):
-    with pytest.raises(HistoryError, match=r"a.csv: the readers 'lab' and 'other' both accept it; say which one"):
-        read_histories(tests_in_folders / "two", [*READERS, Always("lab"), Always("other")])
-
-
-def test_nothing_understood_nothing_found_nothing_given(tests_in_folders):
-    (tests_in_folders / "notes.txt").write_text("hello")
-    with pytest.raises(HistoryError, match=r"notes.txt: no reader understands it; known are indexed-table: a folder"):
-        read_histories(tests_in_folders / "notes.txt", READERS)
-    with pytest.raises(HistoryError, match="no reader understands it"):
-        read_histories(tests_in_folders, READERS)
-    with pytest.raises(HistoryError, match=r"nine\*.csv: no such file or folder, and no file matches it as a pattern"):
-        read_histories(tests_in_folders / "nine*.csv", READERS)
-    with pytest.raises(HistoryError, match="no file, folder or pattern was given"):
-        read_histories([], READERS)
 
 
 def test_bad_file_among_good_ones_is_named(tests_in_folders):

@@ -9,8 +9,8 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import ExportError, HistoryError, SolveError
+from creepkit.exporters.exporting import exported_text
 from creepkit.readers.reading import read_histories
-from creepkit.records import exported_text
 
 TIMES = np.linspace(100.0, 5000.0, 8)
 VALUES = {"A": 1e-14, "n": 4.0}

@@ -48,7 +48,8 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
         info = site / f"{module}-1.2.dist-info"
         info.mkdir(parents=True)
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.2\n")
-        (info / "entry_points.txt").write_text(f"[creepkit]\nmine = {module}\n")
+        groups = [plugin_sources.GROUP_PREFIX + word for word in ("laws", "specimens", "temperature_forms")]
+        (info / "entry_points.txt").write_text("".join(f"[{group}]\nmine = {module}\n" for group in groups))
         file = site / f"{module}.py"
         file.write_text(source)
         monkeypatch.syspath_prepend(site)
@@ -299,7 +300,7 @@ def test_a_wrong_installed_plugin_leaves_the_others_standing(install: Write, sou
 def test_an_unknown_law_reminds_of_broken_plugins(install: Write) -> None:
     install("wrong-pack", "1 / 0\n")
 
-    with pytest.raises(LawError, match=r"\d plugin\(s\) could not be loaded, see 'creepkit plugins'"):
+    with pytest.raises(LawError, match=r"\d plugin\(s\) could not be loaded, see 'creepkit list plugins'"):
         Registry().law("mine")
 
 
@@ -327,19 +328,90 @@ def test_a_file_that_was_mended_loads(write: Write, monkeypatch: pytest.MonkeyPa
     assert registry.law("mended").title == "A law of an outsider"
 
 
-def test_one_module_under_two_entry_points_is_told(install: Write) -> None:
-    file = install("twin-pack", LAW.format(name="twin"))
+TWO_LAWS = LAW.format(name="first").replace("[LAW]", "[LAW, LAW.rename('second')]")
+
+
+def test_a_module_with_several_laws_has_an_entry_point_for_each(install: Write) -> None:
+    file = install("twin-pack", TWO_LAWS)
     (file.parent / "twin_pack-1.2.dist-info" / "entry_points.txt").write_text(
-        "[creepkit]\nfirst = twin_pack\nsecond = twin_pack\n"
+        "[creepkit.laws]\nfirst = twin_pack\nsecond = twin_pack\n"
     )
     registry = Registry()
 
-    assert "twin" in registry.laws()
-    problems = [p.problem for p in registry.plugins() if p.provenance.name == "second"]
-    assert problems == [
-        "plugin 'second' (twin-pack 1.2) is the same module as plugin 'first' (twin-pack 1.2); "
-        "drop one of the two entry points"
-    ]
+    assert registry.law("second").name == "second"
+    assert {name: str(found.provenance) for name, found in registry.laws().items() if name in ("first", "second")} == {
+        "first": "plugin 'first' (twin-pack 1.2)",
+        "second": "plugin 'first' (twin-pack 1.2)",
+    }
+
+
+def test_a_law_without_an_entry_point_of_its_name_is_found_all_the_same(install: Write) -> None:
+    install("twin-pack", TWO_LAWS)
+
+    assert Registry().law("second").name == "second"
+
+
+def test_a_hook_without_an_entry_point_in_its_group_is_told(install: Write) -> None:
+    file = install("twin-pack", LAW.format(name="twin"))
+    (file.parent / "twin_pack-1.2.dist-info" / "entry_points.txt").write_text("[creepkit.readers]\nmine = twin_pack\n")
+
+    problem = of(Registry(), "twin-pack").problem
+    assert problem == (
+        "plugin 'mine' (twin-pack 1.2) has the hook creepkit_laws, but no entry point in the group 'creepkit.laws' "
+        "names its module; add one"
+    )
+
+
+# ---- names ---------------------------------------------------------------------------------------------------------
+
+
+def test_one_name_imports_one_module(install: Write) -> None:
+    for name in ("one-pack", "other-pack"):
+        install(name, LAW.format(name=name))
+        entry_points = Path(sys.path[0]) / f"{name.replace('-', '_')}-1.2.dist-info" / "entry_points.txt"
+        entry_points.write_text(f"[creepkit.laws]\n{name} = {name.replace('-', '_')}\n")
+
+    assert Registry().law("one-pack").name == "one-pack"
+    assert "one_pack" in sys.modules
+    assert "other_pack" not in sys.modules
+
+
+@pytest.mark.parametrize(
+    ("word", "name"),
+    [
+        ("Norton", "norton"),
+        ("strain hardening", "strain-hardening"),
+        ("Time_Hardening", "time-hardening"),
+        ("sinh", "hyperbolic-sine"),
+        ("omega", "mpc-omega"),
+    ],
+)
+def test_a_law_is_found_whatever_its_capitals_and_by_its_aliases(word: str, name: str) -> None:
+    registry = Registry()
+
+    assert registry.law(word) == registry.law(name)
+    assert word not in registry.laws()
+
+
+def test_a_sum_is_named_by_the_names_of_its_laws() -> None:
+    registry = Registry()
+
+    assert registry.law("sinh + norton") == registry.law("hyperbolic-sine") + registry.law("norton")
+
+
+def test_a_missing_law_says_that_plugins_bring_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = [one for one in plugin_sources.installed_modules() if one.is_own]
+    monkeypatch.setattr(plugin_sources, "installed_modules", lambda: own)
+
+    with pytest.raises(LawError, match=r'there is no law .*; plugins bring more: pip install "creepkit\[plugins\]"'):
+        Registry().law("kachanov-rabotnov")
+    assert Registry().law("garofalo").name == "hyperbolic-sine"
+
+
+def test_a_word_for_several_targets_is_answered_by_those_that_serve_it() -> None:
+    with pytest.raises(ExportError, match="choose one of those that serve it: abaqus, calculix, mfront"):
+        Registry().exporter("UMAT")
+    assert Registry().exporter("tex").name == "latex"
 
 
 def test_a_plugin_whose_commands_fail_is_told_and_the_others_add_theirs(write: Write) -> None:
@@ -359,17 +431,17 @@ def test_a_plugin_whose_commands_fail_is_told_and_the_others_add_theirs(write: W
 
 def test_threads_that_ask_first_wait_until_all_plugins_are_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
     waiting = threading.Barrier(4)
-    original = plugin_sources.import_entry
+    original = plugin_sources.InstalledModule.load
 
-    def slow_import(*arguments: Any) -> object:
+    def slow_import(module: Any) -> Any:
         sleep(0.02)
-        return original(*arguments)
+        return original(module)
 
     def ask(registry: Registry) -> list[str]:
         waiting.wait()
         return sorted(registry.specimens())
 
-    monkeypatch.setattr(plugin_sources, "import_entry", slow_import)
+    monkeypatch.setattr(plugin_sources.InstalledModule, "load", slow_import)
     registry = Registry()
     with ThreadPoolExecutor(4) as threads:
         answers = list(threads.map(ask, [registry] * 4))

@@ -34,13 +34,3 @@ def test_an_axis_has_a_written_label_within_three_per_cent_of_either_end(low, hi
     assert ends[1] - written.max() <= tolerance
     assert ends[0] <= np.log(low) + 1e-9
     assert ends[1] >= np.log(high) - 1e-9
-
-
-def test_a_linear_axis_ends_at_labels():
-    figure = empty_figure(4.0, 3.0)
-    axes = figure.subplots()
-    set_range(axes, "y", -3.3, 7.4)
-    labels = axes.get_yticks()
-    assert axes.get_ylim() == pytest.approx((labels[0], labels[-1]))
-    assert labels[0] <= -3.3
-    assert labels[-1] >= 7.4

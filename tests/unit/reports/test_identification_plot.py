@@ -1,7 +1,5 @@
 """The plot of an identification: its panels, labels, bands and legends, for a few tests and for 84."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
@@ -9,11 +7,9 @@ from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
-from creepkit.reports.condition_colours import MOST_GROUPS, MOST_IN_GROUP, condition_groups
 from creepkit.reports.curve_of_test import curve_of_test
 from creepkit.reports.figures import LARGEST_PIXELS, RESOLUTION
 from creepkit.reports.prediction_bands import fitted_curves
-from creepkit.specimens.uniaxial import Uniaxial
 from helpers.steady_rate_predictor import Steady, planted
 
 LAW = NORTON.times(arrhenius(T_ref=1073.15))
@@ -36,27 +32,11 @@ def many():
     return fitted([(s, T) for T in np.linspace(1023.15, 1173.15, 6) for s in np.geomspace(40, 200, 14)])
 
 
-def data_panels(figure):
-    return [axes for axes in figure.axes if axes.get_visible() and axes.lines]
-
-
 def test_a_few_tests_have_curves_residuals_and_rates_with_units(few, tmp_path):
     figure = few.plot(tmp_path / "fit.png")
     assert [axes.get_ylabel() for axes in figure.axes] == ["strain, %", "strain,\nnoise sd", "creep rate, 1/s"]
     assert [axes.get_xlabel() for axes in figure.axes] == ["time, h", "time, h", "von Mises stress, MPa"]
     assert (tmp_path / "fit.png").stat().st_size > 10_000
-
-
-def test_written_labels_do_not_overlap(few, many):
-    for fit in (few, many):
-        figure = fit.plot()
-        figure.canvas.draw()
-        for axes in data_panels(figure):
-            for axis, low, high in ((axes.xaxis, "x0", "x1"), (axes.yaxis, "y0", "y1")):
-                boxes = [label.get_window_extent() for label in axis.get_ticklabels() if label.get_text()]
-                boxes = sorted((b for b in boxes if b.width > 0), key=lambda b: getattr(b, low))
-                for before, after in pairwise(boxes):
-                    assert getattr(after, low) >= getattr(before, high), (axes.get_ylabel(), axes.get_xlabel())
 
 
 def test_bands_contain_the_curves(few):
@@ -79,14 +59,3 @@ def test_84_tests_have_a_panel_for_each_temperature_and_fit_on_a_page(many):
     assert RESOLUTION * max(figure.get_size_inches()) < LARGEST_PIXELS
     dots = [line for axes in figure.axes for line in axes.lines if line.get_marker() == "."]
     assert len(dots) == 84
-
-
-@pytest.mark.parametrize("temperatures", [1, 6, 30])
-def test_groups_hold_every_test_once_and_are_few(temperatures):
-    conditions = [(s, T) for T in 1000.0 + 20.0 * np.arange(temperatures) for s in np.geomspace(40, 200, 40)]
-    tests = planted(LAW, TRUTH, conditions, seed=0, frames=3)
-    groups = condition_groups(tests, Uniaxial())
-    assert sorted(k for _, members in groups for k in members) == list(range(len(tests)))
-    assert len(groups) <= MOST_GROUPS
-    if temperatures == 1:
-        assert max(len(members) for _, members in groups) <= MOST_IN_GROUP

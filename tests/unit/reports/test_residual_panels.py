@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,10 +11,7 @@ import pytest
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
-from creepkit.reports.curve_of_test import TestCurve
-from creepkit.reports.forecast_plot import LONGEST_AXIS, _time_end
 from creepkit.reports.judged_readings import judged_readings
-from creepkit.reports.test_figure import _end_text
 from helpers.steady_rate_predictor import Steady, planted
 
 if TYPE_CHECKING:
@@ -54,23 +50,3 @@ def test_the_scatter_between_tests_is_in_the_misfit_of_the_common_rate_alone() -
     assert 0.3 < np.median(own) < 3.0
     residuals = np.concatenate([readings.residuals(k, "strain")[1] for k in range(len(STRESSES))])
     assert np.sqrt(np.mean(residuals**2)) == pytest.approx(1.0, abs=0.35)
-
-
-def end_text(identified: list[float], half_width: list[float]) -> str:
-    hours, measured = np.arange(1.0, 4.0), np.array([1.0, 2.0, 3.0])
-    curve = TestCurve(hours, measured, np.array(identified), np.array(half_width), np.zeros(3), logarithmic=True)
-    return _end_text(curve, "%")
-
-
-def test_a_band_that_spans_decades_is_said_to_be_unbounded() -> None:
-    assert "95 % band 2.71 to 3.32" in end_text([1.0, 2.0, 3.0], [0.1, 0.1, 0.1])
-    assert "unbounded" in end_text([1.0, 2.0, 90.0], [0.1, 0.1, 50.0])
-    assert "e+" not in end_text([1.0, 2.0, 90.0], [0.1, 0.1, 50.0])
-    assert "follows 2 readings, to 2 h" in end_text([1.0, 2.0, float("nan")], [0.1, 0.1, float("nan")])
-
-
-@pytest.mark.parametrize(("high", "end"), [(991.0, 991.0), (1e6, LONGEST_AXIS * 300.0)])
-def test_the_axis_of_a_forecast_holds_the_interval_of_the_rupture_time(high: float, end: float) -> None:
-    """The interval of a strain carries the axis to 513 h, within which that of the rupture time begins."""
-    times = [SimpleNamespace(low=3600.0 * a, high=3600.0 * b) for a, b in ((341.0, high), (115.0, 513.0))]
-    assert _time_end(SimpleNamespace(times=times), 300.0) == pytest.approx(end)

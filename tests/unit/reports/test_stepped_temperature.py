@@ -9,7 +9,6 @@ from creepkit.kernels import lower
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Program, constant_stress
-from creepkit.reports.condition_colours import condition_groups
 from creepkit.reports.prediction_bands import rates_of_tests
 from creepkit.specimens.uniaxial import Uniaxial
 
@@ -42,15 +41,6 @@ def fit():
     tests = [steady_test(s, T) for T in (COLD, HOT) for s in (200.0, 230.0)]
     settings = IdentificationSettings(starts=2, sobol_points=16, frames=20)
     return identify(LAW, [*tests, stepped_test(215.0)], Uniaxial(), settings=settings)
-
-
-def test_a_test_with_a_step_is_a_group_of_its_levels(fit):
-    titles = [title for title, _ in condition_groups(fit.histories, fit.predictor)]
-    assert titles == [
-        "600 °C, 200 to 230 MPa, 2 tests",
-        "600 to 620 °C, 215 MPa, 1 test",
-        "620 °C, 200 to 230 MPa, 2 tests",
-    ]
 
 
 def test_each_hold_of_temperature_shows_the_rate_at_that_temperature(fit):

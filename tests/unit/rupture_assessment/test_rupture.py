@@ -240,22 +240,6 @@ def test_what_cannot_be_assessed_is_refused(arguments, message):
     assert "\n" not in str(error.value)
 
 
-def test_tests_that_cannot_be_assessed_are_named():
-    good = planted(larson_miller, count=20)
-    stepped = good[0].replace(name="stepped", loading=ck.StressSteps(((0.0, 50.0), (3600.0, 60.0))))
-    with pytest.raises(HistoryError, match="leave out tests with steps of load"):
-        ck.rupture([*good, stepped])
-    with pytest.raises(HistoryError, match="none of 1 tests broke"):
-        ck.rupture([ck.History("a", [1.0], {}, ck.constant_stress(10.0), 900.0, unruptured=True)])
-    with pytest.raises(FitError, match="3 tests broke, and 3 constants with a scatter take 5 or more"):
-        ck.rupture(good[:3], "larson-miller", settings=ck.RuptureSettings(degrees=(1,)))
-    with pytest.raises(HistoryError, match="2 alloys"):
-        ck.rupture([good[0].replace(alloy="A"), good[1].replace(alloy="B")])
-    labelled = good[0].replace(labels={"tensile_strength_MPa": "strong"})
-    with pytest.raises(HistoryError, match="tensile_strength_MPa is 'strong'"):
-        ck.rupture([*good, labelled])
-
-
 def test_degrees_that_few_tests_cannot_hold_are_not_offered():
     """Seven tests: four constants and the scatter leave two degrees of freedom or more, six do not."""
     assessment = ck.rupture(planted(larson_miller, count=7, seed=5), "larson-miller")

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from creepkit.errors import HistoryError
 from creepkit.screening.alloys import ATOMIC_WEIGHTS, Compositions, atomic_percent, read_compositions
 
 
@@ -46,22 +45,3 @@ def test_a_table_is_read_in_its_unit(tmp_path):
     assert weights.atomic["X"] == pytest.approx({"Ti": 50.0, "Al": 50.0}, abs=1e-2)
     shares = read_compositions(written(tmp_path, "# unit: at.%\nalloy,Ti,Al,Nb\nX,50,50,\n"))
     assert shares.atomic["X"] == {"Ti": 50.0, "Al": 50.0}
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("alloy,Fe,Ni\nX,50,50\n", "no line '# unit: ...'; write '# unit: wt.%' or '# unit: at.%' above the columns"),
-        ("# unit: percent\nalloy,Fe\nX,100\n", ":1: unit 'percent'; write '# unit: wt.%'"),
-        ("# unit: wt.%\nname,Fe\nX,100\n", ":2: missing column 'alloy'; found: name, Fe"),
-        ("# unit: wt.%\nalloy,Fe,Nickel\nX,50,50\n", "column 'Nickel' is no element that is known"),
-        ("# unit: wt.%\nalloy,Fe,Ni\nX,50,20\n", ":3: the elements of alloy 'X' add up to 70 %; they must make 100"),
-        ("# unit: wt.%\nalloy,Fe,Ni\nX,150,-50\n", ":3: alloy 'X' has a negative content"),
-        ("# unit: wt.%\nalloy,Fe,Ni\nX,60,40\nX,50,50\n", ":4: alloy 'X' stands there twice or has no name"),
-        ("# unit: wt.%\nalloy,Fe,Ni\nX,60,much\n", ":3: 'Ni' is 'much'; write a finite number"),
-    ],
-)
-def test_what_is_wrong_with_a_table_is_said_with_its_line(tmp_path, text, message):
-    with pytest.raises(HistoryError) as caught:
-        read_compositions(written(tmp_path, text))
-    assert message in str(caught.value)

@@ -168,17 +168,6 @@ def test_an_alloy_without_creep_does_not_stop_the_others(tmp_path):
         _ = found["E"].best
 
 
-def test_all_laws_failing_is_told_with_a_reason():
-    few = [h.replace(times=h.times[:2], outputs={"strain": h.outputs["strain"][:2]}) for h in bars("Z", (80.0,))]
-    found = screened([*few, *TWO[:3]], laws=["norton", "strain-hardening"])
-    assert found["X"].identified
-    assert found.failures["Z"].startswith(
-        "none of the 2 laws could be identified; norton: law 'norton' has 2 parameters"
-    )
-    with pytest.raises(FitError, match="no alloy of this plate has a law, so there is nothing to draw"):
-        screened(few).plot("pictures")
-
-
 def test_compositions_may_lie_beside_the_tests(tmp_path):
     for history in bars("X"):
         write_history(history, tmp_path / f"{history.name}.csv")

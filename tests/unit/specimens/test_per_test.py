@@ -153,19 +153,6 @@ def test_a_length_is_what_the_test_states_else_its_nuisance_else_the_default():
     np.testing.assert_allclose(changed.values, given.values, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("test", "message"),
-    [
-        (wire(diameter=20.0), "history 'wire': diameter is 20 mm; allowed is 0.1 to 10 mm"),
-        (wire(diamter=1.1), "no length of the test piece is called 'diamter'; did you mean 'diameter'"),
-        (plans(60.0)[0].replace(specimen="wire"), "specimen 'wire' is loaded by weight .N., found stress"),
-    ],
-)
-def test_a_test_that_does_not_fit_the_piece_is_refused(test, message):
-    with pytest.raises(SolveError, match=message):
-        Wire().predict(NORTON, NORTON.to_internal(TRUTH), [test])
-
-
 def test_a_diameter_is_found_as_a_nuisance_parameter():
     """Five wires drawn to 1 %: each diameter lies within three of its standard deviations."""
     rng = np.random.default_rng(5)

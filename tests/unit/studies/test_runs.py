@@ -207,12 +207,12 @@ def test_files_that_a_study_has_not_written_stay(study: Path, tmp_path: Path) ->
 
 def test_any_error_of_a_stage_leaves_the_others(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also one that is no error of creepkit's, as of a plugin."""
-    import creepkit.api.identification as api
+    import creepkit.exporters.exporting as exporting
 
     def fails(*_: Any, **__: Any) -> None:
         raise ZeroDivisionError("of a plugin")
 
-    monkeypatch.setattr(api, "exported_text", fails)
+    monkeypatch.setattr(exporting, "exported_text", fails)
     result = ck.Study.load(study).run()
     assert {one.sentence for one in result.failures} == {"ZeroDivisionError: of a plugin"}
     assert set(result.rankings) == {"A", "B"}

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from creepkit.inverse.selection.challenges import Challenge
     from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-    from creepkit.records import History
+    from creepkit.records import History, LawWithValues
 
 
 CRITERIA = ("bic", "aicc", "hold-out")
@@ -82,6 +82,12 @@ class Ranking(Presentable):
     def best(self) -> Identification:
         """The law of lowest criterion."""
         return self.laws[0].fit
+
+    @property
+    def valued(self) -> LawWithValues:
+        """The best law with its numbers, intervals, range of validity and the verdict: what every exporter takes."""
+        verdict = self.verdict if len(self.laws) > 1 else ""
+        return self.best.valued.replace(notes=tuple(self.best.comments(verdict)))
 
     @property
     def decisive(self) -> bool:

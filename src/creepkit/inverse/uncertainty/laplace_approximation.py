@@ -67,7 +67,8 @@ def restricted_covariance(
         information + 1e-9 * np.diag(np.diag(information)) + 1e-12 * np.eye(len(components))
     )
     variance_of_variance = np.einsum("pj,jk,pk->p", gradient, component_covariance, gradient)
-    freedom = 2.0 * np.diag(solution.covariance) ** 2 / np.maximum(variance_of_variance, 1e-300)
+    with np.errstate(over="ignore"):  # a variance that nothing makes uncertain has a freedom without bound
+        freedom = 2.0 * np.diag(solution.covariance) ** 2 / np.maximum(variance_of_variance, 1e-300)
     determined = (unconstrained.jacobian != 0).any(axis=(0, 1))
     if not determined[:parameter_count].any():
         return solution.covariance, MINIMUM_FREEDOM

@@ -9,8 +9,8 @@ import numpy as np
 
 from creepkit.errors import CreepkitError
 from creepkit.records.history import History
-from creepkit.records.known_specimens import loads_of
 from creepkit.records.loading import Loading, PointLoading, constant_strain, constant_stress, load_steps
+from creepkit.records.specimen_lookup import loads_of
 from creepkit.records.specimen_record import Load
 
 TYPICAL_STRESS = 100.0

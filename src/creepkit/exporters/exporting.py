@@ -1,0 +1,107 @@
+"""Exports: a law with its values as text for a target, of anything that has such a law."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from creepkit.checked_arguments import checked
+from creepkit.errors import ExportError
+from creepkit.files.writing import write_text
+from creepkit.language import CreepLaw, Elastic
+from creepkit.records import Exporter, LawWithValues, Units
+from creepkit.records.plugin_calls import call_of_plugin
+from creepkit.registry import default_registry, resolve_law
+
+
+@runtime_checkable
+class Valued(Protocol):
+    """A result that has a law with values: an identification, a ranking, a temperature law."""
+
+    @property
+    def valued(self) -> LawWithValues:
+        """The law, its values, the ranges of the tests, and as notes the intervals and the verdict."""
+        ...
+
+
+@checked
+def export(
+    source: CreepLaw | Valued | LawWithValues | str,
+    target: str | Exporter,
+    values: Mapping[str, float] | None = None,
+    *,
+    units: Units | Mapping[str, str] | None = None,
+    temperature: float | None = None,
+    name: str = "",
+    to: str | Path | None = None,
+    force: bool = False,
+) -> str:
+    """Return a law with its values as text for a target (latex, python, abaqus ...), and write it to a file if asked.
+
+    source : a law, which needs `values` {parameter: value}, or an identification or a temperature law, whose intervals
+        and range of validity become comments, or a ranking, whose best law is written with the verdict on it, or the
+        record of law_with_values(), which may have elastic constants and notes as well.
+    target : one of `available("exporters")`, or an exporter itself. units : of stress and time in the text,
+        Units("Pa", "h") or {"stress": "Pa"}.
+    temperature : K, puts a number in the place of the temperature, for targets that know none.
+    name : what the target calls the law. to, force : the file to write, and whether one that exists may be replaced.
+
+    ExportError, with the reason, when the target cannot express the law.
+    """
+    exporter = default_registry().exporter(target) if isinstance(target, str) else target
+    record = law_with_values(source, values, name=name)
+    if units is not None:
+        record = record.replace(units=_units(units))
+    if temperature is not None:
+        record = record.replace(notes=(*record.notes, f"taken at a temperature of {temperature:g} K")).at(temperature)
+    text = exported_text(exporter, record)
+    if to is not None:
+        write_text(text, Path(to), ExportError, force=force)
+    return text
+
+
+@checked
+def law_with_values(
+    source: CreepLaw | Valued | LawWithValues | str,
+    values: Mapping[str, float] | None = None,
+    *,
+    elastic: Elastic | None = None,
+    name: str = "",
+    notes: Sequence[str] = (),
+) -> LawWithValues:
+    """Return a law with its values and what goes with them into every export.
+
+    source, values, name : as export() takes them; notes say which values were set by hand in the place of others.
+    elastic : E in MPa, and nu, for targets that state them. notes : lines that become comments.
+    """
+    if isinstance(source, (str, CreepLaw)):
+        return LawWithValues(resolve_law(source), values or {}, tuple(notes), elastic=elastic, name=name)
+    given = source if isinstance(source, LawWithValues) else source.valued
+    record = given if values is None else given.replace(values=values)
+    changed = [
+        f"{parameter} = {value:.8g} was set by hand, in place of {given.values[parameter]:.8g}"
+        for parameter, value in record.values.items()
+        if value != given.values[parameter]
+    ]
+    return record.replace(
+        notes=(*given.notes, *changed, *notes), elastic=elastic or record.elastic, name=name or record.name
+    )
+
+
+def exported_text(exporter: Exporter, source: LawWithValues) -> str:
+    """The text of an exporter; ExportError where text() raises another error or returns no text."""
+    what = f"exporter '{exporter.name}': text()"
+    text = call_of_plugin(lambda: exporter.text(source), exporter, what, ExportError)
+    if not isinstance(text, str):
+        raise ExportError(f"{what} returned a {type(text).__name__}; it must return a str")
+    return text
+
+
+def _units(units: Units | Mapping[str, str]) -> Units:
+    if isinstance(units, Units):
+        return units
+    unknown = sorted({*units} - {"stress", "time"})
+    if unknown:
+        raise ExportError(f"units have no '{unknown[0]}'; write units={{'stress': 'Pa', 'time': 'h'}}")
+    return Units(**units)

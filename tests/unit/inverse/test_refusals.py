@@ -1,0 +1,139 @@
+"""What an identification and what follows from it refuse: each mistake has one sentence that names it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import CreepkitError
+from creepkit.inverse.identify import identify
+from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
+from creepkit.inverse.selection import rank
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.penalties import L2, check_penalty
+from creepkit.inverse.uncertainty.correlation import correlation
+from creepkit.inverse.uncertainty.model_averaging import ModelAverage, rate_band
+from creepkit.inverse.uncertainty.profile_likelihood import profile
+from creepkit.inverse.uncertainty.quantities import DerivedQuantity
+from creepkit.laws.norton import NORTON
+from creepkit.records import History, Nuisance, PressureJump, StressSteps, constant_stress
+from helpers.steady_rate_predictor import Steady, planted
+
+QUICK = IdentificationSettings(starts=1, sobol_points=8, frames=20)
+A, N = NORTON.params
+
+
+@pytest.fixture(scope="module")
+def tests():
+    return planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1050.0) for s in (30, 50, 80)], seed=3, noise=1e-5)
+
+
+@pytest.fixture(scope="module")
+def fit(tests):
+    return identify(NORTON, tests, Steady(), settings=QUICK)
+
+
+def settings(**changes):
+    return lambda tests, fit: IdentificationSettings(**changes)
+
+
+def nuisances(*given):
+    return settings(nuisances=given)
+
+
+def identified(law=NORTON, change=lambda tests: tests, **changes):
+    return lambda tests, fit: identify(law, change(tests), Steady(), settings=replace(QUICK, **changes))
+
+
+def rates(**further):
+    """Norton's law from minimum rates alone, with one further test."""
+    given = [stated(s) for s in (60.0, 90.0, 100.0)]
+    return lambda tests, fit: ck.identify(NORTON, [replace(stated(), **further).replace(name="odd"), *given])
+
+
+def stated(stress=80.0):
+    load = constant_stress(stress, "stress")
+    return History(f"{stress:g}", np.array([1e7]), {}, load, 1000.0, minimum_rate=1e-16 * stress**4)
+
+
+def bounded(A_bounds):
+    params = {A: replace(NORTON.params[A], bounds=A_bounds), N: replace(NORTON.params[N], bounds=(1, 5))}
+    return replace(NORTON, params=params)
+
+
+STILL = DerivedQuantity("pi", "1", "linear", lambda c: lambda u: np.full(u.shape[:-1], np.pi))
+BAR = (np.array([1.0, 10.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0)
+DIMPLES = [
+    History(name, np.array([1.0]), {}, PressureJump(1.0, 1.2, 1e4), 1000.0, "bulge", minimum_rate=1e-9)
+    for name in "abc"
+]
+
+MISTAKES = [
+    (settings(starts=0), "starts is 0"),
+    (settings(loss="cubic"), "loss 'cubic'"),
+    (settings(loss="huber", weights="likelihood"), "loss 'huber' does not go with weights 'likelihood'"),
+    (settings(weights={"amplitude": -1.0}), "weights must be numbers above zero"),
+    (settings(weights="none"), 'weights is "none"'),
+    (settings(test_loss="robust"), "test_loss 'robust' is not known"),
+    (settings(rupture_times="never"), "rupture_times 'never' is not known"),
+    (nuisances(Nuisance("offset", mean=0.01, sd=1e-3)), "about zero"),
+    (nuisances(Nuisance("thickness", sd=0.02, scope="all")), "'thickness' is a length in mm and needs its prior mean"),
+    (nuisances(Nuisance("thickness", mean=0.5, bounds=(0.6, 0.7))), "its mean 0.5 lies outside its bounds"),
+    (nuisances(Nuisance("offset"), Nuisance("offset")), "nuisance 'offset' is given twice"),
+    (nuisances(Nuisance("temperature", output="width")), "it has no output"),
+    (nuisances(Nuisance("thickness", tests=("bar_3",))), "'thickness' belongs to every test; leave out tests="),
+    (identified(change=lambda tests: []), "no histories"),
+    (identified(change=lambda tests: [tests[0], tests[0]]), "two histories are called"),
+    (identified(change=lambda tests: [tests[0].replace(used=np.zeros(40, bool))]), "fewer than two usable frames"),
+    (identified(change=lambda tests: [h.replace(outputs={"strain": 0 * h.times}) for h in tests]), "no strain"),
+    (identified(change=lambda tests: [tests[0].replace(outputs={"nonsense": tests[0].times})]), "none of the outputs"),
+    (identified(NORTON.fix(A=1e-16, n=5.0)), "no parameter left"),
+    (identified(bounded((1e-40, 1e-30))), "the bounds exclude the data"),
+    (identified(weights={"depth": 1.0}), "weights name 'depth', which is not among the outputs strain"),
+    (identified(nuisances=(Nuisance("thickness", mean=0.5, sd=0.1),)), "'thickness' means nothing to the predictor"),
+    (lambda tests, fit: fit.with_histories(tests[:1], Steady()), "not among the histories"),
+    (lambda tests, fit: ck.identify(NORTON, [History("plan", np.array([1e5]), {}, BAR[2], 1000.0)]), "'plan' has no"),
+    (rates(loading=StressSteps(((0.0, 80.0), (1e5, 100.0)))), "a load that changes from 80 to 100 MPa; give each load"),
+    (lambda tests, fit: ck.identify(NORTON, [stated()]), "has 2 parameters"),
+    (lambda tests, fit: ck.identify(NORTON, DIMPLES), "leading output is a strain; of specimen 'bulge'"),
+    (lambda tests, fit: History("bar", *BAR, rupture_time=-1.0), "a rupture time of -1 s is not a finite time"),
+    (lambda tests, fit: History("bar", *BAR, rupture_time=9.0), "a used frame at 10 s lies after the rupture at 9 s"),
+    (lambda tests, fit: History("bar", *BAR, rupture_time=10.0, unruptured=True), "keep one of them"),
+    (lambda tests, fit: rank([]), "there are no identifications to rank"),
+    (lambda tests, fit: rank([fit], "hold-up"), "rank(by='hold-up') is not known"),
+    (lambda tests, fit: ck.select([], tests, "uniaxial"), "there are no candidate laws"),
+    (lambda tests, fit: L2(-1.0), "-1"),
+    (lambda tests, fit: check_penalty(L2), "penalty is L2; write L2()"),
+    (lambda tests, fit: ParticleSwarm(particles=1), "particles is 1; allowed are whole numbers from 2 to"),
+    (lambda tests, fit: ParticleSwarm(iterations=2.5), "iterations is 2.5"),
+    (lambda tests, fit: ParticleSwarm(form="best"), "form is 'best'; allowed are constriction and inertia"),
+    (lambda tests, fit: ParticleSwarm(boundary="none"), "boundary is 'none'; allowed are absorb and reflect"),
+    (lambda tests, fit: ParticleSwarm(cognitive=2.0, social=2.0), "must be more than 4 together"),
+    (lambda tests, fit: CmaEs(population=2), "population is 2"),
+    (lambda tests, fit: CmaEs(initial_step_size=0), "initial_step_size is 0 of the width"),
+    (lambda tests, fit: correlation(fit, "raw"), "allowed are 'author' and 'conditioned'"),
+    (lambda tests, fit: profile(fit, "n", level=95), "level is 95"),
+    (lambda tests, fit: profile(fit, STILL), "pi does not depend on any parameter"),
+    (lambda tests, fit: ModelAverage((fit,), (0.5, 0.5)), "as many laws as weights"),
+    (lambda tests, fit: ModelAverage((fit,), (-1.0,)), "must not be negative"),
+    (lambda tests, fit: rate_band(fit, [40.0], 1000.0, temperature_uncertainty=-1.0), "that is not negative"),
+    (lambda tests, fit: rate_band(fit, [0.0], 1000.0), "above zero"),
+    (lambda tests, fit: fit.rupture_time(-10.0), "a stress that is not above zero"),
+]  # fmt: skip
+
+
+def test_every_mistake_is_named_in_one_sentence(tests, fit) -> None:
+    wrong = []
+    for number, (mistake, words) in enumerate(MISTAKES):
+        try:
+            mistake(tests, fit)
+        except CreepkitError as error:
+            if not re.search(re.escape(words), str(error)) or "\n" in str(error):
+                wrong.append(f"{number}: '{words}' is not in: {error}")
+        else:
+            wrong.append(f"{number}: nothing was said of '{words}'")
+    assert wrong == []
