@@ -5,7 +5,7 @@
 Headless Chromium moves the slider of the stress exponent by the pointer, a step every 16 ms. A latency begins at the
 input event and ends at the second frame after the curves were drawn, when they are on the screen; a browser at 60
 frames a second needs one to two frames, 17 to 33 ms, for that whatever a page does, and the first row is of a page
-that shows a single text. `creepkit app` has a page that answers bars, and dimples of the lengths that it was given,
+that shows a single text. `report --app` has a page that answers bars, and dimples of the lengths that it was given,
 itself while a slider moves, and asks its server for all else: "by the server" is a dimple of another thickness, whose
 reduced-order model answers and sends the deformed section as JSON. The page in one file computes all in JavaScript.
 The limit is 50 ms for the 95th percentile with the reduced-order model. Browser, server and this program share the
@@ -134,8 +134,8 @@ def main() -> None:
                 found = latencies(one, options.moves)
             median, high = np.percentile(found, (50, 95))
             answered = {
-                "empty": "nothing", "server": "`creepkit app`", "file": "page in one file",
-                "asked": "`creepkit app`, by the server",
+                "empty": "nothing", "server": "`creepkit report --app`", "file": "page in one file",
+                "asked": "`creepkit report --app`, by the server",
             }[how]  # fmt: skip
             page.row(name, answered, len(found), f"{median:.0f}", f"{high:.0f}", f"{high / LIMIT:.2f}")
     if options.write:

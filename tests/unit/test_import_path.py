@@ -180,7 +180,7 @@ def test_variables_keep_absolute_places_alone(monkeypatch: pytest.MonkeyPatch, t
 @pytest.mark.parametrize(
     ("words", "module"),
     [
-        ("-m creepkit laws", "creepkit"),
+        ("-m creepkit list laws", "creepkit"),
         ("-mcreepkit", "creepkit"),
         ("-Im creepkit", "creepkit"),
         ("-W error -X dev -m creepkit", "creepkit"),

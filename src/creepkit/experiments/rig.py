@@ -56,7 +56,11 @@ class Rig(Options, title="settings of a rig", error=FitError):
     levels: tuple[float, float] = option(MISSING, "What it can load, MPa, or a strain.", example="4:14")
     longest_hours: float = option(MISSING, "The longest test.", numbers_between(1e-9, 1e7), key="longest_h")
     temperatures: tuple[float, ...] = option(
-        MISSING, "At which tests can be made.", numbers_between(-273.15, 9726.85, above=True), **CELSIUS
+        MISSING,
+        "At which tests can be made.",
+        numbers_between(-273.15, 9726.85, above=True),
+        flag="temperature-c",
+        **CELSIUS,
     )
     dimensions: Mapping[str, tuple[float, ...]] = option(
         dict, "Test pieces that can be made, mm.", flag="dimension", example="apex_thickness=0.44,0.5,0.58"

@@ -99,7 +99,7 @@ class RuptureQuestion(Options, title="arguments of an assessment", error=FitErro
         (1e3, 1e4, 1e5), "At which strengths are stated.", numbers(0, 1e12, above=True), key="times_h"
     )
     temperatures: tuple[float, ...] | None = option(
-        None, "Of strengths; by default those of the tests.", numbers(-273.15, 1e4), **CELSIUS
+        None, "Of strengths; by default those of the tests.", numbers(-273.15, 1e4), flag="temperature-c", **CELSIUS
     )
 
 

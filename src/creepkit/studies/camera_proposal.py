@@ -161,7 +161,7 @@ def text_of_cameras(folder: Path, cameras: CameraProposal, names: Sequence[str])
 
     laws = [name for name in names if name in ck.available("laws")]
     identification = ["# The tests are not known before the frames are extracted.", "[identification]"]
-    identification += [f"laws = {quoted_list(laws)}  # creepkit laws lists all", "", "[selection]", 'by = "bic"']
+    identification += [f"laws = {quoted_list(laws)}  # creepkit list laws lists all", "", "[selection]", 'by = "bic"']
     report = ["[report]", 'file = "report.html"', "attach_MB = 3  # data files up to this size in all are put into it"]
     data = ["# [data]", CITATION_LINE]
     parts = [study_part(folder), list(cameras.lines), data, identification, report]

@@ -294,7 +294,7 @@ def _identification_part(summary: DataSummary) -> list[str]:
         lines.append("# Minimum rates of tests of unknown duration cannot judge laws that depend on strain or time.")
     elif not any(history.outputs for history in summary.tests):
         lines.append("# Without curves laws of hardening are not proposed: minimum rates do not test them.")
-    lines += ["[identification]", f"laws = {quoted_list(laws)}  # creepkit laws lists all"]
+    lines += ["[identification]", f"laws = {quoted_list(laws)}  # creepkit list laws lists all"]
     with_alpha = [name for name in laws if "alpha" in ck.law(name).names]
     if with_alpha and summary.rupture_table:
         lines.append("fix = { alpha = 0, m = 0 }  # tables do not say how damage depends on principal stress and time")

@@ -8,7 +8,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.cli.app import COMMANDS
-from creepkit.cli.options import parsed_integer, parsed_number
+from creepkit.cli.generated_options import parsed_integer, parsed_number
 from helpers.command_line import creepkit, one_line
 
 FALLING = """
@@ -66,16 +66,19 @@ def test_help_tells_every_command_in_a_line() -> None:
 
     assert result.exit_code == 0
     assert all(f"\n  {name} " in result.stdout for name in COMMANDS)
-    assert "..." not in result.stdout.split("Commands:")[1]
+    assert "..." not in result.stdout.split("Begin:")[1]
 
 
-@pytest.mark.parametrize("words", [(), ("no-such-command",), ("laws", "--no-such"), ("check",), ("new-law", "Bad!")])
+@pytest.mark.parametrize(
+    "words", [(), ("no-such-command",), ("list", "laws", "--no-such"), ("check",), ("new", "law", "Bad!")]
+)
 def test_wrong_usage_exits_2(words: tuple[str, ...]) -> None:
     assert creepkit(*words).exit_code == 2
 
 
 def test_a_misspelt_command_is_suggested() -> None:
-    assert "Did you mean 'plugins'?" in creepkit("plugin").stderr
+    assert "did you mean 'report'" in creepkit("reprot").stderr
+    assert "Usage: creepkit fit" in creepkit("fit", "--help").stdout
 
 
 def test_version() -> None:
@@ -83,7 +86,7 @@ def test_version() -> None:
 
 
 def test_debug_lets_the_traceback_through() -> None:
-    quiet, loud = creepkit("laws", "nortn"), creepkit("--debug", "laws", "nortn")
+    quiet, loud = creepkit("list", "laws", "nortn"), creepkit("--debug", "list", "laws", "nortn")
 
     assert "did you mean 'norton'?" in one_line(quiet)
     assert loud.exit_code == 1
@@ -94,7 +97,7 @@ def test_debug_lets_the_traceback_through() -> None:
 
 
 def test_laws_are_listed_with_their_parameters() -> None:
-    result = creepkit("laws")
+    result = creepkit("list", "laws")
 
     assert result.exit_code == 0
     assert "norton" in result.stdout
@@ -102,7 +105,7 @@ def test_laws_are_listed_with_their_parameters() -> None:
 
 
 def test_laws_as_json_hold_what_table_1_says() -> None:
-    laws = {law["name"]: law for law in json.loads(creepkit("laws", "--json").stdout)}
+    laws = {law["name"]: law for law in json.loads(creepkit("list", "laws", "--json").stdout)}
 
     m = laws["strain-hardening"]["parameters"]["m"]
     assert (m["bounds"], m["off"]) == ([-1, 0], 0)
@@ -111,12 +114,12 @@ def test_laws_as_json_hold_what_table_1_says() -> None:
 
 
 def test_one_law_in_full() -> None:
-    shown = creepkit("laws", "norton").stdout
+    shown = creepkit("list", "laws", "norton").stdout
 
     assert "A*stress**n" in shown
     assert r"A \sigma_e^{n}" in shown
     assert "Norton (1929)" in shown
-    assert json.loads(creepkit("laws", "norton", "--json").stdout)["terms"] == {"power law": "A*stress**n"}
+    assert json.loads(creepkit("list", "laws", "norton", "--json").stdout)["terms"] == {"power law": "A*stress**n"}
 
 
 # ---- plugins -------------------------------------------------------------------------------------------------------
@@ -125,7 +128,7 @@ def test_one_law_in_full() -> None:
 def test_a_plugin_file_joins_the_laws() -> None:
     Path("mine.py").write_text(FALLING)
 
-    result = creepkit("--plugin", "mine.py", "laws", "falling")
+    result = creepkit("--plugin", "mine.py", "list", "laws", "falling")
 
     assert result.exit_code == 0
     assert f"from plugin 'mine' ({Path('mine.py').resolve()})" in result.stdout
@@ -134,7 +137,7 @@ def test_a_plugin_file_joins_the_laws() -> None:
 def test_a_state_as_json_says_where_the_material_ends() -> None:
     Path("brittle.py").write_text(BRITTLE)
 
-    law = json.loads(creepkit("--plugin", "brittle.py", "laws", "brittle", "--json").stdout)
+    law = json.loads(creepkit("--plugin", "brittle.py", "list", "laws", "brittle", "--json").stdout)
 
     rate = "A*stress/(1 - w)"
     assert law["states"] == {"w": {"meaning": "damage", "unit": "1", "rate": rate, "initial": 0.0, "limit": 0.9}}
@@ -143,8 +146,8 @@ def test_a_state_as_json_says_where_the_material_ends() -> None:
 def test_a_plugin_file_that_is_asked_for_must_work() -> None:
     Path("mine.py").write_text("A = (\n")
 
-    assert f"({Path('mine.py').resolve()}, line 1)" in one_line(creepkit("--plugin", "mine.py", "laws"))
-    assert "plugin file none.py does not exist" in one_line(creepkit("--plugin", "none.py", "laws"))
+    assert f"({Path('mine.py').resolve()}, line 1)" in one_line(creepkit("--plugin", "mine.py", "list", "laws"))
+    assert "plugin file none.py does not exist" in one_line(creepkit("--plugin", "none.py", "list", "laws"))
 
 
 def test_plugins_are_listed_broken_ones_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -153,7 +156,7 @@ def test_plugins_are_listed_broken_ones_with_the_reason(monkeypatch: pytest.Monk
     Path("bad.py").write_text("1 / 0\n")
     monkeypatch.setenv("CREEPKIT_PLUGINS", os.pathsep.join(["good.py", "twin.py", "bad.py"]))
 
-    text, answer = creepkit("plugins"), json.loads(creepkit("plugins", "--json").stdout)
+    text, answer = creepkit("list", "plugins"), json.loads(creepkit("list", "plugins", "--json").stdout)
 
     by_name = {plugin["name"]: plugin for plugin in answer["plugins"]}
     assert by_name["norton"]["offers"] == {"law": ["norton"]}
@@ -268,12 +271,12 @@ def test_a_bar_with_a_modulus_has_its_elastic_strain() -> None:
 
 
 def test_specimens_are_listed_with_their_outputs() -> None:
-    listed = {one["name"]: one for one in json.loads(creepkit("specimens", "--json").stdout)}
+    listed = {one["name"]: one for one in json.loads(creepkit("list", "specimens", "--json").stdout)}
 
     assert {"uniaxial", "relaxation", "point", "bulge"} <= listed.keys()
     assert listed["relaxation"]["outputs"] == ["stress"]
     assert listed["relaxation"]["nuisances"] == ["temperature", "modulus"]
-    assert "strain strain_11" in creepkit("specimens").stdout
+    assert "strain strain_11" in creepkit("list", "specimens").stdout
 
 
 def test_a_bar_relaxes() -> None:
