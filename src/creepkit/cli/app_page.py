@@ -1,4 +1,4 @@
-"""`creepkit app`: an interactive page of a law, an identification or a ranking, served on this machine alone."""
+"""`creepkit app`: an interactive page of a law, an identification or a ranking, as one file."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit import limits
 from creepkit.cli.declared_options import OutputPath
 from creepkit.cli.options import is_file_name, is_law_name
-from creepkit.reports.terminal import tell, tell_written
+from creepkit.reports.terminal import tell_written
 
 if TYPE_CHECKING:
-    from creepkit.app.contents import PageContents, PageSource
+    from creepkit.app.contents import PageSource
     from creepkit.records import History
 
 
@@ -23,28 +22,26 @@ def command(
         typer.Argument(metavar="[LAW|FIT.json|TESTS]...", help="A law, an identification or a ranking, and tests."),
     ] = None,
     specimen: Annotated[str | None, typer.Option(help="Which is shown first; by default that of the tests.")] = None,
-    surrogate: Annotated[Path | None, typer.Option(help="A trained network, for while a slider moves.")] = None,
-    to: Annotated[
-        Path | None, typer.Option(help="Write the page as one file, and serve nothing."), OutputPath()
-    ] = None,
-    port: Annotated[int, typer.Option(help="Of the server; 0 takes any that is free."), limits.PORT] = 0,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Whether to open a browser.")] = True,
+    to: Annotated[Path, typer.Option(help="The page, one file of HTML."), OutputPath()] = Path("page.html"),
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Whether to open it, from a terminal.")
+    ] = True,
 ) -> None:
     """Explore a law by sliders in a browser page.
 
-    Measured tests are laid over. The page is served on this machine alone until Ctrl-C, or written as one file.
+    Measured tests are laid over. The page is one file that computes by itself.
     """
-    import creepkit as ck
+    import sys
+    import webbrowser
+
     from creepkit.api.pages import write_page
     from creepkit.app.contents import page_contents
 
     source, tests = _resolved(sources or [])
-    network = None if surrogate is None else ck.surrogate(surrogate)
-    contents = page_contents(source, tests, specimen=specimen, surrogate=network)
-    if to is not None:
-        tell_written(write_page(contents, to))
-        return
-    _serve(contents, port, browser)
+    path = write_page(page_contents(source, tests, specimen=specimen), to)
+    tell_written(path)
+    if browser and sys.stdout.isatty():
+        webbrowser.open(path.resolve().as_uri())
 
 
 def _resolved(words: list[str]) -> tuple[PageSource, list[History]]:
@@ -99,30 +96,3 @@ def _tests(words: list[str]) -> list[History]:
                     "'creepkit identify' or 'creepkit export' wrote, or study.results/identified/ranking.json"
                 ) from None
     return list(ck.read_histories(words)) if words else []
-
-
-def _serve(contents: PageContents, port: int, browser: bool) -> None:
-    import sys
-    import threading
-    from contextlib import nullcontext
-
-    from creepkit.app.server import PageServer
-    from creepkit.cli.browser_page import browser_at
-    from creepkit.errors import FitError
-
-    try:
-        server = PageServer(contents, port)
-    except OSError as error:
-        raise FitError(f"--port {port} cannot be used: {error.strerror}; give another, or 0 for any") from None
-    with server:
-        threading.Thread(target=server.answers.prepare, daemon=True).start()
-        try:
-            tell("Ctrl-C ends it", err=True)
-            tell(f"the page: {server.url}")
-            sys.stdout.flush()
-            with browser_at(server.url) if browser else nullcontext(True) as opened:
-                if not opened:
-                    tell("no private page for the browser can be written: open the address yourself", err=True)
-                server.serve_forever()
-        except KeyboardInterrupt:
-            tell("ended", err=True)
