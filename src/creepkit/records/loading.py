@@ -86,11 +86,9 @@ class Loading(Protocol):
     @property
     def quantity(self) -> Quantity:
         """What is prescribed."""
-        ...
 
     def program(self) -> Program:
         """The prescribed quantity over time: MPa, or a strain."""
-        ...
 
 
 @checked
