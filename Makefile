@@ -39,7 +39,7 @@ test: core
 	$(BIN)/ruff format --check
 	$(BIN)/lint-imports --no-logo
 	@mkdir -p build; $(BIN)/mypy >build/types 2>&1 & types=$$!; \
-	$(BIN)/pytest -q -n 2 --dist loadgroup $(PYTEST_OPTIONS); \
+	$(BIN)/pytest -q -n 2 --dist loadfile $(PYTEST_OPTIONS); \
 	wait $$types || { cat build/types; exit 1; }; cat build/types
 
 nightly:

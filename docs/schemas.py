@@ -25,7 +25,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.language import CreepLaw, law_codec
 from creepkit.rupture_assessment import assessment_document
 from creepkit.rupture_assessment.assessment import RuptureAssessment
-from creepkit.studies.model import StudyModel
+from creepkit.studies.tables import StudyTables
 
 FOLDER = Path(__file__).parent / "reference" / "schemas"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -166,7 +166,7 @@ def schemas() -> dict[str, dict[str, Any]]:
     """{name of the file: schema}."""
     study = {
         "$schema": DIALECT,
-        **StudyModel.model_json_schema(schema_generator=StudySchema),
+        **StudyTables.model_json_schema(schema_generator=StudySchema),
         "title": "a study file, as TOML",
     }
     identification = document_schema(

@@ -113,6 +113,3 @@ STRAIN = numbers(0, 100, above=True)
 POISSON = numbers(-1, 0.5, above=True)
 ENERGY = numbers(0, 1e9)
 """J/mol."""
-
-
-PORT = Limits(0, 65535)

@@ -87,6 +87,7 @@ BENCHMARKS = {
         "gfortran, gcc, g++, node, Chromium and playwright; root, for all caches",
         short=("--short", "--jobs", "2"),
     ),
+    "mutations": Benchmark(90, (("build/mutations.jsonl",),), "g++"),
 }
 """{name of the program: what it costs and how it is run}."""
 

@@ -260,7 +260,7 @@ def probed(root: Path, package: str, mutations: list[Mutation], folder: Path) ->
     for kind, *values in map(json.loads, log.read_text().splitlines()):
         if kind == "passed":
             durations[values[0]] = values[1]
-        else:
+        elif kind == "entered":
             entered.setdefault(values[0], set()).add(values[1])
     return durations, entered
 
@@ -299,8 +299,10 @@ def _log(*row: object) -> None:
 
 
 def pytest_runtest_logreport(report: object) -> None:
-    """Log the seconds of a test that passes."""
-    if "MUTATIONS_LOG" in os.environ and report.when == "call" and report.passed:
+    """Log the seconds of a test that passes, or which test fails."""
+    if "MUTATIONS_LOG" in os.environ and report.failed:
+        _log("failed", report.nodeid)
+    elif "MUTATIONS_LOG" in os.environ and report.when == "call" and report.passed:
         _log("passed", report.nodeid, report.duration)
 
 
@@ -325,17 +327,22 @@ def selected(durations: dict[str, float], tests: set[str], limit: float) -> list
     return chosen
 
 
-def verdict(root: Path, mutation: Mutation, tests: list[str], seconds: float, folder: Path) -> str:
-    """Whether the tests kill a mutation: killed, killed by the limit of time, not compiled, not entered or survived."""
+def verdict(root: Path, mutation: Mutation, tests: list[str], seconds: float, folder: Path) -> tuple[str, str]:
+    """Whether the tests kill a mutation, and which of them does, if one.
+
+    The first is: killed, killed by the limit of time, not compiled, not entered or survived.
+    """
     if not tests:
-        return "not entered"
-    path, listed = root / mutation.path, folder / "tests.json"
+        return "not entered", ""
+    path, listed, log = root / mutation.path, folder / "tests.json", folder / "mutant.log"
     listed.write_text(json.dumps(tests))
+    log.write_text("")
     cache = folder / "cache" / ("mutant" if mutation.package == "kernels" else mutation.package)
     if mutation.package == "kernels":
         shutil.rmtree(cache, ignore_errors=True)
     environment = {
-        "MUTATIONS_TESTS": str(listed), "CREEPKIT_CACHE": str(cache), "PYTHONDONTWRITEBYTECODE": "1",
+        "MUTATIONS_TESTS": str(listed), "MUTATIONS_LOG": str(log), "CREEPKIT_CACHE": str(cache),
+        "PYTHONDONTWRITEBYTECODE": "1",
     }  # fmt: skip
     status = path.stat()
     original = mutation.apply(root)
@@ -343,14 +350,16 @@ def verdict(root: Path, mutation: Mutation, tests: list[str], seconds: float, fo
         if mutation.package == "core":
             environment["CREEPKIT_CORE"] = str(folder / "libcreepkit_core.so")
             if not compiled_core(root, folder / "libcreepkit_core.so"):
-                return "not compiled"
+                return "not compiled", ""
         files = sorted({name.partition("::")[0] for name in tests})
         code = tests_run(root, files, seconds, environment, "-x")
     finally:
         path.write_text(original, encoding="utf-8")
         if mutation.package != "core":  # what was compiled of it is older than the file again
             os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
-    return "killed by the limit of time" if code is None else "survived" if code in (0, 5) else "killed"
+    failed = [values[0] for kind, *values in map(json.loads, log.read_text().splitlines()) if kind == "failed"]
+    result = "killed by the limit of time" if code is None else "survived" if code in (0, 5) else "killed"
+    return result, failed[0] if failed else ""
 
 
 def main() -> None:
@@ -374,22 +383,27 @@ def main() -> None:
                 tests = durations.keys() if package == "core" else entered.get(number, set())
                 chosen, start = selected(durations, set(tests), options.limit), time.monotonic()
                 seconds = 60 + 3 * sum(durations[name] for name in chosen)
-                result = verdict(root, mutation, chosen, seconds, folder)
-                row = {"mutation": asdict(mutation), "verdict": result, "tests": len(chosen)}
+                result, killer = verdict(root, mutation, chosen, seconds, folder)
+                row = {"mutation": asdict(mutation), "verdict": result, "tests": len(chosen), "killer": killer}
                 with options.results.open("a") as file:
                     file.write(json.dumps({**row, "seconds": round(time.monotonic() - start, 1)}) + "\n")
                 measured.progress(f"{mutation.key}: {result}")
-    _print_shares(options.results)
+    page = shares(options.results)
+    if options.write:
+        page.write()
 
 
-def _print_shares(results: Path) -> None:
-    """The table: mutations of each package, and the share that tests kill."""
+def shares(results: Path) -> measured.Page:
+    """The table: errors of each package, and how many of them make a test fail."""
     rows = [json.loads(line) for line in results.read_text().splitlines()]
-    print("| package | errors | killed |", "|-|-|-|", sep="\n")
+    page = measured.Page("mutations", __doc__)
+    page.table("package", "errors", "noticed", "in functions that no test enters")
     for package in SHARES:
         of_package = [row["verdict"] for row in rows if row["mutation"]["package"] == package]
         tried = [result for result in of_package if result != "not compiled"]
-        print(f"| {package} | {len(tried)} | {sum(result.startswith('killed') for result in tried)} |")
+        noticed = sum(result.startswith("killed") for result in tried)
+        page.row(package, len(tried), noticed, tried.count("not entered"))
+    return page
 
 
 if __name__ == "__main__":

@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +26,9 @@ import numpy as np
 from measured import Page, arguments
 
 import creepkit as ck
-from creepkit.app.contents import PageContents, page_contents
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from helpers.browser import Tab, browser, tab
-from helpers.http_requests import serving
 
 LIMIT = 50.0
 """ms, of the 95th percentile."""
@@ -46,36 +44,23 @@ document.querySelector("input").addEventListener("input", (event) => {
 </script>"""
 
 
-def bars() -> PageContents:
-    """Nine measured bars under an identified law."""
-    tests = ck.read_histories(ck.example_data("planted creep curves"))
-    return page_contents("norton", tests)
-
-
-def dimple() -> PageContents:
-    """A planned bulge test, with its deformed section."""
-    return page_contents("norton", specimen="bulge")
-
-
-def measured_dimple() -> PageContents:
-    """A measured bulge test of three outputs."""
-    return page_contents("norton", ck.read_histories(ck.example_data("planted bulge test")))
-
-
-CASES: dict[str, Callable[[], PageContents]] = {
-    "a planned bar": lambda: page_contents("norton"),
-    "nine measured bars": bars,
-    "a planned bulge test": dimple,
-    "a measured bulge test": measured_dimple,
+BARS, DIMPLE = "planted creep curves", "planted bulge test"
+CASES: dict[str, tuple[str, str | None, str | None]] = {
+    "a planned bar": ("norton", None, None),
+    "a planned bar, law with damage": ("kachanov-rabotnov", None, None),
+    "nine measured bars": ("norton", None, BARS),
+    "nine measured bars, law of four terms": ("theta-projection", None, BARS),
+    "a planned bulge test": ("norton", "bulge", None),
+    "a planned bulge test, law with damage": ("kachanov-rabotnov", "bulge", None),
+    "a measured bulge test": ("norton", None, DIMPLE),
+    "a measured bulge test, hyperbolic sine": ("hyperbolic-sine", None, DIMPLE),
 }
-
-
-OTHER_THICKNESS = "a planned bulge test, 0.48 mm thick"
+"""{page: law, specimen of the planned test, example data of measured tests}."""
 
 
 def latencies(one: Tab, moves: int) -> list[float]:
     """ms, of each answer that was drawn while the slider moved to and fro about its first place."""
-    slider = one.page.get_by_role("slider", name="n", exact=True)
+    slider = one.page.get_by_role("slider").nth(1)  # an exponent, of most laws
     frame = slider.bounding_box()
     middle, height = frame["x"] + frame["width"] / 2, frame["y"] + frame["height"] / 2
     one.page.mouse.move(middle, height)
@@ -91,31 +76,21 @@ def latencies(one: Tab, moves: int) -> list[float]:
 
 
 @contextmanager
-def opened(chromium: Any, name: str, how: str, folder: Path) -> Iterator[Tab]:
+def opened(chromium: Any, name: str, folder: Path) -> Iterator[Tab]:
     """The page of a case, ready."""
-    with ExitStack() as stack:
-        one = stack.enter_context(tab(chromium, viewport={"width": 1400, "height": 900}))
-        if how == "empty":
-            (folder / "empty.html").write_text(EMPTY, encoding="utf-8")
-            one.page.goto((folder / "empty.html").as_uri())
-        elif how in ("server", "asked"):
-            server = stack.enter_context(serving(dimple() if how == "asked" else CASES[name]()))
-            server.answers.prepare()
-            one.open(server.url)
-            if how == "asked":
-                one.page.evaluate("document.querySelector('details').open = true")
-                one.type("apex thickness, mm", "0.48")
+    path = folder / "page.html"
+    with tab(chromium, viewport={"width": 1400, "height": 900}) as one:
+        if name not in CASES:
+            path.write_text(EMPTY, encoding="utf-8")
+            one.page.goto(path.as_uri())
         else:
-            contents = CASES[name]()
-            path = ck.interactive_page(
-                contents.laws[0].law, folder / f"{name}.html", tests=contents.histories,
-                specimen=contents.specimens[0].name,
-            )  # fmt: skip
-            one.open(path.as_uri())
+            law, specimen, data = CASES[name]
+            tests = ck.read_histories(ck.example_data(data)) if data else []
+            one.open(ck.interactive_page(law, path, tests=tests, specimen=specimen, force=True).as_uri())
         latencies(one, 40)  # what is compiled at first
         yield one
         if one.problems:
-            raise RuntimeError(f"{name}, {how}: {one.problems}")
+            raise RuntimeError(f"{name}: {one.problems}")
 
 
 def main() -> None:
@@ -123,14 +98,10 @@ def main() -> None:
     parser.add_argument("--moves", type=int, default=MOVES, help="steps of the pointer in each case")
     options = parser.parse_args()
     page = Page("page_latency", __doc__)
-    page.table(
-        "page", "answered by", "answers drawn", "median, ms", "95th percentile, ms", "95th percentile over limit"
-    )
-    cases = [("a text alone", "empty"), *((name, how) for name in CASES for how in ("server", "file"))]
-    cases.append((OTHER_THICKNESS, "asked"))
+    page.table("page", "answers drawn", "median, ms", "95th percentile, ms", "95th percentile over limit")
     with browser() as chromium, tempfile.TemporaryDirectory() as folder:
-        for name, how in cases:
-            with opened(chromium, name, how, Path(folder)) as one:
+        for name in ("a text alone", *CASES):
+            with opened(chromium, name, Path(folder)) as one:
                 found = latencies(one, options.moves)
             median, high = np.percentile(found, (50, 95))
             answered = {

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import creepkit as ck
-from creepkit.app.model_data import law_data
+from creepkit.app.documents import law_data
 from creepkit.app.runtime_files import runtime_script
 from creepkit.errors import SolveError
 from creepkit.kernels.log_form import log_form

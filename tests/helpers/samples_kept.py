@@ -22,11 +22,11 @@ from creepkit.rupture_assessment.assessment_document import read_assessment
 from creepkit.screening.files import read_result, write_result
 from creepkit.screening.results import AlloyResult, WeightedLaw
 from creepkit.studies.carried_study import study_of_report
-from creepkit.studies.documents import ResultFolder
 from creepkit.studies.execution import Execution
-from creepkit.studies.law_stages import numbers_of_ranking
+from creepkit.studies.kept_results import ResultFolder
 from creepkit.studies.lock import STUDY_LOCK, read_lock
 from creepkit.studies.stage import Stage
+from creepkit.studies.stages import numbers_of_ranking
 from creepkit.surrogates.loading import load_surrogate
 from helpers.paths import ROOT
 from helpers.reader_samples import ReaderSample
@@ -40,11 +40,10 @@ HASH = "0123456789abcdef" * 4
 
 def lock() -> dict[str, Any]:
     """A study.lock of one stage, the parts as a run writes them."""
-    stage = {"key": HASH[:16], "state": "done", "numbers": {"weights": {"norton": 1.0}}, "sha256": HASH[:16]}
+    stage = {"key": HASH[:16], "state": "done", "numbers": {"weights": {"norton": 1.0}}}
     return {
         **STUDY_LOCK.heading,
         "study": HASH,
-        "seed": 0,
         "versions": {"python": "3.11.7", "creepkit": "0.1.0", "numpy": "2.4.6"},
         "inputs": {"data/a.csv": HASH, "data/b.csv": HASH},
         "declared": {"study": {"title": "planted", "seed": 0}, "forecast": []},
@@ -76,7 +75,7 @@ class StageResult:
         ranking = ck.rank([read_identification(FORMATS / "identification.json").with_histories(self.tests)])
         with tempfile.TemporaryDirectory() as name:
             folder = ResultFolder(Path(name))
-            Execution(folder, self.tests).run([self._making(ranking)], ["identification"])
+            Execution(folder, histories=self.tests).run([self._making(ranking)], ["identification"])
             return folder.path("identification").read_bytes()
 
     def __call__(self, path: Path) -> Ranking:
@@ -87,7 +86,7 @@ class StageResult:
 
         folder = ResultFolder(path.parent)
         write_bytes(path.read_bytes(), folder.path("identification"), StudyError, force=True)
-        run = Execution(folder, self.tests)
+        run = Execution(folder, histories=self.tests)
         run.run([self._making(made_again)], ["identification"])
         if run.failures:
             raise StudyError(run.failures[0].sentence)
@@ -97,7 +96,7 @@ class StageResult:
     def _making(self, made: Any) -> Stage:
         make = made if callable(made) else lambda results, tick: made
         settings = {"laws": ["norton"]}
-        return Stage("identification", "identification", "", settings, make, numbers_of_ranking, record=Ranking)
+        return Stage("identification", "identification", "", settings, make, Ranking, numbers_of_ranking)
 
 
 def read_header(path: Path) -> Any:
@@ -126,7 +125,7 @@ def run_report(path: Path) -> Any:
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         study = study_of_report(path, Path(folder) / "study")
         lock_path = Path(folder) / "study" / "study.lock"
-        return study.file.model, read_lock(lock_path) if lock_path.exists() else None
+        return study.file.model, read_lock(lock_path)
 
 
 def samples() -> Iterator[ReaderSample]:
@@ -145,7 +144,7 @@ def samples() -> Iterator[ReaderSample]:
     yield document("alloy result", "x.json", alloy, read_result, '"laws" "verdict" "weight"')
     stage = StageResult()
     yield document("stage result", "x.json", stage.content(), stage, '"weight" "stage"')
-    yield document("study lock", "study.lock", json_text(lock()).encode(), read_lock, '"versions" "stages" "seed"')
+    yield document("study lock", "study.lock", json_text(lock()).encode(), read_lock, '"versions" "stages" "study"')
     files = {"study.toml": STUDY.encode(), "study.lock": json_text(lock()).encode(), "inputs/a.csv": CREEP.encode()}
     yield document("report of a run", "x.html", report(files), run_report, '"files" "sha256" data-number')
 

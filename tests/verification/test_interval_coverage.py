@@ -1,6 +1,7 @@
 """Stated 95 % intervals cover planted values about 95 times in 100, under scatter that real tests have."""
 
 import numpy as np
+import pytest
 
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
@@ -12,6 +13,7 @@ from helpers.steady_rate_predictor import Steady, planted
 REPEATS = 100
 
 
+@pytest.mark.nightly
 def test_coverage_with_test_to_test_scatter_and_offsets():
     """100 campaigns of nine tests; the share covered has a standard error of 2.2 %, so 0.88 to 1 is three of them.
 

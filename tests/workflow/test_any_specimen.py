@@ -61,6 +61,7 @@ def test_samples_of_a_cantilever_are_its_closed_form(beams):
     assert set(str(beams).split()) >= {"force_1", "N", "height", "mm", "deflection"}
 
 
+@pytest.mark.nightly
 def test_a_network_of_the_cantilever_identifies_a_planted_law(beams):
     training = Training(epochs=60, batch=32, rate=1e-2, schedule="cosine", clip=1.0)
     recipe = ck.ParameterGru(16, 1, base="reference-stress", inputs=("load", "mean_load"), training=training)

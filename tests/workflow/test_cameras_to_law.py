@@ -149,6 +149,7 @@ def states(result):
     return {one.name: one.state for one in result.stages}
 
 
+@pytest.mark.nightly
 def test_a_study_goes_from_frames_and_a_record_to_a_law_and_to_its_report(laboratory, tmp_path):
     for name in ("frames", "times.csv", "record.csv"):
         (tmp_path / name).symlink_to(laboratory / name)

@@ -6,6 +6,7 @@ import re
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -124,3 +125,29 @@ def test_the_virtual_bulge_test_is_what_its_script_makes(tmp_path):
     for name, noise in (("amplitude", 1.5e-3), ("width", 0.02), ("shape", 0.02)):
         assert made.outputs[name] == pytest.approx(shipped.outputs[name], abs=noise / 3)
     assert (tmp_path / "truth.json").read_text() == (PLANTED_BULGE / "truth.json").read_text()
+
+
+def test_a_cut_forgets_how_every_test_ended():
+    """A stopped test that never came to the strain of the cut must not be the only one judged by its end."""
+    from creepkit.cli.identify import _truncate_at_strain
+
+    times = np.linspace(3600, 36000, 5)
+    tests = [
+        ck.History(
+            name=name,
+            times=times,
+            outputs={"strain": np.linspace(0.01, end, 5)},
+            loading=ck.constant_stress(100),
+            temperature=1000.0,
+            unruptured=True,
+        )
+        for name, end in (("far", 0.1), ("near", 0.03))
+    ]
+    assert [(h.rupture_time, h.unruptured) for h in _truncate_at_strain(tests, 0.05)] == [(None, False)] * 2
+
+
+def test_laws_are_ranked_by_likelihood_and_further_tests_are_told(tmp_path):
+    words = ("--law", "norton", "--law", "hyperbolic-sine", "--further-tests", "--starts", 1, "--no-sums")
+    result = creepkit("identify", *CURVES[:3], *words, "--to", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "BIC - best" in result.stdout

@@ -15,6 +15,8 @@ from creepkit.cli.demo import PLANTED_BULGE
 from helpers.planted_datasets import bars
 from helpers.running_programs import running
 
+pytestmark = pytest.mark.nightly
+
 HEEDING = (
     "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
     "for name in {'SIGTERM', 'SIGHUP'} & set(dir(signal)): signal.signal(getattr(signal, name), signal.SIG_DFL)\n"

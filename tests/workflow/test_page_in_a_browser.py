@@ -10,13 +10,8 @@ import pytest
 import creepkit as ck
 from creepkit.app.contents import page_contents
 from creepkit.app.page import page_fragment
-from creepkit.surrogates.parameter_gru import ParameterGru
-from creepkit.surrogates.recipe import Training
-from creepkit.surrogates.training import train
 from helpers.browser import browser, tab
 from helpers.command_line import creepkit
-from helpers.http_requests import serving
-from helpers.planted_datasets import bars
 
 A, N = 1e-16, 4.5
 HOSTILE = "</script><img src=x onerror='window.harmed=1'><script>window.harmed=1</script>"
@@ -92,11 +87,11 @@ def test_a_page_in_one_file_follows_its_sliders(chromium, tmp_path):
         assert all(url.startswith("file://") for url in one.requested)
 
 
-def test_a_page_of_the_server_follows_its_sliders(chromium):
-    with serving(page_contents("norton")) as server, tab(chromium) as one:
-        one.open(server.url)
+def test_steps_of_the_load_are_those_of_the_specimen(chromium, tmp_path):
+    path = ck.interactive_page("norton", tmp_path / "page.html")
+    with tab(chromium) as one:
+        one.open(path.as_uri())
         settings_of_a_law(one)
-        assert shown_end(one.page) == pytest.approx(norton_strain(4.5, 100.0, 72000.0), rel=1e-3)
         one.page.get_by_role("button", name="Add a step").click()
         one.type("step 2 begins at, h", "10")
         one.type("stress, step 2, MPa", "120")
@@ -106,20 +101,6 @@ def test_a_page_of_the_server_follows_its_sliders(chromium):
         )  # fmt: skip
         assert shown_end(one.page) == pytest.approx(float(both.outputs["strain"][-1]), rel=1e-3)
         assert one.problems == []
-        assert all(url.startswith(f"http://127.0.0.1:{server.server_address[1]}/") for url in one.requested)
-        refused = one.page.goto(server.url.replace(server.token, "x" * len(server.token)))
-        assert refused.status == 403
-
-
-def test_what_the_server_refuses_is_said_on_the_page(chromium):
-    with serving(page_contents("norton")) as server, tab(chromium) as one:
-        one.open(server.url)
-        server.shutdown()
-        server.server_close()
-        one.page.context.set_offline(True)
-        one.page.get_by_role("textbox", name="n", exact=True).fill("5")
-        one.page.get_by_role("alert").wait_for()
-        assert "does not answer" in one.page.get_by_role("alert").inner_text()
 
 
 def test_measured_tests_and_the_optimum(chromium, fit, histories, tmp_path):
@@ -179,16 +160,14 @@ def hostile_law():
 def test_names_are_text(chromium, histories, tmp_path):
     tests = [h.replace(name=HOSTILE) for h in histories[:1]]
     path = ck.interactive_page(hostile_law(), tmp_path / "page.html", tests=tests, title=HOSTILE)
-    with serving(page_contents(hostile_law(), tests, title=HOSTILE)) as server:
-        for url in (path.as_uri(), server.url):
-            with tab(chromium) as one:
-                one.open(url)
-                assert one.page.evaluate("window.harmed") is None
-                assert HOSTILE in one.page.title()
-                assert one.page.locator("h2").inner_text() == HOSTILE
-                assert one.page.get_by_text(HOSTILE).count() >= 3
-                assert one.page.locator("img").count() == 0
-                assert one.problems == []
+    with tab(chromium) as one:
+        one.open(path.as_uri())
+        assert one.page.evaluate("window.harmed") is None
+        assert HOSTILE in one.page.title()
+        assert one.page.locator("h2").inner_text() == HOSTILE
+        assert one.page.get_by_text(HOSTILE).count() >= 3
+        assert one.page.locator("img").count() == 0
+        assert one.problems == []
 
 
 def test_a_dimple_in_a_page_of_one_file(chromium, tmp_path):
@@ -208,64 +187,6 @@ def test_a_dimple_in_a_page_of_one_file(chromium, tmp_path):
         titles = one.page.locator("h3").all_inner_texts()
         assert titles[:4] == ["Amplitude", "Width", "Shape", "Deformed section"]
         assert one.problems == []
-
-
-def test_a_trained_network_answers_while_a_slider_moves(chromium, tmp_path):
-    data = bars(48)
-    network = train(data, ParameterGru(6, 1, training=Training(epochs=2, batch=32, rate=1e-2)))
-    values, plan = data.values_of(0), data.planned_test(0)
-    end = float(plan.times[-1])
-    stress = float(plan.loading.program().values[0])
-    path = ck.interactive_page(ck.law_with_values(data.law, values), tmp_path / "page.html", surrogate=network)
-    with tab(chromium) as one:
-        one.open(path.as_uri())
-        quick, exact = (
-            one.page.evaluate(
-                """([end, stress, exact]) => {
-                    const data = JSON.parse(window.given), values = {};
-                    for (const p of data.laws[0].parameters) values[p.name] = p.value;
-                    const program = { specimen: "uniaxial", load: "stress", steps: [[0, stress]], control: "load",
-                                      ramp: 0, end, temperature: 1073, modulus: null, lengths: {} };
-                    const question = { law: 0, values, program, tests: [], rate_temperature: 1073, exact };
-                    return creepkitPage.predict(data, question).program;
-                }""".replace("window.given", json.dumps(json.dumps(page_data(path)))),
-                [end, stress, e],
-            )
-            for e in (False, True)
-        )
-        assert one.problems == []
-    held = plan.replace(loading=ck.constant_stress(stress))
-    for answer, model in ((quick, network), (exact, ck.specimen("uniaxial"))):
-        at = held.replace(times=np.array(answer["times"]))
-        expected = model.predict(data.law, data.law.to_internal(values), [at]).of(0)[:, 0]
-        np.testing.assert_allclose(answer["outputs"]["strain"], expected, atol=1e-4 * np.abs(expected).max())
-
-
-def page_data(path):
-    """What the scripts of a page read."""
-    text = path.read_text(encoding="utf-8").partition('class="creepkit-page-data">')[2]
-    return json.loads(text.partition("</script>")[0])
-
-
-def test_a_specimen_that_nobody_registered(chromium):
-    """It brings its own titles, units, loads and lengths."""
-    from helpers.cantilever import Cantilever
-
-    beam = Cantilever()
-    with serving(page_contents("norton", specimen=_known(beam))) as server, tab(chromium) as one:
-        one.open(server.url)
-        output, load = beam.outputs[0], beam.loads[0]
-        assert one.page.locator("h3").first.inner_text().lower() == output.long_name.lower()
-        assert one.page.get_by_role("slider", name=load.long_name, exact=True).count() == 1
-        assert one.page.get_by_text("Lengths of the test piece").count() == 1
-        assert one.problems == []
-
-
-def _known(specimen):
-    from creepkit.records import remember_specimen
-
-    remember_specimen(specimen)
-    return specimen.name
 
 
 def test_several_pages_in_one_document(chromium, tmp_path):

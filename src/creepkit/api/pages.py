@@ -10,15 +10,10 @@ from creepkit.app.contents import PageSource
 from creepkit.checked_arguments import checked
 from creepkit.errors import ExportError
 from creepkit.files.writing import check_target, write_text
-from creepkit.records import Predictor
 
 if TYPE_CHECKING:
     from creepkit.app.contents import PageContents
     from creepkit.records import History
-
-
-LARGE_NETWORK = 300_000
-"""Bytes of weights from which a network is named as what makes a page too large."""
 
 
 @checked
@@ -29,7 +24,6 @@ def interactive_page(
     tests: Sequence[History] = (),
     specimen: str | None = None,
     title: str = "",
-    surrogate: Predictor | None = None,
     force: bool = False,
 ) -> Path:
     """Write a page of HTML on which a law's parameters are moved by sliders, and return its path.
@@ -38,17 +32,15 @@ def interactive_page(
 
     source : a law or its name, a law with values, an identification or a ranking.
     tests : measured ones that are laid over; by default those that an identification holds.
-    specimen : which is shown first. title : of the page. surrogate : a trained network, which answers for its specimen
-    while a slider moves. force : whether a file that creepkit did not write is replaced.
+    specimen : which is shown first. title : of the page.
+    force : whether a file that creepkit did not write is replaced.
 
     Raises ExportError for a law that cannot be written as JavaScript, for a page that is too large, and for a file that
     cannot be written. The page shows MPa, hours, mm and kelvin.
     """
     from creepkit.app.contents import page_contents
 
-    return write_page(
-        page_contents(source, tests, specimen=specimen, title=title, surrogate=surrogate), Path(to), force=force
-    )
+    return write_page(page_contents(source, tests, specimen=specimen, title=title), Path(to), force=force)
 
 
 def write_page(contents: PageContents, path: Path, *, force: bool = False) -> Path:
@@ -60,20 +52,7 @@ def write_page(contents: PageContents, path: Path, *, force: bool = False) -> Pa
     size = len(text.encode("utf-8"))
     if size > LARGEST_PAGE:
         raise ExportError(
-            f"{path}: the page would have {size / 1e6:.1f} MB, allowed is {LARGEST_PAGE / 1e6:g} MB; "
-            f"{_smaller(contents)}"
+            f"{path}: the page would have {size / 1e6:.1f} MB, allowed is {LARGEST_PAGE / 1e6:g} MB; give fewer tests "
+            "or laws"
         )
     return write_text(text, path, ExportError, force=force)
-
-
-def _smaller(contents: PageContents) -> str:
-    """What makes a page that is too large smaller."""
-    from creepkit.app.page_models import network_of
-
-    network = sum(len(text) for text in network_of(contents).values())
-    if network > LARGE_NETWORK:
-        return (
-            f"the weights of the network alone are {network / 1e6:.1f} MB: train one with fewer hidden units or "
-            "layers, or leave the surrogate out"
-        )
-    return "give fewer tests or laws"

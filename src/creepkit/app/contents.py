@@ -1,7 +1,7 @@
 """What an interactive page shows: laws with values, specimens by their records, and measured tests, as plain data.
 
-The page is drawn by scripts, which get all of this as one JSON document; nothing in it names a specimen, an output or a
-load, so that those of plugins are shown with their own titles, units and lengths.
+The page is drawn by scripts, which get all of this as one JSON document. It shows bars, relaxation and the bulge test
+of a dimple, which the core in WebAssembly simulates.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -17,10 +17,13 @@ from creepkit.errors import CreepkitError, FitError, quoted
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.language import temperature
-from creepkit.records import History, LawWithValues, Predictor, Specimen, dimensions_of, known_specimens, predict_with
+from creepkit.records import History, LawWithValues, Specimen, dimensions_of, known_specimens, predict_with
 from creepkit.records.units import celsius_text
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import check_histories
+from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.specimens.relaxation import Relaxation
+from creepkit.specimens.uniaxial import Uniaxial
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -56,6 +59,10 @@ RATE_STRAIN, RATE_TIME = 0.01, 3600.0
 """Where the creep rate is shown of a law that was not identified; s."""
 
 
+KINDS: dict[type[object], str] = {Uniaxial: "creep", Relaxation: "relaxation", Bulge: "dimple"}
+"""{specimen: the function of the runtime that predicts it}."""
+
+
 @dataclass(frozen=True)
 class PageLaw:
     """A law with the values that its sliders start at; fit : where they come from, weight : in a ranking."""
@@ -70,8 +77,7 @@ class PageLaw:
 class PageContents:
     """Laws, specimens and measured tests of a page; the first law and the first specimen are shown first.
 
-    title : of the page. temperature : K, where the sliders start. surrogate : answers for its specimen while a slider
-    moves, in the place of the reduced-order model.
+    title : of the page. temperature : K, where the sliders start.
     """
 
     title: str
@@ -79,7 +85,6 @@ class PageContents:
     specimens: tuple[Specimen, ...]
     histories: tuple[History, ...]
     temperature: float = USUAL_TEMPERATURE
-    surrogate: Predictor | None = None
 
     def specimen(self, name: str) -> Specimen:
         """The specimen of this name; FitError where the page has none."""
@@ -92,46 +97,28 @@ class PageContents:
 
 
 def page_contents(
-    source: PageSource,
-    tests: Sequence[History] = (),
-    *,
-    specimen: str | None = None,
-    title: str = "",
-    surrogate: Predictor | None = None,
+    source: PageSource, tests: Sequence[History] = (), *, specimen: str | None = None, title: str = ""
 ) -> PageContents:
     """Resolve what a page is to show.
 
     source : a law or its name, a law with values, an identification or a ranking. tests : measured ones that are laid
     over; by default those that an identification holds. specimen : which is shown first; by default that of the tests.
-    surrogate : a trained network of the first law, which answers while a slider moves.
     """
     laws = _page_laws(source)
-    fit = laws[0].fit
-    histories = tuple(check_histories(tests)) or (() if fit is None else fit.histories)
+    law, fit = laws[0].law, laws[0].fit
+    known = {name: one for name, one in known_specimens().items() if type(one) in KINDS}
+    given = tuple(check_histories(tests)) or (() if fit is None else fit.histories)
+    histories = tuple(history for history in given if history.specimen in known)
     if len(histories) > MOST_TESTS:
         raise FitError(f"a page shows at most {MOST_TESTS} tests, found {len(histories)}; give fewer files")
-    law = laws[0].law
+    shown = [history.specimen for history in histories or given[:1]]
     return PageContents(
         title or law.title or law.name,
         laws,
-        _specimens(histories, specimen or (specimen_name(surrogate) if not histories else None)),
+        _specimens(known, [*([specimen] if specimen else []), *shown]),
         histories,
         _first_temperature(histories, fit),
-        None if surrogate is None else _checked_surrogate(surrogate, law),
     )
-
-
-def specimen_name(surrogate: Any) -> str | None:
-    """The name of the specimen that a surrogate stands for."""
-    return getattr(getattr(surrogate, "specimen", None), "name", None)
-
-
-def _checked_surrogate(surrogate: Any, law: CreepLaw) -> Predictor:
-    """The surrogate, unless it does not know the law."""
-    problem = surrogate.outside_class(law) if hasattr(surrogate, "outside_class") else ""
-    if problem:
-        raise FitError(f"the surrogate cannot answer for law '{law.name}': {problem}")
-    return cast("Predictor", surrogate)
 
 
 def _page_laws(source: PageSource) -> tuple[PageLaw, ...]:
@@ -168,13 +155,13 @@ def _example_values(law: CreepLaw) -> dict[str, float]:
     return {name: float(np.clip(value, *law.table[name].bounds)) for name, value in law.from_internal(inside).items()}
 
 
-def _specimens(histories: Sequence[History], first: str | None) -> tuple[Specimen, ...]:
-    """All registered specimens whose load is one number over time: that of the tests first."""
-    known = {name: one for name, one in known_specimens().items() if _has_plain_load(one)}
-    wanted = [*([first] if first else []), *(history.specimen for history in histories)]
+def _specimens(known: Mapping[str, Specimen], wanted: Sequence[str]) -> tuple[Specimen, ...]:
+    """The specimens that a page predicts, those wanted first; FitError for others."""
     for name in wanted:
         if name not in known:
-            raise FitError(f"specimen '{name}' cannot be shown on a page; those that can are {', '.join(known)}")
+            raise FitError(
+                f"specimen '{quoted(name, 60)}' cannot be shown on a page; those that can are {', '.join(known)}"
+            )
     others = sorted(known, key=lambda name: _numbers_asked_for(known[name]))
     return tuple(known[name] for name in dict.fromkeys([*wanted, *others]))
 
@@ -182,10 +169,6 @@ def _specimens(histories: Sequence[History], first: str | None) -> tuple[Specime
 def _numbers_asked_for(specimen: Specimen) -> tuple[bool, int]:
     """How much a user has to state before a first curve of a specimen is seen: a modulus, and how many lengths."""
     return "modulus" in getattr(specimen, "conditions", {}), len(dimensions_of(specimen))
-
-
-def _has_plain_load(specimen: Any) -> bool:
-    return any(load.name != "components" for load in getattr(specimen, "loads", ()))
 
 
 def _first_temperature(histories: Sequence[History], fit: Identification | None) -> float:

@@ -10,43 +10,41 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.app.contents import (
+    KINDS,
     RATE_STRAIN,
     RATE_TIME,
     SAME_TEMPERATURE,
     USUAL_STRESS,
     PageContents,
     PageLaw,
-    specimen_name,
     temperature_warning,
     usual_end,
 )
-from creepkit.app.model_data import law_data
-from creepkit.app.page_models import model_of, network_of
+from creepkit.app.models import model_of
 from creepkit.errors import CreepkitError
+from creepkit.exporters.javascript import law_expression
 from creepkit.exporters.latex import latex_unit
+from creepkit.exporters.mathml import expression_mathml, law_equations
+from creepkit.inverse.identification import Identification
 from creepkit.inverse.measured_minimum_rates import measured_minimum_rate
+from creepkit.inverse.uncertainty.correlation import correlation
+from creepkit.language.law import CreepLaw
 from creepkit.language.printing import LatexLawPrinter, latex_equations
+from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import (
     History,
     LawWithValues,
     Load,
     Program,
     Specimen,
-    dimensions_of,
     loads_of,
     outputs_of,
     outputs_of_test,
     typical_history,
 )
-from creepkit.records.interfaces import SupportsReducedOrderModel
-from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.relaxation import Relaxation
-from creepkit.specimens.run import Runnable
-from creepkit.specimens.uniaxial import Uniaxial
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
-    from creepkit.inverse.identification import Identification
 
 
 MOST_FRAMES = 300
@@ -58,33 +56,27 @@ MOST_BREAKPOINTS = 400
 
 
 def contents_document(contents: PageContents, models: Collection[str] = ()) -> dict[str, Any]:
-    """All that the scripts of a page read, but for what answers them.
+    """All that the scripts of a page read. models : names of the models that the page brings along."""
 
-    models : names of the reduced-order models that the page brings along, of one that no server answers.
-    """
+    def with_model(document: dict[str, Any], found: Mapping[str, str]) -> dict[str, Any]:
+        return document | {"model": next((name for name in found if name in models), None)}
 
-    def with_model(document: dict[str, Any], specimen: Specimen, history: History | None = None) -> dict[str, Any]:
-        own = [name for name in (model_of(specimen, history) if models else ()) if name in models]
-        return {**document, "model": own[0] if own else None}
-
-    networks = [name for name in network_of(contents) if name in models]
-    specimens = [
-        with_model(specimen_document(one), one)
-        | {"network": networks[0] if networks and specimen_name(contents.surrogate) == one.name else None}
-        for one in contents.specimens
+    specimens = [with_model(specimen_document(one), model_of(one) if models else {}) for one in contents.specimens]
+    tests = [
+        with_model(test_document(one, contents), model_of(contents.specimen(one.specimen), one) if models else {})
+        for one in contents.histories
     ]
     stress = specimens[0]["loads"][0]["stress"]
+    laws = [
+        law_document(one, usual_end(one, stress, contents.temperature))
+        | {"warning": temperature_warning(one.law, contents.histories)}
+        for one in contents.laws
+    ]
     return {
         "title": contents.title,
-        "laws": [
-            law_document(one, usual_end(one, stress, contents.temperature))
-            | {"warning": temperature_warning(one.law, contents.histories)}
-            for one in contents.laws
-        ],
+        "laws": laws,
         "specimens": specimens,
-        "tests": [
-            with_model(test_document(one, contents), contents.specimen(one.specimen), one) for one in contents.histories
-        ],
+        "tests": tests,
         "temperature": contents.temperature,
         "same_temperature": SAME_TEMPERATURE,
     }
@@ -98,55 +90,96 @@ def law_document(page_law: PageLaw, end: float) -> dict[str, Any]:
 
     end : s, of a first curve.
     """
-    law, latex = page_law.law, LatexLawPrinter(page_law.law)
-    known = law_data(LawWithValues(law, page_law.values) if page_law.fit is None else page_law.fit)
-    for symbol, row in zip(law.params, known["parameters"], strict=True):
-        row |= {"latex": latex.doprint(symbol), "latex_unit": latex_unit(row["unit"]).strip("$")}
+    law, fit = page_law.law, page_law.fit
+    known = law_data(LawWithValues(law, page_law.values) if fit is None else fit)
     return {
         **{name: value for name, value in known.items() if name != "source"},
-        # the page's style aligns their columns, for the policy of the server allows no other
+        # the page's style aligns their columns
         "equations": [re.sub(r' style="[^"]*"', "", equation) for equation in known["equations"]],
-        "code": law_code_name(page_law),
-        "latex": [f"{left} = {' '.join(right)}" for left, right in latex_equations(law, latex)],
+        "code": law.fingerprint,  # under which scripts find its JavaScript
+        "latex": [f"{left} = {' '.join(right)}" for left, right in latex_equations(law, LatexLawPrinter(law))],
         "weight": page_law.weight,
         "end": end,
-        "rate_point": rate_point(page_law.fit),
-        "covariance": None if page_law.fit is None else _covariance(page_law.fit),
-        "undetermined": [] if page_law.fit is None else list(_undetermined(page_law.fit)),
-        "judged": "" if page_law.fit is None else judged_text(page_law.fit),
+        "rate_point": rate_point(fit),
+        "covariance": None if fit is None else _covariance(fit),
+        "undetermined": [] if fit is None else list(_undetermined(fit)),
+        "judged": "" if fit is None else judged_text(fit),
     }
+
+
+def law_data(source: CreepLaw | Identification | LawWithValues) -> dict[str, Any]:
+    """Return a law as a page needs it, in plain JSON values; those of a law alone are the middles of its bounds.
+
+    `source` is a JavaScript expression (see `exporters.javascript.law_expression`). `interval` is that of 95 %,
+    `verdict` says whether the tests determine a parameter, and `directions` are those in which parameters are uncertain
+    together, the least certain first: steps of one standard deviation on the scale of each parameter (its logarithm
+    where the scale is log). They are null, or empty, without an identification.
+    """
+    fit = source if isinstance(source, Identification) else None
+    law, values = (source, source.center()) if isinstance(source, CreepLaw) else (source.law, dict(source.values))
+    return {
+        "name": law.name,
+        "title": law.title or law.name,
+        "equations": [*law_equations(law)],
+        "variables": [symbol.name for symbol in POINT_VARIABLES if law.uses(symbol)],
+        "parameters": _parameters(law, values, fit),
+        "directions": [] if fit is None else _directions(fit),
+        "source": law_expression(LawWithValues(law, values)),
+    }
+
+
+def _parameters(law: CreepLaw, values: Mapping[str, float], fit: Identification | None) -> list[dict[str, Any]]:
+    estimates = {} if fit is None else {estimate.name: estimate for estimate in fit.estimates}
+    rows, latex = [], LatexLawPrinter(law)
+    for symbol, param in law.params.items():
+        found, unit = estimates.get(symbol.name), "" if param.unit == "1" else param.unit
+        rows.append({
+            "name": symbol.name,
+            "symbol": expression_mathml(symbol),
+            "latex": latex.doprint(symbol),
+            "latex_unit": latex_unit(unit).strip("$"),
+            "title": param.meaning,
+            "unit": unit,
+            "scale": param.scale,
+            "low": param.bounds[0],
+            "high": param.bounds[1],
+            "off": param.off,
+            "value": float(values[symbol.name]),
+            "interval": None if found is None else [finite(found.low), finite(found.high)],
+            "verdict": None if found is None else found.verdict,
+        })  # fmt: skip
+    return rows
+
+
+def _directions(fit: Identification) -> list[dict[str, float]]:
+    """One standard deviation along each principal direction of the covariance, the longest first.
+
+    Directions are those of the correlation, so that the units of the parameters do not matter.
+    """
+    found = correlation(fit)
+    if not (np.isfinite(found.matrix).all() and np.isfinite(found.sd).all()):
+        return []
+    lengths, vectors = np.linalg.eigh(found.matrix)
+    steps: Floats = found.sd[:, None] * vectors * np.sqrt(np.maximum(lengths, 0.0))
+    return [dict(zip(fit.law.names, column.tolist(), strict=True)) for column in steps.T[::-1]]
 
 
 def judged_text(fit: Identification) -> str:
     """What the identification found of the misfit, which it takes otherwise than the page does; "" for nothing."""
-    return " ".join(filter(None, (_misfit_at_optimum(fit), _numerical_error(fit))))
-
-
-def _numerical_error(fit: Identification) -> str:
-    """That curves of the page have an error of which the identification took account; "" where it found none."""
-    error = fit.numerical_error
-    if error is None:
-        return ""
-    return (
-        f"The identification was corrected for the numerical error of its predictor, up to {error.noises:.2g} times "
-        "the noise; the curves and misfits here are not."
-    )
-
-
-def _misfit_at_optimum(fit: Identification) -> str:
-    scatter = f"; these scatter by {100.0 * fit.noise_model.rate:.2g} %" if fit.noise_model.rate > 0.0 else ""
-    if fit.adequacy is None or not fit.adequacy.outputs:
-        return ""
-    chi_square = fit.adequacy.chi_square
-    return (
-        f"At its optimum the identification found {np.sqrt(chi_square):.2g} times the noise (reduced chi-square "
-        f"{chi_square:.3g}): it counts a rate and an offset of each test's own as scatter between tests{scatter}."
-    )
-
-
-def law_code_name(page_law: PageLaw) -> str:
-    """The name under which the scripts of a page find the law as JavaScript."""
-    return page_law.law.fingerprint
+    sentences = []
+    if fit.adequacy is not None and fit.adequacy.outputs:
+        chi_square, rate = fit.adequacy.chi_square, fit.noise_model.rate
+        scatter = f"; these scatter by {100.0 * rate:.2g} %" if rate > 0.0 else ""
+        sentences.append(
+            f"At its optimum the identification found {np.sqrt(chi_square):.2g} times the noise (reduced chi-square "
+            f"{chi_square:.3g}): it counts a rate and an offset of each test's own as scatter between tests{scatter}."
+        )
+    if fit.numerical_error is not None:
+        sentences.append(
+            "The identification was corrected for the numerical error of its predictor, up to "
+            f"{fit.numerical_error.noises:.2g} times the noise; the curves and misfits here are not."
+        )
+    return " ".join(sentences)
 
 
 def rate_point(fit: Identification | None) -> dict[str, Any]:
@@ -154,8 +187,7 @@ def rate_point(fit: Identification | None) -> dict[str, Any]:
     if fit is None:
         return {"strain": RATE_STRAIN, "time": RATE_TIME, "stress": [0.1 * USUAL_STRESS, 5.0 * USUAL_STRESS]}
     low, high = fit.ranges["stress"]
-    reference = fit.reference
-    return {"strain": reference.strain, "time": reference.time, "stress": [low / 2.0, high * 2.0]}
+    return {"strain": fit.reference.strain, "time": fit.reference.time, "stress": [low / 2.0, high * 2.0]}
 
 
 def _covariance(fit: Identification) -> list[list[float]] | None:
@@ -178,47 +210,22 @@ def _undetermined(fit: Identification) -> Sequence[str]:
 
 
 def specimen_document(specimen: Specimen) -> dict[str, Any]:
-    """A specimen by its record: outputs, loads, lengths, and whether it needs a modulus or has a section to draw."""
+    """A specimen by its record: outputs, loads, whether it needs a modulus, and what predicts it."""
     conditions: Mapping[str, tuple[float, float]] = getattr(specimen, "conditions", None) or {}
-    elastic = typical_history(specimen).elastic
     low, high = conditions.get("modulus", (50e3, 300e3))
+    modulus = float(f"{getattr(typical_history(specimen).elastic, 'E', 150e3):.2g}")
     return {
         "name": specimen.name,
         "title": specimen.title,
         "outputs": [
-            {
-                "name": str(output),
-                "title": output.long_name,
-                "unit": output.unit,
-                "logarithmic": output.logarithmic,
-                "grows": output.grows,
-                "noise": output.noise,
-            }
+            {"name": str(output), "title": output.long_name, "unit": output.unit}
             for output in outputs_of(specimen)
             if output in specimen.outputs
         ],
         "loads": [_load_document(specimen, load, conditions) for load in loads_of(specimen)],
-        "dimensions": [
-            {"name": d.name, "title": d.long_name, "value": d.default, "low": d.bounds[0], "high": d.bounds[1]}
-            for d in dimensions_of(specimen)
-            if d.of_piece
-        ],
-        "modulus": {
-            "needed": "modulus" in conditions,
-            "low": low,
-            "high": high,
-            "value": float(f"{getattr(elastic, 'E', 150e3):.2g}"),
-        },
-        "runtime": runtime_of(specimen),
-        "reduced": isinstance(specimen, SupportsReducedOrderModel),
-        "runs": isinstance(specimen, Runnable),
+        "modulus": {"needed": "modulus" in conditions, "low": low, "high": high, "value": modulus},
+        "runtime": KINDS.get(type(specimen)),
     }
-
-
-def runtime_of(specimen: Specimen) -> str | None:
-    """Which function of the runtime predicts a specimen in a page that stands alone; None where none does."""
-    kinds: dict[type[object], str] = {Uniaxial: "creep", Relaxation: "relaxation", Bulge: "dimple"}
-    return kinds.get(type(specimen))
 
 
 def _load_document(specimen: Specimen, load: Load, conditions: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
@@ -250,20 +257,19 @@ def _reference_stress(specimen: Any, plan: History) -> float:
 # ---- measured tests ------------------------------------------------------------------------------------------------
 
 
-def compared_frames(history: History) -> Any:
-    """(frames,) indices of the used frames that a page shows."""
-    used = np.flatnonzero(history.used)
-    if used.size > MOST_FRAMES:
-        used = used[np.unique(np.linspace(0, used.size - 1, MOST_FRAMES).round().astype(int))]
-    return used
+def _thinned(rows: Any, most: int) -> Any:
+    """Of many rows, as many as are allowed, evenly spread over them; rows : (rows,) indices."""
+    if rows.size <= most:
+        return rows
+    return rows[np.unique(np.linspace(0, rows.size - 1, most).round().astype(int))]
 
 
 def test_document(history: History, contents: PageContents) -> dict[str, Any]:
     """A measured test: its frames, the noise of each output, and how it was made."""
-    frames = compared_frames(history)
-    program, temperature = history.loading.program(), history.temperature_program()
+    frames, temperature = _thinned(np.flatnonzero(history.used), MOST_FRAMES), history.temperature_program()
     specimen: Any = contents.specimen(history.specimen)
     stated = set(outputs_of_test(specimen, history)) if history.outputs else set()
+    fits = _test_fits(history, contents)
     return {
         "name": history.name,
         "condition": history.condition,
@@ -271,18 +277,16 @@ def test_document(history: History, contents: PageContents) -> dict[str, Any]:
         "times": numbers(history.times[frames]),
         "outputs": {str(n): numbers(v[frames]) for n, v in history.outputs.items() if n in stated},
         "noise": {n: v for n in history.outputs if (v := _noise(history, n, contents)) is not None},
-        "offset": _offsets(history, contents),
+        # what was added before creep began, as loading strain is, of the first law's identification
+        "offset": {o.output: float(o.offset) for one in fits for o in one.outputs if o.offset},
         "load": history.loading.quantity,
         "control": getattr(history.loading, "control", "load"),
-        "program": _thinned(program),
+        "program": _program_rows(history.loading.program()),
         "temperature": float(np.mean(temperature.values)),
-        "temperature_program": _thinned(temperature),
+        "temperature_program": _program_rows(temperature),
         "modulus": None if history.elastic is None else finite(history.elastic.at(history.mean_temperature).E),
-        "lengths": {name: float(value) for name, value in history.geometry.items()},
-        "nuisances": _has_nuisances(history, contents),
         "minimum_rate": _minimum_rate(history),
         "note": "; ".join(_test_notes(history, contents)),
-        "rupture_time": history.rupture_time,
         "includes_elastic": history.includes_elastic,
         "measure": history.strain_measure,
     }
@@ -302,11 +306,9 @@ def _test_notes(history: History, contents: PageContents) -> list[str]:
     return [*notes, *(["the law was identified without this test"] if without else [])]
 
 
-def _thinned(program: Program) -> list[list[float | None]]:
-    """Times and values of a program; of a recorded one of many rows, as many evenly spread over them."""
-    kept = np.arange(program.times.size)
-    if kept.size > MOST_BREAKPOINTS:
-        kept = np.unique(np.linspace(0, kept.size - 1, MOST_BREAKPOINTS).round().astype(int))
+def _program_rows(program: Program) -> list[list[float | None]]:
+    """Times and values of a program."""
+    kept = _thinned(np.arange(program.times.size), MOST_BREAKPOINTS)
     return [numbers(program.times[kept]), numbers(program.values[kept])]
 
 
@@ -321,25 +323,10 @@ def _noise(history: History, output: str, contents: PageContents) -> float | Non
     fit = contents.laws[0].fit
     if fit is not None and fit.adequacy is not None and not fit.adequacy.judges(output):
         return None
-    for one in _test_fits(history, contents):
-        for fitted in one.outputs:
-            if fitted.output == output and 0.0 < fitted.noise < math.inf:
-                return float(fitted.noise)
-    for known in outputs_of(contents.specimen(history.specimen)):
-        if known == output:
-            return known.noise
-    return None
-
-
-def _offsets(history: History, contents: PageContents) -> dict[str, float]:
-    """{output: what was added to it before creep began, as loading strain is}, of the first law's identification."""
-    return {o.output: float(o.offset) for one in _test_fits(history, contents) for o in one.outputs if o.offset}
-
-
-def _has_nuisances(history: History, contents: PageContents) -> bool:
-    """Whether a law on the page was identified with nuisances that change the simulation of a test."""
-    fits = [one.fit for one in contents.laws if one.fit is not None]
-    return any(np.any(values != 0.0) for fit in fits for values in fit.nuisance_values([history]).values())
+    fitted = [o.noise for one in _test_fits(history, contents) for o in one.outputs if o.output == output]
+    estimated = next((float(noise) for noise in fitted if 0.0 < noise < math.inf), None)
+    usual = next((known.noise for known in outputs_of(contents.specimen(history.specimen)) if known == output), None)
+    return usual if estimated is None else estimated
 
 
 def _test_fits(history: History, contents: PageContents) -> list[Any]:
@@ -355,14 +342,7 @@ def numbers(values: Floats) -> list[float | None]:
 
     values : (...,), returned one after another.
     """
-    given = np.asarray(values, float).ravel()
-    with np.errstate(all="ignore"):
-        scale = 10.0 ** (5.0 - np.floor(np.log10(np.abs(given))))
-        rounded = np.round(given * scale) / scale
-    rounded = np.where(np.isfinite(rounded), rounded, given)
-    if np.isfinite(rounded).all():
-        return list(rounded.tolist())
-    return [value if math.isfinite(value) else None for value in rounded.tolist()]
+    return [float(f"{value:.6g}") if math.isfinite(value) else None for value in np.ravel(values).tolist()]
 
 
 def finite(value: Any) -> float | None:

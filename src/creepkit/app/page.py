@@ -9,43 +9,42 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from functools import cache
+from html import escape
 from pathlib import Path
-from typing import Any
 
 from creepkit.app.contents import PageContents
-from creepkit.app.documents import contents_document, law_code_name
-from creepkit.app.model_data import embedded_json
-from creepkit.app.page_models import page_models
+from creepkit.app.documents import contents_document
+from creepkit.app.models import page_models
 from creepkit.app.runtime_files import runtime_script
-from creepkit.exporters.javascript import law_expression
+from creepkit.exporters.javascript import law_expression, script_safe_json
 from creepkit.records import LawWithValues
-
-FOLDER = Path(__file__).parent / "page_parts"
-
 
 SCRIPTS = (
     *("numbers", "elements", "chart", "section", "controls", "law_controls", "test_controls", "test_list"),
-    *("copies", "misfit", "own_predictions", "engine", "page"),
+    *("copies", "misfit", "predictions", "page"),
 )
-"""Files of the folder, without their ending, each of which may use those before it."""
+"""Files of the folder page_parts, without their ending, each of which may use those before it."""
 
 
 LARGEST_PAGE = 1_000_000
-"""Bytes of a page that stands alone."""
+"""Bytes of a page."""
 
 
-def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") -> str:
-    """A whole page. nonce : of the policy of a server. endpoint : where it asks for predictions."""
-    models = page_models(contents, shown_first=bool(endpoint))
-    policy = "" if endpoint else _POLICY_OF_A_FILE
-    mark = f' nonce="{nonce}"' if nonce else ""
+POLICY = (
+    '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; script-src '
+    "'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+    "form-action 'none'\">"
+)
+"""A page loads nothing and sends nothing."""
+
+
+def page_html(contents: PageContents) -> str:
+    """A whole page; CreepkitError where the core in WebAssembly is missing."""
     replacements = {
-        "policy": policy,
-        "title": escaped(contents.title),
-        "style": f"<style{mark}>\n{_part('style.css')}</style>",
-        "fragment": _fragment(contents_document(contents, models), endpoint),
-        "scripts": f"<script{mark}>\n{runtime_script()}\n{law_scripts(contents)}\n{model_scripts(models)}</script>",
-        "page_scripts": f"<script{mark}>\n{page_scripts()}</script>",
+        "policy": POLICY,
+        "title": escape(contents.title),
+        "style": f"<style>\n{page_style()}</style>",
+        "fragment": page_fragment(contents, style=False, kind=""),
     }
     text = _part("page.html")
     for name, value in replacements.items():
@@ -53,12 +52,29 @@ def page_html(contents: PageContents, *, nonce: str = "", endpoint: str = "") ->
     return text
 
 
-_POLICY_OF_A_FILE = (
-    '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; script-src '
-    "'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
-    "form-action 'none'\">"
-)
-"""A page that is a file loads nothing and sends nothing."""
+def page_fragment(contents: PageContents, *, style: bool = True, scripts: bool = True, kind: str = "embedded") -> str:
+    """The page as part of another document of HTML.
+
+    style, scripts : whether it brings its own style, and its own scripts and reduced-order models; of several fragments
+    in one document the first has to. shared_scripts() are the scripts of all of them. kind : class of the element.
+    """
+    models = page_models(contents)
+    data = script_safe_json(contents_document(contents, models))
+    note = "This part of the page needs scripts: it computes creep curves while its sliders are moved."
+    parts = [
+        f"<style>\n{page_style()}</style>" if style else "",
+        f"<script>\n{runtime_script()}\n{_model_scripts(models)}</script>" if scripts else "",
+        f"<script>\n{_law_scripts(contents)}</script>",
+        f'<div class="{f"creepkit-page {kind}".strip()}"><noscript><p>{note}</p></noscript>'
+        f'<script type="application/json" class="creepkit-page-data">{data}</script></div>',
+        f"<script>\n{_page_scripts()}</script>" if scripts else "",
+    ]
+    return "\n".join(filter(None, parts))
+
+
+def shared_scripts(contents: PageContents) -> str:
+    """What page_fragment(scripts=False) leaves out, as one script that is loaded after the fragments."""
+    return "\n".join([runtime_script(), _model_scripts(page_models(contents)), _page_scripts()])
 
 
 def page_style() -> str:
@@ -67,60 +83,27 @@ def page_style() -> str:
 
 
 @cache
-def page_scripts() -> str:
+def _page_scripts() -> str:
     """The scripts of pages and fragments; they start every fragment of the document that they stand in."""
     return "\n".join(_part(f"{name}.js") for name in SCRIPTS)
 
 
-def law_scripts(contents: PageContents) -> str:
+def _law_scripts(contents: PageContents) -> str:
     """The laws as JavaScript, by the names that the data of the page give them."""
-    codes = {law_code_name(one): law_expression(LawWithValues(one.law, one.values)) for one in contents.laws}
-    lines = [f"globalThis.creepkitLaws[{json.dumps(name)}] = {code};" for name, code in codes.items()]
-    return "\n".join(["globalThis.creepkitLaws ??= {};", *lines])
+    codes = {one.law.fingerprint: law_expression(LawWithValues(one.law, one.values)) for one in contents.laws}
+    return _assignments("creepkitLaws", codes)
 
 
-def model_scripts(models: Mapping[str, str]) -> str:
+def _model_scripts(models: Mapping[str, str]) -> str:
     """Reduced-order models by the names that the data of the page give them."""
-    lines = [f"globalThis.creepkitModels[{json.dumps(name)}] = {text};" for name, text in models.items()]
-    return "\n".join(["globalThis.creepkitModels ??= {};", *lines])
+    return _assignments("creepkitModels", models)
 
 
-def page_fragment(contents: PageContents, *, style: bool = True, scripts: bool = True) -> str:
-    """The page as part of another document of HTML.
-
-    style, scripts : whether it brings its own style, and its own scripts and reduced-order models; of several fragments
-    in one document the first has to. shared_scripts() are the scripts of all of them.
-    """
-    models = page_models(contents)
-    parts = [f"<style>\n{page_style()}</style>"] if style else []
-    parts += [f"<script>\n{runtime_script()}\n{model_scripts(models)}</script>"] if scripts else []
-    parts.append(f"<script>\n{law_scripts(contents)}</script>")
-    parts.append(_fragment(contents_document(contents, models), kind="embedded"))
-    parts += [f"<script>\n{page_scripts()}</script>"] if scripts else []
-    return "\n".join(parts)
-
-
-def shared_scripts(contents: PageContents) -> str:
-    """What page_fragment(scripts=False) leaves out, as one script that is loaded after the fragments."""
-    return "\n".join([runtime_script(), model_scripts(page_models(contents)), page_scripts()])
-
-
-def _fragment(document: Mapping[str, Any], endpoint: str = "", kind: str = "") -> str:
-    data = embedded_json({**document, "endpoint": endpoint})
-    note = "This part of the page needs scripts: it computes creep curves while its sliders are moved."
-    return (
-        f'<div class="{f"creepkit-page {kind}".strip()}"><noscript><p>{note}</p></noscript>'
-        f'<script type="application/json" class="creepkit-page-data">{data}</script></div>'
-    )
+def _assignments(place: str, values: Mapping[str, str]) -> str:
+    lines = [f"globalThis.{place}[{json.dumps(name)}] = {text};" for name, text in values.items()]
+    return "\n".join([f"globalThis.{place} ??= {{}};", *lines])
 
 
 @cache
 def _part(name: str) -> str:
-    return (FOLDER / name).read_text(encoding="utf-8")
-
-
-def escaped(text: str) -> str:
-    """Text as HTML shows it."""
-    for character, name in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;"), ("'", "&#39;")):
-        text = text.replace(character, name)
-    return text
+    return (Path(__file__).parent / "page_parts" / name).read_text(encoding="utf-8")

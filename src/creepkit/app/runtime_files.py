@@ -21,7 +21,7 @@ from creepkit.integration.time_transformation import SMALLEST_EXPONENT
 from creepkit.records import Status
 from creepkit.specimens.bulge.reduced_order_model import SEARCH_GROWTH, SEARCH_MODES, SEARCH_TOLERANCE
 
-RUNTIME_FILES = ("core.js", "programs.js", "bars.js", "dimple.js", "network.js")
+RUNTIME_FILES = ("core.js", "programs.js", "bars.js", "dimple.js")
 """Each needs those before it."""
 
 

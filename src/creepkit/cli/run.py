@@ -35,9 +35,6 @@ def command(
     locked: Annotated[
         bool, typer.Option("--locked", help="Refuse to run where anything differs from study.lock.")
     ] = False,
-    prune: Annotated[
-        bool, typer.Option("--prune", help="Remove kept identifications that this study does not ask for any more.")
-    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print how each stage ended as JSON.")] = False,
 ) -> None:
     """Only what changed runs again. Interrupted, it goes on where it was when it is started again. A report is written
@@ -54,13 +51,9 @@ def command(
     else:
         loaded, target = Study.load(study), to if to is not None else study.parent
     with ProgressBar() as progress:
-        result = loaded.run(
-            to=target, only=only or None, force=force, locked=locked, prune=prune, progress=progress.tick
-        )
+        result = loaded.run(to=target, only=only or None, force=force, locked=locked, progress=progress.tick)
     for change in result.changes:
         tell(f"since the last lock: {change}", err=True)
-    if prune:
-        tell(f"removed {result.pruned} kept identifications that no stage rests on", err=True)
     if as_json:
         print_json(result_to_json(result))
     else:

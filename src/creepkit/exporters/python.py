@@ -14,7 +14,6 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-import numpy as np
 import sympy
 
 from creepkit.errors import ExportError, LawError
@@ -311,6 +310,8 @@ class NumpyExporter:
 
 def _numpy_imports(names: set[str]) -> str:
     """The error function is the standard library's: NumPy has none."""
+    import numpy as np  # for this target alone
+
     imported = sorted(name for name in names & {*TARGET_FUNCTIONS, "errstate"} if hasattr(np, name))
     lines = ["import numpy as np", *([f"from numpy import {', '.join(imported)}"] if imported else [])]
     return "\n".join(["import math", "", *lines] if "math" in names else lines)

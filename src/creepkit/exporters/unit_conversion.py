@@ -8,13 +8,14 @@ on time or temperature, the conversion is refused.
 
 from __future__ import annotations
 
+import math
+import random
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import mpmath
-import numpy as np
 
 from creepkit.errors import ExportError
 from creepkit.kernels.multiprecision import MultiprecisionLaw
@@ -95,10 +96,7 @@ class _RateSamples:
 
     def __init__(self, law: CreepLaw, units: Units) -> None:
         self.law, self.exact = law, MultiprecisionLaw(law)
-        scaled = np.array(_sample_points(law))
-        scaled[:, [0, 4, 5]] /= units.megapascals
-        scaled[:, 2] /= units.seconds
-        self.points = scaled.tolist()
+        self.points = _sample_points(law, units)
 
     def at(self, values: Mapping[str, float]) -> list[list[Any]]:
         """Rates with these values of the parameters."""
@@ -129,16 +127,17 @@ def _finite_ratio(a: Any, b: Any) -> Any:
     return a / b if b != 0 and mpmath.isfinite(a / b) else None
 
 
-def _sample_points(law: CreepLaw) -> Sequence[Sequence[float]]:
-    """Points spread over what tests visit; states between their start and their limit."""
-    rng = np.random.default_rng(0)
-    stress = np.exp(rng.uniform(np.log(20.0), np.log(200.0), _POINT_COUNT))
-    strain, time = np.exp(rng.uniform(-9, -2, _POINT_COUNT)), np.exp(rng.uniform(7, 14, _POINT_COUNT))
-    temperature, fractions = rng.uniform(850.0, 1250.0, _POINT_COUNT), rng.uniform(0.1, 0.6, _POINT_COUNT)
+def _sample_points(law: CreepLaw, units: Units) -> list[list[float]]:
+    """Points spread over what tests visit, in some units; states between their start and their limit."""
+    draw = random.Random(0).uniform
     spans = [(s.initial, s.initial + 1.0 if s.limit is None else s.limit) for s in law.states.values()]
-    state_columns = [low + fractions * (high - low) for low, high in spans]
-    columns = [stress, strain, time, temperature, 0.9 * stress, stress / 3, *state_columns]
-    return [[float(v) for v in row] for row in np.column_stack(columns)]
+    points = []
+    for _ in range(_POINT_COUNT):
+        stress, strain = math.exp(draw(3.0, 5.3)) / units.megapascals, math.exp(draw(-9.0, -2.0))
+        time, temperature, fraction = math.exp(draw(7.0, 14.0)) / units.seconds, draw(850.0, 1250.0), draw(0.1, 0.6)
+        states = [low + fraction * (high - low) for low, high in spans]
+        points.append([stress, strain, time, temperature, 0.9 * stress, stress / 3, *states])
+    return points
 
 
 # ---- units as text -------------------------------------------------------------------------------------------------

@@ -110,7 +110,7 @@ class RecordCodec:
         if isinstance(value, np.ndarray | np.generic):
             return self.to_json(value.tolist(), place)
         if isinstance(value, Mapping):
-            return {str(key): self.to_json(item, f"{place}.{key}") for key, item in value.items()}
+            return {_key(key): self.to_json(item, f"{place}.{key}") for key, item in value.items()}
         if isinstance(value, tuple | list):
             return [self.to_json(item, f"{place}.{k}") for k, item in enumerate(value)]
         if is_dataclass(value) and not isinstance(value, type):
@@ -189,7 +189,9 @@ class RecordCodec:
         if _is_a(origin, np.ndarray):
             return plain(partial(self._array, np.dtype(get_args(arguments[1])[0]), allowed))
         if _is_a(origin, Mapping):
-            return schemas.dict_schema(_TEXT, self._schema(arguments[1], allowed))
+            table = schemas.dict_schema(_TEXT, self._schema(arguments[1], allowed))
+            pairs = get_origin(arguments[0]) is tuple
+            return schemas.no_info_after_validator_function(_with_pairs, table) if pairs else table
         if _is_a(origin, Sequence):
             items = [self._schema(part, allowed) for part in arguments if part is not ...]
             if origin is list:
@@ -258,6 +260,15 @@ def _json_kind(hint: Any) -> str:
 
 def _is_a(hint: Any, kinds: Any) -> bool:
     return isinstance(hint, type) and issubclass(hint, kinds)
+
+
+def _key(key: Any) -> str:
+    """A key of a mapping as JSON has it; names of a pair, such as two outputs, stand on both sides of a bar."""
+    return "|".join(key) if isinstance(key, tuple) else str(key)
+
+
+def _with_pairs(table: Mapping[str, Any]) -> Any:
+    return {tuple(key.split("|")): value for key, value in table.items()}
 
 
 def _tuples(value: Any) -> Any:

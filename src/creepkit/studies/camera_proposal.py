@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import CreepkitError
 from creepkit.registry.reading import frame_files, read_frames, read_record
-from creepkit.studies.toml_text import CITATION_LINE, comment, quoted, quoted_list, study_part
+from creepkit.studies.proposed_tables import comment, quoted
 
 if TYPE_CHECKING:
     from creepkit.records import Frames, InstrumentRecord
@@ -43,95 +43,66 @@ def proposed_cameras(folder: Path, path: Path, others: Sequence[Path], base: str
 
     path : the study file. others : files that hold tests. base : of the folder, relative to the study file.
     """
-    below = [one for one in sorted(folder.iterdir()) if one.is_dir() and one.name[0] != "."]
-    found = {one: pair for one in (folder, *below)[:MOST_FOLDERS] if (pair := _frames(one)) is not None}
-    if not found:
+    place, visible = "" if base == "." else f"{base}/", sorted(folder.iterdir())
+    below = [one for one in visible if one.is_dir() and one.name[0] != "."]
+    tried = {one: _of(read_frames, one) for one in (folder, *below)[:MOST_FOLDERS]}
+    cameras = {one: frames for one, frames in tried.items() if frames is not None and len(frames) >= FEWEST_FRAMES}
+    if not cameras:
         return CameraProposal()
-    inside = {file for one, (files, _) in found.items() for file in files}
-    beside = [one for one in sorted(folder.iterdir()) if one.is_file() and one != path]
-    tried = list(islice((one for one in beside if one not in inside and one not in others), MOST_FILES))
-    records = {one: record for one in tried if (record := _record(one)) is not None}
-    place = "" if base == "." else f"{base}/"
-    lines: list[str] = []
-    for file, record in records.items():
-        lines += _record_lines(file, record, place)
-    times = {one: count for one in tried if one not in records and (count := _count_of_times(one))}
+    named = {file for one in cameras for file in frame_files(one)}
+    beside = [one for one in visible if one.is_file() and one not in {path, *named, *others}][:MOST_FILES]
+    read = {one: _of(read_record, one) for one in beside}
+    records = {
+        one: record
+        for one, record in read.items()
+        if record is not None and any(channel.quantity in LOADS for channel in record.channels.values())
+    }
+    times = {one: _of(read_frame_times, one) for one in beside if one not in records}
+    lines = [line for file, record in records.items() for line in _record_lines(file, record, place)]
     summary = []
-    for one, (files, frames) in found.items():
-        name = "." if one == folder else one.name
-        own = next((file for file, count in times.items() if count == len(frames)), None)
-        lines += _camera_lines(name if name != "." else folder.absolute().name, place, name, frames, own, records)
+    for one, frames in cameras.items():
+        own = next((file for file, found in times.items() if found is not None and found.size == len(frames)), None)
+        source = base if one == folder else f"{place}{one.name}"
+        lines += _camera_lines(one.absolute().name, source, frames, own and f"{place}{own.name}", records)
         summary.append(f"{one}: {len(frames)} frames of {frames.system or 'a camera'}")
-        inside |= {*files, *([] if own is None else [own])}
-    summary += [
-        f"{file}: an instrument record with {len(record.channels)} channels" for file, record in records.items()
-    ]
-    return CameraProposal(tuple(lines[:-1]), tuple(summary), tuple(sorted({*inside, *records})))
+        named |= set() if own is None else {own}
+    summary += [f"{one}: an instrument record with {len(record.channels)} channels" for one, record in records.items()]
+    return CameraProposal(tuple(lines[:-1]), tuple(summary), tuple(sorted({*named, *records})))
 
 
-def _frames(folder: Path) -> tuple[list[Path], Frames] | None:
-    """The frames of a folder by their heads; None where there are none."""
-    try:
-        files = frame_files(folder)
-        frames = read_frames(folder)
-    except (CreepkitError, OSError):
-        return None
-    return (files, frames) if len(frames) >= FEWEST_FRAMES else None
-
-
-def _record(file: Path) -> InstrumentRecord | None:
-    """The record of a file that has a load or a pressure over time."""
-    try:
-        record = read_record(file)
-    except (CreepkitError, OSError):
-        return None
-    return record if any(one.quantity in LOADS for one in record.channels.values()) else None
-
-
-def _count_of_times(file: Path) -> int:
-    """How many times of frames a file holds; 0 where it is no such table."""
-    try:
-        return int(read_frame_times(file).size)
-    except (CreepkitError, OSError):
-        return 0
+def _of(read: Callable[[Path], Any], path: Path) -> Any:
+    """What is read of a file or folder; None where it holds no such thing."""
+    with suppress(CreepkitError, OSError):
+        return read(path)
+    return None
 
 
 def _record_lines(file: Path, record: InstrumentRecord, place: str) -> list[str]:
-    notes = [comment(f"assumed: {note}") for note in record.notes[:5]]
-    zone = [] if record.start is not None else ['# time_zone = "Europe/Berlin"  # of its times, which do not state one']
-    unstated = [name for name, one in record.channels.items() if one.quantity == "pressure" and not one.reference]
-    reference = (
-        ['pressure_reference = "gauge"  # assumed, for the file does not say; or "absolute"'] if unstated else []
-    )
-    return [
-        comment(f"{file.name}: {record.times.size} rows; channels {', '.join(record.channels)}"),
-        *notes,
-        "[[record]]",
-        f"name = {quoted(file.stem)}",
-        f"file = {quoted(place + file.name)}",
-        *zone,
-        *reference,
-        "",
-    ]
+    unstated = any(one.quantity == "pressure" and not one.reference for one in record.channels.values())
+    lines = {
+        comment(f"{file.name}: {record.times.size} rows; channels {', '.join(record.channels)}"): True,
+        **{comment(f"assumed: {note}"): True for note in record.notes[:5]},
+        "[[record]]": True,
+        f"name = {quoted(file.stem)}": True,
+        f"file = {quoted(place + file.name)}": True,
+        '# time_zone = "Europe/Berlin"  # of its times, which do not state one': record.start is None,
+        'pressure_reference = "gauge"  # assumed, for the file does not say; or "absolute"': unstated,
+        "": True,
+    }
+    return [line for line, shown in lines.items() if shown]
 
 
 def _camera_lines(
-    title: str, place: str, name: str, frames: Frames, times: Path | None, records: dict[Path, InstrumentRecord]
+    title: str, source: str, frames: Frames, times: str | None, records: dict[Path, InstrumentRecord]
 ) -> list[str]:
     """A table [[camera]], with what was assumed in comments."""
-    lines = [
-        comment(f"{len(frames)} frames, by their heads of {frames.system or 'a camera'}"),
-        *([comment(f"numbers that are absent: {len(frames.missing)}")] if frames.missing else []),
-        "[[camera]]",
-        f"name = {quoted(title or 'camera')}",
-        f"frames = {quoted((place.rstrip('/') or '.') if name == '.' else place + name)}",
-    ]
+    lines = [comment(f"{len(frames)} frames, by their heads of {frames.system or 'a camera'}")]
+    if frames.missing:
+        lines.append(comment(f"numbers that are absent: {len(frames.missing)}"))
+    lines += ["[[camera]]", f"name = {quoted(title or 'camera')}", f"frames = {quoted(source)}"]
     if bool(np.isnan(frames.times).any()):
-        lines.append(
-            f"times = {quoted(place + times.name)}  # assumed: it has as many rows as there are frames"
-            if times is not None
-            else "interval_s = 1  # assumed, for the files hold no times; or times = a file"
-        )
+        rows = None if times is None else f"times = {quoted(times)}  # assumed: it has as many rows as there are frames"
+        lines.append(rows or "interval_s = 1  # assumed, for the files hold no times; or times = a file")
     lines.append("subset_mm = 0  # side of a subset, whose smoothing is taken out; 0 leaves it in")
     if records:
         (file, record), *others = records.items()
@@ -140,29 +111,9 @@ def _camera_lines(
         if not record.channel_patterns:
             load = next(n for n, one in record.channels.items() if one.quantity in LOADS)
             warm = next((n for n, one in record.channels.items() if one.quantity == "temperature"), "temperature")
-            lines.append(
-                f"channels = [{quoted(load)}, {quoted(warm)}]  # assumed: load and temperature, the first of each"
-            )
+            pair = f"[{quoted(load)}, {quoted(warm)}]"
+            lines.append(f"channels = {pair}  # assumed: load and temperature, the first of each")
     else:
-        lines += [
-            "# record = a [[record]] of loads and temperatures, or without one:",
-            "# load = { pressure_bar = 50 }",
-        ]
-        lines += ["# temperature_C = 800"]
+        lines.append("# record = a [[record]] of loads and temperatures, or without one:")
+        lines += ["# load = { pressure_bar = 50 }", "# temperature_C = 800"]
     return [*lines, "# modulus_GPa = 150  # a specimen of finite elements needs it", '# names = ["D1"]', ""]
-
-
-def text_of_cameras(folder: Path, cameras: CameraProposal, names: Sequence[str]) -> str:
-    """A study whose tests are all of cameras: what they hold is known when it has been extracted.
-
-    names : of candidate laws, those of them that are installed.
-    """
-    import creepkit as ck
-
-    laws = [name for name in names if name in ck.available("laws")]
-    identification = ["# The tests are not known before the frames are extracted.", "[identification]"]
-    identification += [f"laws = {quoted_list(laws)}  # creepkit list laws lists all", "", "[selection]", 'by = "bic"']
-    report = ["[report]", 'file = "report.html"', "attach_MB = 3  # data files up to this size in all are put into it"]
-    data = ["# [data]", CITATION_LINE]
-    parts = [study_part(folder), list(cameras.lines), data, identification, report]
-    return "\n\n".join("\n".join(lines) for lines in parts) + "\n"

@@ -1,223 +1,401 @@
-"""Cameras of a study file: their files, what contradicts itself, and what their tables say as arguments."""
+"""Cameras and instrument records of a study: stages whose results are tests, which are identified like those of files.
+
+Frames are extracted first, and what an instrument recorded is then put onto their clock; each is a stage of its own, so
+that another time zone of a record, or another channel, leaves the frames alone.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from creepkit.api.extraction import WATCHED, operator_of
+import numpy as np
+
+from creepkit.api.extraction import WATCHED, history_of, imposed_on, operator_of
 from creepkit.api.planned_tests import stepped_load
 from creepkit.cameras.sequences import in_order
-from creepkit.errors import HistoryError, nearest
-from creepkit.records import Loading, Specimen, SupportsSurfaceObservation, loads_of
+from creepkit.errors import CreepkitError, HistoryError, StudyError, nearest
+from creepkit.extraction import Extraction
+from creepkit.instruments.imposed import Imposed
+from creepkit.inverse.fingerprints import predictor_fingerprint
+from creepkit.language import Elastic
+from creepkit.records import Frames, History, Loading, Specimen, SupportsSurfaceObservation, loads_of
 from creepkit.registry.reading import frame_files
+from creepkit.reports.contents import Exclusion
 from creepkit.studies import arguments
-from creepkit.studies.inputs import resolve_paths
-from creepkit.studies.model import CameraPart
-from creepkit.studies.study_file import StudyFile
+from creepkit.studies.inputs import InputFile
+from creepkit.studies.stage import Results, Stage, Tick
+from creepkit.studies.study_file import KeyPath, StudyFile
+from creepkit.studies.tables import CameraTable, RecordTable
+
+MOST_REASON = 300
+"""Characters of a reason for which frames were flagged."""
+
+
+CONTRADICTIONS = (
+    *(("format", "columns"), ("times", "interval_s"), ("operator", "window_mm"), ("operator", "rings_mm")),
+    *(("window_mm", "rings_mm"), ("lag_s", "search_s"), ("record", "load"), ("record", "temperature_C")),
+)
+"""Keys of a [[camera]] of which one may be given."""
 
 
 @dataclass(frozen=True)
-class CameraFiles:
-    """Files of one camera. frames : in their order. times : of frames. record : of its instrument."""
+class ExtractedTests:
+    """What the frames of one camera gave, one extraction for each test piece."""
 
-    frames: tuple[Path, ...]
-    times: Path | None
-    record: Path | None
-
-    @property
-    def all(self) -> list[Path]:
-        """Every one."""
-        return [*self.frames, *(path for path in (self.times, self.record) if path is not None)]
+    tests: tuple[Extraction, ...]
 
 
 @dataclass(frozen=True)
-class StudyCameras:
-    """The cameras of a study file. root : see resolve_paths."""
+class ImposedOnTests:
+    """What an instrument recorded of the test pieces of one camera, in their order."""
+
+    tests: tuple[Imposed, ...]
+
+
+def cameras_of(file: StudyFile) -> list[StudyCamera]:
+    """The cameras of a study; StudyError for cameras and records that contradict themselves, or that nobody names."""
+    import creepkit as ck
+
+    model = file.model
+    for table, parts in (("camera", model.camera), ("record", model.record)):
+        names = [one.name for one in parts]
+        for k, name in enumerate(names):
+            if name in names[:k]:
+                raise file.error((table, k, "name"), f"two of them are called '{name}'; rename one of them")
+    cameras = [StudyCamera(file, k) for k in range(len(model.camera))]
+    for camera in cameras:
+        camera.check()
+    for k, record in enumerate(model.record):
+        if record.name not in [part.record for part in model.camera]:
+            what = f"no [[camera]] says record = '{record.name}'; add that, or leave it out"
+            raise file.error(("record", k, "name"), what)
+        file.check_name(("record", k, "format"), "format", record.format, ck.available("instruments"))
+    return cameras
+
+
+@dataclass(frozen=True)
+class StudyCamera:
+    """One [[camera]] of a study file, of this number."""
 
     file: StudyFile
-    root: Path | None = None
+    number: int
 
     @property
-    def parts(self) -> list[CameraPart]:
-        """Tables of the file."""
-        return self.file.model.camera
+    def part(self) -> CameraTable:
+        """Its table."""
+        return self.file.model.camera[self.number]
 
-    def files(self) -> list[CameraFiles]:
-        """The files of each camera; StudyError where there are none."""
-        return [self._files(k, part) for k, part in enumerate(self.parts)]
+    @property
+    def name(self) -> str:
+        """Of its extraction."""
+        return f"extraction of {self.part.name}"
 
-    def _files(self, number: int, part: CameraPart) -> CameraFiles:
-        place = ("camera", number)
-        paths = resolve_paths(self.file, (*place, "frames"), part.frames, self.root)
-        with self.file.at(*place, "frames"):
-            if len(part.frames) == len(paths) == 1 and paths[0].is_dir():
-                frames = frame_files(paths[0], format_of(part))
-            elif any(path.is_dir() for path in paths):
-                raise HistoryError("names a folder beside others; give one folder, or files of frames")
-            else:
-                frames = in_order(paths) if len(part.frames) == 1 else paths
-        times = self._one(("camera", number, "times"), part.times)
-        index = self.record_number(number)
-        record = None if index is None else self._one(("record", index, "file"), self.file.model.record[index].file)
-        return CameraFiles(tuple(frames), times, record)
+    @property
+    def record_name(self) -> str:
+        """Of what its instrument recorded."""
+        return f"record of {self.part.name}"
 
-    def _one(self, key: tuple[str | int, ...], text: str | None) -> Path | None:
-        """One existing file."""
-        if text is None:
-            return None
-        found = resolve_paths(self.file, key, [text], self.root)
-        if len(found) != 1 or not found[0].is_file():
-            raise self.file.error(key, f"'{text}' is no single file; name one")
-        return found[0]
-
-    def record_number(self, number: int) -> int | None:
-        """Which [[record]] a camera names; None where it names none."""
-        name = self.parts[number].record
-        names = [one.name for one in self.file.model.record]
-        if name is None:
-            return None
-        if name not in names:
-            known = nearest(name, names) if names else "add a table [[record]] with name and file"
-            raise self.file.error(("camera", number, "record"), f"there is no record '{name}'; {known}")
-        return names.index(name)
-
-    # ---- what can be said before anything is read ------------------------------------------------------------------
+    def key(self, *names: str) -> KeyPath:
+        """The place of a key in the file."""
+        return ("camera", self.number, *names)
 
     def check(self) -> None:
-        """StudyError for cameras and records that contradict themselves, or name what there is not."""
-        model = self.file.model
-        for table, parts in (("camera", model.camera), ("record", model.record)):
-            names = [one.name for one in parts]
-            for k, name in enumerate(names):
-                if name in names[:k]:
-                    raise self.file.error((table, k, "name"), f"two of them are called '{name}'; rename one of them")
-        for k, part in enumerate(model.camera):
-            self._check(k, part)
-        used = {part.record for part in model.camera}
-        for k, record in enumerate(model.record):
-            if record.name not in used:
-                raise self.file.error(
-                    ("record", k, "name"), f"no [[camera]] says record = '{record.name}'; add that, or leave it out"
-                )
-            self._check_name("instruments", ("record", k, "format"), record.format)
-
-    def _check_name(self, kind: Any, key: tuple[str | int, ...], name: str | None) -> None:
+        """StudyError for what contradicts itself, or names what there is not; before anything is read."""
         import creepkit as ck
 
-        known = ck.available(kind)
-        if name is not None and name not in known:
-            raise self.file.error(key, f"there is no format '{name}'; {nearest(name, known)}")
-
-    def _check(self, number: int, part: CameraPart) -> None:
-        place = ("camera", number)
-        self._check_name("cameras", (*place, "format"), part.format)
-        pairs: tuple[tuple[str, str], ...] = (
-            ("format", "columns"),
-            ("times", "interval_s"),
-            ("operator", "window_mm"),
-            ("operator", "rings_mm"),
-        )
-        pairs += (("window_mm", "rings_mm"), ("lag_s", "search_s"), ("record", "load"), ("record", "temperature_C"))
-        for first, second in pairs:
-            if getattr(part, first) not in (None, {}) and getattr(part, second) not in (None, {}):
-                raise self.file.error((*place, second), f"contradicts {first}; leave one of them out")
+        part = self.part
+        given = {key for key in type(part).model_fields if getattr(part, key) not in (None, {}, [])}
+        self.file.check_name(self.key("format"), "format", part.format, ck.available("cameras"))
+        for first, second in CONTRADICTIONS:
+            if {first, second} <= given:
+                raise self.file.error(self.key(second), f"contradicts {first}; leave one of them out")
         for name in ("channels", "lag_s", "search_s", "camera_start"):
-            if part.record is None and getattr(part, name) not in (None, {}):
-                raise self.file.error((*place, name), "belongs to a record; say record = its name")
+            if part.record is None and name in given:
+                raise self.file.error(self.key(name), "belongs to a record; say record = its name")
         if part.record is None and (len(part.load) != 1 or part.temperature_C is None):
-            raise self.file.error(
-                place, "does not say what was imposed; give record, or load and temperature_C, as load = { ... = 5 }"
-            )
+            what = "does not say what was imposed; give record, or load and temperature_C, as load = { ... = 5 }"
+            raise self.file.error(self.key(), what)
         if part.names and part.centers_mm and len(part.names) != len(part.centers_mm):
-            raise self.file.error(
-                (*place, "names"),
-                f"are {len(part.names)}, and centers_mm {len(part.centers_mm)}; give one name of each",
-            )
+            what = f"are {len(part.names)}, and centers_mm {len(part.centers_mm)}; give one name of each"
+            raise self.file.error(self.key("names"), what)
         if len(set(part.names)) < len(part.names):
-            raise self.file.error((*place, "names"), "stand there twice; each test piece has its own")
-        self.record_number(number)
-        self.operator(number)
-        self.rest(number)
-        self.camera_start(number)
-        self.loading(number)
-        arguments.lengths_of(self.file, (*place, "lengths"), part.lengths, self.specimen(number))
+            raise self.file.error(self.key("names"), "stand there twice; each test piece has its own")
+        for name in ("record_number", "operator", "rest", "camera_start", "stated_loading", "lengths", "files"):
+            getattr(self, name)  # each says what is wrong with its keys
 
-    # ---- settings as arguments --------------------------------------------------------------------------------------
+    # ---- its table as arguments ------------------------------------------------------------------------------------
 
-    def specimen(self, number: int) -> Specimen:
-        """What a camera watched: as it says, else the specimen of the study, else the one of ck.extract."""
+    @cached_property
+    def record_number(self) -> int | None:
+        """Which [[record]] it names; None where it names none."""
+        names, name = [one.name for one in self.file.model.record], self.part.record
+        if name is not None and name not in names:
+            known = nearest(name, names) if names else "add a table [[record]] with name and file"
+            raise self.file.error(self.key("record"), f"there is no record '{name}'; {known}")
+        return None if name is None else names.index(name)
+
+    @cached_property
+    def files(self) -> tuple[list[Path], Path | None, Path | None]:
+        """Its frames in their order, the file of their times, and that of its record."""
+        part, file, index = self.part, self.file, self.record_number
+        paths = file.paths(self.key("frames"), part.frames)
+        with file.at(*self.key("frames")):
+            if len(part.frames) == len(paths) == 1 and paths[0].is_dir():
+                paths = frame_files(paths[0], self.format)
+            elif any(path.is_dir() for path in paths):
+                raise HistoryError("names a folder beside others; give one folder, or files of frames")
+            elif len(part.frames) == 1:
+                paths = in_order(paths)
+        record = None if index is None else self._file(("record", index, "file"), file.model.record[index].file)
+        return paths, self._file(self.key("times"), part.times), record
+
+    def _file(self, key: KeyPath, text: str | None) -> Path | None:
+        found = [] if text is None else self.file.paths(key, [text])
+        if text is not None and (len(found) != 1 or not found[0].is_file()):
+            raise self.file.error(key, f"'{text}' is no single file; name one")
+        return found[0] if found else None
+
+    @property
+    def all_files(self) -> list[Path]:
+        """Every file that it reads."""
+        frames, times, record = self.files
+        return [*frames, *(path for path in (times, record) if path is not None)]
+
+    @property
+    def format(self) -> Any:
+        """The camera format as ck.read_frames takes it."""
+        return self.part.columns or self.part.format
+
+    @cached_property
+    def specimen(self) -> Specimen:
+        """What it watched: as it says, else the specimen of the study, else the one of ck.extract."""
         import creepkit as ck
 
-        part, place = self.parts[number], ("camera", number)
-        if part.specimen is None and self.file.model.specimen is not None:
-            found, key = arguments.specimen_of_study(self.file), ("specimen", "name")
-        else:
-            key = (*place, "specimen") if part.specimen is not None else place  # type: ignore[assignment]
-            with self.file.at(*key):
-                found = ck.specimen(part.specimen or WATCHED)
+        of_study = self.part.specimen is None and self.file.model.specimen is not None
+        key = ("specimen", "name") if of_study else self.key(*(["specimen"] if self.part.specimen else []))
+        with self.file.at(*key):
+            found = arguments.specimen_of_study(self.file) if of_study else ck.specimen(self.part.specimen or WATCHED)
         if not isinstance(found, SupportsSurfaceObservation):
             watched = [n for n, s in ck.available("specimens").items() if isinstance(s, SupportsSurfaceObservation)]
-            raise self.file.error(
-                key, f"specimen '{found.name}' does not say how cameras see its surface; {nearest(found.name, watched)}"
-            )
+            what = f"specimen '{found.name}' does not say how cameras see its surface; {nearest(found.name, watched)}"
+            raise self.file.error(key, what)
         return found
 
-    def operator(self, number: int) -> str:
+    @cached_property
+    def operator(self) -> str:
         """What is made of the points."""
-        part, specimen = self.parts[number], self.specimen(number)
-        if part.operator is not None:
-            return part.operator
-        with self.file.at("camera", number, "rings_mm" if part.rings_mm else "window_mm"):
-            return operator_of(specimen, part.window_mm, part.rings_mm or ())
+        if self.part.operator is not None:
+            return self.part.operator
+        with self.file.at(*self.key("rings_mm" if self.part.rings_mm else "window_mm")):
+            return operator_of(self.specimen, self.part.window_mm, self.part.rings_mm or ())
 
-    def rest(self, number: int) -> slice | None:
+    @cached_property
+    def rest(self) -> slice | None:
         """Frames at rest, where they are not to be found."""
-        text = self.parts[number].rest_frames
+        text = self.part.rest_frames
         if text is None:
             return None
         first, _, last = (one.strip() for one in text.partition("-"))
         if not (first + last).isascii() or not first.isdecimal() or not last.isdecimal() or int(first) > int(last):
-            raise self.file.error(
-                ("camera", number, "rest_frames"), f"'{text}' is not known; write the first and the last, as \"0-39\""
-            )
+            what = f"'{text}' is not known; write the first and the last, as \"0-39\""
+            raise self.file.error(self.key("rest_frames"), what)
         return slice(int(first[:9]), int(last[:9]) + 1)
 
-    def camera_start(self, number: int) -> float | None:
+    @cached_property
+    def camera_start(self) -> float | None:
         """Unix time of the camera's time zero, s."""
-        text = self.parts[number].camera_start
+        text, start = self.part.camera_start, None
         if text is None:
             return None
-        try:
+        with suppress(ValueError):
             start = datetime.fromisoformat(text)
-        except ValueError:
-            start = None
         if start is None or start.tzinfo is None:
-            raise self.file.error(
-                ("camera", number, "camera_start"), f"'{text}' is not known; write \"2025-08-18T18:51:53-05:00\""
-            )
+            what = f"'{text}' is not known; write \"2025-08-18T18:51:53-05:00\""
+            raise self.file.error(self.key("camera_start"), what)
         return start.timestamp()
 
-    def loading(self, number: int) -> tuple[Loading | float, Any] | None:
+    @cached_property
+    def stated_loading(self) -> tuple[Loading | float, Any] | None:
         """Load and temperature, K, where there is no record."""
-        part, place = self.parts[number], ("camera", number)
-        if part.record is not None:
+        if self.part.record is not None:
             return None
-        specimen = self.specimen(number)
-        kinds = {load.name: load.kind for load in loads_of(specimen)}
-        ((key, steps),) = part.load.items()
-        name, unit = arguments.quantity(self.file, (*place, "load", key), kinds)
-        assert part.temperature_C is not None
-        with self.file.at(*place, "load", key):
-            levels = [(start, kinds[name].convert(v, unit, "", name)) for start, v in arguments.steps_of(steps)]
-            load = next(one for one in loads_of(specimen) if one.name == name)
-            end = max(2.0 * levels[-1][0], 1e9)
-            loading = stepped_load(name, load, levels, control=None, ramp=part.ramp_s, end=end)
-        return loading, arguments.temperature_of(self.file, (*place, "temperature_C"), part.temperature_C)
+        loads = {load.name: load for load in loads_of(self.specimen)}
+        ((key, steps),) = self.part.load.items()
+        kinds = {name: load.kind for name, load in loads.items()}
+        name, levels = arguments.levels_of(self.file, self.key("load", key), kinds, steps)
+        end = max(2.0 * levels[-1][0], 1e9)
+        with self.file.at(*self.key("load", key)):
+            loading = stepped_load(name, loads[name], levels, control=None, ramp=self.part.ramp_s, end=end)
+        assert self.part.temperature_C is not None
+        return loading, arguments.temperature_of(self.file, self.key("temperature_C"), self.part.temperature_C)
+
+    @cached_property
+    def lengths(self) -> dict[str, float]:
+        """{length of the test pieces: mm}."""
+        return arguments.lengths_of(self.file, self.key("lengths"), self.part.lengths, self.specimen)
+
+    # ---- its stages ------------------------------------------------------------------------------------------------
+
+    def stages(self, files: Sequence[InputFile]) -> list[Stage]:
+        """The extraction, and what its record imposed. files : with their hashes."""
+        hashes = {one.path: [one.name, one.sha256] for one in files}
+        return [self._extraction(hashes), *([] if self.part.record is None else [self._imposed(hashes)])]
+
+    def _extraction(self, hashes: Mapping[Path, list[str]]) -> Stage:
+        import creepkit as ck
+
+        part, (paths, times, _) = self.part, self.files
+        centers: Any = part.centers_mm or None
+        if centers is not None:
+            names = part.names or [f"D{k + 1}" for k in range(len(centers))]
+            centers = {name: (x, y) for name, (x, y) in zip(names, centers, strict=True)}
+
+        def make(results: Results, tick: Tick) -> ExtractedTests:
+            frames = ck.read_frames(list(paths), self.format, times)
+            if part.interval_s is not None:
+                frames = replace(frames, times=part.interval_s * np.arange(len(frames), dtype=float))
+            found = ck.extract(
+                replace(_reporting(frames, tick), name=part.name),
+                self.specimen,
+                operator=self.operator,
+                centers=centers,
+                rest=self.rest,
+                subset=part.subset_mm,
+            )
+            if part.names and centers is None:
+                if len(part.names) != len(found):
+                    raise HistoryError(
+                        f"{len(found)} test pieces were found, and {len(part.names)} names are given; give their "
+                        "centers_mm, or as many names"
+                    )
+                found = [one.replace(name=name) for one, name in zip(found, part.names, strict=True)]
+            return ExtractedTests(tuple(_without_folders(one, paths[0].parent) for one in found))
+
+        settings = [
+            {"frames": [hashes[path] for path in paths], "times": times and hashes[times]},
+            {name: getattr(part, name) for name in ("name", "format", "columns", "interval_s", "names", "subset_mm")},
+            [self.operator, part.centers_mm, part.rest_frames, predictor_fingerprint(self.specimen)],
+        ]
+        return Stage(self.name, "extraction", "", settings, make, ExtractedTests, _numbers_of_frames)
+
+    def _imposed(self, hashes: Mapping[Path, list[str]]) -> Stage:
+        import creepkit as ck
+
+        part, path, index = self.part, self.files[2], self.record_number
+        assert index is not None
+        assert path is not None
+        record = self.file.model.record[index]
+        search = None if part.search_s is None else (part.search_s[0], part.search_s[1])
+
+        def make(results: Results, tick: Tick) -> ImposedOnTests:
+            read = ck.read_record(path, record.format, **_record_options(record))
+            found = []
+            tests: tuple[Extraction, ...] = results[self.name].tests
+            for k, one in enumerate(tests):
+                tick("align clocks", k, len(tests))
+                channels = part.channels.get(one.name, part.channels.get(""))
+                try:
+                    under = imposed_on(
+                        one, read, channels, lag=part.lag_s, search=search, camera_start=self.camera_start
+                    )
+                except CreepkitError as error:
+                    raise StudyError(f"{one.name}: {error}") from None
+                found.append(under)
+            return ImposedOnTests(tuple(found))
+
+        settings = [hashes[path], record.model_dump(), part.channels, [part.lag_s, part.search_s, part.camera_start]]
+        name, needs = self.record_name, (self.name,)
+        return Stage(name, "record", "", settings, make, ImposedOnTests, _numbers_of_records, needs)
+
+    # ---- its tests -------------------------------------------------------------------------------------------------
+
+    def tests(self, results: Any) -> Iterator[tuple[str, Extraction, Imposed | None]]:
+        """Name, extraction, and what its record says was imposed, of each test; none where the extraction failed."""
+        extracted = results[self.name].tests if self.name in results else ()
+        imposed = results[self.record_name].tests if self.record_name in results else [None] * len(extracted)
+        for one, under in zip(extracted, imposed, strict=True):
+            yield f"{self.part.name} {one.name}", one, under
+
+    def histories(self, results: Any) -> list[History]:
+        """The tests, where no stage failed."""
+        with self.file.at(*self.key()):
+            return [
+                self._history(name, one, under)
+                for name, one, under in self.tests(results)
+                if under is not None or self.part.record is None
+            ]
+
+    def _history(self, name: str, one: Extraction, under: Imposed | None) -> History:
+        part, stated = self.part, self.stated_loading
+        history = one.history_under(*stated) if stated is not None else history_of(one, under)  # type: ignore[arg-type]
+        modulus = arguments.stated(part, E="modulus_GPa")
+        return history.replace(
+            name=name,
+            alloy=part.alloy or "",
+            elastic=Elastic(**modulus, nu=part.poisson) if modulus else None,
+            geometry={**history.geometry, **self.lengths},
+            labels={**history.labels, **part.labels},
+            source=f"{part.frames[0]} ({one.name})",
+        )
 
 
-def format_of(part: CameraPart) -> Any:
-    """The camera format as ck.read_frames takes it."""
-    return part.columns or part.format
+def flagged_frames(extractions: Mapping[str, Extraction]) -> list[Exclusion]:
+    """Frames that extractions do not use, with the reasons, as the camera counts them."""
+    return [
+        Exclusion(name, flag.frames, f"{flag.kind}, frames as the camera counts them: {flag.reason}")
+        for name, one in extractions.items()
+        for flag in one.flags
+    ]
+
+
+def _numbers_of_frames(extracted: ExtractedTests) -> dict[str, Any]:
+    """Frames used, the centre and the last outputs of each test piece."""
+    return {
+        one.name: {
+            "frames": int(one.used.sum()),
+            "centre": one.center,
+            **{name: float(values[one.used][-1]) for name, values in one.outputs.items() if one.used.any()},
+        }
+        for one in extracted.tests
+    }
+
+
+def _numbers_of_records(imposed: ImposedOnTests) -> dict[str, Any]:
+    """The alignment of the clocks of each test piece."""
+    return {
+        f"{k + 1}": {"lag_s": one.alignment.lag, "interval_s": one.alignment.lag_interval, "zero_s": one.time_zero}
+        for k, one in enumerate(imposed.tests)
+    }
+
+
+def _record_options(record: RecordTable) -> Any:
+    options = record.model_dump(exclude={"name", "file", "format", "pressure_reference", "ambient_pressure_MPa"})
+    reference, ambient = record.pressure_reference or "", record.ambient_pressure_MPa
+    return {**options, "pressure_reference": reference, "ambient_pressure": ambient}
+
+
+def _reporting(frames: Frames, tick: Tick) -> Frames:
+    """The same frames; each that is read counts as progress."""
+    done: set[int] = set()
+
+    def read(index: int) -> Any:
+        done.add(index)
+        tick("frames", len(done), len(frames))
+        return frames.read_frame(index)
+
+    return replace(frames, read_frame=read)
+
+
+def _without_folders(extraction: Extraction, folder: Path) -> Extraction:
+    """Reasons of flags without the place of the files on this machine, which are the same wherever they lie."""
+    flags = tuple(
+        replace(flag, reason=flag.reason.replace(f"{folder}/", "").replace(f"{folder}\\", "")[:MOST_REASON])
+        for flag in extraction.flags
+    )
+    return extraction.replace(flags=flags)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from creepkit.errors import StudyError
@@ -24,26 +23,23 @@ def study_of_report(report: Path, folder: Path) -> Study:
     files = read_attachments(report)
     if STUDY_NAME not in files:
         raise StudyError(f"{report}: carries no {STUDY_NAME}; give a report that 'creepkit run study.toml' wrote")
-    foreign = [name for name in files if name not in (STUDY_NAME, LOCK_NAME) and not name.startswith(INPUTS)]
-    if foreign:
-        raise StudyError(
-            f"{report}: carries '{foreign[0]}', and a report carries {STUDY_NAME}, {LOCK_NAME} and data below "
-            f"{INPUTS} alone; use the report as creepkit wrote it"
-        )
-    _refuse_links(folder, list(files))
+    for name in files:
+        if name not in (STUDY_NAME, LOCK_NAME) and not name.startswith(INPUTS):
+            raise StudyError(
+                f"{report}: carries '{name}', and a report carries {STUDY_NAME}, {LOCK_NAME} and data below {INPUTS} "
+                "alone; use the report as creepkit wrote it"
+            )
     for name, content in files.items():
         path = folder / name
-        if path.exists() and name == LOCK_NAME:
-            continue  # of an earlier run in this folder, which the report began
-        if path.exists():
-            if read_bytes(path, DATA_FILE) != content:
-                raise StudyError(f"{path}: is there already, and differs from what {report} carries; give --to FOLDER")
-            continue
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StudyError(f"{path.parent}: cannot be made ({error.strerror}); name another folder by --to") from None
-        write_bytes(content, path, StudyError)
+        if path.exists() and name != LOCK_NAME and read_bytes(path, DATA_FILE) != content:
+            raise StudyError(f"{path}: is there already, and differs from what {report} carries; give --to FOLDER")
+        if not path.exists():
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                what = f"cannot be made ({error.strerror}); name another folder by --to"
+                raise StudyError(f"{path.parent}: {what}") from None
+            write_bytes(content, path, StudyError)
     inputs = folder / CARRIED_FOLDER
     if not inputs.is_dir():
         raise StudyError(
@@ -51,14 +47,3 @@ def study_of_report(report: Path, folder: Path) -> Study:
             f"put the files that {folder / LOCK_NAME} names into {inputs}, and run the report again"
         )
     return Study.load(folder / STUDY_NAME, root=inputs)
-
-
-def _refuse_links(folder: Path, names: Sequence[str]) -> None:
-    """StudyError where a file would be written through a link, to a place that nobody named."""
-    places = {folder, folder / CARRIED_FOLDER}
-    for name in names:
-        path = folder / name
-        places |= {path, *(one for one in path.parents if folder in one.parents)}
-    for path in sorted(places):
-        if path.is_symlink():
-            raise StudyError(f"{path}: is a link, through which nothing is written; remove it, or give --to FOLDER")

@@ -9,31 +9,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
+from types import FunctionType
 from typing import Any, Literal
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.files.owners import check_owner_by_name
+from creepkit.files.locking import locked
 from creepkit.files.record_codec import RecordError, record_to_json
-from creepkit.files.writing import check_folder_target
 from creepkit.inverse.kept_fits import COMPUTING, keep_fits
-from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text, series_of_task
+from creepkit.jobs.shard_progress import ProgressCallback, duration_text, series_of_task
 from creepkit.records import History
-from creepkit.reports.contents import ExportedFile, StageFailure
-from creepkit.studies.documents import (
-    FITS_FOLDER,
-    IDENTIFIED_FOLDER,
-    ResultCodec,
-    ResultFolder,
-    digest_of_result,
-    key_of,
-)
-from creepkit.studies.stage import Stage
-
-RUNNING_LOCK = "running.lock"
-
-
-CHANGED = "was made again, for what was kept of it had been changed since it was written"
-
+from creepkit.reports.contents import StageFailure
+from creepkit.studies.kept_results import ResultFolder, codec_of, key_of
+from creepkit.studies.stage import Stage, StageKind
 
 MOST_NAMED = 6
 """Stages that a sentence names."""
@@ -47,92 +34,63 @@ class StageRecord:
     """How a stage of a run ended.
 
     name, kind, group : of the stage. state : "made", "kept" from an earlier run, "failed", or "left out" where it was
-    not asked for. key : hash of all that decides its result. sentence : why it failed, cannot be kept, or was made
-    again. numbers : of its result, and sha256 : of all of it, "" where there is none, which study.lock records.
-    needs : the stages that it was made from.
+    not asked for. key : hash of all that decides its result. sentence : why it failed, or cannot be kept.
+    numbers : of its result, which study.lock records.
     """
 
     name: str
-    kind: str
+    kind: StageKind
     group: str
     state: Literal["made", "kept", "failed", "left out"]
     key: str
     sentence: str = ""
     numbers: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    sha256: str = ""
-    needs: tuple[str, ...] = ()
 
 
-class LazyResults:
-    """{name of a stage: its result}; what a file holds is read when it is asked for."""
-
-    def __init__(self) -> None:
-        self._makers: dict[str, Callable[[], Any]] = {}
-        self._values: dict[str, Any] = {}
-
-    def set(self, name: str, value: Any) -> None:
-        """Keep a result."""
-        self._values[name] = value
-
-    def defer(self, name: str, make: Callable[[], Any]) -> None:
-        """Read, or make, a result when it is asked for first."""
-        self._makers[name] = make
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._values or name in self._makers
+class LazyResults(dict[str, Any]):
+    """{name of a stage: its result}; of a function the result is made when it is asked for first."""
 
     def __getitem__(self, name: str) -> Any:
-        if name not in self._values:
-            self._values[name] = self._makers[name]()
-        return self._values[name]
+        value = super().__getitem__(name)
+        if isinstance(value, FunctionType):
+            self[name] = value = value()
+        return value
 
 
 @contextmanager
 def running_alone(folder: Path) -> Iterator[None]:
     """StudyError where another process is carrying out the same study; the system frees the lock of one that dies."""
-    for one in (folder, folder / FITS_FOLDER, folder / IDENTIFIED_FOLDER):
-        if one.is_symlink():
-            raise StudyError(f"{one}: is a link, and results are kept in a folder of the study's own; remove the link")
-    check_folder_target(folder, StudyError)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for one in (folder, folder / FITS_FOLDER, folder / IDENTIFIED_FOLDER):
-            check_owner_by_name(one, StudyError)
-        lock = ShardLock(folder / RUNNING_LOCK, StudyError)
-        lock.__enter__()
+        with locked(folder / "running.lock") as held:
+            if not held:
+                raise StudyError(f"{folder}: another process is carrying out this study; wait for it, or end it")
+            yield
     except OSError as error:
         raise StudyError(
-            f"{folder}: results cannot be kept there ({error.strerror}); remove what stands in their place, or name "
-            "another folder by --to"
+            f"{folder}: results cannot be kept there ({error.strerror}); name another folder by --to"
         ) from None
-    try:
-        if not lock.held:
-            raise StudyError(f"{folder}: another process is carrying out this study; wait for it, or end it")
-        yield
-    finally:
-        lock.__exit__(None, None, None)
+
+
+def failure_text(error: Exception) -> str:
+    """Why a stage failed, in one line; errors that are not creepkit's, as of a plugin, with their class."""
+    return " ".join((str(error) if isinstance(error, CreepkitError) else f"{type(error).__name__}: {error}").split())
 
 
 @dataclass
 class Execution:
     """One run over the stages of a study.
 
-    folder : of kept results. histories : the tests. asked : keys of the identifications that the stages rest on.
-    progress : called as progress(task, done, total, note). documents : {stage: what was written of its result}.
-    stated : {stage: what study.lock says of it}. locked : StudyError for a kept result that is not that of the lock.
-    digests : {stage: hash of its result}.
+    folder : of kept results. histories : the tests. progress : called as progress(task, done, total, note).
+    documents : {stage: what was written of its result}.
     """
 
     folder: ResultFolder
-    histories: Sequence[History]
     progress: ProgressCallback | None = None
-    asked: set[str] = field(default_factory=set)
+    histories: Sequence[History] = ()
     records: list[StageRecord] = field(default_factory=list)
-    results: Any = field(default_factory=LazyResults)
+    results: LazyResults = field(default_factory=LazyResults)
     documents: dict[str, Any] = field(default_factory=dict)
-    stated: Mapping[str, Any] = field(default_factory=dict)
-    locked: bool = False
-    digests: dict[str, str] = field(default_factory=dict)
 
     @property
     def failures(self) -> tuple[StageFailure, ...]:
@@ -145,43 +103,35 @@ class Execution:
         read_others : whether results of other stages, where they are kept of the same inputs, are read for a report.
         A KeyboardInterrupt says which stages are kept.
         """
-        try:
-            self._run(stages, wanted, read_others=read_others)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(self._kept_sentence(stages, wanted)) from None
-
-    def _kept_sentence(self, stages: Sequence[Stage], wanted: Collection[str]) -> str:
-        """Half a sentence on what an interrupted run leaves."""
-        kept = [one.name for one in self.records if one.state in ("made", "kept")]
-        ended = {one.name for one in self.records}
-        left = [stage.name for stage in stages if stage.name in wanted and stage.name not in ended]
-        named = f"kept: {_listed(kept)}" if kept else "no stage was finished, laws that are fitted are kept"
-        return f"{named}; the same command goes on with {left[0] if left else 'the report'}"
-
-    def _run(self, stages: Sequence[Stage], wanted: Collection[str], *, read_others: bool) -> None:
         for number, stage in enumerate(stages, 1):
-            key = self._key(stage)
-            if stage.name not in wanted:
-                kept = self._read(stage, key) if read_others and all(n in self.results for n in stage.needs) else None
-                if kept is not None:
-                    self._record(stage, "kept", key, "was not asked for; the report shows what was kept of it", kept)
-                    continue
+            try:
+                self._run(stage, stage.name in wanted, read_others, f"stage {number} of {len(stages)}")
+            except KeyboardInterrupt:
+                kept = [one.name for one in self.records if one.state in ("made", "kept")]
+                more = f" and {len(kept) - MOST_NAMED} more" if len(kept) > MOST_NAMED else ""
+                named = f"kept: {', '.join(kept[:MOST_NAMED])}{more}" if kept else "laws that are fitted are kept"
+                raise KeyboardInterrupt(f"{named}; the same command goes on with {stage.name}") from None
+
+    def _run(self, stage: Stage, wanted: bool, read_others: bool, place: str) -> None:
+        key = self._key(stage)
+        missing = [name for name in stage.needs if name not in self.results]
+        if not wanted:
+            numbers = self._read(stage, key) if read_others and not missing else None
+            if numbers is not None:
+                self._record(stage, "kept", key, "was not asked for; the report shows what was kept of it", numbers)
+            else:
                 lacking = "was not asked for, and nothing of these inputs is kept: the report lacks it"
                 self._record(stage, "left out", key, lacking if read_others else "")
-                self._note_unread(stage, key)
-                continue
-            failed = [name for name in stage.needs if name not in self.results]
-            if failed:
-                self._record(stage, "failed", key, f"{failed[0]} failed, which it needs")
-                continue
-            self._report(stage, 0, 1, f"stage {number} of {len(stages)}")
+        elif missing:
+            self._record(stage, "failed", key, f"{missing[0]} failed, which it needs")
+        else:
+            self._report(stage, 0, 1, place)
             numbers = self._read(stage, key)
             if numbers is not None:
-                self._record(stage, "kept", key, numbers=numbers)
+                self._record(stage, "kept", key, stage.remark, numbers)
                 self._report(stage, 1, 1, "kept from before")
-                continue
-            remark = CHANGED if self.folder.is_altered(stage.name, readable=self._data(stage, key) is not None) else ""
-            self._make(stage, key, remark)
+            else:
+                self._make(stage, key)
 
     def _key(self, stage: Stage) -> str:
         keys = {one.name: one.key for one in self.records}
@@ -192,163 +142,69 @@ class Execution:
     def _record(
         self, stage: Stage, state: Any, key: str, sentence: str = "", numbers: Mapping[str, Any] | None = None
     ) -> None:
-        sha256 = self.digests.get(stage.name, "")
-        if state in ("made", "kept"):
-            sentence = "; ".join(filter(None, (stage.remark, sentence)))
-        self.records.append(
-            StageRecord(stage.name, stage.kind, stage.group, state, key, sentence, numbers or {}, sha256, stage.needs)
-        )
+        self.records.append(StageRecord(stage.name, stage.kind, stage.group, state, key, sentence, numbers or {}))
 
     def _report(self, stage: Stage, done: int, total: int, note: str) -> None:
         if self.progress is not None:
             self.progress(stage.name, done, total, note)
 
-    def _codec(self, stage: Stage) -> Any:
-        return ResultCodec(self.histories, stage.predictor).codec
-
-    def _read(self, stage: Stage, key: str) -> dict[str, Any] | None:
-        """The numbers of a result of this key, None where there is none.
+    def _read(self, stage: Stage, key: str) -> Any:
+        """The numbers of a result of this key, None where there is none that can be read.
 
         A record is read at once, for its file may be damaged; what is no record is made again when it is asked for.
         """
-        data = self._data(stage, key)
-        if self._is_altered(stage, key, data) or data is None:
-            return None
-        numbers: dict[str, Any] = data["numbers"]
-        self._note_fits(data)
-        self.digests[stage.name] = digest_of_result(data)
-        if stage.document is not None:
-            self.documents[stage.name] = data.get("document")
-        if stage.record is None:
-            self.results.defer(stage.name, lambda: self._made(stage, _no_tick))
-            return numbers
+        data = self.folder.load(stage.name, key)
         try:
-            result = self._codec(stage).from_json(stage.record, data["record"])
-            if isinstance(result, ExportedFile):
-                _check_export(stage, result)
-            numbers = _numbers_of(stage, result)  # not those of the file, which anybody may have written
-        except (CreepkitError, KeyError, AttributeError, TypeError, ValueError, ArithmeticError, AssertionError):
+            result = (
+                self._codec(stage).from_json(stage.record, data["record"])
+                if stage.record
+                else lambda: self._made(stage, lambda task, done, total: None)
+            )
+            numbers = data["numbers"]
+        except (CreepkitError, LookupError, AttributeError, TypeError, ValueError, ArithmeticError, AssertionError):
             return None
-        self.results.set(stage.name, result)
+        self.results[stage.name] = result
+        self.documents[stage.name] = data.get("document")
         return numbers
 
-    def _data(self, stage: Stage, key: str) -> dict[str, Any] | None:
-        """What the file of a stage holds, where it was made of what its needs are now."""
-        data = self.folder.load(stage.name, self._content_key(stage, key))
-        return data if isinstance(data, dict) and isinstance(data.get("numbers"), dict) else None
+    def _codec(self, stage: Stage) -> Any:
+        return codec_of(self.histories, stage.predictor)
 
-    def _content_key(self, stage: Stage, key: str) -> str:
-        """Hash of all that decides a result, the results that it is made from included."""
-        return key_of({"key": key, "needs": [self.digests.get(name, "") for name in stage.needs]})
-
-    def _is_altered(self, stage: Stage, key: str, data: dict[str, Any] | None) -> bool:
-        """Whether a kept result is not the one that was written; under --locked, StudyError for that."""
-        known = self.stated.get(stage.name)
-        known = known if isinstance(known, dict) and known.get("key") == key else {}
-        stated = known.get("sha256") if data is not None else None
-        same = data is not None and stated is not None and digest_of_result(data) == stated
-        altered = not same and self.folder.is_altered(stage.name, readable=data is not None)
-        if self.locked and (altered or (stated is not None and not same)):
-            raise StudyError(
-                f"{self.folder.path(stage.name)}: the study cannot be repeated exactly: what was kept of {stage.name} "
-                "is not what study.lock states; leave --locked out, and it is made again"
-            )
-        return altered
-
-    def _note_unread(self, stage: Stage, key: str) -> None:
-        """Note what the result of a stage that was not asked for rests on, and its hash for those made from it."""
-        data = self._data(stage, key)
-        if data is not None:
-            self._note_fits(data)
-            self.digests[stage.name] = digest_of_result(data)
-
-    def _note_fits(self, data: Any) -> None:
-        """Note the identifications that a kept result was made from."""
-        keys = data.get("fits") if isinstance(data, dict) else None
-        self.asked.update(str(key) for key in (keys if isinstance(keys, list) else ()))
-
-    def _make(self, stage: Stage, key: str, remark: str) -> None:
+    def _make(self, stage: Stage, key: str) -> None:
         start = time.monotonic()
         begun: dict[str, float] = {}
 
         def tick(task: str, done: int, total: int) -> None:
-            series = series_of_task(task)[0]
-            elapsed = time.monotonic() - begun.setdefault(series, start if not begun else time.monotonic())
-            left = (
-                f", {duration_text(elapsed / done * (total - done))} left" if elapsed > 0 and 0 < done < total else ""
-            )
-            self._report(stage, min(done, total), total, f"{task}{left}")
+            now = time.monotonic()
+            elapsed = now - begun.setdefault(series_of_task(task)[0], now if begun else start)
+            if elapsed > 0 and 0 < done < total:
+                task += f", {duration_text(elapsed / done * (total - done))} left"
+            self._report(stage, min(done, total), total, task)
 
-        self.digests.pop(stage.name, None)
-        fits: list[str] = []
-        altered: list[int] = []
         try:
-            result = self._made(stage, tick, fits, altered)
+            result = self._made(stage, tick)
         except Exception as error:  # of a plugin, too: the other stages go on
-            what = str(error) if isinstance(error, CreepkitError) else f"{type(error).__name__}: {error}"
             _log.debug("%s failed", stage.name, exc_info=error)
-            self._record(stage, "failed", key, " ".join(what.split()))
+            self._record(stage, "failed", key, failure_text(error))
             self._report(stage, 1, 1, "failed")
             return
         if getattr(result, "interrupted", False):  # by Ctrl-C, with the best so far, which is not the result
             raise KeyboardInterrupt
-        self.results.set(stage.name, result)
-        numbers = _numbers_of(stage, result)
-        if sum(altered):
-            remark = CHANGED
-        kept: dict[str, Any] = {"numbers": numbers}
+        self.results[stage.name] = result
+        kept = {"numbers": record_to_json(dict(stage.numbers(result)))}
+        sentence = stage.remark
         try:
-            record = {} if stage.record is None else {"record": self._codec(stage).to_json(result)}
             if stage.document is not None:
-                self.documents[stage.name] = record["document"] = stage.document(result)
-            kept |= record
-            self.folder.save(stage.name, self._content_key(stage, key), {**kept, "fits": fits})
+                kept["document"] = self.documents[stage.name] = stage.document(result)
+            if stage.record is not None:
+                kept["record"] = self._codec(stage).to_json(result)
+            self.folder.save(stage.name, key, kept)
         except RecordError as error:  # of what a plugin brought
-            remark = f"is made again in each run, for it cannot be stored: {' '.join(str(error).split())}"
-        self.digests[stage.name] = digest_of_result(kept)
-        self._record(stage, "made", key, remark, numbers)
+            again = f"is made again in each run, for it cannot be stored: {failure_text(error)}"
+            sentence = "; ".join(filter(None, (sentence, again)))
+        self._record(stage, "made", key, sentence, kept["numbers"])
         self._report(stage, 1, 1, f"done in {duration_text(time.monotonic() - start)}")
 
-    def _made(
-        self,
-        stage: Stage,
-        tick: Callable[[str, int, int], None],
-        fits: list[str] | None = None,
-        altered: list[int] | None = None,
-    ) -> Any:
-        """The result. fits : to which the keys of the identifications that it rests on are added.
-
-        altered : to which the number of kept identifications is added that were not as they were written.
-        """
-        with keep_fits(self.folder.fits) as kept:
-            try:
-                return stage.make(self.results, tick)
-            finally:
-                keys = list(dict.fromkeys(kept.keys))
-                self.asked.update(keys)
-                if fits is not None:
-                    fits += keys
-                if altered is not None:
-                    altered.append(kept.altered)
-
-
-def _numbers_of(stage: Stage, result: Any) -> dict[str, Any]:
-    """The numbers of a result by name, as JSON holds them."""
-    numbers: dict[str, Any] = record_to_json(dict(stage.numbers(result)))
-    return numbers
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
-
-
-def _check_export(stage: Stage, export: ExportedFile) -> None:
-    """ValueError for a kept export that is not the file that the study names."""
-    export.text.encode()
-    if export.name != stage.file:
-        raise ValueError("another file")
-
-
-def _no_tick(task: str, done: int, total: int) -> None:
-    """Progress of what is only read again."""
+    def _made(self, stage: Stage, tick: Callable[[str, int, int], None]) -> Any:
+        with keep_fits(self.folder.fits):
+            return stage.make(self.results, tick)

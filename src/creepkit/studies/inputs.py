@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
 from creepkit.errors import StudyError, nearest
-from creepkit.files.reading import FileKind, check_readable
-from creepkit.files.reading import sha256_of as hash_of_file
+from creepkit.files.reading import FileKind, check_readable, sha256_of
 from creepkit.inverse.history_checks import SUSPECT_LABEL, truncated_at_strain
 from creepkit.quality import without_copies
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History
@@ -22,18 +20,10 @@ from creepkit.records.history_selection import select_tests
 from creepkit.records.plugin_calls import accepts_path
 from creepkit.registry import default_registry
 from creepkit.reports.contents import Exclusion
-from creepkit.studies.arguments import carried_name, plain_path
-from creepkit.studies.study_file import StudyFile
+from creepkit.studies.study_file import KeyPath, StudyFile, carried_name
+from creepkit.studies.tables import ExcludeTable
 
 DATA_FILE = FileKind("a data file", StudyError, "name files of tests", maximum_bytes=2_000_000_000)
-
-
-MOST_FILES = 10_000
-"""Of one study."""
-
-
-MOST_NAMES = 300_000
-"""Names of files that the patterns of one key are compared with."""
 
 
 NOT_STATED = "not stated"
@@ -66,9 +56,9 @@ class StudyInputs:
     measured : all tests as files hold them. exclusions : with reasons. groups : of the tests that remain.
     """
 
-    measured: tuple[History, ...]
-    exclusions: tuple[Exclusion, ...]
-    groups: tuple[TestGroup, ...]
+    measured: tuple[History, ...] = ()
+    exclusions: tuple[Exclusion, ...] = ()
+    groups: tuple[TestGroup, ...] = ()
 
     @property
     def histories(self) -> tuple[History, ...]:
@@ -76,149 +66,26 @@ class StudyInputs:
         return tuple(history for group in self.groups for history in group.histories)
 
 
-def resolve_paths(file: StudyFile, key: tuple[str | int, ...], texts: Sequence[str], root: Path | None) -> list[Path]:
-    """Existing files and folders of patterns relative to the study file; StudyError where there is none.
-
-    root : folder of files that a report carried, in which `..` is written `up`.
-    """
-    found: dict[Path, None] = {}
-    search = _Search()
-    for k, text in enumerate(texts):
-        place = (*key, k)
-        pattern = plain_path(file, place, text)
-        if "**" in pattern.parts:
-            raise file.error(place, f"'{text}' goes through folders of any depth; name the folders")
-        base, relative = (file.path.parent, pattern) if root is None else (root, PurePosixPath(carried_name(pattern)))
-        path = base / relative
-        try:
-            matches = [path] if path.exists() else search.matches(base, relative)
-        except _TooManyNamesError:
-            raise file.error(
-                place,
-                f"'{text}' and those before it look at more than {MOST_NAMES} names of files; name folders in the "
-                "place of patterns",
-            ) from None
-        except OSError as error:  # a folder that may not be entered, a name too long
-            refused = (
-                "" if error.filename in (None, str(path)) else f", for {_relative(Path(error.filename), base)} cannot"
-            )
-            raise file.error(
-                place, f"'{text}' cannot be read{refused} ({error.strerror}); check its name and who may read it"
-            ) from None
-        if not matches:
-            raise file.error(place, f"there is no file or folder '{text}' beside the study, and none matches it")
-        found.update(dict.fromkeys(matches))
-    return list(found)
-
-
-class _TooManyNamesError(Exception):
-    """More names than patterns are compared with."""
-
-
-class _Search:
-    """What matches patterns; each counts the names that it looks at, of which there are MOST_NAMES for all together."""
-
-    def __init__(self) -> None:
-        self.looked_at = 0
-
-    def matches(self, base: Path, pattern: PurePosixPath) -> list[Path]:
-        """Files and folders that match; of folders that are the same one, by links, the first alone.
-
-        OSError for a folder on the way that cannot be read.
-        """
-        found = [base]
-        for part in pattern.parts:
-            if not set(part) & set("*?["):
-                self._count(len(found))
-                found = [one / part for one in found if _is_there(one / part)]
-                continue
-            matching = self._matching((one for one in found if one.is_dir()), part)
-            found = list(_without_other_names(islice(matching, MOST_FILES + 1)))
-        return found if found != [base] else []
-
-    def _matching(self, folders: Iterable[Path], part: str) -> Iterator[Path]:
-        for folder in folders:
-            names = sorted(os.listdir(folder))
-            self._count(1 + len(names))
-            yield from (folder / name for name in names if fnmatchcase(name, part))
-
-    def _count(self, names: int) -> None:
-        self.looked_at += names
-        if self.looked_at > MOST_NAMES:
-            raise _TooManyNamesError
-
-
-def _without_other_names(paths: Iterable[Path]) -> Iterator[Path]:
-    """Paths without those of folders that had another name among them already, by a link."""
-    seen: set[tuple[int, int] | str] = set()
-    for path in paths:
-        if path.is_dir():
-            status = path.stat()
-            place = (status.st_dev, status.st_ino) if status.st_ino else os.path.realpath(path)
-            if place in seen:
-                continue
-            seen.add(place)
-        yield path
-
-
-def _is_there(path: Path) -> bool:
-    """Whether there is such a file; OSError where nobody may look, which Path.exists answers otherwise since 3.13."""
-    try:
-        path.stat()
-    except (FileNotFoundError, NotADirectoryError):
-        return False
-    return True
-
-
-def input_files(file: StudyFile, paths: Sequence[Path], root: Path | None, left_out: Sequence[Path]) -> list[InputFile]:
+def input_files(file: StudyFile, paths: Sequence[Path], left_out: Sequence[Path]) -> list[InputFile]:
     """Every regular file among paths and in folders among them, with its hash; without what the study itself writes."""
-    base = file.path.parent if root is None else root
-    files: dict[Path, None] = {}
-    for path in paths:
-        for one in sorted(islice(_files_below(file, path), 2 * MOST_FILES)) if path.is_dir() else [path]:
-            if one.is_file() and not any(one == own or own in one.parents for own in left_out):
-                files[one] = None
-            if len(files) > MOST_FILES:
-                raise file.error(("data", "files"), f"they are more than {MOST_FILES} files; name fewer")
+    found = (one for path in paths for one in (_files_of_tests(path) if path.is_dir() else [path]))
+    files = list(dict.fromkeys(one for one in found if one.is_file() and one not in left_out))
     for one in files:  # of all, before any is read from its beginning to its end
         check_readable(one, DATA_FILE)
-    result = []
-    for one in files:
-        relative = PurePosixPath(_relative(one, base))
-        name = str(relative) if root is not None else carried_name(relative)
-        result.append(InputFile(name, one, sha256_of(one)))
-    return result
+    names = (PurePosixPath(os.path.relpath(one, file.base).replace("\\", "/")) for one in files)
+    return [
+        InputFile(str(name) if file.root is not None else carried_name(name), one, sha256_of(one, DATA_FILE))
+        for name, one in zip(names, files, strict=True)
+    ]
 
 
-def _files_below(file: StudyFile, folder: Path) -> Iterator[Path]:
-    """The visible files of a folder that tests are read from; StudyError where a folder in it cannot be read.
-
-    Of a folder that a reader takes as a whole all files below are, of another those that a reader accepts; what else
-    lies there is nobody's business.
-    """
+def _files_of_tests(folder: Path) -> list[Path]:
+    """The visible files of a folder: all below where a reader takes it as a whole, else those that a reader accepts."""
     readers = [found.value for found in default_registry().readers().values()]
-    is_whole = any(accepts_path(reader, folder) for reader in readers)
-
-    def refuse(error: OSError) -> None:
-        raise file.error(
-            ("data", "files"),
-            f"folder {error.filename} cannot be read ({error.strerror}); make it readable, or move it",
-        )
-
-    for parent, folders, names in os.walk(folder, onerror=refuse):
-        folders[:] = [name for name in folders if name[0] != "."] if is_whole else []
-        for one in (Path(parent, name) for name in names if name[0] != "."):
-            if is_whole or (one.is_file() and any(accepts_path(reader, one) for reader in readers)):
-                yield one
-
-
-def _relative(path: Path, base: Path) -> str:
-    return os.path.relpath(path, base).replace("\\", "/")
-
-
-def sha256_of(path: Path) -> str:
-    """Of the content of a regular file."""
-    return hash_of_file(path, DATA_FILE)
+    whole = any(accepts_path(reader, folder) for reader in readers)
+    below = sorted(folder.rglob("*") if whole else folder.iterdir())
+    visible = [one for one in below if not any(part[0] == "." for part in one.relative_to(folder).parts)]
+    return visible if whole else [one for one in visible if any(accepts_path(reader, one) for reader in readers)]
 
 
 # ---- tests ---------------------------------------------------------------------------------------------------------
@@ -242,7 +109,7 @@ def read_inputs(file: StudyFile, paths: Sequence[Path], watched: Sequence[Histor
             raise file.error(("data", "files"), f"hold a test '{one.name}', as a camera does; give that another name")
     measured += watched
     if not measured and not complete:
-        return StudyInputs((), (), ())
+        return StudyInputs()
     chosen = measured
     if data.only:
         with file.at("data", "only"):
@@ -259,12 +126,10 @@ def read_inputs(file: StudyFile, paths: Sequence[Path], watched: Sequence[Histor
         ]
         histories = sound
     if data.up_to_strain is not None:
-        before, limit = histories, data.up_to_strain
-        histories = truncated_at_strain(histories, limit)
-        names = {history.name for history in histories}
-        exclusions += [
-            Exclusion(h.name, (), f"no two frames below a strain of {limit:g}") for h in before if h.name not in names
-        ]
+        before, histories = histories, truncated_at_strain(histories, data.up_to_strain)
+        reason = f"no two frames below a strain of {data.up_to_strain:g}"
+        remaining = {history.name for history in histories}
+        exclusions += [Exclusion(h.name, (), reason) for h in before if h.name not in remaining]
     if not histories:
         raise file.error(("data",), "no test is left; leave out fewer of them")
     return StudyInputs(tuple(measured), tuple(exclusions), tuple(_groups(file, histories)))
@@ -272,68 +137,62 @@ def read_inputs(file: StudyFile, paths: Sequence[Path], watched: Sequence[Histor
 
 def _labels(file: StudyFile, only: dict[str, list[Any]]) -> dict[str, list[Any]]:
     """Labels as select_tests takes them; temperature_C in K."""
-    labels = {name: values for name, values in only.items() if name != "temperature_C"}
+    labels = dict(only)
     if "temperature_C" in only:
         if not all(isinstance(value, int | float) for value in only["temperature_C"]):
             raise file.error(("data", "only", "temperature_C"), "must be a number in C, or a list of them")
-        labels["temperature"] = [float(value) + ZERO_CELSIUS for value in only["temperature_C"]]
+        labels["temperature"] = [float(value) + ZERO_CELSIUS for value in labels.pop("temperature_C")]
     return labels
 
 
 def _excluded(file: StudyFile, histories: Sequence[History], complete: bool) -> tuple[list[History], list[Exclusion]]:
     """The histories without what the study excludes."""
-    remaining = list(histories)
+    remaining = {history.name: history for history in histories}
     exclusions: list[Exclusion] = []
     for k, part in enumerate(file.model.exclude):
+        place: KeyPath = ("exclude", k)
         if part.from_h is not None and part.to_h is not None and not part.from_h < part.to_h:
-            raise file.error(("exclude", k, "to_h"), f"{part.to_h:g} h does not lie after from_h, {part.from_h:g} h")
+            raise file.error((*place, "to_h"), f"{part.to_h:g} h does not lie after from_h, {part.from_h:g} h")
         named = [h for h in histories if fnmatchcase(h.name, part.test)]
-        if not named and not complete:
-            continue  # it may be of a camera that failed
-        if not named:
+        if not named and complete:  # else it may be of a camera that failed
             names = [h.name for h in histories]
-            raise file.error(("exclude", k, "test"), f"there is no test '{part.test}'; {nearest(part.test, names)}")
+            raise file.error((*place, "test"), f"there is no test '{part.test}'; {nearest(part.test, names)}")
         before = len(exclusions)
         for history in named:
             if part.frames is None and part.from_h is None and part.to_h is None:
-                remaining = [h for h in remaining if h.name != history.name]
+                remaining.pop(history.name, None)
                 exclusions.append(Exclusion(history.name, (), part.reason))
                 continue
-            unused = np.zeros(history.times.size, bool)
-            if part.frames is not None:
-                unused[_frame_numbers(file, k, part.frames, history)] = True
-            if part.from_h is not None or part.to_h is not None:
-                hours = history.times / SECONDS_PER_HOUR
-                within = (hours >= (part.from_h or 0.0)) & (hours <= (np.inf if part.to_h is None else part.to_h))
-                unused |= within
-            if not unused.any():
-                continue  # another test of the pattern has frames there
-            exclusions.append(Exclusion(history.name, _frames(unused), part.reason))
-            remaining = [replace(h, used=h.used & ~unused) if h.name == history.name else h for h in remaining]
-        if len(exclusions) == before:
-            given = "from_h" if part.from_h is not None else "to_h"
-            first = min(h.times[0] for h in named) / SECONDS_PER_HOUR
-            last = max(h.times[-1] for h in named) / SECONDS_PER_HOUR
+            unused = _unused_frames(file, place, part, history)
+            if unused.any():
+                exclusions.append(Exclusion(history.name, _frames(unused), part.reason))
+            if unused.any() and history.name in remaining:
+                used = remaining[history.name].used & ~unused
+                remaining[history.name] = replace(remaining[history.name], used=used)
+        if named and len(exclusions) == before:
+            first, last = (f(h.times[k] for h in named) / SECONDS_PER_HOUR for f, k in ((min, 0), (max, -1)))
             what = f"test '{part.test}' has no frame there; its frames are from {first:g} h to {last:g} h"
-            raise file.error(("exclude", k, given), what)
-    return remaining, exclusions
+            raise file.error((*place, "from_h" if part.from_h is not None else "to_h"), what)
+    return list(remaining.values()), exclusions
 
 
-def _frame_numbers(file: StudyFile, number: int, text: str, history: History) -> list[int]:
-    """Frames of a text such as 97-191, 193, counted from 0."""
-    frames: list[int] = []
-    for part in text.split(","):
-        first, _, last = (one.strip() for one in part.partition("-"))
+def _unused_frames(file: StudyFile, place: KeyPath, part: ExcludeTable, history: History) -> Any:
+    """(frames,) which of a test are left out, by numbers or by times."""
+    unused = np.zeros(history.times.size, bool)
+    for text in [] if part.frames is None else part.frames.split(","):
+        first, _, last = (one.strip() for one in text.partition("-"))
         if not (first.isascii() and first.isdigit() and (not last or (last.isascii() and last.isdigit()))):
-            raise file.error(("exclude", number, "frames"), f"'{text}' is not known; write frames = \"97-191, 193\"")
+            what = f"'{part.frames}' is not known; write frames = \"97-191, 193\""
+            raise file.error((*place, "frames"), what)
         low, high = int(first[:9]), int((last or first)[:9])
-        if not low <= high < history.times.size:
-            size = history.times.size
-            raise file.error(
-                ("exclude", number, "frames"), f"test '{history.name}' has frames 0 to {size - 1}, found {part.strip()}"
-            )
-        frames += range(low, high + 1)
-    return frames
+        if not low <= high < unused.size:
+            what = f"test '{history.name}' has frames 0 to {unused.size - 1}, found {text.strip()}"
+            raise file.error((*place, "frames"), what)
+        unused[low : high + 1] = True
+    if part.from_h is not None or part.to_h is not None:
+        hours = history.times / SECONDS_PER_HOUR
+        unused |= (hours >= (part.from_h or 0.0)) & (hours <= (np.inf if part.to_h is None else part.to_h))
+    return unused
 
 
 def _frames(mask: Any) -> tuple[int, ...]:
@@ -343,19 +202,16 @@ def _frames(mask: Any) -> tuple[int, ...]:
 def _groups(file: StudyFile, histories: Sequence[History]) -> list[TestGroup]:
     """Groups by the label that the study names; by alloy where it names none."""
     part = file.model.identification
-    label = "alloy" if part is None or part.group_by is None else part.group_by
+    stated = None if part is None else part.group_by
+    label = stated or "alloy"
     known = {"alloy", "specimen", *(name for history in histories for name in history.labels)} - {SUSPECT_LABEL}
-    if label == "none":
-        return [TestGroup("", tuple(histories))]
-    if label not in known:
-        raise file.error(
-            ("identification", "group_by"), f"no test has a label '{label}'; {nearest(label, known | {'none'})}"
-        )
+    if label != "none" and label not in known:
+        what = f"no test has a label '{label}'; {nearest(label, known | {'none'})}"
+        raise file.error(("identification", "group_by"), what)
     by_value: dict[str, list[History]] = {}
-    for history in histories:
-        stated = getattr(history, label) if label in ("alloy", "specimen") else ""
-        value = stated or history.labels.get(label, "")
-        by_value.setdefault(value or NOT_STATED, []).append(history)
-    if len(by_value) == 1 and (part is None or part.group_by is None):
+    for history in histories if label != "none" else ():
+        value = getattr(history, label) if label in ("alloy", "specimen") else ""
+        by_value.setdefault(value or history.labels.get(label, "") or NOT_STATED, []).append(history)
+    if label == "none" or (len(by_value) == 1 and stated is None):
         return [TestGroup("", tuple(histories))]
     return [TestGroup(name, tuple(tests)) for name, tests in by_value.items()]

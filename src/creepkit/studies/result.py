@@ -1,15 +1,16 @@
-"""StudyResult: what a run of a study gave, as the ordinary records of every stage."""
+"""StudyResult: what a run of a study gave, as the ordinary records of every stage, and what its report shows of it."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.checked_arguments import checked
+from creepkit.files.file_names import hashed_stem
+from creepkit.files.json_documents import json_text
 from creepkit.files.reading import read_bytes
 from creepkit.reports.attachments import problem_of_names
 from creepkit.reports.contents import (
@@ -23,10 +24,10 @@ from creepkit.reports.contents import (
 )
 from creepkit.reports.identified_files import identified_files
 from creepkit.studies.execution import StageRecord
-from creepkit.studies.inputs import DATA_FILE, InputFile, TestGroup
+from creepkit.studies.inputs import DATA_FILE, InputFile, StudyInputs, TestGroup
 from creepkit.studies.lock import versions_of
-from creepkit.studies.model import ReportPart
 from creepkit.studies.study_file import StudyFile
+from creepkit.studies.tables import ReportTable
 
 CARRIED_FOLDER = "inputs"
 """Of the data files that a report carries."""
@@ -57,50 +58,56 @@ if TYPE_CHECKING:
 class StudyResult:
     """What a run of a study gave: ordinary records, by group of tests or by name.
 
-    title : of the study. groups : of the tests that were used; "" names the only one. exclusions : what was left out.
-    stages : how each ended. exports : laws as text. report : the page, where one was asked for.
-    changes : what differs from the study.lock that was there, one sentence each. files : that were read.
-    measured : all tests as the files hold them. file, lock_path : the study, and the lock of this run.
-    asked : keys of the identifications that the stages rest on. pruned : how many others were removed.
+    file, lock_path : the study, and the lock of this run. inputs : its tests. files : that were read.
+    exclusions : what was left out. stages : how each ended, and results : {stage: its result}. changes : what differs
+    from the study.lock that was there, one sentence each. report : the page, where one was asked for.
     extractions, imposed : {test of a camera: what its frames gave, and what its instrument recorded}.
     documents : {stage: its result as JSON-able data, which other commands read}.
     """
 
-    title: str
-    groups: tuple[TestGroup, ...]
+    file: StudyFile
+    lock_path: Path
+    inputs: StudyInputs
+    files: tuple[InputFile, ...]
     exclusions: tuple[Exclusion, ...]
     stages: tuple[StageRecord, ...]
-    files: tuple[InputFile, ...]
     changes: tuple[str, ...] = ()
     report: Path | None = None
-    measured: tuple[History, ...] = ()
     results: Any = field(default_factory=dict, repr=False)
-    file: StudyFile | None = field(default=None, repr=False)
-    lock_path: Path | None = None
-    asked: frozenset[str] = field(default=frozenset(), repr=False)
-    pruned: int = 0
     extractions: Mapping[str, Extraction] = field(default_factory=dict, repr=False)
     imposed: Mapping[str, Imposed] = field(default_factory=dict, repr=False)
     documents: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
         """Stages by their states, the verdict on each group, and where the report is."""
-        states = Counter(one.state for one in self.stages)
-        counted = ", ".join(f"{count} {state}" for state, count in states.items()) or "none"
-        lines = [f"StudyResult '{self.title}': {len(self.histories)} tests; stages: {counted}"]
+        counted = ", ".join(f"{n} {state}" for state, n in Counter(one.state for one in self.stages).items()) or "none"
         verdicts = [f"{name}: {one.verdict}" if name else one.verdict for name, one in self.rankings.items()]
-        lines += [
-            *verdicts[:MOST_VERDICTS],
-            *([f"and {len(verdicts) - MOST_VERDICTS} more groups"] if len(verdicts) > MOST_VERDICTS else []),
-        ]
-        lines += [f"failed: {one.stage}: {one.sentence}" for one in self.failures]
-        lines.append(f"report: {self.report or 'none'}")
+        if len(verdicts) > MOST_VERDICTS:
+            verdicts[MOST_VERDICTS:] = [f"and {len(verdicts) - MOST_VERDICTS} more groups"]
+        failed = [f"failed: {one.stage}: {one.sentence}" for one in self.failures]
+        head = f"StudyResult '{self.title}': {len(self.histories)} tests; stages: {counted}"
+        lines = [head, *verdicts, *failed, f"report: {self.report or 'none'}"]
         return "\n  ".join(line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 1]}…" for line in lines)
+
+    @property
+    def title(self) -> str:
+        """Of the study."""
+        return self.file.model.study.title
+
+    @property
+    def groups(self) -> tuple[TestGroup, ...]:
+        """The tests that were used; "" names the only group."""
+        return self.inputs.groups
+
+    @property
+    def measured(self) -> tuple[History, ...]:
+        """All tests as the files hold them."""
+        return self.inputs.measured
 
     @property
     def histories(self) -> tuple[History, ...]:
         """The tests that were used."""
-        return tuple(history for group in self.groups for history in group.histories)
+        return self.inputs.histories
 
     @property
     def failures(self) -> tuple[StageFailure, ...]:
@@ -135,103 +142,80 @@ class StudyResult:
     @property
     def forecasts(self) -> Mapping[str, Forecast]:
         """{name of a forecast: what its tests will show}."""
-        names = self._names("forecast")
-        return {name.removeprefix("forecast of "): self.results[name] for name, _ in names}
+        return {one.name.removeprefix("forecast of "): self.results[one.name] for one in self._with_result("forecast")}
 
     @property
     def exports(self) -> tuple[ExportedFile, ...]:
         """Laws as text."""
-        return tuple(self.results[name] for name, _ in self._names("export"))
+        return tuple(self.results[one.name] for one in self._with_result("export"))
 
-    @cached_property
+    @property
     def identified(self) -> tuple[ExportedFile, ...]:
         """Identifications, rankings and temperature laws as the files that other commands read."""
-        from creepkit.files.file_names import hashed_stem
-        from creepkit.files.json_documents import json_text
-
         documents = ((hashed_stem(stage), data) for stage, data in self.documents.items() if data is not None)
         laws = [ExportedFile(f"{name}.json", "temperature law", json_text(data)) for name, data in documents]
         return (*identified_files(self.rankings), *laws)
 
-    def _names(self, kind: str) -> list[tuple[str, str]]:
-        return [(one.name, one.group) for one in self.stages if one.kind == kind and one.name in self.results]
+    def _with_result(self, kind: str) -> list[StageRecord]:
+        return [one for one in self.stages if one.kind == kind and one.name in self.results]
 
     def _by_group(self, kind: str) -> dict[str, Any]:
-        return {group: self.results[name] for name, group in self._names(kind)}
+        return {one.group: self.results[one.name] for one in self._with_result(kind)}
 
     def report_contents(self) -> ReportContents:
         """What the report of the study shows, and what it carries."""
-        return contents_of(self)
+        model, failed = self.file.model, [one for one in self.stages if one.state == "failed"]
+        failures = {one.group: one.sentence for one in failed if one.kind == "identification"}
+        rankings: Mapping[str, Any] = self.rankings
+        attached, notes = self._attachments()
+        notes += [f"{one.name} {one.sentence}" for one in self.stages if one.state == "left out"]
+        carried = self.identified
+        if sum(len(one.text) for one in carried) > MOST_IDENTIFIED:
+            folder, carried = f"{self.file.path.stem}.results/identified", ()
+            notes.append(f"the identifications are too large for this page; 'creepkit run' writes them to {folder}")
+        return ReportContents(
+            title=self.title,
+            groups=tuple(
+                ReportGroup(one.name, rankings.get(one.name), one.histories, failures.get(one.name, ""))
+                for one in self.groups
+            ),
+            quality=self.quality,
+            exclusions=self.exclusions,
+            temperature=_titled(self.temperature),
+            forecasts=dict(self.forecasts),
+            design=_titled(self.designs),
+            rupture=_titled(self.rupture),
+            extractions=self.extractions,
+            imposed=self.imposed,
+            exports=(*self.exports, *carried),
+            failures=self.failures,
+            provenance=ReportProvenance(
+                versions=versions_of(),
+                seed=model.study.seed,
+                settings=model.model_dump(exclude_none=True),
+                inputs={one.name: one.sha256 for one in self.files},
+                commands=(f"creepkit run {self.file.path.name}",),
+            ),
+            attachments=tuple(attached),
+            notes=tuple(notes),
+            data_citations=tuple(model.data.citation),
+        )
 
-
-def contents_of(result: StudyResult) -> ReportContents:
-    """What the report of a study shows, and what it carries."""
-    file = result.file
-    assert file is not None
-    rankings: Mapping[str, Any] = result.rankings
-    failed = {
-        one.group: one.sentence for one in result.stages if one.kind == "identification" and one.state == "failed"
-    }
-    groups = tuple(
-        ReportGroup(group.name, rankings.get(group.name), group.histories, failed.get(group.name, ""))
-        for group in result.groups
-    )
-    attached, notes = attachments_of(result)
-    notes = (*notes, *(f"{one.name} {one.sentence}" for one in result.stages if one.state == "left out"))
-    carried = result.identified
-    if sum(len(one.text) for one in carried) > MOST_IDENTIFIED:
-        carried, folder = (), f"{file.path.stem}.results/identified"
-        notes = (*notes, f"the identifications are too large for this page; 'creepkit run' writes them to {folder}")
-    return ReportContents(
-        title=result.title,
-        groups=groups,
-        quality=result.quality,
-        exclusions=result.exclusions,
-        temperature=_titled(result.temperature),
-        forecasts=dict(result.forecasts),
-        design=_titled(result.designs),
-        rupture=_titled(result.rupture),
-        extractions=result.extractions,
-        imposed=result.imposed,
-        exports=(*result.exports, *carried),
-        failures=result.failures,
-        provenance=ReportProvenance(
-            versions=versions_of(),
-            seed=file.model.study.seed,
-            settings=file.model.model_dump(exclude_none=True),
-            inputs={one.name: one.sha256 for one in result.files},
-            commands=(f"creepkit run {file.path.name}",),
-        ),
-        attachments=attached,
-        notes=notes,
-        data_citations=tuple(file.model.data.citation),
-    )
+    def _attachments(self) -> tuple[list[Attachment], list[str]]:
+        """Study, lock and data files; without the data, and a note, where they are larger than the study allows."""
+        lock = read_bytes(self.lock_path, DATA_FILE)
+        attached = [Attachment("study.toml", self.file.text.encode()), Attachment("study.lock", lock)]
+        allowed = (self.file.model.report or ReportTable()).attach_MB
+        names = [f"{CARRIED_FOLDER}/{one.name}" for one in self.files]
+        size = sum(one.path.stat().st_size for one in self.files) / 1e6
+        problem = problem_of_names(names)
+        if not problem and size > allowed:
+            problem = f"they have {size:.3g} MB, more than the {allowed:g} MB that the study lets it carry"
+        if problem:
+            return attached, [f"the report does not carry the data files: {problem}; study.lock has their hashes"]
+        contents = [read_bytes(one.path, DATA_FILE) for one in self.files]
+        return [*attached, *(Attachment(*pair) for pair in zip(names, contents, strict=True))], []
 
 
 def _titled(by_group: Mapping[str, Any]) -> dict[str, Any]:
     return {name or "all tests": value for name, value in by_group.items()}
-
-
-def attachments_of(result: StudyResult) -> tuple[tuple[Attachment, ...], tuple[str, ...]]:
-    """Study, lock and data files; without the data, and a note, where they are larger than the study allows."""
-    file = result.file
-    assert file is not None
-    attached = [Attachment("study.toml", file.text.encode())]
-    if result.lock_path is not None:
-        attached.append(Attachment("study.lock", read_bytes(result.lock_path, DATA_FILE)))
-    allowed = (file.model.report or ReportPart()).attach_MB * 1e6
-    names = [f"{CARRIED_FOLDER}/{one.name}" for one in result.files]
-    odd = problem_of_names(names)
-    if odd:
-        note = f"the report does not carry the data files, for {odd}; study.lock has their hashes"
-        return tuple(attached), (note,)
-    size = sum(one.path.stat().st_size for one in result.files)
-    if size > allowed:
-        note = (
-            f"the data files have {size / 1e6:.3g} MB, more than the {allowed / 1e6:g} MB that the study lets the "
-            "report carry; study.lock has their hashes"
-        )
-        return tuple(attached), (note,)
-    for name, one in zip(names, result.files, strict=True):
-        attached.append(Attachment(name, read_bytes(one.path, DATA_FILE)))
-    return tuple(attached), ()

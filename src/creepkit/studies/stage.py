@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
@@ -33,15 +33,20 @@ Results = Mapping[str, Any]
 """{name of a stage: its result}."""
 
 
+def no_numbers(result: Any) -> dict[str, Any]:
+    """The numbers of a stage of which study.lock records none."""
+    return {}
+
+
 @dataclass(frozen=True)
 class Stage:
     """One stage.
 
     name : of its result. kind : what it makes. group : of the tests that it is about, "" for all.
-    numbers : of its result by name, which study.lock records, so that a run says whether it gives them again.
     settings : JSON-able data of all that decides the result beside what it `needs`, names of other stages.
     make : from the results of these, with something to report progress to. record : class of the result, by which a
         file is read; None where the result is made again from identifications that are kept.
+    numbers : of its result by name, which study.lock records, so that a run says whether it gives them again.
     document : what of a result that no record can be read from is written down, as JSON-able data.
     predictor : of identifications that its file holds. file : that an export is written to, "" for other stages.
     remark : what is known beforehand that the result leaves out of account, "" where nothing is.
@@ -52,9 +57,9 @@ class Stage:
     group: str
     settings: Any
     make: Callable[[Results, Tick], Any]
-    numbers: Callable[[Any], Mapping[str, Any]]
-    needs: tuple[str, ...] = ()
     record: Any = None
+    numbers: Callable[[Any], Mapping[str, Any]] = no_numbers
+    needs: tuple[str, ...] = ()
     document: Callable[[Any], Any] | None = None
     predictor: Predictor | None = field(default=None, repr=False)
     file: str = ""
@@ -66,18 +71,10 @@ def stage_name(kind: StageKind, group: str = "") -> str:
     return f"{kind} of {group}" if group else kind
 
 
-def no_numbers(result: Any) -> dict[str, Any]:
-    """The numbers of a stage whose result is compared by its hash alone."""
-    return {}
-
-
 def needed_stages(stages: Sequence[Stage], kinds: Sequence[str]) -> set[str]:
-    """Names of the stages of some kinds, and of all that these need."""
-    by_name = {stage.name: stage for stage in stages}
-
-    def with_needs(stage: Stage) -> Iterator[str]:
-        yield stage.name
-        for name in stage.needs:
-            yield from with_needs(by_name[name])
-
-    return {name for stage in stages if stage.kind in kinds for name in with_needs(stage)}
+    """Names of the stages of some kinds, and of all that these need; stages stand behind those that they need."""
+    wanted: set[str] = set()
+    for stage in reversed(stages):
+        if stage.kind in kinds or stage.name in wanted:
+            wanted |= {stage.name, *stage.needs}
+    return wanted

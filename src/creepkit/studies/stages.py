@@ -1,63 +1,366 @@
-"""All stages of a study, in the order of their kinds; the functions that make them stand in files of their own."""
+"""The stages of a study's tables: quality, identification, temperature, rupture, forecasts, designs and exports."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
-from creepkit.studies.inputs import TestGroup
-from creepkit.studies.law_stages import identification_stage, quality_stage, temperature_stage
-from creepkit.studies.result_stages import design_stage, export_stage, forecast_stage, rupture_stage
-from creepkit.studies.stage import STAGE_KINDS, Stage, StageKind
-from creepkit.studies.stage_inputs import StageInputs
+import creepkit as ck
+from creepkit.api.searches import penalty_of_name, search_of_name
+from creepkit.errors import CreepkitError, StudyError
+from creepkit.files.file_names import hashed_stem
+from creepkit.files.record_codec import record_to_json
+from creepkit.inverse.fingerprints import predictor_fingerprint, short_hash
+from creepkit.inverse.kept_fits import history_digest
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
+from creepkit.quality import DataQuality
+from creepkit.records import History
+from creepkit.registry import default_registry
+from creepkit.reports.contents import ExportedFile
+from creepkit.studies import arguments
+from creepkit.studies.arguments import stated
+from creepkit.studies.inputs import StudyInputs, TestGroup
+from creepkit.studies.planned_tests import check_forecast, planned_test
+from creepkit.studies.stage import STAGE_KINDS, Results, Stage, StageKind, Tick, stage_name
+from creepkit.studies.study_file import KeyPath, StudyFile
+
+if TYPE_CHECKING:
+    from creepkit.experiments.planned_design import Design
+    from creepkit.forecasts.forecast import Forecast
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.language import CreepLaw
+    from creepkit.rupture_assessment.assessment import RuptureAssessment
+
+
+@dataclass(frozen=True)
+class StageInputs:
+    """What stages are made from: the study file and its tests, and what several of them need."""
+
+    file: StudyFile
+    inputs: StudyInputs
+
+    def groups_of(self, place: KeyPath, name: str | None) -> list[TestGroup]:
+        """The group of a name, or all."""
+        groups = {group.name: group for group in self.inputs.groups}
+        self.file.check_name((*place, "group"), "group", name, groups)
+        return [*groups.values()] if name is None else [groups[name]]
+
+    def needed(self, place: KeyPath, table: StageKind, group: TestGroup) -> str:
+        """The name of a stage that the table at `place` needs; StudyError where the study has not its table."""
+        if getattr(self.file.model, table) is None:
+            raise self.file.error(place, f"needs the table [{table}], which the study has not")
+        return stage_name(table, group.name)
+
+    @cached_property
+    def using(self) -> Any:
+        """What predicts the tests; None for the specimens that they name."""
+        return arguments.predictor_of(self.file)
+
+    @property
+    def using_fingerprint(self) -> str | None:
+        """Of what predicts the tests."""
+        return None if self.using is None else predictor_fingerprint(self.using)
+
+    @cached_property
+    def settings(self) -> Any:
+        """Of every identification."""
+        return arguments.settings_of(self.file)
+
+    def laws(self, group: TestGroup) -> list[tuple[CreepLaw, CreepLaw]]:
+        """Pairs of a candidate as it is named, and as it is fitted to a group."""
+        named = arguments.laws_of(self.file)
+        return [(law, arguments.law_as_fitted(self.file, law, group.histories)) for law in named]
+
+
+def _digests(histories: Sequence[History]) -> list[str]:
+    return [history_digest(history) for history in histories]
 
 
 def stages_of(study: StageInputs) -> list[Stage]:
     """The stages of the tables that a study has, in the order in which they are made; none without tests.
 
-    Those of cameras and records give the tests themselves (see camera_stages); the report is made at the end.
+    Those of cameras and records give the tests themselves (see cameras); the report is made at the end.
     """
+    model, made = study.file.model, {}
     if not study.inputs.groups:  # of cameras whose stages failed
         return []
-    return [stage for kind in STAGE_KINDS if kind in STAGES for stage in STAGES[kind](study)]
-
-
-def _quality(study: StageInputs) -> list[Stage]:
-    return [quality_stage(study)] if study.file.model.data.check_quality else []
-
-
-def _of_each_group(
-    table: StageKind, make: Callable[[StageInputs, TestGroup], Stage]
-) -> Callable[[StageInputs], list[Stage]]:
-    """The stages of a table that stands once in the file and holds for every group, or for the one that it names."""
-
-    def stages(study: StageInputs) -> list[Stage]:
-        part = getattr(study.file.model, table)
-        if part is None:
-            return []
-        return [make(study, group) for group in study.groups_of((table,), getattr(part, "group", None))]
-
-    return stages
-
-
-def _forecasts(study: StageInputs) -> list[Stage]:
-    return [forecast_stage(study, k) for k in range(len(study.file.model.forecast))]
-
-
-def _exports(study: StageInputs) -> list[Stage]:
-    return [
-        export_stage(study, k, group)
-        for k, part in enumerate(study.file.model.export)
+    if model.data.check_quality:
+        made["quality"] = [_quality_stage(study)]
+    for kind, make in OF_EACH_GROUP.items():
+        part = getattr(model, kind)
+        groups = [] if part is None else study.groups_of((kind,), getattr(part, "group", None))
+        made[kind] = [make(study, group) for group in groups]
+    made["forecast"] = [_forecast_stage(study, k) for k in range(len(model.forecast))]
+    made["export"] = [
+        _export_stage(study, k, group)
+        for k, part in enumerate(model.export)
         for group in study.groups_of(("export", k), part.group)
     ]
+    return [stage for kind in STAGE_KINDS for stage in made.get(kind, ())]
 
 
-STAGES: Mapping[StageKind, Callable[[StageInputs], list[Stage]]] = {
-    "quality": _quality,
-    "identification": _of_each_group("identification", identification_stage),
-    "temperature": _of_each_group("temperature", temperature_stage),
-    "rupture": _of_each_group("rupture", rupture_stage),
-    "forecast": _forecasts,
-    "design": _of_each_group("design", design_stage),
-    "export": _exports,
+def _quality_stage(study: StageInputs) -> Stage:
+    framed = [history for history in study.inputs.measured if history.outputs]
+
+    def make(results: Results, tick: Tick) -> DataQuality:
+        return ck.check_data_quality(framed)
+
+    return Stage("quality", "quality", "", _digests(framed), make, DataQuality)
+
+
+# ---- laws ----------------------------------------------------------------------------------------------------------
+
+
+def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
+    """The identification of the laws of a group, and their ranking."""
+    from creepkit.inverse.selection.ranking import Ranking
+
+    model, using, settings = study.file.model, study.using, study.settings
+    part, selection = model.identification, model.selection
+    assert part is not None
+    laws, tests = [fitted for _, fitted in study.laws(group)], list(group.histories)
+    search = search_of_name(part.search)
+    penalty = None if part.penalty is None else penalty_of_name(part.penalty)
+    by_likelihood = part.weights in (None, "likelihood") and part.loss in (None, "linear")
+    by_likelihood = by_likelihood and search is None and penalty is None
+    if selection is not None and not by_likelihood:
+        what = "compares laws by their likelihood: leave out weights, loss, search and penalty"
+        raise study.file.error(("selection",), what)
+
+    def make(results: Results, tick: Tick) -> Ranking:
+        if by_likelihood and (len(laws) > 1 or selection is not None):
+            how: dict[str, Any] = {} if selection is None else {"by": selection.by, "sums": selection.sums}
+            return ck.select(laws, tests, using, settings=settings, progress=tick, **how)
+        return _each_by_itself(laws, tests, using, settings, tick, search=search, penalty=penalty)
+
+    described = {
+        "laws": [[law.name, law.fingerprint, [[n, *p.bounds, p.off] for n, p in law.table.items()]] for law in laws],
+        "settings": record_to_json(asdict(settings)),
+        "how": [part.search, part.penalty, None if selection is None else selection.model_dump()],
+        "using": study.using_fingerprint,
+        "tests": _digests(tests),
+    }
+    name = stage_name("identification", group.name)
+    return Stage(name, "identification", group.name, described, make, Ranking, numbers_of_ranking, predictor=using)
+
+
+def _each_by_itself(
+    laws: Sequence[CreepLaw], tests: list[History], using: Any, settings: Any, tick: Tick, **how: Any
+) -> Ranking:
+    """Each law identified by itself, and all ranked. how : search and penalty."""
+    from creepkit.inverse.rupture_use import common_rupture_times
+
+    fits, settings = [], common_rupture_times(laws, settings)
+    for k, law in enumerate(laws, start=1):
+        place = f"law {k} of {len(laws)}: {law.title or law.name}"
+
+        def of_law(task: str, done: int, total: int, place: str = place) -> None:
+            tick(f"{place}, {task}", done, total)
+
+        fits.append(ck.identify(law, tests, using, settings=settings, progress=of_law, **how))
+    return ck.rank(fits)
+
+
+def numbers_of_ranking(ranking: Ranking) -> dict[str, Any]:
+    """Weights and values of the laws."""
+    return {
+        "weights": {one.fit.law.name: one.weight for one in ranking.laws},
+        "values": {one.fit.law.name: one.fit.values for one in ranking.laws},
+    }
+
+
+def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
+    """The forms of temperature of the law of a group."""
+    from creepkit.discovery.discover import isothermal_tests
+    from creepkit.discovery.temperature_law import temperature_law_to_json
+
+    part, using, tests, law = study.file.model.temperature, study.using, list(group.histories), None
+    assert part is not None
+    within = ISOTHERMAL_RANGE if part.within_K is None else part.within_K
+    if part.law is not None:
+        with study.file.at("temperature", "law"):
+            law = ck.law(part.law)
+    elif study.file.model.identification is None:
+        raise study.file.error(("temperature",), "needs a law: give law, or the table [identification]")
+    need = "" if law is not None else study.needed(("temperature",), "identification", group)
+    options = stated(part, "forms", "parameters", prior="prior_odds")
+
+    def make(results: Results, tick: Tick) -> Any:
+        chosen, fit = (law, None) if law is not None else _best_candidate(study, results[need], group)
+        settings = study.settings if fit is None else fit.settings
+        found = ck.temperature_study(
+            chosen, tests, using, moduli=part.moduli, within=within, settings=settings, progress=tick, **options
+        )
+        if found.temperature_law is None:
+            raise StudyError(found.notes[-1])
+        # One law has one set of values: those of its identification, with what the study bounds and fixes.
+        return found if fit is None or part.moduli else replace(found, joint_fit=fit)
+
+    def document(found: Any) -> Any:
+        """The temperature law as `creepkit discover --to` writes it; None of a plugin's law that cannot be stored."""
+        with suppress(CreepkitError):
+            return temperature_law_to_json(found.temperature_law)
+        return None
+
+    law_fingerprint = None if law is None else law.fingerprint
+    described = [part.model_dump(), record_to_json(asdict(study.settings)), study.using_fingerprint, law_fingerprint]
+    return Stage(
+        stage_name("temperature", group.name),
+        "temperature",
+        group.name,
+        [*described, _digests(tests)],
+        make,
+        numbers=lambda found: {"forms": found.temperature_law.forms, "values": found.temperature_law.values},
+        needs=(need,) if need else (),
+        document=document,
+        remark=isothermal_tests(tests, within)[1],
+    )
+
+
+def _best_candidate(study: StageInputs, ranking: Ranking, group: TestGroup) -> tuple[CreepLaw, Identification | None]:
+    """The candidate that is best, without temperature, and its identification from all tests of the group.
+
+    Where another law was found to be the best, it is the best of the candidates; None where none was identified.
+    """
+    named = {fitted.name: law for law, fitted in study.laws(group)}
+    fit = next((one.fit for one in ranking.laws if one.fit.law.name in named), None)
+    return (next(iter(named.values())) if fit is None else named[fit.law.name]), fit
+
+
+# ---- what follows from tests and laws ------------------------------------------------------------------------------
+
+
+def _rupture_stage(study: StageInputs, group: TestGroup) -> Stage:
+    """The assessment of the rupture times of a group."""
+    from creepkit.rupture_assessment.assessment import RuptureAssessment
+
+    part, tests = study.file.model.rupture, list(group.histories)
+    assert part is not None
+    changes = stated(part, "distribution", "criterion", "level", "degrees", "fixed")
+    if "degrees" in changes:
+        changes["degrees"] = tuple(changes["degrees"])
+    with study.file.at("rupture"):
+        settings = ck.RuptureSettings(seed=study.file.model.study.seed, **changes)
+    how = stated(part, hours="times_h", temperatures="temperatures_C")
+    strengths = [stated(one, "strength_MPa", T="temperature_C") for one in part.tensile_strengths]
+    if strengths:
+        how["tensile_strength"] = {one["T"]: one["strength_MPa"] for one in strengths}
+
+    def make(results: Results, tick: Tick) -> RuptureAssessment:
+        return ck.rupture(tests, part.methods, settings=settings, **how)
+
+    described = [part.model_dump(), record_to_json(asdict(settings)), _digests(tests)]
+    name = stage_name("rupture", group.name)
+    return Stage(name, "rupture", group.name, described, make, RuptureAssessment, _numbers_of_rupture)
+
+
+def _numbers_of_rupture(assessment: RuptureAssessment) -> dict[str, Any]:
+    """The strengths that there are."""
+    known = [one for one in assessment.strengths if one.value is not None]
+    return {f"{one.method} {one.hours:g} h {one.temperature:g} K": one.value for one in known}
+
+
+def _forecast_stage(study: StageInputs, number: int) -> Stage:
+    """The forecast of this number in the study file."""
+    from creepkit.forecasts.forecast import Forecast
+
+    file, place, measured = study.file, ("forecast", number), []
+    part = file.model.forecast[number]
+    check_forecast(file, number)
+    groups = study.groups_of(place, part.group)
+    if len(groups) > 1:
+        names = " or ".join(f"'{group.name}'" for group in groups)
+        raise file.error(place, f"there are several groups of tests; say by group which one: {names}")
+    need = study.needed(place, "identification", groups[0])
+    if part.tests:
+        paths = file.paths((*place, "tests"), part.tests)
+        with file.at(*place, "tests"):
+            measured = ck.read_histories(paths)
+    targets, tolerances = arguments.targets_of(file, number), arguments.tolerances_of(file, number)
+    how = stated(part, "level", "draws") | ({"targets": targets} if targets else {})
+
+    def make(results: Results, tick: Tick) -> Forecast:
+        ranking: Ranking = results[need]
+        low, high = ranking.best.ranges["temperature"]
+        usual = 0.5 * (low + high) if high - low <= ISOTHERMAL_RANGE else None
+        tests = measured or [planned_test(file, number, usual)]
+        return ck.forecast(ranking, tests, tolerances=tolerances or None, progress=tick, **how)
+
+    name, described = f"forecast of {part.name}", [part.model_dump(), _digests(measured)]
+    return Stage(name, "forecast", groups[0].name, described, make, Forecast, _numbers_of_forecast, (need,))
+
+
+def _numbers_of_forecast(forecast: Forecast) -> dict[str, Any]:
+    """Outputs at the end of each test, and times with their intervals."""
+    return {
+        test.name: {
+            **{name: float(output.value[-1]) for name, output in test.outputs.items()},
+            **{time.event: [time.value, time.low, time.high] for time in test.times},
+        }
+        for test in forecast.tests
+    }
+
+
+def _design_stage(study: StageInputs, group: TestGroup) -> Stage:
+    """The further tests that are proposed for a group."""
+    from creepkit.experiments.planned_design import Design
+    from creepkit.experiments.rig import rigs_of
+
+    part, seed = study.file.model.design, study.file.model.study.seed
+    assert part is not None
+    need = study.needed(("design",), "identification", group)
+    goal = arguments.goal_of(study.file)
+
+    def make(results: Results, tick: Tick) -> Design:
+        best = results[need].best
+        rigs = arguments.rigs_of_study(study.file, rigs_of(best.histories, best.predictor))
+        return ck.design(results[need], rig=rigs, goal=goal, budget=part.budget_h, seed=seed, progress=tick)
+
+    def numbers(design: Design) -> dict[str, Any]:
+        return {"plan": [test.description for test in design.plan]}
+
+    name = stage_name("design", group.name)
+    return Stage(name, "design", group.name, [part.model_dump(), seed], make, Design, numbers, (need,))
+
+
+def _export_stage(study: StageInputs, number: int, group: TestGroup) -> Stage:
+    """The export of this number in the study file, for a group."""
+    part, place = study.file.model.export[number], ("export", number)
+    need = study.needed(place, "temperature" if part.law == "temperature" else "identification", group)
+    with study.file.at(*place, "target"):
+        exporter = default_registry().exporter(part.target)
+    file = part.file or f"law{exporter.suffix}"
+    if len(study.groups_of(place, part.group)) > 1:
+        stem, dot, suffix = file.rpartition(".")
+        file = f"{stem or suffix}_{hashed_stem(group.name)}{dot}{suffix if stem else ''}"
+    units = {"stress": part.stress_unit, "time": part.time_unit}
+    modulus, how = stated(part, E="modulus_GPa"), stated(part, temperature="temperature_C")
+    with study.file.at(*place):
+        ck.Units(**units)
+        elastic = ck.Elastic(**modulus, nu=part.poisson) if modulus else None
+
+    def make(results: Results, tick: Tick) -> ExportedFile:
+        source = results[need]
+        law = source.temperature_law if part.law == "temperature" else source  # a ranking gives its verdict along
+        record = ck.law_with_values(law, elastic=elastic, name=part.name or "")
+        return ExportedFile(file, part.target, ck.export(record, part.target, units=units, **how))
+
+    def numbers(export: ExportedFile) -> dict[str, Any]:
+        return {"hash of the text": short_hash(export.text.encode())}
+
+    name = f"export {number + 1}{f' of {group.name}' if group.name else ''}: {part.target}"
+    described = [part.model_dump(), file]
+    return Stage(name, "export", group.name, described, make, ExportedFile, numbers, (need,), file=file)
+
+
+OF_EACH_GROUP: Mapping[StageKind, Callable[[StageInputs, TestGroup], Stage]] = {
+    "identification": _identification_stage,
+    "temperature": _temperature_stage,
+    "rupture": _rupture_stage,
+    "design": _design_stage,
 }
-"""{kind: its stages of a study}; STAGE_KINDS says in which order they are made."""
+"""{kind: its stage} of tables that stand once in the file and hold for every group, or for the one that they name."""

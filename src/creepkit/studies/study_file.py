@@ -1,41 +1,29 @@
-"""Study files: TOML to a checked model; every mistake is one sentence with file and line, and the nearest valid key."""
+"""Study files: TOML to checked tables; every mistake is one sentence with file and line, and the nearest valid key."""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
 from creepkit.errors import CreepkitError, StudyError, nearest, quoted
 from creepkit.files.reading import FileKind, read_text
-from creepkit.studies.model import StudyModel
-from creepkit.studies.toml_lines import KeyPath, key_lines, line_of
+from creepkit.studies.tables import StudyTables
 
 STUDY_FILE = FileKind(
     "a study file", StudyError, "give a study.toml, which 'creepkit init FOLDER' writes", maximum_bytes=1_000_000
 )
 
 
-MOST_PARTS, MOST_KEYS = 20, 20_000
-"""Parts of one key, and keys of a file."""
-
-
-LARGEST_WHOLE = 2**63
-"""Whole numbers of TOML are below it."""
-
-
-LARGE_NUMBER = "the number is too large; whole numbers have 18 digits at most"
-
-
-_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
-_LONG_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS},}}")
+KeyPath = tuple[str | int, ...]
+"""Keys from the top on; a number counts the tables of a list of tables, and the items of a list."""
 
 
 SHOWN = 40
@@ -44,11 +32,15 @@ SHOWN = 40
 
 @dataclass(frozen=True)
 class StudyFile:
-    """A study file that was read: its path, its text, and what it says."""
+    """A study file that was read: its path, its text, and what it says.
+
+    root : folder of the data that a report carried, in which `..` is written `up`; None for those beside the file.
+    """
 
     path: Path
     text: str
-    model: StudyModel
+    model: StudyTables
+    root: Path | None = None
 
     @cached_property
     def lines(self) -> Mapping[KeyPath, int]:
@@ -58,6 +50,11 @@ class StudyFile:
     def error(self, key: KeyPath, sentence: str) -> StudyError:
         """An error about what stands at a key."""
         return StudyError(f"{self.path}:{line_of(key, self.lines)}: {place_text(key)}: {sentence}")
+
+    def check_name(self, key: KeyPath, noun: str, name: str | None, known: Collection[str]) -> None:
+        """StudyError, with the nearest, for a name of what there is not; None is no name."""
+        if name is not None and name not in known:
+            raise self.error(key, f"there is no {noun} '{name}'; {nearest(name, known)}")
 
     @contextmanager
     def at(self, *key: str | int) -> Iterator[None]:
@@ -69,36 +66,65 @@ class StudyFile:
         except CreepkitError as error:
             raise self.error(key, str(error)) from None
 
+    # ---- files that it names -----------------------------------------------------------------------------------
 
-def read_study_file(path: Path) -> StudyFile:
+    @property
+    def base(self) -> Path:
+        """The folder that paths are relative to."""
+        return self.path.parent if self.root is None else self.root
+
+    def place_of(self, key: KeyPath, text: str) -> PurePosixPath:
+        """A path or pattern relative to the base; StudyError for one that is absolute, or of folders of any depth."""
+        path = PurePosixPath(text.replace("\\", "/"))
+        if path.is_absolute() or text.startswith("~") or re.match(r"^[A-Za-z]:", text):
+            raise self.error(key, f"'{text}' is absolute; write it relative to the study file, such as data/*.csv")
+        if "**" in path.parts:
+            raise self.error(key, f"'{text}' goes through folders of any depth; name the folders")
+        return path if self.root is None else PurePosixPath(carried_name(path))
+
+    def paths(self, key: KeyPath, texts: Sequence[str]) -> list[Path]:
+        """Existing files and folders of the patterns at a key; StudyError where there is none."""
+        found: dict[Path, None] = {}
+        for k, text in enumerate(texts):
+            place = self.place_of((*key, k), text)
+            try:
+                path = self.base / place
+                matches = [path] if path.exists() else sorted(self.base.glob(str(place)))
+            except OSError as error:  # a folder that may not be entered, a name too long
+                what = f"'{text}' cannot be read ({error.strerror}); check its name and who may read it"
+                raise self.error((*key, k), what) from None
+            if not matches:
+                what = f"there is no file or folder '{text}' beside the study, and none matches it"
+                raise self.error((*key, k), what)
+            found |= dict.fromkeys(matches)
+        return list(found)
+
+
+def carried_name(path: PurePosixPath) -> str:
+    """The name under which a report carries a file: plain parts only."""
+    return str(PurePosixPath(*("up" if part == ".." else part for part in path.parts)))
+
+
+def read_study_file(path: Path, root: Path | None = None) -> StudyFile:
     """Read and check the layout of a study file; StudyError, in one sentence with the line, says what is wrong."""
-    return parse_study(path, read_text(path, STUDY_FILE))
+    return parse_study(path, read_text(path, STUDY_FILE), root)
 
 
-def parse_study(path: Path, text: str) -> StudyFile:
+def parse_study(path: Path, text: str, root: Path | None = None) -> StudyFile:
     """The study file of a text; path : its name, for messages."""
-    _refuse_long_keys(path, text)
     try:
         data = tomllib.loads(text)
-        lines = key_lines(text)
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{path}:{_syntax_error(str(error), text)}") from None
-    except ValueError:  # what int() says of thousands of digits
-        found = re.search(r"[0-9_]{400}", text)
-        line = 1 + text.count("\n", 0, found.start() if found else 0)
-        raise StudyError(f"{path}:{line}: {LARGE_NUMBER}") from None
-    except RecursionError:
-        raise StudyError(f"{path}: lists or tables nested too deep for a study file; {STUDY_FILE.advice}") from None
-    large = next(_large_numbers(data, ()), None)
-    if large is not None:
-        raise StudyError(f"{path}:{line_of(large, lines)}: {place_text(large)}: {LARGE_NUMBER}")
+    except (ValueError, RecursionError):  # what int() says of thousands of digits, or brackets in brackets
+        raise StudyError(f"{path}: numbers too large or lists too deep for a study file; {STUDY_FILE.advice}") from None
     try:
-        model = StudyModel.model_validate(data)
+        model = StudyTables.model_validate(data)
     except ValidationError as error:
-        raise StudyError(_sentence(path, error, lines)) from None
+        raise StudyError(_sentence(path, error, key_lines(text))) from None
     if not model.data.files and not model.camera:
-        raise StudyError(f"{path}:{_no_tests(data, lines)}")
-    return StudyFile(path, text, model)
+        raise StudyError(f"{path}:{_no_tests(data, key_lines(text))}")
+    return StudyFile(path, text, model, root)
 
 
 def _no_tests(data: Mapping[str, Any], lines: Mapping[KeyPath, int]) -> str:
@@ -110,36 +136,77 @@ def _no_tests(data: Mapping[str, Any], lines: Mapping[KeyPath, int]) -> str:
     return f"{line_of(('data', 'files'), lines)}: [data] files is [], and needs 1 or more entries"
 
 
-def _refuse_long_keys(path: Path, text: str) -> None:
-    """StudyError for keys whose reading would take minutes: of thousands of parts, or tens of thousands of them."""
-    found = _LONG_KEY.search(text)
-    if found is not None:
-        line = 1 + text.count("\n", 0, found.start())
-        raise StudyError(f"{path}:{line}: a key has more than {MOST_PARTS} parts; a study has keys of four at most")
-    if text.count("=") > MOST_KEYS:
-        raise StudyError(f"{path}: has more than {MOST_KEYS} keys, which a study file never has; {STUDY_FILE.advice}")
+# ---- lines ---------------------------------------------------------------------------------------------------------
 
 
-def _large_numbers(data: Any, key: KeyPath) -> Iterator[KeyPath]:
-    """Keys of whole numbers beyond those of TOML."""
-    if isinstance(data, int) and not -LARGEST_WHOLE <= data < LARGEST_WHOLE:
-        yield key
-    elif isinstance(data, dict | list):
-        for name, value in data.items() if isinstance(data, dict) else enumerate(data):
-            yield from _large_numbers(value, (*key, name))
+def key_lines(text: str) -> Mapping[KeyPath, int]:
+    """{path: line, counted from 1} of every key and table in a text that tomllib reads.
+
+    Lines are gathered until tomllib takes them for a whole statement: a heading, or a key with its value.
+    """
+    lines: dict[KeyPath, int] = {}
+    table: KeyPath = ()
+    statement, first = "", 1
+    for number, line in enumerate(text.splitlines(keepends=True), 1):
+        first = first if statement else number
+        statement += line
+        try:
+            data = tomllib.loads(statement)
+        except tomllib.TOMLDecodeError:
+            continue
+        if statement.lstrip().startswith("["):
+            table = _counted(_keys_of(data), lines, new="[[" in statement.partition("#")[0])
+            for length in range(1, len(table) + 1):
+                lines.setdefault(table[:length], first)
+        else:
+            _note(data, table, first, lines)
+        statement = ""
+    return lines
+
+
+def _keys_of(data: Any) -> tuple[str, ...]:
+    """The keys of a heading, of which tomllib has made tables in one another."""
+    while isinstance(data, list):
+        data = data[0]
+    return (key, *_keys_of(data[key])) if (key := next(iter(data), None)) is not None else ()
+
+
+def _counted(keys: Iterable[str], lines: Mapping[KeyPath, int], *, new: bool) -> KeyPath:
+    """Keys with the number of the last table where one names a list of tables; new : the last key begins one more."""
+    path: KeyPath = ()
+    for key in keys:
+        path = (*path, key)
+        count = sum(1 for one in lines if one[:-1] == path and isinstance(one[-1], int))
+        path = (*path, count - 1) if count else path
+    if new and not isinstance(path[-1], int):
+        return (*path, 0)
+    return (*path[:-1], int(path[-1]) + 1) if new else path
+
+
+def _note(data: Any, path: KeyPath, line: int, lines: dict[KeyPath, int]) -> None:
+    """Note the line of every key of a statement, those of tables within braces too."""
+    for key, value in data.items() if isinstance(data, dict) else ():
+        lines.setdefault((*path, key), line)
+        _note(value, (*path, key), line, lines)
+
+
+def line_of(path: KeyPath, lines: Mapping[KeyPath, int]) -> int:
+    """The line of a key, or of the innermost table around it that stands in the text; 1 where none does."""
+    return next((lines[path[:length]] for length in range(len(path), 0, -1) if path[:length] in lines), 1)
 
 
 def place_text(key: KeyPath) -> str:
     """A key as people write it: [forecast 2] end_h."""
-    if not key:
-        return "the study"
-    words, numbers = [one for one in key if isinstance(one, str)], {}
-    for k, one in enumerate(key):
-        if isinstance(one, int):
-            numbers[sum(isinstance(e, str) for e in key[:k]) - 1] = one
-    shown = [f"{quoted(word, SHOWN)}{f' {numbers[k] + 1}' if k in numbers else ''}" for k, word in enumerate(words)]
-    table = f"[{shown[0]}]"
-    return table if len(shown) == 1 else f"{table} {'.'.join(shown[1:])}"
+    shown: list[str] = []
+    for part in key:
+        if isinstance(part, int):
+            shown[-1] += f" {part + 1}"
+        else:
+            shown.append(quoted(part, SHOWN))
+    return f"[{shown[0]}] {'.'.join(shown[1:])}".rstrip() if shown else "the study"
+
+
+# ---- what tomllib and pydantic say, as a sentence ------------------------------------------------------------------
 
 
 def _syntax_error(message: str, text: str) -> str:
@@ -147,8 +214,8 @@ def _syntax_error(message: str, text: str) -> str:
     found = re.search(r" \(at line (\d+), column (\d+)\)$", message)
     line, column = (found[1], f", column {found[2]}") if found else (str(text.count("\n") + 1), "")
     twice = re.match(r"Cannot (?:declare|overwrite|mutate).*?\('([^']*)',\)", message)
-    if twice and twice[1] in StudyModel.model_fields:
-        several = _takes_several(twice[1])
+    if twice and twice[1] in StudyTables.model_fields:
+        several = get_origin(StudyTables.model_fields[twice[1]].annotation) is list
         remedy = f"write [[{twice[1]}]] above each of them" if several else "put its keys under one heading"
         return f"{line}: [{twice[1]}] stands there twice; {remedy}"
     if not re.search(r"^\s*(?:\[|[\w\"'.-]+\s*=)", text, re.MULTILINE):
@@ -158,46 +225,13 @@ def _syntax_error(message: str, text: str) -> str:
     return f"{line}: this is not TOML: {quoted(reason, 120)}{column}; texts stand in quotes, and each key on a line"
 
 
-# ---- what pydantic says, as a sentence -----------------------------------------------------------------------------
-
-
 def _sentence(path: Path, error: ValidationError, lines: Mapping[KeyPath, int]) -> str:
     """The first mistake in the order of the file; first unknown keys, for they make others look missing."""
-    found = error.errors(include_url=False)
-    first = min(found, key=lambda one: (one["type"] != "extra_forbidden", line_of(_key(one), lines)))
-    key = _key(first)
+    found: list[Any] = [{**one, "loc": tuple(part for part in one["loc"] if part != "[key]")} for one in error.errors()]
+    first = min(found, key=lambda one: (one["type"] != "extra_forbidden", line_of(one["loc"], lines)))
     more = len(found) - 1
     others = f" ({more} more mistake{'s' if more > 1 else ''} in the file)" if more else ""
-    return f"{path}:{line_of(key, lines)}: {_problem(first, key)}{others}"
-
-
-def _takes_several(table: str) -> bool:
-    """Whether a study may have several tables of a name."""
-    return get_origin(StudyModel.model_fields[table].annotation) is list
-
-
-def _key(error: Any) -> KeyPath:
-    """The path of a key in the file, without what pydantic adds for its own types."""
-    return tuple(part for part in error["loc"] if part != "[key]")
-
-
-def _problem(error: Any, key: KeyPath) -> str:
-    kind, given, context = error["type"], error["input"], error.get("ctx", {})
-    if kind == "extra_forbidden":
-        table = key[:-1]
-        known = known_keys(table)
-        where = f"in {place_text(table)}" if table else "at the top of a study"
-        what = f"[{quoted(key[-1], SHOWN)}]" if not table else f"key '{quoted(key[-1], SHOWN)}'"
-        return f"unknown {'table ' if not table else ''}{what} {where}; {nearest(str(key[-1])[:SHOWN], known)}"
-    if kind == "missing":
-        table = key[:-1]
-        example = f"; {EXAMPLES[str(key[-1])]}" if str(key[-1]) in EXAMPLES else ""
-        return f"{place_text(table) if table else 'the study'} has no '{key[-1]}', which it needs{example}"
-    if len(key) == 1 and kind == "list_type" and isinstance(given, dict):
-        return f"[{key[0]}] may stand there several times; write it in two brackets, [[{key[0]}]]"
-    if len(key) == 1 and kind in ("model_type", "model_attributes_type") and isinstance(given, list):
-        return f"[[{key[0]}]] stands there once at most; write it in one bracket, [{key[0]}]"
-    return f"{place_text(key)} is {_shown(given)}, and {_needed(kind, given, context, error)}"
+    return f"{path}:{line_of(first['loc'], lines)}: {_problem(first)}{others}"
 
 
 EXAMPLES = {
@@ -211,59 +245,62 @@ EXAMPLES = {
 }
 
 
-def _needed(kind: str, given: Any, context: Mapping[str, Any], error: Any) -> str:
-    """What would be right in the place of what was found."""
-    simple = {
-        "string_type": "must be a text in quotes",
-        "int_type": "must be a whole number",
-        "int_from_float": "must be a whole number",
-        "float_type": "must be a number",
-        "finite_number": "must be a finite number",
-        "bool_type": "must be true or false",
-        "list_type": "must be a list, such as [1, 2]",
-        "dict_type": "must be a table",
-        "model_type": "must be a table",
-        "model_attributes_type": "must be a table",
-        "string_too_short": "must not be empty",
-        "string_too_long": f"may have {context.get('max_length')} signs at most",
-        "too_short": f"needs {context.get('min_length')} or more entries",
-        "too_long": f"may have {context.get('max_length')} entries at most",
-    }
-    if kind in simple:
-        return simple[kind]
-    if kind == "literal_error":
-        words = re.findall(r"'([^']*)'", str(context.get("expected", "")))
-        return f"must be one of these: {', '.join(words)}"
-    limits = {"greater_than": "above", "greater_than_equal": "at least", "less_than": "below"}
-    limits["less_than_equal"] = "at most"
-    if kind in limits:
-        bound = next(value for name, value in context.items() if name in ("gt", "ge", "lt", "le"))
-        return f"must be {limits[kind]} {bound:g}"
-    return str(error["msg"])
+NEEDED = {
+    "string_type": "must be a text in quotes",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "float_type": "must be a number",
+    "finite_number": "must be a finite number",
+    "bool_type": "must be true or false",
+    "list_type": "must be a list, such as [1, 2]",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "string_too_short": "must not be empty",
+    "string_too_long": "may have {max_length} signs at most",
+    "too_short": "needs {min_length} or more entries",
+    "too_long": "may have {max_length} entries at most",
+    "greater_than": "must be above {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be below {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "literal_error": "must be one of these: {expected}",
+}
+"""{kind of an error of pydantic: what would be right}, with the numbers of its context."""
 
 
-def _shown(value: Any) -> str:
-    text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
-    return quoted(text, SHOWN)
+def _problem(error: Any) -> str:
+    kind, given, key = error["type"], error["input"], error["loc"]
+    table, name = key[:-1], str(key[-1]) if key else ""
+    if kind == "extra_forbidden":
+        what = f"key '{quoted(name, SHOWN)}' in {place_text(table)}"
+        what = what if table else f"table [{quoted(name, SHOWN)}] at the top of a study"
+        return f"unknown {what}; {nearest(name[:SHOWN], known_keys(table))}"
+    if kind == "missing":
+        example = f"; {EXAMPLES[name]}" if name in EXAMPLES else ""
+        return f"{place_text(table)} has no '{name}', which it needs{example}"
+    if len(key) == 1 and kind == "list_type" and isinstance(given, dict):
+        return f"[{name}] may stand there several times; write it in two brackets, [[{name}]]"
+    if len(key) == 1 and kind in ("model_type", "model_attributes_type") and isinstance(given, list):
+        return f"[[{name}]] stands there once at most; write it in one bracket, [{name}]"
+    context = error.get("ctx", {})
+    words = ", ".join(re.findall(r"'([^']*)'", str(context.get("expected"))))
+    needed = NEEDED[kind].format(**{**context, "expected": words}) if kind in NEEDED else error["msg"]
+    shown = quoted(str(given).lower() if isinstance(given, bool) else repr(given), SHOWN)
+    return f"{place_text(key)} is {shown}, and {needed}"
 
 
 def known_keys(table: Iterable[str | int]) -> list[str]:
     """Keys that a table of a study file may have."""
-    model: Any = StudyModel
-    named = False  # whether the next key is a name that the user chose
+    model: Any = StudyTables
     for part in table:
-        if isinstance(part, int) or named:
-            named = named and isinstance(part, int)
-            continue
-        annotation = model.model_fields[part].annotation if part in model.model_fields else None
-        model, named = next(_models_in(annotation), None), get_origin(annotation) is dict
-        if model is None:
-            return []
-    return list(model.model_fields)
+        if isinstance(part, str) and model is not None and part in model.model_fields:
+            model = next(_tables_in(model.model_fields[part].annotation), None)
+    return [] if model is None else list(model.model_fields)
 
 
-def _models_in(annotation: Any) -> Any:
+def _tables_in(annotation: Any) -> Any:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for inner in get_args(annotation):
-        yield from _models_in(inner)
+        yield from _tables_in(inner)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -45,79 +45,56 @@ def swapped_units(tests: Sequence[History]) -> list[str]:
     for history in tests:
         by_file.setdefault(history.source.partition(" (")[0] or history.name, []).append(history)
     files = dict(list(by_file.items())[:MOST_FILES])
-    return [*_first(_of_loads(files)), *_first(_of_times(files))]
-
-
-def _first(sentences: Iterator[str]) -> list[str]:
-    return [one] if (one := next(sentences, "")) else []
+    return [one for sentences in (_of_loads(files), _of_times(files)) if (one := next(sentences, ""))]
 
 
 def _of_loads(files: Mapping[str, Sequence[History]]) -> Iterator[str]:
     """Of files where every level of one is that of the other times one factor, and tests so paired creep alike."""
-    for a, b in combinations(files, 2):
-        low, high = sorted((files[a], files[b]), key=lambda tests: max(map(_load, tests)))
+    for pair in combinations(files, 2):
+        small, large = sorted(pair, key=lambda name: max(map(_load, files[name])))
         for units, factor in LOAD_FACTORS.items():
-            pairs = [[h for h in high if _is_near(_load(h), factor * _load(g), SAME_RATIO)] for g in low]
-            if not all(pairs) or not all(
-                _creep_alike(g, h) for g, found in zip(low, pairs, strict=True) for h in found
-            ):
-                continue
-            names = (a, b) if high is files[a] else (b, a)
-            yield f"loads of {_name(names[0])} are those of {_name(names[1])} times {factor:.4g}, as of {units}: {ASK}"
+            pairs = [
+                [h for h in files[large] if _is_near(_load(h), factor * _load(g), SAME_RATIO)] for g in files[small]
+            ]
+            alike = (_creep_alike(g, h) for g, found in zip(files[small], pairs, strict=True) for h in found)
+            if all(pairs) and all(alike):
+                what = f"loads of {_name(large)} are those of {_name(small)} times {factor:.4g}"
+                yield f"{what}, as of {units}: {ASK}"
 
 
 def _creep_alike(first: History, second: History) -> bool:
     """Whether two tests could be at one load: a load so much higher would make the second creep far faster."""
-    if first.specimen != second.specimen or first.loading.quantity != second.loading.quantity:
-        return False
     rates = _mean_rate(first), _mean_rate(second)
-    return _same_temperature(first, second) and (0.0 in rates or 1 / ALIKE < rates[0] / rates[1] < ALIKE)
+    same = _same_condition(first, second, None) and first.loading.quantity == second.loading.quantity
+    return same and (0.0 in rates or 1 / ALIKE < rates[0] / rates[1] < ALIKE)
 
 
 def _of_times(files: Mapping[str, Sequence[History]]) -> Iterator[str]:
     """Of files whose tests at similar conditions last, or creep, longer or slower by a factor between units of time."""
     for a, b in combinations(files, 2):
-        for ratio, tolerance in (*_ratio_of_durations(files[a], files[b]), *_ratio_of_rates(files[a], files[b])):
+        pairs = [*product(files[a], files[b])]
+        lasting = [(g, h) for g, h in pairs if _same_condition(g, h, SIMILAR_LOAD) and _lasts(g) and _lasts(h)]
+        durations = [float(g.times[-1] / h.times[-1]) for g, h in lasting]
+        repeated = [(_mean_rate(g), _mean_rate(h)) for g, h in pairs if _same_condition(g, h, SAME_LOAD)]
+        rates = [second / first for first, second in repeated if first > 0 < second]
+        for ratios, tolerance in ((durations, DURATION_RATIO), (rates, RATE_RATIO)):
+            ratio = float(np.median(ratios)) if ratios else 1.0
             for units, factor in TIME_FACTORS.items():
                 if abs(abs(math.log(ratio)) - math.log(factor)) < math.log(tolerance):
-                    names = [_name(one) for one in ((a, b) if ratio > 1 else (b, a))]
-                    yield f"times of {names[0]} are about {factor:g} times those of {names[1]}, as of {units}: {ASK}"
+                    slow, fast = (a, b) if ratio > 1 else (b, a)
+                    what = f"times of {_name(slow)} are about {factor:g} times those of {_name(fast)}"
+                    yield f"{what}, as of {units}: {ASK}"
 
 
-def _ratio_of_durations(first: Sequence[History], second: Sequence[History]) -> Iterator[tuple[float, float]]:
-    ratios = [
-        float(g.times[-1] / h.times[-1])
-        for g in first
-        for h in second
-        if _at_one_condition(g, h, SIMILAR_LOAD)
-        and all(one.times.size and duration_known(one) and one.times[-1] > 0 for one in (g, h))
-    ]
-    if ratios:
-        yield float(np.median(ratios)), DURATION_RATIO
+def _lasts(history: History) -> bool:
+    return bool(history.times.size) and duration_known(history) and float(history.times[-1]) > 0
 
 
-def _ratio_of_rates(first: Sequence[History], second: Sequence[History]) -> Iterator[tuple[float, float]]:
-    """Median ratio of the mean rates of tests at one condition, inverted: that of their times."""
-    ratios = [
-        _mean_rate(h) / _mean_rate(g)
-        for g in first
-        for h in second
-        if _at_one_condition(g, h, SAME_LOAD) and _mean_rate(g) > 0 < _mean_rate(h)
-    ]
-    if ratios:
-        yield float(np.median(ratios)), RATE_RATIO
-
-
-def _at_one_condition(first: History, second: History, tolerance: float) -> bool:
-    return (
-        first.specimen == second.specimen
-        and _is_near(_load(first), _load(second), tolerance)
-        and _same_temperature(first, second)
-    )
-
-
-def _same_temperature(first: History, second: History) -> bool:
-    return abs(first.mean_temperature - second.mean_temperature) <= SAME_TEMPERATURE
+def _same_condition(first: History, second: History, load_tolerance: float | None) -> bool:
+    """Whether specimens and temperatures are the same, and loads within a relative tolerance, where one is given."""
+    near = load_tolerance is None or _is_near(_load(first), _load(second), load_tolerance)
+    cold = abs(first.mean_temperature - second.mean_temperature) <= SAME_TEMPERATURE
+    return first.specimen == second.specimen and near and cold
 
 
 def _is_near(value: float, other: float, tolerance: float) -> bool:
@@ -127,9 +104,7 @@ def _is_near(value: float, other: float, tolerance: float) -> bool:
 def _mean_rate(history: History) -> float:
     """Of the first output, over the whole test; 0 where it does not grow."""
     values = next(iter(history.outputs.values()), np.zeros(0))
-    if not values.size:
-        return 0.0
-    finite = np.flatnonzero(np.isfinite(values) & (history.times > 0))
+    finite = np.flatnonzero(np.isfinite(values) & (history.times > 0)) if values.size else values
     if finite.size < 2:
         return 0.0
     return max(float(values[finite[-1]] / history.times[finite[-1]]), 0.0)

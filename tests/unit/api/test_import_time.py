@@ -35,12 +35,33 @@ def test_the_door_opens_without_heavy_libraries(code: str) -> None:
     assert heavy_after(code) == []
 
 
+LAW = "import creepkit as ck; ck.law('norton')"
+EXPORT = "import creepkit as ck; ck.export('norton', 'python', {'A': 1e-16, 'n': 5})"
+NOT_FOR_AN_EXPORT = [
+    *("numpy", "scipy", "torch", "h5py", "matplotlib", "llvmlite", "pydantic", "pysindy"),
+    *(f"creepkit.{name}" for name in ("api.identification", "inverse", "reports", "readers", "cameras", "instruments")),
+    *(f"creepkit.{name}" for name in ("specimens", "fem", "integration", "core", "surrogates", "dataset", "jobs")),
+    *(f"creepkit.exporters.{name}" for name in ("abaqus_cards", "c", "javascript", "mathml", "mfront")),
+    *(f"creepkit.laws.{name}" for name in ("combined", "hyperbolic_sine", "time_hardening")),
+    *("creepkit_classic", "creepkit_damage", "creepkit_logarithmic", "creepkit_specimens"),
+]
+
+
 @pytest.mark.parametrize(
-    "code", ["import creepkit", "import sys; sys.argv = ['creepkit', '--help']; from creepkit.cli import main; main()"]
+    ("code", "others"),
+    [
+        ("import creepkit", ["pydantic"]),
+        ("import sys; sys.argv = ['creepkit', '--help']; from creepkit.cli import main; main()", ["pydantic"]),
+        (LAW, [*NOT_FOR_AN_EXPORT, "creepkit.exporters", "creepkit.kernels", "creepkit.files", "creepkit.records"]),
+        (EXPORT, NOT_FOR_AN_EXPORT),
+    ],
 )
-def test_records_are_not_validated_before_there_are_any(code: str) -> None:
-    assert heavy_after(code, "pydantic") == []  # typer imports it for the options of a command
+def test_what_is_not_asked_for_is_not_imported(code: str, others: list[str]) -> None:
+    assert set(heavy_after(code, *others)) - {"sympy"} == set()
 
 
 def test_the_watch_sees_what_is_heavy() -> None:
     assert "sympy" in heavy_after("import creepkit; creepkit.Param")
+    assert "creepkit.laws.combined" in heavy_after(
+        "import creepkit; creepkit.law('combined')", "creepkit.laws.combined"
+    )

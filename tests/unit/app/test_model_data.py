@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.app.model_data import embedded_json, law_data
+from creepkit.app.documents import law_data
 from creepkit.app.runtime_files import RUNTIME_FILES, runtime_files, runtime_script
+from creepkit.exporters.javascript import script_safe_json
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.laws.norton import NORTON
 from creepkit.records import LawWithValues
@@ -30,10 +31,9 @@ def test_a_law_alone_has_the_middle_of_its_bounds_and_no_intervals():
 @pytest.mark.parametrize("name", sorted(default_registry().laws()))
 def test_every_law_is_json_and_its_equations_are_well_formed(name):
     data = law_data(default_registry().law(name))
-    again = json.loads(embedded_json(data))
+    again = json.loads(script_safe_json(data))
     assert again == data
-    symbols = [p["symbol"] for p in [*data["parameters"], *data["states"]]]
-    for text in [*data["equations"], *symbols, *(term["formula"] for term in data["terms"])]:
+    for text in [*data["equations"], *(p["symbol"] for p in data["parameters"])]:
         assert ElementTree.fromstring(text).tag.endswith("math")
 
 
@@ -69,7 +69,6 @@ def test_a_fit_brings_its_values_intervals_and_likely_directions():
     lengths = np.linalg.norm(steps / known.sd, axis=1)
     assert (np.diff(lengths) <= 0).all()
     assert steps[0, 0] * steps[0, 1] < 0  # a larger exponent goes with a smaller coefficient
-    assert data["ranges"]["stress"] == [pytest.approx(60.0), pytest.approx(120.0, rel=0.1)]
 
 
 def test_values_of_a_law_with_values_stay():
@@ -100,7 +99,7 @@ def test_nothing_of_a_hostile_law_leaves_its_script_element():
         references=("</script><s>",),
     )
     data = law_data(law)
-    page = f"<p></p><script>x = {embedded_json(data)};</script><script>y = {data['source']};</script><em></em>"
+    page = f"<p></p><script>x = {script_safe_json(data)};</script><script>y = {data['source']};</script><em></em>"
     assert Elements(page).names == ["p", "script", "script", "em"]
 
 

@@ -263,3 +263,9 @@ def test_times_in_names_have_decimals(tmp_path: Path) -> None:
     for name in ("t_2.25.txt", "t_12.5.txt"):
         (tmp_path / f"{name[:-4].split('.')[0]}.txt").rename(tmp_path / name)
     assert ck.read_frames(tmp_path, format=format).times.tolist() == [2.25, 12.5]
+
+
+def test_infinity_is_no_matter_where_a_point_is_lost(tmp_path: Path) -> None:
+    lines = vic_3d().decode().split("\n")
+    lines[4] = "1,2,inf,4,5,6,-1,8"
+    assert not ck.read_frames(written(tmp_path, "\n".join(lines).encode(), "a.csv"))[0].valid[2]

@@ -152,3 +152,8 @@ def test_a_test_of_pyvale(tmp_path: Path) -> None:
 def test_times_of_frames_from_a_file(tmp_path, text, expected):
     (tmp_path / "times.csv").write_text(text)
     np.testing.assert_allclose(read_frame_times(tmp_path / "times.csv"), expected, rtol=1e-12)
+
+
+def test_numbers_may_count_in_steps(tmp_path: Path) -> None:
+    frames = ck.read_frames(folder_of(tmp_path / "test", [f"run2_{k:05d}_0.csv" for k in (10, 20, 30, 50)], vic_3d))
+    assert frames.missing == (40,)

@@ -159,6 +159,7 @@ def test_a_form_is_where_it_should_be_at_its_reference_temperature():
 # ---- a dimple ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_a_dimple_at_three_temperatures_through_the_surrogate():
     model, rng = ck.surrogate("dimple"), np.random.default_rng(8)
     law = NORTON.times(arrhenius(1033.15))

@@ -238,3 +238,21 @@ def test_a_test_that_ruptures_or_does_not_grow_is_refused_or_left_out(hardening)
     found = design(hardening, rig=Rig("uniaxial", (5.0, 4000.0), 28.0, (1000.0,)))
     assert any("rupture" in reason for _, reason in found.left_out)
     assert all(max(h.loading.program().values) < 1000 for t in found.tests for h in t.histories)
+
+
+def test_a_number_in_the_map_is_one_of_the_table(hardening):
+    """In each cell the probability of the first test of the table with that first load and duration."""
+    found = design(hardening)
+    first: dict[tuple[bool, float, float], str] = {}
+    for test in found.tests:
+        levels = test.histories[0].loading.program().values
+        place = bool(np.ptp(levels[levels > 0]) == 0.0), round(test.first_level, 6), round(test.histories[0].times[-1])
+        first.setdefault(place, f"{test.expectation.probability:.2f}")
+    drawn = [text.get_text() for panel in found.plot().axes[:2] for text in panel.texts]
+    assert sorted(drawn) == sorted(first.values())
+
+
+def test_the_same_question_has_the_same_answer(line):
+    first, second = (design(line, rig=RIG, goal=rate_at(40.0), seed=3) for _ in range(2))
+    assert [t.description for t in first.tests] == [t.description for t in second.tests]
+    assert first.best.expectation.sd == second.best.expectation.sd

@@ -149,21 +149,21 @@ def outside(text):
     return re.sub(r"^@Description\{ \"[^\"\\]*\" \}$", "", rest, flags=re.MULTILINE), blocks
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_the_file_keeps_the_grammar(name):
-    text = exported(LAWS[name], units=Units("Pa", "h"))
-    assert {*re.findall(r"^@\w+", bare(text), re.MULTILINE)} <= DECLARATIONS | BLOCKS
-    rest, _ = outside(text)
-    for line in filter(None, map(str.strip, rest.splitlines())):
-        assert STATEMENT.fullmatch(line), line
-    for opening, closing in ("()", "{}", "[]"):
-        code = re.sub(r"@PhysicalBounds.*", "", bare(text))
-        assert code.count(opening) == code.count(closing)
-    code = re.search(r"^@Integrator \{\n(.*?)^\}", bare(text), re.MULTILINE | re.DOTALL)[1]
-    assert all(line.endswith(";") for line in filter(None, map(str.strip, code.splitlines())))
-    used = {*re.findall(r"\w+", code)}
-    assert {*declared(text, "Parameter"), *declared(text, "AuxiliaryStateVariable")} <= used
-    assert {f"{sign}{variable}" for variable in declared(text, "StateVariable") for sign in "df"} <= used
+def test_every_file_keeps_the_grammar():
+    for law in LAWS.values():
+        text = exported(law, units=Units("Pa", "h"))
+        assert {*re.findall(r"^@\w+", bare(text), re.MULTILINE)} <= DECLARATIONS | BLOCKS
+        rest, _ = outside(text)
+        for line in filter(None, map(str.strip, rest.splitlines())):
+            assert STATEMENT.fullmatch(line), line
+        for opening, closing in ("()", "{}", "[]"):
+            code = re.sub(r"@PhysicalBounds.*", "", bare(text))
+            assert code.count(opening) == code.count(closing)
+        code = re.search(r"^@Integrator \{\n(.*?)^\}", bare(text), re.MULTILINE | re.DOTALL)[1]
+        assert all(line.endswith(";") for line in filter(None, map(str.strip, code.splitlines())))
+        used = {*re.findall(r"\w+", code)}
+        assert {*declared(text, "Parameter"), *declared(text, "AuxiliaryStateVariable")} <= used
+        assert {f"{sign}{variable}" for variable in declared(text, "StateVariable") for sign in "df"} <= used
 
 
 def test_the_file_reads_as_the_gallery_does():

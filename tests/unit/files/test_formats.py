@@ -73,7 +73,7 @@ def test_plates_and_locks_are_of_a_version_that_is_read(version) -> None:
     with h5py.File(FORMATS / version / "plate.h5") as file:
         assert (file.attrs["format"], file["alloys/0000"].attrs["law"]) == ("creepkit-plate", "norton")
     lock = read_lock(FORMATS / version / "study.lock")
-    assert {stage["state"] for stage in lock["stages"].values()} == {"done"}
+    assert {stage.state for stage in lock.stages.values()} == {"done"}
 
 
 def test_every_kind_of_file_is_made_by_the_program_that_is_to_make_the_next_version(tmp_path) -> None:

@@ -1,5 +1,6 @@
 """Forecasts of Norton bars, whose curves, times and their distributions are closed forms; and what is refused."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from creepkit.forecasts.draws import law_draws
 from creepkit.forecasts.forecast import forecast
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.records import Status
+from creepkit.reports.forecast import forecast_to_json
 from helpers.rupture_tests import BAR
 
 TIMES = np.geomspace(3.6e3, 3.6e5, 40)
@@ -198,6 +200,7 @@ def test_what_tests_share_is_at_its_estimate_in_forecast_and_score():
     assert np.log(one.outputs["strain"].band.high[-1] / one.outputs["strain"].band.low[-1]) < 0.4
 
 
+@pytest.mark.nightly
 def test_p_values_of_tests_like_the_fitted_ones_are_uniform(fit):
     """Over 60 tests from the true law: P(p < 0.2) is 0.2 give or take 0.05, and none is below 1e-4."""
     rng = np.random.default_rng(21)
@@ -240,6 +243,7 @@ def test_a_broken_test_is_not_scored_by_its_life_where_no_life_was_fitted(fit):
     assert fit.forecast(broken).tests[0].score.p_value > 1e-3
 
 
+@pytest.mark.nightly
 def test_curves_with_noise_of_their_own_lie_inside(fit):
     """Stated noise ten times that of the fitted tests: 40 whole curves inside at 0.95, give or take 0.035."""
     made = []
@@ -322,3 +326,26 @@ def test_a_dimple_is_forecast_from_bars_with_the_tolerance_of_its_thickness(fit)
 def test_nonsense_is_refused(fit, options, sentence):
     with pytest.raises(FitError, match=sentence):
         fit.forecast(bar("plan", 100.0, noise=0.0), **options)
+
+
+def test_a_saved_identification_forecasts_the_same(fit, tmp_path):
+    plan = bar("plan", 105.0, noise=0.0)
+    loaded = ck.load(fit.save(tmp_path / "fit.json"))
+    assert forecast_to_json(loaded.forecast(plan, using=BAR)) == forecast_to_json(fit.forecast(plan, using=BAR))
+
+
+def test_extrapolation_is_said_by_how_much(fit):
+    one = fit.forecast(bar("plan", 60.0, noise=0.0)).tests[0]
+    assert "stress 60 MPa (the tests cover 80 to 120 MPa; 1.33 times beyond)" in one.extrapolation
+
+
+def test_celsius_is_refused_and_may_be_insisted_on(fit):
+    plan = bar("plan", 100.0, noise=0.0).replace(temperature=800.0)
+    assert fit.forecast(plan).tests[0].extrapolation.endswith("temperatures are in K: is 800 °C meant, 1073.15 K?")
+    with pytest.raises(FitError, match=r"temperature 800 K lies 273 K below .* if 800 °C is meant, give 1073.15"):
+        fit.rate(100.0, 800.0)
+    with pytest.raises(FitError, match="temperatures are in K"):
+        fit.rupture_time(100.0, 800.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit.rate(100.0, 800.0, warn=False)

@@ -238,3 +238,10 @@ def test_units_that_are_nearly_known_are_not_taken_in_silence(tmp_path: Path) ->
     assert "p: taken for numbers without a unit; if 'psgi' means psi, write psi into the head" in text
     assert "V: numbers in 'rpm', which is not converted" in text
     assert not any(note.startswith(("valve", "T_set")) for note in record.notes)
+
+
+@pytest.mark.parametrize(("order", "day"), [("year first", "2025-08-18"), ("day first", "2018-08-25")])
+def test_years_of_two_digits(tmp_path: Path, order: str, day: str) -> None:
+    content = "time,p_bar\n25-08-18 00:00,1\n25-08-18 00:01,2\n"
+    record = ck.read_record(written(tmp_path, content), date_order=order, time_zone="+00:00")
+    assert record.start == np.datetime64(day).astype("datetime64[s]").astype(float)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.inverse.cross_validation import cross_validate, times_to_strain
+from creepkit.inverse.cross_validation import cross_validate, measured_time_to_strain, times_to_strain
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify, refit
 from creepkit.inverse.selection import rank
@@ -175,3 +175,17 @@ def test_noise_of_a_smooth_sparse_curve_is_small():
     times = np.geomspace(1e2, 1e6, 12)
     curve = History("smooth", times, {"strain": 0.01 * (times / 1e6) ** 0.1}, constant_stress(100.0), 1000.0)
     assert frame_noise(curve, "strain") < 1e-5
+
+
+def test_every_seed_reaches_the_same_minimum(tests, fit):
+    other = identify(
+        LAW, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20, seed=11)
+    )
+    assert (np.abs(other.u - fit.u) < 0.05 * np.sqrt(np.diag(fit.covariance))).all()
+
+
+def test_measured_time_interpolates(tests):
+    test = tests[0]
+    t = measured_time_to_strain(test, 0.01)
+    assert np.interp(t, test.times, test.outputs["strain"]) == pytest.approx(0.01, rel=1e-9)
+    assert measured_time_to_strain(test, 1.0) is None

@@ -31,3 +31,24 @@ def test_that_of_a_drifting_exponent_is_n_at_the_reference_time():
     decay, rise = np.exp(-2e4 / values["tau_d"]), np.exp(-2e4 / values["tau_r"])
     n = values["n_inf"] + (values["C"] + values["n_0"] - values["n_inf"]) * decay - values["C"] * rise
     assert u[local.position] == pytest.approx(n, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["norton", "strain-hardening", "time-hardening"])
+def test_a_power_law_keeps_its_exponent(name):
+    assert local_exponents(ck.law(name)) == ()
+
+
+@pytest.mark.parametrize("name", ["hyperbolic-sine", "combined", "drifting-exponent"])
+def test_the_map_inverts_and_its_derivatives_are_exact(name):
+    law, rng = ck.law(name), np.random.default_rng(0)
+    coordinates = Coordinates(law, AT)
+    ends = np.array([[p.to_internal(b) for b in p.bounds] for p in law.params.values()])
+    theta = ends[:, 0] + rng.uniform(0.2, 0.8, (6, len(ends))) * np.diff(ends, axis=1)[:, 0]
+    u = coordinates.u(theta)
+    assert coordinates.theta(u) == pytest.approx(theta, rel=1e-9, abs=1e-9)
+    exact = coordinates.jacobian(u)
+    for k in range(len(ends)):
+        step = np.zeros(len(ends))
+        step[k] = 1e-5 * max(1.0, np.abs(u[:, k]).min())
+        slope = (coordinates.theta(u + step) - coordinates.theta(u - step)) / (2 * step[k])
+        assert exact[..., k] == pytest.approx(slope, rel=2e-5, abs=2e-5)

@@ -12,6 +12,7 @@ from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
+from creepkit.inverse.observation_vector import thinned_history
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
 from helpers.correlated_noise import BARS, LAW, NOISE, PAIR, least_squares, measured
@@ -138,3 +139,19 @@ def test_the_correlation_goes_through_the_transforms_of_outputs() -> None:
             for k, n in enumerate(observations.outputs)
         ])  # fmt: skip
         np.testing.assert_allclose(c[np.ix_(places, places)], np.cov(drawn), rtol=0.05)
+
+
+def test_without_correlation_nothing_changes() -> None:
+    plain, zero = measured(0.0, seed=1), [h.replace(noise_correlation={PAIR: 0.0}) for h in measured(0.0, seed=1)]
+    fits = [identify(LAW, tests, TwoOutputs(), settings=SETTINGS) for tests in (plain, zero)]
+    assert fits[0].values == fits[1].values
+    assert fits[0].estimates == fits[1].estimates
+    assert fits[0].log_likelihood == fits[1].log_likelihood
+
+
+def test_thinned_and_planned_histories_keep_it() -> None:
+    test = measured(0.6, seed=2)[0]
+    assert thinned_history(test, 10).noise_correlation == {PAIR: 0.6}
+    plan = test.replace(times=np.array([1.0, 2.0]), outputs={}, standard_deviation={})
+    assert plan.noise_correlation == {PAIR: 0.6}
+    assert plan.replace(outputs={"amplitude": np.zeros(2)}).noise_correlation == {}

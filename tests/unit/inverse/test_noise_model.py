@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from creepkit.inverse.noise_covariance import effective_sample_size, log_likelihood, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, autocorrelated_components, covariance
@@ -211,3 +212,56 @@ def test_autocorrelated_parts_are_counted():
     assert autocorrelated_components(scatter) == 2
     assert autocorrelated_components(replace(scatter, discrepancy=1.0)) == 4
     assert autocorrelated_components(replace(scatter, discrepancy=0.01)) == 2
+
+
+def by_hand(residuals, scatter, test):
+    """The covariance of one test, entry by entry."""
+    r, c = residuals, np.zeros((10, 10))
+    for i in range(10):
+        for j in range(10):
+            a, b = (list(scatter.outputs.values())[r.output_index[test, k]] for k in (i, j))
+            c[i, j] = scatter.rate**2 * r.log_rate_sensitivity[test, i] * r.log_rate_sensitivity[test, j]
+            if a is b:
+                lag = abs(r.correlation_coordinate[test, i] - r.correlation_coordinate[test, j])
+                c[i, j] += (
+                    a.drift**2 * np.exp(-lag / a.correlation_length)
+                    + a.offset**2 * r.offset_sensitivity[test, i] * r.offset_sensitivity[test, j]
+                )
+            if i == j:
+                c[i, j] += (a.noise * r.offset_sensitivity[test, i]) ** 2 + a.misfit**2
+    return c
+
+
+def test_likelihood_is_that_of_a_multivariate_normal():
+    scatter = sizes(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, correlation_length=1.5)
+    residuals = made(3, 12, 0, scatter)
+    c = covariance(residuals, scatter)
+    truth = sum(multivariate_normal(np.zeros(12), c[k]).logpdf(residuals.values[k]) for k in range(3))
+    assert log_likelihood(residuals, scatter) == pytest.approx(truth, rel=1e-10)
+
+
+def test_absent_frames_do_not_count():
+    scatter = sizes(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, correlation_length=1.5)
+    whole = made(2, 12, 1, scatter)
+    present = whole.present.copy()
+    present[1, 7:] = False
+    part = replace(whole, present=present, values=np.where(present, whole.values, 0),
+                   offset_sensitivity=np.where(present, whole.offset_sensitivity, 0),
+                   log_rate_sensitivity=np.where(present, whole.log_rate_sensitivity, 0))  # fmt: skip
+    c = covariance(whole, scatter)
+    truth = multivariate_normal(np.zeros(12), c[0]).logpdf(whole.values[0])
+    truth += multivariate_normal(np.zeros(7), c[1][:7, :7]).logpdf(whole.values[1, :7])
+    assert log_likelihood(part, scatter) == pytest.approx(truth, rel=1e-10)
+
+
+def test_outputs_share_the_rate_alone():
+    residuals, scatter = two_outputs()
+    for k, found in enumerate(covariance(residuals, scatter)):
+        np.testing.assert_allclose(found, by_hand(residuals, scatter, k), rtol=1e-7, atol=1e-8)
+
+
+def test_the_likelihood_with_a_discrepancy_is_that_of_a_multivariate_normal():
+    residuals, scatter = with_discrepancy()
+    c = covariance(residuals, scatter)
+    truth = sum(multivariate_normal(np.zeros(10), c[k]).logpdf(residuals.values[k]) for k in range(2))
+    assert log_likelihood(residuals, scatter) == pytest.approx(truth, rel=1e-10)

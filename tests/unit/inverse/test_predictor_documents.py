@@ -95,3 +95,17 @@ def test_a_reduced_order_model_is_found_again_with_the_fields_of_its_specimen():
     gone = {"": replace(documents[""], name="torsion-tube")}
     assert predictor_from_documents(gone) is None
     assert "made with specimen 'torsion-tube', which is not known here" in missing_predictor(gone)
+
+
+def test_with_its_histories_alone_it_is_the_whole_identification(fit, tmp_path):
+    back = ck.load(fit.save(tmp_path / "fit.json")).with_histories(TESTS)
+
+    assert back.predictor == BAR
+    again, profile = back.profile("n"), fit.profile("n")
+    assert (again.low, again.high) == pytest.approx((profile.low, profile.high), rel=1e-6)
+    assert ck.load(back.save(tmp_path / "again.json")).predictor == BAR
+
+
+def test_a_specimen_under_another_ones_name_is_no_specimen():
+    (document,) = predictor_documents(Foreign("uniaxial")).values()
+    assert document.kind == "other"

@@ -9,6 +9,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import CompositePredictor, predict, predict_with_sensitivities
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify, refit
+from creepkit.inverse.settings import default_nuisances
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -226,3 +227,27 @@ def test_nuisances_that_do_the_same_are_named_or_refused():
 
 
 # ---- settings ----------------------------------------------------------------------------------------------------
+
+
+def test_finite_elements_differentiate_programs_themselves():
+    test = History("one", np.array([3600.0, 10800.0]), {}, PressureJump(8.0, 8.0, 9000.0), 1040.0, "bulge",
+                   elastic=Elastic(100e3))  # fmt: skip
+    values = {"temperature step@8250": np.array([[-5.0]]), "rate drift": np.array([[0.1]])}
+    found = predict(Bulge(refinement=0.5), LAW, THETA[None], [test], nuisances=values, sensitivities=True)
+    assert set(found.nuisance_jacobian) == set(values)
+    assert found.jacobian.shape[-1] == 3
+
+
+def test_a_fit_without_the_step_is_worse(fit):
+    plain = identify(LAW, planted(), BAR, settings=replace(QUICK, nuisances=()))
+    assert plain.rms > 5 * fit.rms
+
+
+def test_the_defaults_and_further_ones():
+    usual = IdentificationSettings().nuisances
+    thickness = Nuisance("thickness", mean=0.49, sd=0.03)
+    assert default_nuisances() == usual
+    assert default_nuisances(thickness, without=["rate"]) == (usual[0], thickness)
+    assert default_nuisances(Nuisance("rate", sd=0.2)) == (usual[0], Nuisance("rate", sd=0.2))
+    with pytest.raises(FitError, match="'rat' is no default nuisance that could be left out; did you mean 'rate'"):
+        default_nuisances(without=["rat"])

@@ -65,3 +65,15 @@ def test_planted_temperature_errors_are_found():
     errors = np.array([(e.value - shift) / e.sd for e, shift in zip(fit.nuisances, off, strict=True)])
     assert np.sqrt(np.mean(errors**2)) < 1.9
     assert np.corrcoef([e.value for e in fit.nuisances], off)[0, 1] > 0.95
+
+
+def test_derivatives_are_those_of_differences():
+    nuisances = {"temperature": np.array([[3.0, -2.0]]), "modulus": np.array([[0.1, 0.2]])}
+    tests = [bar(), bar(80.0, 1030.0)]
+    found = BAR.predict(LAW, LAW.to_internal(VALUES), tests, nuisances=nuisances, sensitivities=True)
+    for kind, step in (("temperature", 0.5), ("modulus", 1e-3)):
+        up, down = (
+            BAR.predict(LAW, LAW.to_internal(VALUES), tests, nuisances={**nuisances, kind: nuisances[kind] + s}).values
+            for s in (step, -step)
+        )
+        np.testing.assert_allclose(found.nuisance_jacobian[kind], (up - down) / (2 * step), rtol=2e-3)

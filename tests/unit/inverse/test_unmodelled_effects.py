@@ -1,6 +1,6 @@
 """Unmodelled effects: each against a simulation, or an identification, in which it is there."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -273,3 +273,16 @@ def test_an_effect_in_the_covariance_is_a_rank_of_one_in_each_test():
     np.testing.assert_allclose(found, np.broadcast_to(np.eye(len(expected[0])), found.shape), atol=1e-5)
     again = with_random_effects(with_both, [effects[DRIFT]])
     assert again.residuals.random_effect_sensitivities.shape[-1] == 3
+
+
+@dataclass(frozen=True)
+class Toleranced(Steady):
+    """States a tolerance of a length that it does not know as a nuisance parameter."""
+
+    tolerances = {"thickness": 0.02}  # noqa: RUF012
+
+
+def test_a_predictor_that_does_not_know_a_length_has_no_effect_of_it():
+    tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(60.0, 1000.0), (80.0, 1000.0)], seed=0, noise=1e-5)
+    fit = identify(NORTON, tests, Toleranced(), settings=SETTINGS)
+    assert "thickness" not in {e.kind for e in fit.unmodelled}

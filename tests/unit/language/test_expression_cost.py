@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 import sympy
-from sympy import Abs, Add, Heaviside, Max, Mul, Piecewise, Pow, Rational, exp, log, sinh
+from sympy import Abs, Add, Heaviside, Max, Mul, Piecewise, Rational, exp, log, sinh
 
 from creepkit.errors import LawError
 from creepkit.kernels import lower
@@ -30,17 +30,11 @@ def law(expression: sympy.Expr) -> CreepLaw:
 HOSTILE = {
     "28 nested absolute values": lambda: nested(lambda e: Abs(e - 1, evaluate=False), 28),
     "a maximum of 1500": lambda: Max(*(stress - k * strain for k in range(1500)), evaluate=False),
-    "nested squares of sums": lambda: nested(lambda e: Pow(e + 1, 2, evaluate=False), 28),
     "nested products": lambda: nested(lambda e: Mul(e, e + 1, evaluate=False), 20),
     "nested steps": lambda: nested(lambda e: Heaviside(e - Rational(1, 2), 0) + e, 12),
     "nested branches": lambda: nested(
         lambda e: Piecewise((e, stress > 1), (e + 1, time > 1), (-e, True), evaluate=False), 12
     ),
-    "a product of sums": lambda: Mul(*(exp(k * stress) + exp(k * strain) - k for k in range(1, 22)), evaluate=False),
-    "a large power of a sum": lambda: (stress + strain + time + temperature) ** 999,
-    "nested squares": lambda: nested(lambda e: Pow(e, 2, evaluate=False), 28),
-    "a number of a million digits": lambda: Mul(stress, Pow(7, 10**6, evaluate=False), evaluate=False),
-    "a tower of numbers": lambda: stress ** Pow(7, Pow(7, Pow(7, 7, evaluate=False), evaluate=False), evaluate=False),
     "a deep expression": lambda: nested(lambda e: exp(-e, evaluate=False), 200),
     "a sum of 2000 powers": lambda: Add(*(strain**k for k in range(2, 2000))),
 }

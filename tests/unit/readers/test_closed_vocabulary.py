@@ -51,3 +51,39 @@ def test_the_names_of_a_laboratory_are_misspelt_as_well(tmp_path: Path):
     (tmp_path / "index.csv").write_text("key,temperature_C,stress_MPa,yongs_MPa\na,850,60,150000\n")
     with pytest.raises(HistoryError, match="unknown key 'yongs_MPa'; did you mean 'youngs_MPa'"):
         INDEXED_TABLE.read(tmp_path)
+
+
+def test_an_index_refuses_misspelt_columns_too(tmp_path: Path):
+    """A column of an index that resembles no key is a label; a misspelt key of seven letters or more is an error."""
+    spellings = HeaderVocabulary().terms().spellings
+    keys = [key for key in HeaderVocabulary().terms("uniaxial").spellings.values() if len(key) >= 7]
+    (tmp_path / "curves.csv").write_text("key,time_s,strain_pct\na,0,0\na,10,0.1\n")
+    index = "key,temperature_C,stress_MPa,{}\na,850,60,7\n"
+    accepted, refused = [], 0
+    for key, wrong in misspelt_keys(keys, 200, 96, spellings):
+        (tmp_path / "index.csv").write_text(index.format(f'"{wrong}"'))
+        try:
+            accepted += [(key, wrong, dict(h.labels)) for h in INDEXED_TABLE.read(tmp_path)]
+        except HistoryError as error:
+            refused += str(error).startswith(str(tmp_path / "index.csv"))
+    assert (accepted, refused) == ([], 200)
+    (tmp_path / "index.csv").write_text(index.format("grain_size_um"))
+    assert INDEXED_TABLE.read(tmp_path)[0].labels["grain_size_um"] == "7"
+
+
+def test_capitals_blanks_hyphens_and_brackets_do_not_matter(tmp_path: Path):
+    head = (
+        "# Temperature [C]: 850\n# STRESS (MPa): 60\n# Strain-Measure: logarithmic\n# includes elastic: no\n"
+        "# Control: load\n# Specimen: Uniaxial\n# Modulus, GPa: 150\n"
+    )
+    history = read(head + BODY, tmp_path / "x.csv")
+    plain = "# temperature_C: 850\n# stress_MPa: 60\n# strain_measure: logarithmic\n# includes_elastic: no\n"
+    expected = read(plain + "# control: load\n# modulus_GPa: 150\n" + BODY, tmp_path / "x.csv")
+    assert (history.temperature, history.loading) == (expected.temperature, expected.loading)
+    assert (history.elastic, history.strain_measure, history.specimen) == (expected.elastic, "logarithmic", "uniaxial")
+    assert dict(history.labels) == {}
+
+
+def test_what_was_assumed_stays_known(tmp_path: Path):
+    text = HEAD + "# label assumed: modulus of the data sheet\n" + BODY
+    assert read(text, tmp_path / "x.csv").labels["assumed"].startswith("modulus of the data sheet, control load")

@@ -213,3 +213,18 @@ def test_stated_end_of_loading(read):
         read(LOADED + "# includes_loading: yes\ntime_s,strain_pct\n" + rows(AFTER, 100 * (3e-3 + CREEP)))
     with pytest.raises(HistoryError, match="no elastic strain is left; leave out includes_elastic: yes"):
         read(LOADED + "# includes_loading: yes\n# includes_elastic: yes\n# loading_strain_pct: 0.3\n" + total())
+
+
+def test_steps_of_temperature(read):
+    text = HOT.replace("temperature_C: 850", "stress_MPa: 100") + "time_s,strain_pct,temperature_C\n"
+    temperatures = np.where(LEVELS > 110, 870.0, 850.0)
+    program = read(text + rows(STEP_TIMES, STRAIN, temperatures)).temperature_program()
+    np.testing.assert_allclose(program.at([0, 50.4 * 3600, 50.5 * 3600]) - 273.15, [850, 850, 870])
+
+
+@pytest.mark.parametrize("unit", ["°C", "deg C", "C", "celsius"])
+def test_units_of_programs_are_spelled_as_those_of_columns(read, unit):
+    program = f"# stress_MPa: 120\n# temperature_program: 0 h 630 {unit}; 200 hours 630 {unit}; 201 h 670 {unit}\n"
+    history = read(program + "time_h,strain_pct\n" + rows([0, 1, 300], [0.0, 0.1, 0.2]))
+    assert history.temperature.values.tolist() == pytest.approx([903.15, 903.15, 943.15])
+    assert history.temperature.times.tolist() == pytest.approx([0, 200 * 3600, 201 * 3600])

@@ -79,3 +79,8 @@ def test_entries_are_known_by_their_whole_name(tmp_path: Path):
 def test_a_rupture_time_without_load_control_says_what_was_assumed(tmp_path: Path):
     (test,) = ck.read_histories(write(tmp_path, document(link="", loadControlType=""), series=None))
     assert (test.loading.control, test.labels) == ("load", {"assumed": "control load"})
+
+
+def test_the_first_files_are_in_the_code_page_of_windows(tmp_path: Path):
+    (test,) = ck.read_histories(write(tmp_path, document(), encoding="cp1252"))
+    assert test.times.size == 4

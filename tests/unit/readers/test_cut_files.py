@@ -80,3 +80,13 @@ def test_the_last_test_of_a_table_of_rates(lost, tmp_path):
     assert (f"{written} in line 31 is whole" in last.labels["assumed"]) == (lost > 0)
     said = " ".join(creepkit("read", str(path)).stdout.split())
     assert ("fewer digits than the numbers above have" in said) == (lost > 0)
+
+
+@pytest.mark.parametrize("form", ["fixed", "exponents"])
+def test_forms_of_one_length_show_each_digit_that_is_lost(form):
+    lines = [f"{k},{FORMS[form](0.5 + 0.013 * k)}" for k in range(50)]
+    text = "time_h,strain_pct\n" + "\n".join(lines)
+    assert cut_number(text, Dialect()) is None
+    for lost in (1, 2, 3):
+        found = cut_number(text[:-lost], Dialect())
+        assert (found.line, found.column, found.text) == (51, 1, lines[-1].split(",")[1][:-lost])

@@ -44,3 +44,13 @@ def test_steps_with_decimal_commas_or_a_plain_point(tmp_path: Path):
         path.write_text(FRAMES.format(f"# stress_steps: 0 s 100 MPa; {word} h 120 MPa"))
         (history,) = HISTORY_CSV.read(path)
         np.testing.assert_allclose(history.loading.steps, [(0.0, 100.0), (5400.0, 120.0)])
+
+
+def test_a_large_table_of_several_tests_keeps_its_decimal_commas(tmp_path: Path):
+    path, times = tmp_path / "wide.csv", np.arange(6000) + 0.125
+    rows = [f"{t:.3f};{t / 1e3:.4f};{t / 2e3:.4f}".replace(".", ",") for t in times]
+    head = "# stress_MPa: 100\n# temperature_C: 800\ntime_h;A1 strain (%);A2 strain (%)\n"
+    path.write_text(head + "\n".join(rows) + "\n")
+    first, second = HISTORY_CSV.read(path)
+    np.testing.assert_allclose(first.times, 3600 * times)
+    np.testing.assert_allclose(second.outputs["strain"] * 100, times / 2e3, atol=6e-5)

@@ -89,3 +89,18 @@ def test_what_an_empty_cell_of_the_index_leaves_unknown_is_said(tmp_path):
     assert "youngs_MPa unknown (empty cell)" in first.labels["assumed"].split(", ")
     assert "state unknown (empty cell)" in second.labels["assumed"].split(", ")
     assert "product" not in first.labels["assumed"]
+
+
+def test_any_file_of_the_folder_leads_to_it(tmp_path):
+    made = folder(tmp_path, files())
+    assert all(INDEXED_FILES.accepts(made / name) for name in ("", "index.csv", "A_creep.csv"))
+    assert [history.name for history in INDEXED_FILES.read(made / "index.csv")] == ["B", "A"]
+    assert [history.name for history in INDEXED_FILES.read(made / "A_creep.csv")] == ["A"]
+    assert not INDEXED_TABLE.accepts(made)
+    (made / "notes.csv").write_text("x\n1\n")
+    assert not INDEXED_FILES.accepts(made / "notes.csv")
+
+
+def test_alloy_from_the_index(tmp_path):
+    index = "test,temperature_C,stress_MPa,alloy\nA,980,230,CMSX-6\nB,980,140,CMSX-6\n"
+    assert {history.alloy for history in INDEXED_FILES.read(folder(tmp_path, files(index)))} == {"CMSX-6"}

@@ -82,3 +82,28 @@ def test_inconel_625_bulges():
     assert first.elastic.E == pytest.approx(108425.0)
     assert [first.outputs[name][0] for name in ("amplitude", "width", "shape")] == [0.069047753, 3.6917447, 1.98580857]
     assert first.labels["specimen"] == "dimple bulge, wrought Inconel 625"
+
+
+def test_alloy_617_readings_of_one_time_are_merged(alloy617):
+    merged = [history.labels.get("merged_frames") for history in alloy617.values()]
+    assert Counter(merged) == {None: 84, "1": 10}
+    ruptured = alloy617["inl_2/AirBase_750_118_a"]  # at 12040600 s: 0.21372, then 0.22174
+    assert ruptured.times[-1] == 12040600.0
+    assert ruptured.outputs["strain"][-1] == pytest.approx(0.21773, abs=1e-12)
+    repeated = alloy617["kaeri_2/HeBase_850_50_b"]  # 0.34191 twice
+    assert repeated.outputs["strain"][-1] == pytest.approx(0.34191, abs=1e-12)
+
+
+def test_alloy_617_holds_four_tests_twice(alloy617):
+    found = duplicate_tests(list(alloy617.values()))
+    assert found == [(f"kaeri_2/AirBase_900_{s}_a", f"kaeri_3/AirBase_900_{s}_a") for s in (25, 40, 45, 50)]
+    for one, two in (map(alloy617.get, pair) for pair in found):  # they agree all along, though thinned differently
+        times = np.linspace(0.2, 0.9, 8) * one.times[-1]
+        strains = [np.interp(times, test.times, test.outputs["strain"]) for test in (one, two)]
+        np.testing.assert_allclose(*strains, rtol=0.01)
+
+
+def test_frames_of_the_unloading_bulges_are_not_used():
+    after = {name: history.times[~history.used].tolist() for name, history in read("dabi/in625").items()}
+    assert after.pop("test_11") == [28950.0, 29100.0]
+    assert set(map(tuple, after.values())) == {(14550.0,)}

@@ -1,11 +1,13 @@
 """Tables of tests, one row a test, and heads without frames: what they say, what they refuse, what reads back."""
 
+import numpy as np
 import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
+from creepkit.readers.history_csv import write_history
 from creepkit.readers.rate_and_rupture_tables import key_of_column
-from creepkit.records import UNKNOWN_DURATION, constant_stress
+from creepkit.records import UNKNOWN_DURATION, History, constant_stress
 
 TABLE = """# alloy: Alloy X
 # control: stress
@@ -170,3 +172,27 @@ def test_rows_that_state_nothing_but_ignored_columns_are_left_out(tmp_path):
     path.write_text(text.replace(",,5000", ",,"))
     with pytest.raises(HistoryError, match="no minimum creep rate and no end"):
         ck.read_histories(path)
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        {"times": [1.0], "minimum_rate": 1.25e-9},
+        {"times": [3e6], "minimum_rate": 1.25e-9, "minimum_rate_sd": 3e-11},
+        {"times": [3e6], "rupture_time": 3e6},
+        {"times": [3e6], "unruptured": True, "minimum_rate": 2e-9},
+    ],
+)
+def test_a_test_without_frames_reads_back(tmp_path, known):
+    times = np.array(known.pop("times"))
+    test = History("A1", times, {}, constant_stress(80.0), 1000.0, labels={"heat": "X7"}, **known)
+    (back,) = ck.read_histories(write_history(test, tmp_path / "A1.csv"))
+    for name in ("name", "minimum_rate", "minimum_rate_sd", "rupture_time", "unruptured", "loading", "temperature"):
+        assert getattr(back, name) == getattr(test, name)
+    np.testing.assert_array_equal(back.times, test.times)
+    assert back.labels["heat"] == "X7"
+
+
+def test_a_rate_beside_frames_reads_back(tmp_path):
+    test = History("A1", np.array([1.0, 2.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0, minimum_rate=2e-9)
+    assert ck.read_histories(write_history(test, tmp_path / "A1.csv"))[0].minimum_rate == 2e-9

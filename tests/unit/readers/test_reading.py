@@ -8,7 +8,7 @@ import pytest
 from creepkit.errors import HistoryError
 from creepkit.quality.comparison import duplicate_tests
 from creepkit.readers.reading import creepkit_readers, read_histories
-from creepkit.records import History, constant_stress
+from creepkit.records import History, Program, constant_stress
 
 READERS = creepkit_readers()
 TEST = "# temperature_C: 850\n# stress_MPa: 60\ntime_s,strain_1\n0,0\n1,0.1\n"
@@ -87,3 +87,17 @@ def planned(name: str, end: float = 1e6, strain: float = 0.4, stress: float = 25
 def test_test_published_twice_is_found():
     records = [planned("a"), planned("b", stress=26.0), planned("c", end=1e6 + 0.7), planned("d", strain=0.40001)]
     assert duplicate_tests(records) == [("a", "c"), ("a", "d"), ("c", "d")]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        planned("b", end=1.001e6),
+        planned("b", strain=0.41),
+        planned("b", stress=26.0),
+        planned("b", temperature=1223.15),
+        planned("b", temperature=Program([0, 1], [1173.15, 1174])),
+    ],
+)
+def test_like_tests_are_no_duplicates(other):
+    assert duplicate_tests([planned("a"), other]) == []

@@ -273,3 +273,21 @@ def test_what_empty_cells_of_conditions_leave_unknown_is_said(tmp_path):
     assert "cell" not in first.labels["assumed"]
     assert "modulus_GPa unknown (empty cell)" in second.labels["assumed"].split(", ")
     assert "heat" not in second.labels
+
+
+def test_pairs_of_different_length(read):
+    text = "# temperature_C: 850\nA1;;A2;\nStress (MPa);60;Stress (MPa);80\nTime (h);Strain (%);Time (h);Strain (%)\n"
+    first, second = read(text + "0;0;0;0\n1;0,5;1;0,7\n2;0,9;;\n")
+    assert (first.times.size, second.times.size) == (3, 2)
+
+
+def test_the_decimal_sign_may_be_stated(read):
+    (history,) = read(HEAD + "# decimal: comma\ntime_h;strain_pct\n1,000;0\n1,234;2,345\n")
+    assert history.times.tolist() == [3600.0, 1.234 * 3600.0]
+
+
+def test_text_files_are_tables_where_they_name_a_time(tmp_path: Path):
+    (tmp_path / "a.txt").write_text("Time (h)\tStrain (%)\n0\t0\n")
+    (tmp_path / "readme.txt").write_text("Time and again, this was measured.\n")
+    assert HISTORY_CSV.accepts(tmp_path / "a.txt")
+    assert not HISTORY_CSV.accepts(tmp_path / "readme.txt")

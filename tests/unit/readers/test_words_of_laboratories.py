@@ -71,3 +71,8 @@ def test_german_names_and_units(tmp_path):
     assert one.outputs["strain"] == pytest.approx(other.outputs["strain"], rel=1e-12)
     assert one.loading.program().values[-1] == pytest.approx(20 * 9.80665, rel=1e-12)
     assert not one.includes_elastic
+
+
+def test_with_the_column_renamed_the_row_is_a_run_out(tmp_path):
+    first, second = _read(tmp_path, TABLE.format(name="status", a="", b="Läufer"))
+    assert (first.rupture_time, second.rupture_time, second.unruptured) == (1200 * 3600.0, None, True)

@@ -7,6 +7,7 @@ import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.reference_conditions import detect_creep
+from creepkit.records import PressureJump
 from creepkit.screening.alloys import Alloy, check_tests, group_by_alloy, limitations
 from creepkit.specimens.bulge.outputs import profile_displacement
 from helpers.planted_alloys import bars, bulge
@@ -64,3 +65,17 @@ def test_displacement_at_a_radius_is_equation_3():
     np.testing.assert_allclose(profile_displacement(rows, 2.0), 0.5 * np.exp(-0.25), rtol=1e-14)
     assert np.isnan(profile_displacement({"amplitude": np.ones(2)}, 2.0)).all()
     np.testing.assert_array_equal(profile_displacement({"amplitude": np.ones(2)}, 0.0), 1.0)
+
+
+def test_one_creeping_test_is_enough():
+    check_tests(Alloy("X", (bulge("a", "X", rise=0.0), bulge("b", "X", rise=0.05))), BULGE)
+
+
+def test_one_test_says_what_it_cannot_know():
+    one = bulge("a", "X", outputs=("amplitude", "width")).replace(loading=PressureJump(8.0, 8.0, 7200.0))
+    assert limitations(Alloy("X", (one,)), BULGE) == (
+        "one test: how dimples or bars of this alloy differ cannot be known from it",
+        "one level of load: strain and time hardening are nearly the same law then",
+        "one temperature: the activation energy cannot be known",
+        "no shape in 1 of 1 tests: the stress exponent is known the less",
+    )

@@ -45,3 +45,10 @@ def test_a_table_is_read_in_its_unit(tmp_path):
     assert weights.atomic["X"] == pytest.approx({"Ti": 50.0, "Al": 50.0}, abs=1e-2)
     shares = read_compositions(written(tmp_path, "# unit: at.%\nalloy,Ti,Al,Nb\nX,50,50,\n"))
     assert shares.atomic["X"] == {"Ti": 50.0, "Al": 50.0}
+
+
+def test_an_alloy_that_the_table_lacks_is_named():
+    told = Compositions({"alloy 1": {"Fe": 100.0}}, "table.csv").missing(["alloy 1", "aloy 1"])
+    assert told == (
+        "table.csv: no alloy 'aloy 1', whose class stays unknown; did you mean 'alloy 1'? (known: alloy 1)",
+    )

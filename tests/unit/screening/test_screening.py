@@ -1,5 +1,6 @@
 """Alloy after alloy: what is found, what is kept, what is done again, and what is said when something is wrong."""
 
+import csv
 import dataclasses
 
 import h5py
@@ -146,6 +147,7 @@ def test_a_damaged_answer_is_worked_out_again(tmp_path, caplog):
     assert "X.json: this is not the result of an alloy that creepkit wrote" in caplog.text
 
 
+@pytest.mark.nightly
 def test_workers_find_what_this_process_finds_and_one_that_dies_costs_one_alloy():
     deadly = [h.replace(specimen="deadly") for h in bars("D")]
     apart = screened([*deadly, *TWO[:3]], using={"uniaxial": specimen("uniaxial"), "deadly": Deadly()}, workers=2)
@@ -182,3 +184,14 @@ def test_a_copy_of_a_test_is_left_out_with_a_note():
     plate = screened([*tests, tests[0].replace(name="again")])
     assert plate.notes == (f"left out: again: the same readings as {tests[0].name}: one test, which counts once",)
     assert [h.name for h in plate.histories["X"]] == [h.name for h in tests]
+
+
+def test_the_table_has_a_row_an_alloy(plate, tmp_path):
+    with plate.to_csv(tmp_path / "plate.csv").open() as stream:
+        rows = {row["alloy"]: row for row in csv.DictReader(stream)}
+    assert (rows["X"]["class"], rows["Y"]["class"]) == ("Fe-rich", "near-equimolar")
+    rate = NORTON["A"] * 100.0 ** NORTON["n"]
+    assert float(rows["X"]["rate_100MPa"]) == pytest.approx(rate, rel=0.05)
+    assert float(rows["X"]["local_exponent_100MPa"]) == pytest.approx(NORTON["n"], abs=0.05)
+    assert float(rows["X"]["n_low"]) < float(rows["X"]["n"]) < float(rows["X"]["n_high"])
+    assert float(rows["X"]["loss_dense"]) == pytest.approx(float(rows["X"]["loss_reduced"]), rel=0.2)

@@ -9,6 +9,7 @@ from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.language import CreepLaw, mean_stress, principal_stress, stress
 from creepkit.laws.norton import NORTON
+from creepkit.readers.history_csv import write_history
 from creepkit.records import History, PointLoading, Program, Status
 from creepkit.specimens.material_point import MaterialPoint, PointRun
 from helpers.kachanov_law import A, kachanov, n
@@ -247,3 +248,12 @@ def test_planted_values_are_found_by_differences():
         law, [test], MaterialPoint(), settings=IdentificationSettings(starts=1, sobol_points=2, nuisances=())
     )
     assert fit.values["A"] == pytest.approx(VALUES["A"], rel=1e-3)
+
+
+def test_a_history_of_a_point_survives_its_file(tmp_path):
+    loading = PointLoading(stress={"11": 60, "12": [(0.0, 0.0), (5e3, -40.0)]}, strain={"33": 0.0})
+    run = ck.simulate(NORTON, "point", VALUES, loading=loading, times=TIMES, elastic=STEEL)
+    (again,) = ck.read_histories(write_history(run, tmp_path / "point.csv"))
+    assert (again.specimen, again.loading, again.elastic) == ("point", loading, STEEL)
+    assert {name: v.tolist() for name, v in again.outputs.items()} == {n: v.tolist() for n, v in run.outputs.items()}
+    assert again.condition == "20 °C, 11 60 MPa, 12 0 to -40 MPa, strain 33 0"

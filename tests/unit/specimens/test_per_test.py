@@ -170,3 +170,11 @@ def test_a_diameter_is_found_as_a_nuisance_parameter():
     assert "mm" in str(fit)
     for estimate, truth in zip(fit.nuisances, diameters, strict=True):
         assert abs(estimate.value - truth) < 3.0 * estimate.sd
+
+
+def test_it_simulates_and_forecasts():
+    run = ck.simulate(NORTON, Bar(), TRUTH, loading=ck.constant_stress(80.0, "stress"), times=TIMES)
+    np.testing.assert_allclose(run.outputs["strain"], 1e-16 * 80.0**4 * TIMES, rtol=1e-12)
+    fit = ck.identify(NORTON, planted(), Bar(), starts=1, nuisances=[ck.Nuisance("rate", sd=0.1)])
+    one = fit.forecast(plans(70.0)).tests[0].outputs["strain"]
+    assert one.band.low[-1] < 1e-16 * 70.0**4 * TIMES[-1] < one.band.high[-1]

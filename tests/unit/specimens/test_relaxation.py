@@ -5,8 +5,10 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import SolveError
+from creepkit.language import wachtman
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.readers.history_csv import write_history
 from creepkit.records import History, Program, RecordedLoading, Status, StrainSteps
 from creepkit.specimens.relaxation import Relaxation
 from creepkit.specimens.uniaxial import Uniaxial
@@ -154,3 +156,51 @@ def test_planted_values_are_found_from_relaxation_and_creep_together():
     fit = ck.identify("norton", [*relaxing, *bars], starts=2)
     assert all(e.low <= VALUES[e.name] <= e.high for e in fit.estimates)
     assert set(fit.errors) == {"stress", "strain"}
+
+
+def test_no_frame_shows_a_bar_in_compression():
+    down = StrainSteps(((0, START / E), (1e4, 0.0)))
+    run = ck.simulate(NORTON, TIGHT, VALUES, loading=down, times=[0.0, 1e3, 1e4, 2e4], elastic=ck.Elastic(E))
+    assert "compress" in run.reason
+    assert run.times.tolist() == [0.0, 1e3]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"loading": ck.constant_stress(100.0)}, "loaded by strain, found stress; use StrainSteps or constant_strain"),
+        ({"elastic": None}, "a relaxation specimen under prescribed strain needs elastic data; set elastic="),
+        (
+            {"elastic": ck.Elastic(wachtman(2e5, 60.0, 300.0)), "temperature": Program.steps([(0, 900), (9, 1000)])},
+            "the modulus changes from .* with the temperature of the test",
+        ),
+    ],
+)
+def test_what_cannot_be_relaxed_is_said(changes, said):
+    with pytest.raises(SolveError, match=said):
+        stress(held(**changes))
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: StrainSteps(((1.0, 0.1),)), "must start at time 0"),
+        (lambda: ck.constant_strain(2.0), r"from 0 to 1 in every step, found \[2.0\]"),
+        (
+            lambda: StrainSteps(((0, 0.1), (5, 0.2)), ramp=6.0),
+            "ramp is 6 s; it must not be negative nor outlast a step",
+        ),
+    ],
+)
+def test_strains_that_make_no_sense_are_refused(make, said):
+    with pytest.raises(SolveError, match=said):
+        make()
+
+
+def test_a_history_of_relaxation_survives_its_file(tmp_path):
+    loading = StrainSteps(((0, 1e-3), (600, 1.2e-3)))
+    run = ck.simulate(NORTON, TIGHT, VALUES, loading=loading, times=[0, 100, 900], elastic=ck.Elastic(E))
+    (again,) = ck.read_histories(write_history(run, tmp_path / "held.csv"))
+    assert (again.specimen, again.loading, again.elastic) == ("relaxation", loading, ck.Elastic(E))
+    assert again.outputs["stress"].tolist() == run.outputs["stress"].tolist()
+    assert again.condition == "20 °C, strain 0.001 to 0.0012"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.errors import LawError, SolveError
 from creepkit.language import Elastic, arrhenius, wachtman
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -141,3 +142,26 @@ def test_tolerance_tightens_the_answer() -> None:
     assert errors[0] < 1e-3
     assert errors[1] < 1e-5
     assert errors[2] < 1e-7
+
+
+def test_no_histories_give_an_empty_prediction() -> None:
+    assert predicted().values.shape == (1, 0, 0, 1)
+
+
+def test_a_missing_value_is_named() -> None:
+    with pytest.raises(LawError, match="needs a value for n"):
+        ck.simulate(NORTON, Uniaxial(), {"A": 1e-13}, loading=constant_stress(100.0), times=TIMES)
+
+
+def test_an_early_end_names_values_outside_their_bounds_and_a_modulus_in_gpa() -> None:
+    import creepkit as ck
+
+    times = np.linspace(1.0, 7200.0, 10)
+    with pytest.raises(SolveError, match="; n = 40 lies outside its bounds, 1 to 8$"):
+        ck.simulate("norton", "uniaxial", {"A": 1e-16, "n": 40.0}, loading=constant_stress(100.0), times=times)
+    soft = ck.simulate(
+        "norton", "bulge", {"A": 1e-16, "n": 5.0}, loading=ck.PressureJump(8, 10, 3600), times=times,
+        temperature=1073.0, elastic=ck.Elastic(E=150.0),
+    )  # fmt: skip
+    assert soft.reason.endswith("; E is 150 MPa (write 150000 if GPa were meant)")
+    assert soft.labels["ended"] == soft.reason

@@ -25,7 +25,7 @@ BASE = '[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["norton"]\n'
     [
         ('[data]\nfiles = ["*.csv"]\nreader = "cvs"\n', 3, "did you mean 'csv'"),
         ('[data]\nfiles = ["none/*.csv"]\n', 2, "none/*.csv"),
-        ('[data]\nfiles = [\n "*.csv",\n "/etc/passwd"]\n', 4, "absolute"),
+        ('[data]\nfiles = [\n "*.csv",\n "/etc/passwd"]\n', 2, "absolute"),
         ('[data]\nfiles = ["~/x.csv"]\n', 2, "absolute"),
         (BASE.replace("norton", "nortn"), 4, "did you mean 'norton'"),
         (BASE + "fix = { nn = 5 }\n", 5, "no law has a parameter 'nn'"),
@@ -34,7 +34,7 @@ BASE = '[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["norton"]\n'
         (BASE + "bounds = { n = [1, 1e308] }\n", 5, "at most 1e+100"),
         (BASE + 'predictor = "dimpel"\n', 5, "did you mean 'dimple'"),
         (BASE + 'predictor = "/etc/passwd"\n', 5, "absolute"),
-        (BASE + 'loss = "lin"\n', 5, "loss 'lin' is not known"),
+        (BASE + 'loss = "lin"\n', 5, "must be one of these: linear, "),
         (BASE + 'without_nuisances = ["offst"]\n', 5, "did you mean 'offset'"),
         (BASE + '[[identification.nuisances]]\nkind = "thicknes"\n', 6, "thickness"),
         (BASE + '[[identification.nuisances]]\nkind = "thickness"\nsd = 0.1\n', 7, "given as sd_mm"),

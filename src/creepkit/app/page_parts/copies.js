@@ -31,7 +31,6 @@
     words.push("--end-h", page.plain(state.end / 3600));
     if (law.variables.includes("temperature")) words.push("--temperature-c", page.plain(state.temperature - 273.15, 8));
     if (state.specimen.modulus.needed) words.push("--modulus-gpa", page.plain(state.modulus / 1e3));
-    for (const [name, value] of Object.entries(state.lengths)) words.push("--geometry", `${name}=${page.plain(value)}`);
     return words.map(quoted).join(" ");
   }
 

@@ -23,14 +23,8 @@
 
   // The rms of residuals over their noise, of all outputs of all tests; null where no noise is known.
   page.weighted = function (misfits) {
-    let squares = 0, frames = 0;
-    for (const misfit of misfits) {
-      for (const one of Object.values(misfit)) {
-        if (one.squares === null) continue;
-        squares += one.squares;
-        frames += one.frames;
-      }
-    }
-    return frames ? Math.sqrt(squares / frames) : null;
+    const known = misfits.flatMap((misfit) => Object.values(misfit)).filter((one) => one.squares !== null);
+    const total = (what) => known.reduce((sum, one) => sum + one[what], 0);
+    return total("frames") ? Math.sqrt(total("squares") / total("frames")) : null;
   };
 })((globalThis.creepkitPage ??= {}));

@@ -63,10 +63,10 @@
     return places;
   };
 
-  const TIME_UNITS = [["s", 1], ["min", 60], ["h", 3600], ["days", 86400], ["years", 31557600]];
+  const UNITS = [[200, "s", 1], [3600, "min", 60], [3.6e7, "h", 3600], [Infinity, "years", 31557600]];
   // The unit in which a duration is read most easily.
   page.timeUnit = function (seconds) {
-    const [name, size] = seconds < 200 ? TIME_UNITS[0] : seconds < 3600 ? TIME_UNITS[1] : seconds < 3.6e7 ? TIME_UNITS[2] : TIME_UNITS[4];
+    const [, name, size] = UNITS.find(([most]) => seconds < most) ?? UNITS[0];
     return { name, size };
   };
 

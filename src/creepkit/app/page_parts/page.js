@@ -1,5 +1,5 @@
 "use strict";
-// The page: controls at one side, panels at the other; every input asks the engine, every answer is drawn.
+// The page: controls at one side, panels at the other; every input is answered, every answer is drawn.
 (function (page) {
   const { element } = page;
   const LONGEST_LABEL = 22; // letters beside an axis
@@ -24,8 +24,7 @@
     const chosen = element("select", { "aria-label": "plot that is shown", onchange: offerPanels });
     let inputAt = null, charts = new Map(), rates = null, section = null, last = null, timer = null, before = null, settled = true;
 
-    const engine = data.endpoint ? page.serverEngine(data, draw, complain) : page.ownEngine(data, draw, complain);
-    data.specimens = data.specimens.filter((specimen) => engine.has(specimen));
+    data.specimens = data.specimens.filter(page.predicts);
 
     const laws = page.lawControls(data, state, { onInput: changed, onRelease: released, onLaw });
     const planned = page.testControls(data, state, { onInput: plannedChanged, onRelease: released, onSpecimen });
@@ -81,18 +80,26 @@
       if (settled && event !== null) { before = last; settled = false; }
       inputAt = event === null ? null : performance.now();
       root.dataset.exact = "false";
-      engine.quick(question());
+      answer(false);
     }
 
     function released() {
       settled = true;
       clearTimeout(timer);
-      timer = setTimeout(() => engine.precise(question()), 120);
+      timer = setTimeout(() => answer(true), 120);
+    }
+
+    function answer(exact) {
+      try {
+        draw({ exact, ...page.predict(data, { ...question(), exact }) });
+      } catch (error) {
+        complain(String(error.message ?? error));
+      }
     }
 
     function question() {
-      const { specimen, load, steps, ramp, control, end, temperature, modulus, lengths } = state;
-      const program = { specimen: specimen.name, load: load.name, steps, control, ramp: load.control ? 0 : ramp, end, temperature, modulus: specimen.modulus.needed ? modulus : null, lengths };
+      const { specimen, load, steps, ramp, control, end, temperature, modulus } = state;
+      const program = { specimen: specimen.name, load: load.name, steps, control, ramp: load.control ? 0 : ramp, end, temperature, modulus: specimen.modulus.needed ? modulus : null };
       const shown = data.tests.map((_, k) => k).filter((k) => state.tests[k]);
       return { law: state.law, values: state.values, program: state.planned ? program : null, tests: shown, rate_temperature: temperature };
     }
@@ -153,7 +160,7 @@
         const planned = answer.program?.outputs[name]?.filter((v) => v !== null).at(-1);
         chart.draw({ series, xLabel: `time, ${unit.name}`, summary: planned === undefined ? `${shown.length} measured tests.` : `The planned test ends at ${page.format(planned)}.` });
       }
-      warning.textContent = shown.length ? answer.warning ?? page.temperatureWarning(data, state) : "";
+      warning.textContent = shown.length ? page.temperatureWarning(data, state) : "";
       warning.hidden = warning.textContent === "";
       drawRates(answer.rate);
       if (answer.program?.section) {
@@ -161,8 +168,7 @@
           section.panel.hidden = false;
           offerPanels();
         }
-        const drawn = answer.program.section;
-        section.draw({ at: (k) => drawn.displacements[k], ...drawn });
+        section.draw(answer.program.section);
       }
       const misfits = new Map(shown.map((one) => [one.test, page.misfit(data.tests[one.test], one.outputs)]));
       if (data.tests.length) tests.show(misfits);
@@ -189,11 +195,11 @@
     }
 
     function say(answer) {
-      const how = answer.exact ? "" : state.specimen.network !== null && state.planned ? "The network that was trained for it; more exact when you let go. " : state.specimen.reduced && state.planned ? (data.endpoint ? "Reduced-order model; finite elements when you let go. " : "Reduced-order model in few modes; all modes when you let go. ") : "";
+      const coarse = !answer.exact && state.planned && state.specimen.runtime === "dimple";
+      const how = coarse ? "Reduced-order model in few modes; all modes when you let go. " : "";
       const ended = answer.program?.ended ? `The planned test ended after ${page.duration(answer.program.end)}: ${answer.program.ended}.` : "";
       status.textContent = how + ended;
       root.dataset.exact = String(answer.exact);
-      root.dataset.number = String(answer.number ?? 0);
     }
 
     function complain(sentence) {
@@ -201,7 +207,6 @@
       problem.hidden = false;
     }
 
-    return { data, state, redraw: () => last && draw(last) };
   };
 
   async function startAll() {

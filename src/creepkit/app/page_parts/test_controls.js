@@ -1,5 +1,5 @@
 "use strict";
-// The planned test: specimen, load program, temperature, end, modulus and lengths, as the specimen's record says.
+// The planned test: specimen, load program, temperature, end and modulus, as the specimen's record says.
 (function (page) {
   const { element } = page;
   const ZERO_CELSIUS = 273.15;
@@ -23,7 +23,6 @@
         ramp: load.ramp,
         control: from.control ?? "load",
         modulus: from.modulus ?? specimen.modulus.value,
-        lengths: from.lengths ?? {},
       });
       if (from.temperature !== undefined) state.temperature = from.temperature;
       if (from.end !== undefined) state.end = from.end;
@@ -61,13 +60,6 @@
       if (specimen.modulus.needed) {
         const { low, high } = specimen.modulus;
         parts.push(page.slider({ name: "Young's modulus", unit: "GPa", factor: 1e3, log: true, low, high, value: state.modulus, accepts: (v) => v > 0, ...changed, onInput: (v, event) => { state.modulus = v; handlers.onInput(event); } }).row);
-      }
-      if (specimen.dimensions.length && (data.endpoint || specimen.model === null)) { // a model that comes with a file has its lengths
-        const rows = specimen.dimensions.map((d) => {
-          const low = Math.max(d.low, d.value / 2), high = Math.min(d.high, d.value * 2);
-          return page.slider({ name: d.title, unit: "mm", log: true, low, high, value: state.lengths[d.name] ?? d.value, accepts: (v) => v >= d.low && v <= d.high, ...changed, onInput: (v, event) => { state.lengths = { ...state.lengths, [d.name]: v }; handlers.onInput(event); } }).row;
-        });
-        parts.push(element("details", {}, element("summary", {}, "Lengths of the test piece"), ...rows));
       }
       body.replaceChildren(...parts);
     }
@@ -116,6 +108,6 @@
       if (last && values[k] > 0 && (steps.length === 0 || values[k] !== steps.at(-1)[1])) steps.push([steps.length === 0 ? 0 : times[Math.max(0, values[k - 1] === steps.at(-1)[1] ? k - 1 : k)], values[k]]);
     }
     const end = test.times.at(-1);
-    return steps.length && steps.length <= 50 ? { load: test.load, steps, control: test.control, temperature: test.temperature, modulus: test.modulus ?? undefined, lengths: test.lengths, end } : null;
+    return steps.length && steps.length <= 50 ? { load: test.load, steps, control: test.control, temperature: test.temperature, modulus: test.modulus ?? undefined, end } : null;
   };
 })((globalThis.creepkitPage ??= {}));

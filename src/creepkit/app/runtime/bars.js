@@ -6,15 +6,16 @@
   const STRESS_TOLERANCE = 1e-3;
 
   function integrate(law, driving, temperature, times, controls, options) {
-    const { settings, tableau } = creepkit.constants.bar, rows = creepkit.segments([driving, temperature], times.at(-1));
-    const given = { ...settings, max_steps: options.maxSteps || settings.max_steps, rtol: options.tolerance || settings.rtol,
-      strain_limit: options.strainLimit || settings.strain_limit };
+    const { settings, tableau } = creepkit.constants.bar, given = { ...settings };
+    const names = { maxSteps: "max_steps", tolerance: "rtol", strainLimit: "strain_limit" };
+    for (const [option, name] of Object.entries(names)) if (options[option]) given[name] = options[option];
+    const rows = creepkit.segments([driving, temperature], times.at(-1));
     return creepkit.withLaw(law, (put, call) => {
       const strain = put(times.length).fill(NaN), values = put(times.length * law.states).fill(NaN), ended = put(4);
-      const code = call("creepkit_page_bar", law.states, law.leadingExponent, put([...law.initial, ...law.limits]), put(controls),
-        rows.length, put(rows.flat()), times.length, put(times), put(Object.values(given)), put(tableau.sizes, Int32Array),
-        put(tableau.numbers), strain, values, ended);
-      if (code !== 0) throw new RangeError("no memory is left for this simulation");
+      const failed = call("creepkit_page_bar", law.states, law.leadingExponent, put([...law.initial, ...law.limits]),
+        put(controls), rows.length, put(rows.flat()), times.length, put(times), put(Object.values(given)),
+        put(tableau.sizes, Int32Array), put(tableau.numbers), strain, values, ended);
+      if (failed) throw new RangeError("no memory is left for this simulation");
       const states = law.law.states.map(({ name }, i) => [name, values.filter((_, k) => k % law.states === i)]);
       return { strain: strain.slice(), states: Object.fromEntries(states), steps: ended[2] + ended[3],
         ...creepkit.ending("bar", ended[0], ended[1]) };
@@ -27,7 +28,8 @@
     return Float64Array.from(times, (time, k) => {
       if (Number.isNaN(strain[k]) || (strain[k] === 0.0 && law.leadingExponent < 1.0)) return NaN;
       const ofStates = Object.values(states).map((values) => values[k]);
-      law.rates([stress[k], strain[k], time, creepkit.valueAt(temperature, time), stress[k], stress[k] / 3.0, ...ofStates], out);
+      const T = creepkit.valueAt(temperature, time);
+      law.rates([stress[k], strain[k], time, T, stress[k], stress[k] / 3.0, ...ofStates], out);
       return out[0];
     });
   }
@@ -35,7 +37,8 @@
   /** Creep of a bar under a program of nominal stress; see app/__init__.py for options and result. */
   function simulateCreep(module, parameters, options) {
     const law = creepkit.bindLaw(module, parameters), times = creepkit.outputTimes(options.times);
-    const driving = creepkit.program(options.stress, "the stress"), temperature = creepkit.temperatureOf(law, options.temperature);
+    const driving = creepkit.program(options.stress, "the stress");
+    const temperature = creepkit.temperatureOf(law, options.temperature);
     if (driving.values.some((value) => !(value >= 0.0))) throw new RangeError("a stress must not be negative");
     const load = (options.control || "load") === "load" ? 1.0 : 0.0;
     const run = integrate(law, driving, temperature, times, [0.0, load], options);
@@ -44,15 +47,17 @@
       ? creepkit.valueAt(driving, t) / creepkit.modulusAt(options.elastic, creepkit.valueAt(temperature, t)) : 0.0);
     const engineering = options.strainMeasure === "engineering";
     const strain = run.strain.map((creep, k) => (engineering ? Math.expm1(creep) : creep) + elastic[k]);
-    return { ...run, times, strain, creepStrain: run.strain, stress, rate: ratesAlong(law, times, temperature, stress, run) };
+    const rate = ratesAlong(law, times, temperature, stress, run);
+    return { ...run, times, strain, creepStrain: run.strain, stress, rate };
   }
 
   /** Relaxation of a bar under a program of total strain; needs options.elastic. */
   function simulateRelaxation(module, parameters, options) {
     const law = creepkit.bindLaw(module, parameters), times = creepkit.outputTimes(options.times);
-    const total = creepkit.program(options.strain, "the total strain"), temperature = creepkit.temperatureOf(law, options.temperature);
-    if (!options.elastic) throw new RangeError("a relaxation test needs elastic data: elastic: {modulus: 150e3}, in MPa");
-    const moduli = temperature.values.map((value) => creepkit.modulusAt(options.elastic, value)), modulus = moduli[0];
+    const total = creepkit.program(options.strain, "the total strain"), { elastic } = options;
+    const temperature = creepkit.temperatureOf(law, options.temperature);
+    if (!elastic) throw new RangeError("a relaxation test needs elastic data: elastic: {modulus: 150e3}, in MPa");
+    const moduli = temperature.values.map((value) => creepkit.modulusAt(elastic, value)), modulus = moduli[0];
     if (Math.max(...moduli) - Math.min(...moduli) > 1e-12 * modulus) {
       throw new RangeError("the modulus changes with the temperature of the test; a relaxation test takes one modulus");
     }
@@ -67,7 +72,8 @@
 
   /** Rates of creep, in all and of each term, against stress at one strain, time, temperature and state. */
   function rateCurve(module, parameters, options) {
-    const law = creepkit.bindLaw(module, parameters), stresses = Float64Array.from(options.stresses), names = law.law.terms;
+    const law = creepkit.bindLaw(module, parameters), names = law.law.terms;
+    const stresses = Float64Array.from(options.stresses);
     const temperature = creepkit.temperatureOf(law, options.temperature).values[0];
     const states = law.law.states.map(({ name }, k) => options.states?.[name] ?? law.initial[k]);
     const out = new Float64Array(1 + law.states), parts = new Float64Array(names.length);

@@ -27,7 +27,7 @@ globalThis.creepkit ??= {};
   function placed(values, Kind = Float64Array) {
     const count = typeof values === "number" ? values : values.length;
     const at = core.creepkit_page_zeros(count * Kind.BYTES_PER_ELEMENT);
-    if (at === 0) throw new RangeError("no memory is left for this simulation; ask for fewer times or simpler programs");
+    if (at === 0) throw new RangeError("no memory is left; ask for fewer times or simpler programs");
     const view = new Kind(core.memory.buffer, at, count);
     if (typeof values !== "number") view.set(values);
     return view;
@@ -37,7 +37,8 @@ globalThis.creepkit ??= {};
   function inCore(use) {
     if (core === null) throw new RangeError("the core has not started; wait for it: await creepkit.ready");
     const before = core.creepkit_page_used();
-    const call = (name, ...given) => core[name](...given.map((one) => (ArrayBuffer.isView(one) ? one.byteOffset : one)));
+    const address = (one) => (ArrayBuffer.isView(one) ? one.byteOffset : one);
+    const call = (name, ...given) => core[name](...given.map(address));
     try {
       return use(placed, call);
     } finally {
@@ -48,10 +49,10 @@ globalThis.creepkit ??= {};
   /** A law module with values of its parameters {name: value}; those not given are the module's own. */
   function bindLaw(module, parameters = {}) {
     const { law, kernel } = module, known = law.parameters.map((p) => p.name);
-    for (const name of Object.keys(parameters)) {
-      if (!known.includes(name)) throw new RangeError(`the law has no parameter '${name}'; allowed are ${known.join(", ")}`);
-    }
-    const values = law.parameters.map(({ name, value }) => (Object.hasOwn(parameters, name) ? Number(parameters[name]) : value));
+    const wrong = Object.keys(parameters).find((name) => !known.includes(name));
+    if (wrong) throw new RangeError(`the law has no parameter '${wrong}'; allowed are ${known.join(", ")}`);
+    const given = { ...Object.fromEntries(law.parameters.map((p) => [p.name, p.value])), ...parameters };
+    const values = known.map((name) => Number(given[name]));
     const initial = law.states.map((s) => s.initial), limits = law.states.map((s) => s.limit ?? Infinity);
     return { law, values, ...kernel(values), states: law.states.length, initial, limits };
   }
@@ -62,7 +63,8 @@ globalThis.creepkit ??= {};
       const width = 6 + law.states, columns = (1 + law.states) * (1 + width);
       const at = call("creepkit_page_points", law.states), out = call("creepkit_page_outputs");
       if (at === 0) throw new RangeError(`the law has ${law.states} internal variables, more than the core takes`);
-      const rows = (start, length) => Array.from({ length: 8 }, (_, k) => new Float64Array(core.memory.buffer, start + 8 * k * length, length));
+      const view = (start, length, k) => new Float64Array(core.memory.buffer, start + 8 * k * length, length);
+      const rows = (start, length) => Array.from({ length: 8 }, (_, k) => view(start, length, k));
       [bound, points, outputs] = [law, rows(at, width), rows(out, columns)];
       return use(put, call);
     });

@@ -7,16 +7,16 @@
   /** A program: a number that is held, or pairs [time in s, value] joined by straight lines, two at one time a jump. */
   function program(given, what) {
     const pairs = typeof given === "number" ? [[0, given]] : given;
-    if (!Array.isArray(pairs) || pairs.length === 0) throw new RangeError(`${what} must be a number or pairs of time and value`);
+    if (!Array.isArray(pairs) || !pairs.length) throw new RangeError(`${what} must be a number or pairs [time, value]`);
     const times = pairs.map((pair) => Number(pair[0])), values = pairs.map((pair) => Number(pair[1]));
-    if (![...times, ...values].every(Number.isFinite)) throw new RangeError(`${what} holds a number that is not finite`);
+    if (!pairs.flat().every((one) => Number.isFinite(Number(one)))) throw new RangeError(`${what} must be finite numbers`);
     if (times[0] !== 0 || times.some((t, k) => t < times[k - 1])) {
       throw new RangeError(`the times of ${what} must start at 0 and never decrease`);
     }
     return { times, values };
   }
 
-  /** Pairs of a program from steps [[start, value], ...]; ramp : s, in which each is reached from the one before (or 0). */
+  /** Pairs of a program from steps [[start, value], ...]; ramp : s, in which each is reached from that before, or 0. */
   function steps(given, ramp = 0) {
     return given.flatMap(([start, value], k) => {
       const before = k > 0 ? given[k - 1][1] : ramp > 0 ? 0 : null;
@@ -33,8 +33,10 @@
 
   /** Programs merged into segments [start, end, values of the first at both, of the second at both, ...]. */
   function segments(programs, end) {
-    const marks = [...new Set([0, end, ...programs.flatMap((p) => p.times)])].filter((t) => t <= end).sort((a, b) => a - b);
-    return marks.slice(1).map((stop, k) => [marks[k], stop, ...programs.flatMap((p) => [valueAt(p, marks[k]), valueAt(p, stop, true)])]);
+    const times = [...new Set([0, end, ...programs.flatMap((p) => p.times)])].filter((t) => t <= end);
+    const marks = times.sort((a, b) => a - b);
+    const ends = (k) => programs.flatMap((p) => [valueAt(p, marks[k]), valueAt(p, marks[k + 1], true)]);
+    return marks.slice(1).map((stop, k) => [marks[k], stop, ...ends(k)]);
   }
 
   /** Output times as an array: finite, from 0 on, never falling. */
@@ -48,7 +50,8 @@
 
   function temperatureOf(law, given) {
     if (given !== undefined && given !== null) return program(given, "the temperature");
-    if (law.law.variables.includes("temperature")) throw new RangeError("the law depends on temperature: give one, in K");
+    const needed = law.law.variables.includes("temperature");
+    if (needed) throw new RangeError("the law depends on temperature: give one, in K");
     return program(ROOM_TEMPERATURE, "the temperature");
   }
 
@@ -57,7 +60,8 @@
     if (typeof modulus === "number") return modulus;
     if (modulus.length < 2 || temperature <= modulus[0][0]) return modulus[0][1];
     const above = modulus.findIndex((pair) => pair[0] >= temperature), k = above < 0 ? modulus.length - 1 : above;
-    const [low, high] = [modulus[k - 1], modulus[k]], share = above < 0 ? 1.0 : (temperature - low[0]) / (high[0] - low[0]);
+    const [low, high] = [modulus[k - 1], modulus[k]];
+    const share = above < 0 ? 1.0 : (temperature - low[0]) / (high[0] - low[0]);
     return low[1] + share * (high[1] - low[1]);
   }
 

@@ -46,6 +46,7 @@ def test_a_planted_law_lies_in_its_intervals_whatever_searched(stand_in, test, n
     assert fit.search_trace.evaluations[-1] <= fit.provenance["search_evaluations"]
 
 
+@pytest.mark.nightly
 def test_of_a_sum_the_swarm_keeps_the_best_of_each_subset(stand_in, test):
     """Norton alone is refined as if it were alone, and a second term gains no more than its three parameters may.
 

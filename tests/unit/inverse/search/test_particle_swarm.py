@@ -203,3 +203,31 @@ def test_a_parameter_shared_with_another_term_does_not_rest():
 
 
 # ---- what cannot be ------------------------------------------------------------------------------------------------
+
+
+def test_refined_minima_differ_and_come_best_first():
+    found = ParticleSwarm(refined_candidates=4).minima(Known(rastrigin, cube(3, 5.12))).minima
+    assert [m.cost for m in found] == sorted(m.cost for m in found)
+    starts = np.array([m.x for m in found])
+    assert len(found) == 4
+    assert len(np.unique(starts.round(2), axis=0)) > 1
+
+
+def test_an_optimum_beyond_a_wall_is_found_on_it():
+    box = Bounds(np.array([2.0, -5.0]), np.array([5.0, 5.0]))
+    found = BARE.minima(Known(quadratic, box)).minima[0]
+    assert found.x[0] == 2.0
+    assert found.x[1] == pytest.approx(2.0, abs=1e-3)
+
+
+def test_each_iteration_is_one_call():
+    landscape = Known(quadratic, cube(2))
+    found = ParticleSwarm(particles=30, iterations=12).minima(landscape)
+    assert landscape.calls == [30] * 12
+    np.testing.assert_array_equal(found.trace.evaluations, 30 * np.arange(1, 13))
+
+
+def test_what_is_off_rests_at_the_bottom_of_its_rate():
+    found = CAREFUL.minima(planted(POWER)).minima[0]
+    assert found.terms_off == (HARDENING,)
+    assert found.x[2] == -12.0

@@ -78,3 +78,18 @@ def test_over_a_wide_range_of_stress_a_sinh_is_no_power_law():
     quick = IdentificationSettings(starts=3, sobol_points=16, frames=20, weights="likelihood", nuisances=())
     fits = [identify(law, tests, Steady(), settings=quick) for law in (HYPERBOLIC_SINE, NORTON)]
     assert equivalent_laws(rank(fits)) == ()
+
+
+def test_identifications_not_made_by_likelihood_are_predicted_again():
+    tests = planted(NORTON, PL, [(s, 1000.0) for s in (50.0, 55.0, 60.0)] * 2, seed=4, rate=0.05, noise=1e-5)
+    fits = [identify(law, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20))
+            for law in (NORTON, HYPERBOLIC_SINE)]  # fmt: skip
+    (found,) = equivalent_laws(rank(fits))
+    assert found.chi_square < DISTINGUISHABLE_CHI_SQUARE
+    assert "over 50 to 60 MPa" in found.sentence
+
+
+def test_one_stress_is_said():
+    tests = bars(NORTON, PL, HELD[:1], seed=2)
+    (found,) = equivalent_laws(ranking((NORTON, HYPERBOLIC_SINE), tests))
+    assert "every test holds one stress, 40 MPa" in found.sentence

@@ -12,7 +12,7 @@ from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
 from creepkit.inverse.identify import identify
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.selection.challenges import Challenge
-from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores
+from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores, verdict_of
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
@@ -124,3 +124,63 @@ def test_an_export_of_a_ranking_carries_its_verdict():
         text = " ".join(ck.export(found, target).replace(marker or "\0", " ").split())
         assert "verdict on the law: not decisive" in text
     assert "verdict on the law" not in ck.export(found.best, "latex")
+
+
+def test_where_no_law_explains_the_best_is_named_with_what_it_leaves():
+    found = verdict_of(ranking([1.0, 0.0, 0.0], [LEAVES] * 3))
+    assert found == (
+        "not decisive: none of 3 laws tried explains the tests; the best, norton (weight 1.00 of the laws tried), "
+        f"{LEAVES}"
+    )
+    assert "leaves 4e-05 of strain (2 times its stated noise) unexplained" in found
+    assert "most in strain of 'bar 1' about 1.5 h, where it lies 4e-05 above what was measured" in found
+    two = verdict_of(ranking([0.6, 0.35, 0.05], [LEAVES] * 3))
+    assert "norton (weight 0.60 of the laws tried, not told apart from sinh), leaves" in two
+
+
+def test_an_effect_with_which_a_law_would_explain_is_named():
+    """Of the best law it stands in its adequacy; of another one it is said beside it."""
+    own = replace(LEAVES, remedies=("thickness",))
+    assert verdict_of(ranking([1.0, 0.0], [own, LEAVES])).endswith(
+        "it would explain them with thickness, which nobody modelled"
+    )
+    other = verdict_of(ranking([1.0, 0.0], [LEAVES, replace(LEAVES, remedies=("thickness", "temperature drift"))]))
+    assert "; with thickness or temperature drift, which nobody modelled, sinh would explain them)" in other
+
+
+def test_a_law_that_nobody_asked_for_is_a_proposal():
+    found = verdict_of(ranking([0.99, 0.01, 0.0], [EXPLAINS, LEAVES, LEAVES], further=("norton", "theta")))
+    assert found == (
+        "not decisive: the law asked for does not explain the tests; of 2 more that were tried, norton is not "
+        "contradicted by them (weight 0.99 of the laws tried): plan tests that can refute it"
+    )
+    two = verdict_of(ranking([0.99, 0.01, 0.0], [EXPLAINS, LEAVES, LEAVES], further=("norton",)))
+    assert two.startswith("not decisive: none of the 2 laws asked for explains the tests; of 1 more")
+
+
+def test_laws_that_cannot_be_told_apart_are_named():
+    found = verdict_of(ranking([0.5, 0.45, 0.05]))
+    assert found == (
+        "not decisive: of 3 laws tried these tests cannot tell apart norton and sinh; the best is norton: "
+        f"it {EXPLAINS}"
+    )
+
+
+def test_what_the_tests_allow_beside_it_is_said():
+    found = verdict_of(ranking([0.99, 0.01], challenges=(SUM, DRIFT)))
+    assert found == (
+        "not decisive: of 2 laws tried norton has nearly all the weight (weight 0.99 of the laws tried) and is not "
+        "contradicted by the tests; but norton+sinh with 30 % of the rate from sinh explains them as well; and a "
+        "temperature drift would leave it a weight of 0.52"
+    )
+
+
+def test_without_known_noise_nothing_is_decided():
+    found = verdict_of(ranking([0.99, 0.01], [UNKNOWN, UNKNOWN]))
+    assert found.startswith("not decisive: of 2 laws tried norton is best (weight 0.99 of the laws tried); it cannot")
+    assert "cannot be judged: no noise is stated" in found
+
+
+def test_weights_are_of_the_laws_tried():
+    for one in (ranking([0.99, 0.01], challenges=(SUM,)), ranking([1.0, 0.0], [LEAVES] * 2)):
+        assert "of the laws tried" in one.verdict

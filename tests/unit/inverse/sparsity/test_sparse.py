@@ -1,15 +1,24 @@
 """A sum reduced to the terms that planted bulge tests need: single laws, two-term laws, paths and draws."""
 
+import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from creepkit.inverse.identification_document import CODEC
 from creepkit.inverse.search.derivative_free import ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.bootstrap import binomial_interval, bootstrap_weights, selection_frequencies
+from creepkit.inverse.sparsity.bootstrap import (
+    binomial_interval,
+    bootstrap_weights,
+    selection_frequencies,
+    with_weights,
+)
 from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Sqrt, Subsets
 from creepkit.inverse.sparsity.reduced_laws import terms_above
+from creepkit.inverse.sparsity.result import Sparsity
 from creepkit.inverse.sparsity.term_selection import (
     TermChoice,
     choose_terms,
@@ -165,3 +174,19 @@ def test_a_term_that_is_needed_comes_back(hardening):
 def test_the_largest_term_stays_whatever_the_least_share():
     assert terms_above({"a": 0.6, "b": 0.04}) == ("a",)
     assert terms_above({"a": 0.03, "b": 0.04}) == ("b",)
+
+
+def test_frames_drawn_twice_count_twice(hardening):
+    stage = hardening[1].problem
+    twice = with_weights(stage, np.full(stage.problem.observations.present.shape, 2.0))
+    assert twice.problem.chi_square(stage.start) == pytest.approx(2 * stage.problem.chi_square(stage.start))
+
+
+def test_the_record_says_what_was_dropped_and_survives_a_file(reduced):
+    told = reduced.sparsity
+    assert "without 'hyperbolic sine' and 'time hardening' of 'combined' chi-square rises by" in told.verdict
+    assert "'strain hardening' suffices" in told.verdict
+    stored = json.loads(json.dumps(CODEC.to_json(told)))
+    assert CODEC.from_json(Sparsity, stored) == told
+    back = replace(told, proposed_terms=())
+    assert "The penalty had dropped 'strain hardening' too" in back.verdict

@@ -65,3 +65,7 @@ def test_a_sinh_over_narrow_stresses_is_known_by_its_exponent():
     assert abs(found.between("ln rate", "local exponent")) < 0.5
     assert abs(correlation(fit).between("n", "ln B")) > 0.95
     assert "the local exponent is" in second
+
+
+def test_where_all_is_determined_nothing_is_said(fit):
+    assert undetermined(fit) == ()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import beta, multivariate_normal, truncnorm
 
+from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.importance_sampling import SAMPLES, needs_samples, posterior_samples, with_samples
@@ -147,3 +148,17 @@ def test_a_cheaper_predictor_is_corrected_before_samples_are_drawn_through_it(at
     found = with_samples(replace(at_bound, samples=None), Shifted())
     deviation = (found.samples.mean(axis=0) - at_bound.samples.mean(axis=0)) / at_bound.samples.std(axis=0)
     assert np.abs(deviation).max() < 0.3
+
+
+def test_the_same_seed_gives_the_same_samples(monkeypatch):
+    runs = [sampled(multivariate_normal([0.0, 0.0]).logpdf, [0.0, 0.0], np.eye(2), monkeypatch, s) for s in (1, 1, 2)]
+    assert (runs[0] == runs[1]).all()
+    assert (runs[0] != runs[2]).any()
+
+
+def test_samples_that_fail_are_said(at_bound, monkeypatch):
+    monkeypatch.setattr(Posterior, "__call__", lambda _self, u: np.full(len(u), -np.inf))
+    found = with_samples(replace(at_bound, samples=None))
+    assert isinstance(found, Identification)
+    assert found.samples is None
+    assert found.notes[-1].endswith("could not be sampled: intervals of rates may be too narrow")

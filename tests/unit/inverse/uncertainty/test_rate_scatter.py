@@ -151,3 +151,9 @@ def test_a_new_test_of_the_named_heat_has_the_same_band_with_and_without_the_unl
     assert fit.rate_scatter.new_test(new) == labelled.rate_scatter.new_test(new)
     assert fit.rate_scatter.new_test(new).unseen == ()
     assert fit.rate_scatter.new_test(new.replace(labels={"heat": "c"})).unseen == ("heat",)
+
+
+def test_a_given_standard_deviation_is_taken():
+    posterior = scatter_of([0.1, -0.3, 0.2], known=0.07).posterior
+    assert posterior.sd.tolist() == [[0.07]]
+    assert posterior.weight.tolist() == [1.0]

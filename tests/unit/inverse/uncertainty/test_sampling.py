@@ -118,3 +118,9 @@ def test_nuisances_are_integrated_out(tests):
     y = np.concatenate([h.outputs["amplitude"] - h.times / 1e5 for h in tests])
     left = [y - rows @ u for u in points]
     assert up - down == pytest.approx(left[0] @ inverse @ left[0] - left[1] @ inverse @ left[1], rel=1e-4)
+
+
+def test_a_seed_repeats_the_draws(fit):
+    first, again = (sample_posterior(fit, walkers=8, steps=20, seed=5) for _ in range(2))
+    assert np.array_equal(first.chain, again.chain)
+    assert not np.array_equal(first.chain, sample_posterior(fit, walkers=8, steps=20, seed=6).chain)

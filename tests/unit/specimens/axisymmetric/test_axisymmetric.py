@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.errors import SolveError
 from creepkit.fem.mesh import Mesh
 
 AREA = 4.0 * np.pi
@@ -200,3 +201,17 @@ def test_the_dimple_is_such_a_specimen() -> None:
     )  # fmt: skip
     slope = (up - down) / 0.002
     np.testing.assert_allclose(derivatives.nuisance_jacobian["apex_thickness"][0, 0, :, 0], slope, rtol=5e-3)
+
+
+def test_a_run_keeps_the_whole_body() -> None:
+    run = ck.simulate(
+        "norton", RoundBar(), LAWS["norton"], loading=ck.constant_load("force", 60.0 * AREA), temperature=1000.0,
+        elastic=ck.Elastic(E=9e7), times=[1e3, 1e4],
+    )  # fmt: skip
+    assert run.geometry == {"radius": 2.0, "gauge_length": 3.0}
+    assert run.displacements().shape == (2, len(run.model.nodes), 2)
+    stress = 60.0 * np.exp(run.outputs["strain"])[:, None]
+    np.testing.assert_allclose(run.field("stress").values / stress, 1.0, rtol=1e-4)
+    np.testing.assert_allclose(run.field("creep strain").values[-1], run.outputs["strain"][-1], rtol=1e-3)
+    with pytest.raises(SolveError, match="nothing is known at 20000 s; the simulation reaches from 0 to 10000 s"):
+        run.field("stress", 2e4)

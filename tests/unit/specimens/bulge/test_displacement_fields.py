@@ -25,6 +25,7 @@ def test_planted_field_is_recovered(D):
     assert fit.points == 2500
 
 
+@pytest.mark.nightly
 def test_standard_errors_of_a_field_are_its_scatter():
     x, y = pixels(30)
     truth, noise = np.array([0.35, 3.6, 2.3, 0.7, -0.4]), np.random.default_rng(8).normal(size=(150, 30, 30))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from creepkit.fem.mesh import discretize, half_bandwidth, mesh_quality, refuse_inverted, strip_nodes
+from creepkit.fem.mesh import discretize, half_bandwidth, mesh_quality, outline, refuse_inverted, strip_nodes
 from creepkit.specimens.bulge.geometry import DimpleGeometry, column_lines, mesh_layout
 
 TAPERED = DimpleGeometry()
@@ -156,3 +156,17 @@ def test_velocities_move_the_boundary_as_the_length_says():
     np.testing.assert_allclose(thicker[roof], np.tile([0.0, -1.0], (roof.size, 1)), atol=1e-14)
     wider = TAPERED.mesh_velocity("outer_radius")
     np.testing.assert_allclose(wider[mesh.nodes[:, 0] == 10.0], [[1.0, 0.0]] * 5, atol=1e-14)
+
+
+def test_the_outline_is_the_cavity_the_top_the_rim_the_ground_and_the_axis():
+    for g in FAMILY:
+        mesh = g.mesh()
+        columns, layers = len(mesh.pressed), 5
+        assert len(outline(mesh.elements)) == 2 * (columns + layers)
+
+
+def test_the_section_encloses_the_area():
+    for g in FAMILY:
+        r, z = g.section(4000).T
+        shoelace = 0.5 * abs((r[:-1] * z[1:] - r[1:] * z[:-1]).sum())
+        assert shoelace == pytest.approx(area(g), rel=1e-6)

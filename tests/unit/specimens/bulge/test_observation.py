@@ -227,3 +227,12 @@ def test_the_two_forms_part_on_a_real_profile():
 
 
 # The operator as text
+
+
+def test_the_defaults_of_the_field_are_dense_enough():
+    dense, usual = (Observation("field", 7.5, points).observe(NODES, plates(NODES)) for points in (600, None))
+    np.testing.assert_allclose(usual, dense, atol=1e-4, rtol=0)
+
+
+def test_rest_alone_has_no_shape():
+    np.testing.assert_array_equal(Observation().observe(NODES, np.zeros((2, 41))), [[0.0, np.nan, np.nan]] * 2)

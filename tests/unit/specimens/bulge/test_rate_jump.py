@@ -54,3 +54,13 @@ def test_a_jump_is_found_to_its_place_and_size(factor: float) -> None:
     assert jump is not None
     assert jump.place == pytest.approx(77.7, rel=1e-9)
     assert np.exp(jump.after - jump.before) == pytest.approx(factor, rel=1e-6)
+
+
+@pytest.mark.parametrize("power", [1.0, 3.0, 40.0])
+def test_steep_slopes_and_kinks_are_no_jumps(power: float) -> None:
+    def kinked(places):
+        with np.errstate(divide="ignore"):
+            return power * np.log(np.maximum(places - 50.0, 0.0))
+
+    assert find_rate_jump(kinked, 1e-3, 2e3) is None
+    assert find_rate_jump(lambda places: power * np.log(places), 1e-3, 2e3) is None

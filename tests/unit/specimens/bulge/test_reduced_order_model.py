@@ -19,7 +19,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.records import History, PressureJump, Status
 from creepkit.specimens.bulge.finite_elements import solver_settings
 from creepkit.specimens.bulge.geometry import DimpleGeometry
-from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
+from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel, nominal_geometry
 from creepkit.specimens.bulge.setup import set_up_test
 from creepkit.specimens.bulge.specimen import Bulge
 from helpers.fem_cases import lowered
@@ -108,6 +108,7 @@ def test_thickness() -> None:
 
 
 @pytest.mark.long_when_sanitized
+@pytest.mark.nightly
 def test_another_dimple_and_its_mesh_from_files() -> None:
     """A plate with a fillet, meshed and as a mesh from elsewhere, within one per cent: nothing knows the dimple."""
     fillet = Bulge(geometry=DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",)), threads=1, tolerance=1e-4)
@@ -132,6 +133,7 @@ def test_stated_error_enters_the_covariance_and_the_specimen_corrects_it() -> No
 
 
 @pytest.mark.long_when_sanitized
+@pytest.mark.nightly
 def test_fewer_modes_err_more() -> None:
     creep, values = CASES["combined"]
     theta = creep.to_internal(values)
@@ -140,3 +142,14 @@ def test_fewer_modes_err_more() -> None:
         for count in (4, 24)
     ]
     assert errors[0][..., 0].max() > 3.0 * errors[1][..., 0].max()
+
+
+def test_test_pieces_share_a_basis() -> None:
+    """Within a tenth of the thickness and two per cent of other lengths; where these do not fit, each has its own."""
+    own = DimpleGeometry()
+    assert nominal_geometry(own, own.replace(apex_thickness=0.53)) == own
+    assert nominal_geometry(own, own.replace(outer_radius=10.15)) == own
+    thick = nominal_geometry(own, own.replace(apex_thickness=0.6))
+    assert thick.apex_thickness == pytest.approx(0.625)
+    tall = own.replace(roof_axial=3.45)
+    assert nominal_geometry(own, tall).roof_axial == pytest.approx(3.45, rel=0.025)

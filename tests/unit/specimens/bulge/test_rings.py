@@ -112,3 +112,9 @@ def test_files_keep_rings(tmp_path: Path) -> None:
     for name in NAMES:
         np.testing.assert_array_equal(again.outputs[name], outputs[name])
     np.testing.assert_array_equal(again.standard_deviation["displacement_2"], np.full(4, 0.002))
+
+
+def test_the_error_of_the_reduced_order_model_on_rings_is_that_of_the_middle() -> None:
+    specimen = Bulge(refinement=0.5, threads=1)
+    error = specimen.reduced_order_model().error
+    assert error["displacement_1"] == error["displacement_8"] >= 0.9 * error["amplitude"] > 0.0

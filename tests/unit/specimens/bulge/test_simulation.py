@@ -1,11 +1,14 @@
 """What a simulated bulge test holds: displacements, profile, stresses, fields and pictures, until its end."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import creepkit as ck
 from creepkit.errors import SolveError
 from creepkit.language import stress
+from creepkit.readers.history_csv import write_history
 from creepkit.records import Program, RecordedLoading, Status
 from creepkit.specimens.bulge.run import BulgeRun
 from helpers.literature_laws import POWER, RATE, A, B, damage, k, n
@@ -146,3 +149,20 @@ def test_a_program_holds_its_last_value_beyond_its_end(run: BulgeRun) -> None:
 
 
 # ---- kept, written, drawn ------------------------------------------------------------------------------------------
+
+
+def test_what_is_observed_is_close_to_the_apex(run: BulgeRun) -> None:
+    np.testing.assert_allclose(run.outputs["amplitude"][1:], run.displacement()[1:], rtol=0.02)
+
+
+def test_a_run_is_a_history_that_files_keep(run: BulgeRun, tmp_path: Path) -> None:
+    thin = simulated(using=ck.specimen("bulge").replace(apex_thickness=0.45))
+    (read,) = ck.read_histories(write_history(thin, tmp_path / "thin.csv"))
+    assert read.specimen == "bulge"
+    assert read.geometry == thin.geometry
+    assert read.geometry["apex_thickness"] == 0.45
+    assert (read.operator, read.elastic, read.loading) == ("profile 0-7.5 mm", STIFF, HELD)
+    for name, values in thin.outputs.items():
+        np.testing.assert_array_equal(read.outputs[name], values)
+    again = ck.specimen("bulge").predict(ck.law("norton"), ck.law("norton").to_internal(N3), [read])
+    np.testing.assert_allclose(again.of(0)[:, 0], thin.outputs["amplitude"], rtol=1e-9)

@@ -5,11 +5,14 @@ A key that is missing takes the default of the function that it goes to, which s
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
+
+from creepkit.api.searches import PenaltyName, SearchName
+from creepkit.inverse.settings import IdentificationSettings, OutputWeights
+from creepkit.options import table_of
 
 MOST_ITEMS = 1000
 """In a list of a study file."""
@@ -31,13 +34,13 @@ SomeTexts = Annotated[list[Text], Field(min_length=1, max_length=MOST_ITEMS)]
 Numbers = Annotated[list[float], Field(min_length=1, max_length=MOST_ITEMS)]
 
 
-class Part(BaseModel):
+class Table(BaseModel):
     """A table of a study file: no other keys, no values of other types."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class Step(Part):
+class Step(Table):
     """A level that begins at a time: { from_h = 4, level = 10 }, in the unit of the key that it belongs to."""
 
     from_h: Annotated[float, Field(ge=0.0)]
@@ -58,8 +61,12 @@ def _one_or_more(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
 
+LARGEST_NUMBER = 1e300
+"""Below which a number of a table of any names is."""
+
+
 def _is_number(value: Any) -> bool:
-    return type(value) in (int, float) and math.isfinite(value)
+    return type(value) in (int, float) and abs(value) < LARGEST_NUMBER
 
 
 def _label_values(value: Any) -> Any:
@@ -90,14 +97,14 @@ ChannelPair = Annotated[list[Text], Field(min_length=2, max_length=2)]
 Bounds = Annotated[list[Annotated[float, Field(ge=-1e100, le=1e100)]], Field(min_length=2, max_length=2)]
 
 
-class StudyPart(Part):
+class StudyTable(Table):
     """[study]: what the report is called, and the seed of all random draws."""
 
     title: Text = "creep study"
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
 
 
-class DataPart(Part):
+class DataTable(Table):
     """[data]: files of tests, patterns or folders, relative to the study file; none where cameras give the tests.
 
     only : values of labels that tests must have. up_to_strain : frames beyond it are left out.
@@ -114,7 +121,7 @@ class DataPart(Part):
     citation: Annotated[Texts, BeforeValidator(_one_or_more)] = []
 
 
-class RecordPart(Part):
+class RecordTable(Table):
     """[[record]]: what an instrument recorded of loads and temperatures, and what its file does not say, as in
     ck.read_record.
     """
@@ -134,7 +141,7 @@ class RecordPart(Part):
     missing: Texts = []
 
 
-class CameraPart(Part):
+class CameraTable(Table):
     """[[camera]]: frames of a surface, what is made of them as in ck.extract, and what was imposed meanwhile.
 
     frames : a folder, a pattern or files in their order. names, centers_mm : of the test pieces in the field of view.
@@ -172,7 +179,7 @@ class CameraPart(Part):
     labels: dict[Text, Text] = {}
 
 
-class ExcludePart(Part):
+class ExcludeTable(Table):
     """[[exclude]]: a test, or some of its frames, with the reason. Frames are counted from 0: "97-191, 193"."""
 
     test: Text
@@ -182,14 +189,14 @@ class ExcludePart(Part):
     to_h: Positive | None = None
 
 
-class SpecimenPart(Part):
+class SpecimenTable(Table):
     """[specimen]: what the tests are of where files do not say, and lengths of the test piece, as thickness_mm."""
 
     name: Text
     lengths: dict[Text, Positive] = {}
 
 
-class NuisancePart(Part):
+class NuisanceTable(Table):
     """[[identification.nuisances]]: what differs between tests; mean and sd in the unit of the kind."""
 
     kind: Text
@@ -205,7 +212,15 @@ class NuisancePart(Part):
     sd_K: Positive | None = None
 
 
-class IdentificationPart(Part):
+WEIGHTS = {OutputWeights: Annotated[Any, BeforeValidator(_output_weights)]}
+ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws")
+"""Settings of identifications whose keys stand in tables of their own, or in [study], [data] and [selection]."""
+
+
+_IdentificationKeys = table_of(IdentificationSettings, Table, types=WEIGHTS, without=ELSEWHERE)
+
+
+class IdentificationTable(_IdentificationKeys, Table):  # type: ignore[misc]
     """[identification]: candidate laws and how each is fitted, for every group of tests."""
 
     laws: Annotated[SomeTexts, BeforeValidator(_one_or_more)]
@@ -214,19 +229,13 @@ class IdentificationPart(Part):
     predictor: Text | None = None
     fix: dict[Text, float] = {}
     bounds: dict[Text, Bounds] = {}
-    nuisances: Annotated[list[NuisancePart], Field(max_length=50)] = []
+    nuisances: Annotated[list[NuisanceTable], Field(max_length=50)] = []
     without_nuisances: Texts = []
-    starts: Annotated[int, Field(ge=1, le=1000)] | None = None
-    frames: Annotated[int, Field(ge=2, le=100_000)] | None = None
-    weights: Annotated[Any, BeforeValidator(_output_weights)] = None
-    loss: Text | None = None
-    test_loss: Text | None = None
-    rupture_times: Literal["auto", "use", "ignore"] | None = None
-    search: Literal["multi-start", "swarm", "cma-es"] = "multi-start"
-    penalty: Literal["l2", "group-l2", "sqrt", "subsets"] | None = None
+    search: SearchName = "multi-start"
+    penalty: PenaltyName | None = None
 
 
-class SelectionPart(Part):
+class SelectionTable(Table):
     """[selection]: how laws are compared; without sums, sums are tried where no candidate explains the tests."""
 
     by: Literal["bic", "aicc", "hold-out"] = "bic"
@@ -234,7 +243,7 @@ class SelectionPart(Part):
     further_laws: Annotated[int, Field(ge=0, le=100)] | None = None
 
 
-class TemperaturePart(Part):
+class TemperatureTable(Table):
     """[temperature]: forms of temperature for the parameters of a law, by default the best law of each group."""
 
     law: Text | None = None
@@ -245,14 +254,14 @@ class TemperaturePart(Part):
     within_K: Annotated[float, Field(ge=0.0)] | None = None
 
 
-class TensileStrength(Part):
+class TensileStrength(Table):
     """A tensile strength at a temperature."""
 
     temperature_C: float
     strength_MPa: Positive
 
 
-class RupturePart(Part):
+class RuptureTable(Table):
     """[rupture]: parametric methods for rupture tests."""
 
     methods: Annotated[SomeTexts, BeforeValidator(_one_or_more)] | None = None
@@ -266,7 +275,7 @@ class RupturePart(Part):
     level: Annotated[float, Field(ge=0.5, lt=1.0)] | None = None
 
 
-class ForecastPart(Part):
+class ForecastTable(Table):
     """[[forecast]]: measured tests by their files, or a planned one by its load, temperature and end.
 
     load : as { stress_MPa = 80 } or steps, of components as
@@ -291,7 +300,7 @@ class ForecastPart(Part):
     draws: Annotated[int, Field(ge=50, le=100_000)] | None = None
 
 
-class DesignPart(Part):
+class DesignTable(Table):
     """[design]: further tests, by what they tell for each hour of machine time."""
 
     goal: Literal["law", "parameters", "rate", "exponent"] | None = None
@@ -309,7 +318,7 @@ class DesignPart(Part):
     frame_interval_s: Positive | None = None
 
 
-class ExportPart(Part):
+class ExportTable(Table):
     """[[export]]: the best law of a group, or its law of temperature, as text for a target."""
 
     target: Text
@@ -324,27 +333,27 @@ class ExportPart(Part):
     poisson: Annotated[float, Field(gt=-1.0, lt=0.5)] = 0.3
 
 
-class ReportPart(Part):
+class ReportTable(Table):
     """[report]: the page. Data files up to attach_MB in all are put into it, of others their hashes alone."""
 
     file: Text = "report.html"
     attach_MB: Annotated[float, Field(ge=0.0, le=50.0)] = 3.0
 
 
-class StudyModel(Part):
+class StudyTables(Table):
     """A whole study file; every table but [data], or but [[camera]], may be missing."""
 
-    study: StudyPart = StudyPart()
-    record: Annotated[list[RecordPart], Field(max_length=100)] = []
-    camera: Annotated[list[CameraPart], Field(max_length=100)] = []
-    data: DataPart = DataPart()
-    exclude: Annotated[list[ExcludePart], Field(max_length=MOST_ITEMS)] = []
-    specimen: SpecimenPart | None = None
-    identification: IdentificationPart | None = None
-    selection: SelectionPart | None = None
-    temperature: TemperaturePart | None = None
-    rupture: RupturePart | None = None
-    forecast: Annotated[list[ForecastPart], Field(max_length=100)] = []
-    design: DesignPart | None = None
-    export: Annotated[list[ExportPart], Field(max_length=100)] = []
-    report: ReportPart | None = None
+    study: StudyTable = StudyTable()
+    record: Annotated[list[RecordTable], Field(max_length=100)] = []
+    camera: Annotated[list[CameraTable], Field(max_length=100)] = []
+    data: DataTable = DataTable()
+    exclude: Annotated[list[ExcludeTable], Field(max_length=MOST_ITEMS)] = []
+    specimen: SpecimenTable | None = None
+    identification: IdentificationTable | None = None
+    selection: SelectionTable | None = None
+    temperature: TemperatureTable | None = None
+    rupture: RuptureTable | None = None
+    forecast: Annotated[list[ForecastTable], Field(max_length=100)] = []
+    design: DesignTable | None = None
+    export: Annotated[list[ExportTable], Field(max_length=100)] = []
+    report: ReportTable | None = None
