@@ -9,7 +9,6 @@ def main() -> None:
     """Run the command line; the entry point of the script `creepkit`."""
     from creepkit.cli.ending import run_to_the_end
 
-    leave_settings_of_working_folder_out()
     run_to_the_end(_run)
 
 

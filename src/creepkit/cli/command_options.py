@@ -15,6 +15,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_type_hints
@@ -95,11 +96,10 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
                 options[name] = one.default if value is None else value
             elif value is not None:
                 given[group][name] = None if value is NOTHING else value
-        with overwriting("replace" if force else "refuse"):
+        with overwriting() if force else nullcontext():
             for name, output in outputs.items():
                 if options.get(name) is not None:
                     output.check(options[name], force=force)
-        with overwriting("replace" if force else "beside"):
             command(**options, **given)
 
     order = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in parameters]

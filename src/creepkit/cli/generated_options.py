@@ -56,15 +56,17 @@ NEXT_NAME = re.compile(r",(?=\s*\w[\w.-]*\s*=)")
 """The comma before another NAME=VALUE."""
 
 
-def _by_name(parse: Callable[[str], Any], texts: Sequence[str]) -> dict[str, Any]:
-    """{name: value} from texts NAME=VALUE or A=VALUE,B=VALUE; a dot, A.C=20, leads into a dictionary of its own."""
+def _by_name(parse: Callable[[str], Any], texts: Sequence[str], *, nested: bool = False) -> dict[str, Any]:
+    """{name: value} from texts NAME=VALUE or A=VALUE,B=VALUE; nested : {group: {name: value}} from GROUP.NAME=VALUE."""
     values: dict[str, Any] = {}
     for text in (part for whole in texts for part in NEXT_NAME.split(whole)):
         name, value = pair(text)
-        group, _, key = name.rpartition(".")
-        inner = values.setdefault(group, {}) if group else values
+        group, dot, key = name.rpartition(".") if nested else ("", "", name)
+        if nested and not dot:
+            raise ValueError(text)
+        inner = values.setdefault(group, {}) if nested else values
         if key in inner:
-            raise CreepkitError(f"{text}: {name} is given twice; keep one of them")
+            raise CreepkitError(f"{name} is given twice; keep one of them")
         inner[key] = parse(value)
     return values
 
@@ -125,8 +127,9 @@ def text_form(hint: Any) -> TextForm:
             parse = functools.partial(_lists_by_name, item.parse)
             return TextForm(f"NAME={item.metavar},...", parse, several=True)
         item = text_form(inner[1] if _is_mapping(parts[1]) else parts[1])
-        name = "GROUP.NAME" if _is_mapping(parts[1]) else "NAME"
-        return TextForm(f"{name}={item.metavar}", functools.partial(_by_name, item.parse), several=True)
+        nested = _is_mapping(parts[1])
+        metavar = f"{'GROUP.' if nested else ''}NAME={item.metavar}"
+        return TextForm(metavar, functools.partial(_by_name, item.parse, nested=nested), several=True)
     raise TypeError(f"no option is made of {hint}; give its text form in SPECIAL")
 
 

@@ -189,14 +189,21 @@ def _loading(
     """One load by steps; its ramp is the load's own where none is given."""
     if len(loads) != 1:
         flags = [f"--{name.replace('_', '-')}" for name in (loads or own or ("stress",))]
-        example = f"{flags[0]} {_usual_level(specimen, next(iter(own), ''))}"
-        found = f"{' and '.join(flags)} are different loads" if loads else f"its load is missing: {' or '.join(flags)}"
-        raise SolveError(f"specimen '{specimen.name}' has one load, and {found}; give one, such as {example}")
+        if loads:
+            raise SolveError(f"{' and '.join(flags)} are different loads of one test; leave all but one out")
+        level = _usual_level(specimen, next(iter(own), ""))
+        named = " or ".join(own) or "load"
+        raise SolveError(f"specimen '{specimen.name}' needs a {named}: give {' or '.join(flags)}, such as {level}")
     ((name, texts),) = loads.items()
+    component = next((text for text in texts if "=" in text), None)
+    if component is not None:
+        raise SolveError(
+            f"{component} names a component, which --specimen {specimen.name} has not; give --specimen point"
+        )
     flag = f"--{name.replace('_', '-')}"
     unknown = "control" if name != "stress" else "ramp"
     if getattr(options, unknown) is not None:
-        raise SolveError(f"--{unknown} does not belong to {flag}; leave it out")
+        raise SolveError(f"--{unknown} does not belong to {flag} of --specimen {specimen.name}; leave it out")
     try:
         return stepped_load(name, own[name], steps_of(texts, flag), control=options.control, ramp=options.ramp, end=end)
     except SolveError as error:

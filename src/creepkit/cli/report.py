@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -37,7 +39,6 @@ def command(
     title: Annotated[str, Option(help="Of the page.")] = "",
     app: Annotated[bool, Option(help="A page on which the law's parameters are moved by sliders.")] = False,
     specimen: Annotated[str | None, Option(help="Of a page of sliders: which is shown first.")] = None,
-    surrogate: Annotated[Path | None, Option(help="Of a page of sliders: a network, for while one moves.")] = None,
 ) -> None:
     """One file, complete without scripts: findings, curves, tests, laws tried, data, files to download, methods.
 
@@ -50,14 +51,13 @@ def command(
     if app:
         if len(results) > 1:
             raise FitError(f"{len(results)} laws or results are named; name one, and tests by --tests")
-        network = None if surrogate is None else ck.surrogate(surrogate)
-        path = ck.interactive_page(
-            _page_source(results[0]), to or Path("page.html"), tests=histories, specimen=specimen, title=title,
-            surrogate=network,
-        )  # fmt: skip
+        source = _page_source(results[0])
+        path = ck.interactive_page(source, to or Path("page.html"), tests=histories, specimen=specimen, title=title)
+        if sys.stdout.isatty():
+            webbrowser.open(path.resolve().as_uri())
     else:
-        if specimen is not None or surrogate is not None:
-            raise ReportError("--specimen and --surrogate belong to a page of sliders: give --app as well")
+        if specimen is not None:
+            raise ReportError("--specimen belongs to a page of sliders: give --app as well")
         found = [_read(Path(name), histories) for name in results]
         path = ck.report(found, to or Path("report.html"), title=title)
     tell_written(path, err=True)

@@ -64,6 +64,7 @@ def generate(
     from creepkit.reports.dataset import print_dataset
     from creepkit.reports.sampling import print_acceptance
 
+    chosen = ParallelExecution(**execution)
     changes: dict[str, Any] = {"domain": domain}
     for name, text in (conditions or {}).items():
         whole = text if ":" in text else f"{text}:{text}"
@@ -81,7 +82,6 @@ def generate(
         return
     if to is None:
         raise DatasetError("--to FILE is missing: name the HDF5 file to write, such as --to combined.h5")
-    chosen = ParallelExecution(**execution)
     with ProgressBar() as progress:
         data = ck.generate(
             design, piece, samples, draws=draws, seed=seed, to=to, execution=chosen, progress=progress.tick

@@ -23,8 +23,8 @@ def no_identification(monkeypatch):
     [
         (("--form", "n=lin"), "no temperature form 'lin': did you mean 'linear'"),
         (("--form", "m=linear"), "'m'"),
-        (("--prior", "A:arrhenus=10"), "did you mean 'arrhenius'"),
-        (("--prior", "B:arrhenius=10"), "'B'"),
+        (("--prior", "A.arrhenus=10"), "did you mean 'arrhenius'"),
+        (("--prior", "B.arrhenius=10"), "'B'"),
     ],
 )
 def test_forms_and_parameters_of_a_temperature_study(no_identification, tmp_path, words, said):

@@ -141,14 +141,14 @@ def test_a_plugin_file_that_is_missing_is_told_in_the_help() -> None:
 
 
 def test_a_plugin_cannot_take_the_place_of_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
-    Path("mine.py").write_text(COMMAND.format(name="laws"))
+    Path("mine.py").write_text(COMMAND.format(name="list"))
     Path("first.py").write_text(COMMAND.format(name="greet"))
     Path("second.py").write_text(COMMAND.format(name="greet").replace("from a", "from another"))
     monkeypatch.setenv("CREEPKIT_PLUGINS", os.pathsep.join(["mine.py", "first.py", "second.py"]))
 
     laws, greet = section(creepkit("--help").stdout, "Plugins that failed")
 
-    assert "adds the command 'laws', which creepkit has already; rename it" in laws
+    assert "adds the command 'list', which creepkit has already; rename it" in laws
     assert f"plugin 'second' ({Path('second.py').resolve()}) adds the command 'greet', which another plugin" in greet
     assert creepkit("greet").stdout == "from a plugin\n"
     assert "norton" in creepkit("list", "laws").stdout
