@@ -5,12 +5,9 @@
 Headless Chromium moves the slider of the stress exponent by the pointer, a step every 16 ms. A latency begins at the
 input event and ends at the second frame after the curves were drawn, when they are on the screen; a browser at 60
 frames a second needs one to two frames, 17 to 33 ms, for that whatever a page does, and the first row is of a page
-that shows a single text. `report --app` has a page that answers bars, and dimples of the lengths that it was given,
-itself while a slider moves, and asks its server for all else: "by the server" is a dimple of another thickness, whose
-reduced-order model answers and sends the deformed section as JSON. The page in one file computes all in JavaScript.
-The limit is 50 ms for the 95th percentile with the reduced-order model. Browser, server and this program share the
-cores of the machine; on one that does other work start it as `chrt -f 10 python tests/benchmarks/page_latency.py`,
-which is how the table below was made.
+that shows a single text. Pages are single files; dimples are simulated by the core in WebAssembly. The limit is 50 ms
+for the 95th percentile. Browser and this program share the cores of the machine; on one that does other work start it
+as `chrt -f 10 python tests/benchmarks/page_latency.py`, which is how the table below was made.
 """
 
 from __future__ import annotations
@@ -104,11 +101,7 @@ def main() -> None:
             with opened(chromium, name, Path(folder)) as one:
                 found = latencies(one, options.moves)
             median, high = np.percentile(found, (50, 95))
-            answered = {
-                "empty": "nothing", "server": "`creepkit report --app`", "file": "page in one file",
-                "asked": "`creepkit report --app`, by the server",
-            }[how]  # fmt: skip
-            page.row(name, answered, len(found), f"{median:.0f}", f"{high:.0f}", f"{high / LIMIT:.2f}")
+            page.row(name, len(found), f"{median:.0f}", f"{high:.0f}", f"{high / LIMIT:.2f}")
     if options.write:
         page.write()
 

@@ -98,50 +98,6 @@ def test_a_worker_finds_nothing_in_the_working_folder_but_the_class_of_its_job(
     assert not (folder / "ran").exists()
 
 
-def test_variables_keep_absolute_places_alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(["", ".", "src", str(tmp_path)]))
-    monkeypatch.setenv("PYTHONPYCACHEPREFIX", "compiled")
-    monkeypatch.setenv("PYTHONUSERBASE", str(tmp_path))
-
-    variables = import_path.environment_without_working_folder()
-
-    assert variables["PYTHONPATH"] == str(tmp_path)
-    assert "PYTHONPYCACHEPREFIX" not in variables
-    assert variables["PYTHONUSERBASE"] == str(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("words", "module"),
-    [
-        ("-m creepkit list laws", "creepkit"),
-        ("-mcreepkit", "creepkit"),
-        ("-Im creepkit", "creepkit"),
-        ("-W error -X dev -m creepkit", "creepkit"),
-        ("-Werror -m pytest creepkit", "pytest"),
-        ("-c pass -m creepkit", None),
-        ("creepkit -m creepkit", None),
-        ("script.py", None),
-        ("", None),
-    ],
-)
-def test_the_started_module_is_read_as_python_reads_it(
-    monkeypatch: pytest.MonkeyPatch, words: str, module: str | None
-) -> None:
-    monkeypatch.setattr(sys, "orig_argv", ["python", *words.split()])
-    assert import_path._started_module() == module
-
-
-def test_restrictions_of_the_interpreter_hold_for_its_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Flags:
-        isolated, ignore_environment, no_user_site, no_site = 0, 1, 1, 0
-
-    assert import_path.options_of_another_interpreter()[0] in ("-P", "-I")
-    monkeypatch.setattr(sys, "flags", Flags)
-    assert import_path.options_of_another_interpreter() == ["-P", "-E", "-s"]
-    Flags.isolated = 1
-    assert import_path.options_of_another_interpreter() == ["-I"]
-
-
 STARTING = {
     "subprocess", "multiprocessing", "pty", "asyncio", "joblib", "loky", "billiard", "runpy", "webbrowser",
 }  # fmt: skip

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from creepkit.import_path import leave_settings_of_working_folder_out
-
 
 def main() -> None:
     """Run the command line; the entry point of the script `creepkit`."""

@@ -32,8 +32,7 @@ def command(
     """What was imposed is in an instrument's record, or constant; without it, histories cannot be written."""
     import creepkit as ck
     from creepkit.api.extraction import operator_of
-    from creepkit.files.writing import check_folder_target, check_target
-    from creepkit.files.written_lists import made_from
+    from creepkit.files.writing import check_folder_target, check_target, made_from
 
     said, under = ExtractionOptions().changed(options), ImposedOptions().changed(conditions)
     if to is not None and under.record is None and (under.load is None or under.temperature is None):

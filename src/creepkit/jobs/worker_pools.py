@@ -23,8 +23,7 @@ from creepkit import limits
 from creepkit.arrays import usable_cores
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, DatasetError, quoted
-from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task
-from creepkit.jobs.worker_start import setup_message, start_worker
+from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task, send, setup_message, start_worker
 from creepkit.options import Options, option
 
 SHARD_ROWS = 256
