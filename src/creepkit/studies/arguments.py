@@ -141,6 +141,14 @@ def law_changes(file: StudyFile) -> LawChanges:
         return LawChanges().changed(values_of_table(LawChanges, part))
 
 
+def isothermal_laws(changes: LawChanges, laws: Sequence[CreepLaw]) -> list[CreepLaw]:
+    """The laws without a factor of temperature, with those of their own parameters changed that the study names."""
+    own = {name for law in laws for name in law.names}
+    bounds = {name: limits for name, limits in changes.bounds.items() if name in own}
+    fixed = {name: value for name, value in changes.fix.items() if name in own}
+    return LawChanges("none", fixed, bounds).applied(laws, ())
+
+
 def check_parameters(file: StudyFile, table: KeyPath, names: Mapping[str, Any], laws: Sequence[CreepLaw]) -> None:
     """StudyError for keys of a table that are parameters of none of the laws."""
     known = {name for law in laws for name in law.names}

@@ -73,10 +73,11 @@ class StageInputs:
         return arguments.settings_of(self.file)
 
     def laws(self, group: TestGroup) -> list[tuple[CreepLaw, CreepLaw]]:
-        """Pairs of a candidate as it is named, and as it is fitted to a group."""
-        named = arguments.laws_of(self.file)
+        """Pairs of a candidate at one temperature, and as it is fitted to a group."""
+        laws, changes = arguments.laws_of(self.file), arguments.law_changes(self.file)
         with self.file.at("identification"):
-            return list(zip(named, arguments.law_changes(self.file).applied(named, group.histories), strict=True))
+            fitted = changes.applied(laws, group.histories)
+            return list(zip(arguments.isothermal_laws(changes, laws), fitted, strict=True))
 
 
 def _digests(histories: Sequence[History]) -> list[str]:
