@@ -231,9 +231,10 @@ ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws", "bounds", "s
 """Options of identifications whose keys stand in tables of their own, in [study], [data] and [selection]."""
 
 
-class IdentificationTable(  # type: ignore[misc]
-    _keys(IdentificationSettings, LawChanges, SearchOptions, without=ELSEWHERE), Table
-):
+_OF_IDENTIFICATION: Any = _keys(IdentificationSettings, LawChanges, SearchOptions, without=ELSEWHERE)
+
+
+class IdentificationTable(_OF_IDENTIFICATION, Table):
     """[identification]: candidate laws and how each is fitted, for every group of tests."""
 
     laws: OneOrMore

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import creepkit as ck
-from creepkit.cli.law_sources import read_law_file
+from creepkit.cli.shared import read_law_file
 from creepkit.errors import CreepkitError
 from execution_attempts import texts
 from execution_attempts.canaries import Attempt, Control, Found, left, planted
