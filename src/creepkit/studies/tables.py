@@ -234,7 +234,7 @@ ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws", "bounds", "s
 _OF_IDENTIFICATION: Any = _keys(IdentificationSettings, LawChanges, SearchOptions, without=ELSEWHERE)
 
 
-class IdentificationTable(_OF_IDENTIFICATION, Table):
+class IdentificationTable(_OF_IDENTIFICATION, Table):  # type: ignore[misc]
     """[identification]: candidate laws and how each is fitted, for every group of tests."""
 
     laws: OneOrMore
