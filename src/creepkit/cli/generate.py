@@ -123,7 +123,7 @@ def select_design(
     law: str, specimen: Specimen, domain: str | None, changes: dict[str, Any], interval: float | None
 ) -> SamplingDesign:
     """The design that these options name; interval : s between frames."""
-    from creepkit.api.simulation import resolve_design
+    from creepkit.dataset.generation import resolve_design
 
     given = {name: value for name, value in (("domain", domain), ("every", interval)) if value is not None}
     return resolve_design(law, specimen, **given, **changes)
