@@ -4,11 +4,10 @@ Every public name stands once, in __init__.pyi; its module is loaded when the na
 `import creepkit` itself is quick.
 """
 
-from creepkit import import_path as _import_path
+import sys as _sys
 
-if _import_path.is_the_command_line():
-    _import_path.leave_working_folder_out()  # before anything is imported that could lie there
-    _import_path.end_without_traceback_at_ctrl_c()
+if _sys.orig_argv[1:3] == ["-m", "creepkit"] and _sys.argv[:1] == ["-m"] and not _sys.flags.safe_path:
+    del _sys.path[:1]  # the working folder, where a file beside the data, such as json.py, would be executed
 
 import lazy_loader as _lazy
 

@@ -1,7 +1,7 @@
 """What tests of generations share: a small one with processes or without, what it leaves behind, what it makes."""
 
+from concurrent.futures import Future
 from contextlib import nullcontext
-from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -24,24 +24,18 @@ def run(to, design=None, **how):
     return generate(design or Planted(), BAR, to=to, execution=execution, **how)
 
 
-@dataclass
 class Here:
     """A worker that is this very process: where no process matters, none is started."""
 
-    job: GenerationJob
-    submitted: list = field(default_factory=list)
+    size = 1
 
-    @property
-    def free_slots(self):
-        return 1 - len(self.submitted)
+    def __init__(self, job: GenerationJob) -> None:
+        self.job = job
 
     def submit(self, number):
-        self.submitted.append(number)
-
-    def results(self, timeout):
-        results = [run_task(self.job, number) for number in self.submitted]
-        self.submitted.clear()
-        return results
+        done = Future()
+        done.set_result(run_task(self.job, number))
+        return done
 
 
 def run_here(to, design=None, **how):

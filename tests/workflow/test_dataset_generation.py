@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from creepkit.dataset import shards
+from creepkit.errors import DatasetError
 from helpers.dataset_runs import ROWS, assert_same, left_behind, run, run_here, shards_of, whole_of
 from helpers.planted_sampling import Deadly, Planted, Strong, Visible, strain, stress_of
 
@@ -88,18 +90,15 @@ def test_a_worker_that_is_killed_is_replaced(whole, tmp_path, caplog):
     data = run(tmp_path / "a.h5", Planted((*Planted().criteria, deadly)), workers=1)
     assert once.exists()
     assert_same(data, whole)
-    assert "a worker process died (signal SIGKILL); its shard 1 is simulated again" in caplog.text
+    assert "a worker process died (signal SIGKILL); its shard 1 is done again" in caplog.text
 
 
 @pytest.mark.nightly
-def test_a_sample_that_kills_its_worker_each_time_fails(whole, tmp_path):
-    row = strong_enough(range(20, 32))
-    deadly = Deadly(stress_of(row))
-    data = run(tmp_path / "a.h5", Planted((Strong(), deadly, Visible())), samples=None, draws=48, workers=1)
-    assert data.failures == {row: "its process died 2 times while it was simulated"}
-    others = np.delete(np.arange(48), row)
-    np.testing.assert_array_equal(data.values[others][:, :, 0] > 0, whole.values[others][:, :, 0] > 0)
-    assert data.reasons[row] == -1
+def test_a_sample_that_kills_its_worker_each_time_is_said(tmp_path):
+    deadly = Deadly(stress_of(strong_enough(range(20, 32))))
+    with pytest.raises(DatasetError, match="shard 1: its worker process died 3 times, the last time by signal SIGKILL"):
+        run(tmp_path / "a.h5", Planted((Strong(), deadly, Visible())), samples=None, draws=48, workers=1)
+    assert len(shards_of(tmp_path / "a.h5")) == 1
 
 
 SCRIPT = """
@@ -150,29 +149,28 @@ def test_a_generation_that_is_killed_goes_on_where_it_was(whole, tmp_path, worke
     made = {path: path.stat().st_mtime_ns for path in shards_of(to)}
     assert_same(run_here(to), whole)
     assert made.items() <= {path: path.stat().st_mtime_ns for path in shards_of(to)}.items()
-    assert left_behind(tmp_path) == ["merging.lock"]
+    assert left_behind(tmp_path) == ["generating.lock"]
 
 
 @pytest.mark.nightly
-def test_ctrl_c_ends_the_workers_and_counts_no_death(tmp_path):
+def test_ctrl_c_ends_the_workers(tmp_path):
     to = tmp_path / "a.h5"
     first = started(to, seconds=0.1, workers=1)
-    wait_for(lambda: len(children(first.pid)) == 1 and list(to.with_name("a.h5.parts").glob("*.lock")))
+    wait_for(lambda: len(children(first.pid)) == 1 and to.with_name("a.h5.parts").exists())
     workers = children(first.pid)
     time.sleep(0.5)
     first.send_signal(signal.SIGINT)
     assert "KeyboardInterrupt" in first.communicate()[1]
     assert not any(Path(f"/proc/{pid}").exists() for pid in workers)
-    assert [path.read_bytes() for path in to.with_name("a.h5.parts").glob("*.lock")] == [b""]
 
 
-def test_a_lock_of_the_dead_does_not_block(whole, tmp_path):
-    to = tmp_path / "a.h5"
-    parts = tmp_path / "a.h5.parts"
+def test_two_generations_in_one_folder_do_not_do_the_work_twice(whole, tmp_path):
+    to, parts = tmp_path / "a.h5", tmp_path / "a.h5.parts"
     parts.mkdir()
-    (parts / "00000.lock").write_text("3\n")
-    (parts / "00001.lock").write_bytes(b"\xff\x00garbage")
-    assert_same(run_here(to), whole)
+    with shards.generating_alone(parts, None), pytest.raises(DatasetError, match="another process is making these"):
+        run_here(to)
+    with shards.generating_alone(parts, (1, 2)):
+        assert_same(run_here(to), whole)
 
 
 # ---- a cluster -----------------------------------------------------------------------------------------------------

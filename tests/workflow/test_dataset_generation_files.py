@@ -65,7 +65,7 @@ def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
     assert re.search(r"a\.h5: cannot be written: File too large; free some space", complaint(3 * shard // 2))
     made = {path: path.stat().st_mtime_ns for path in shards_of(to)}
     assert len(made) * ROWS >= len(expected)
-    assert left_behind(tmp_path / "a.h5.parts") == ["merging.lock"]
+    assert left_behind(tmp_path / "a.h5.parts") == ["generating.lock"]
     assert_same(run_here(to, samples=300), expected)
     assert made == {path: path.stat().st_mtime_ns for path in shards_of(to)}
 

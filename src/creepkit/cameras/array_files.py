@@ -132,10 +132,10 @@ def _hdf5_table(path: Path) -> ArrayTable:
     from creepkit.files.hdf5_files import open_hdf5
 
     def load(names: Sequence[str]) -> dict[str, Floats]:
-        with open_hdf5(path, FRAME_FILE, bounded=False) as file:
+        with open_hdf5(path, FRAME_FILE) as file:
             return {name: np.asarray(file[name][()], dtype=float).T.ravel() for name in names}
 
-    with open_hdf5(path, FRAME_FILE, bounded=False) as file:
+    with open_hdf5(path, FRAME_FILE) as file:
         shapes = {
             name: item.shape
             for name, item in file.items()

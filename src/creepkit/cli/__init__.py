@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from creepkit.cli.failures import check_working_folder, prepare_streams, print_warnings_plainly, run_to_the_end
 from creepkit.cli.interrupts import interrupt_at_signals
-from creepkit.import_path import leave_settings_of_working_folder_out
 
 
 def main() -> None:
@@ -17,7 +16,6 @@ def _run() -> None:
     prepare_streams()
     check_working_folder()
     print_warnings_plainly()
-    leave_settings_of_working_folder_out()
     from creepkit.cli.app import app
 
     app()

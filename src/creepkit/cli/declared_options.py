@@ -11,6 +11,7 @@ import copy
 import functools
 import inspect
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
@@ -83,11 +84,10 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
             options[name] = given_values(
                 record, {field: texts[field] for field in texts if generated[field][0] == name}
             )
-        with overwriting("replace" if force else "refuse"):
+        with overwriting() if force else nullcontext():
             for name, output in outputs.items():
                 if options.get(name) is not None:
                     output.check(options[name], force=force)
-        with overwriting("replace" if force else "beside"):
             command(**options)
 
     run.__signature__ = signature.replace(parameters=list(parameters.values()))  # type: ignore[attr-defined]

@@ -94,8 +94,7 @@ def command(
     import creepkit as ck
     from creepkit.api.extraction import operator_of
     from creepkit.errors import HistoryError
-    from creepkit.files.writing import check_folder_target, check_target
-    from creepkit.files.written_lists import made_from
+    from creepkit.files.writing import check_folder_target, check_target, made_from
     from creepkit.records import ZERO_CELSIUS
     from creepkit.reports.terminal import ProgressBar
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.errors import FitError
+from creepkit.files.locking import locked
 from creepkit.files.reading import sha256_of
-from creepkit.files.writing import check_folder_target
-from creepkit.files.written_lists import is_foreign
+from creepkit.files.writing import check_folder_target, is_foreign
 
 if TYPE_CHECKING:
     from creepkit.inverse.selection import Ranking
@@ -35,28 +35,26 @@ def identifying_alone(folder: Path, laws: Sequence[CreepLaw]) -> Iterator[None]:
     not as creepkit wrote it. A folder that is made for nothing is removed again.
     """
     from creepkit.inverse.ranking_document import stems_of_laws
-    from creepkit.jobs.shard_progress import ShardLock
 
     stems = stems_of_laws(laws, RANKING_STEM)
     names = [f"{stem}{suffix}" for stem in stems for suffix in (*LAW_SUFFIXES, *BEST_LAW_SUFFIXES)]
     check_folder_target(folder, FitError, tuple(dict.fromkeys([*names, *(one.name for one in former_files(folder))])))
     made = not folder.exists()
-    lock = ShardLock(folder / LOCK, FitError)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock.__enter__()
-    except OSError as error:
-        raise FitError(f"{folder}: results cannot be kept there ({error.strerror}); name another folder") from None
-    try:
-        if not lock.held:
+    with ExitStack() as stack:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            held = stack.enter_context(locked(folder / LOCK))
+        except OSError as error:
+            raise FitError(f"{folder}: results cannot be kept there ({error.strerror}); name another folder") from None
+        if not held:
             raise FitError(f"{folder}: another process is writing its results there; wait for it, or name another --to")
-        yield
-    finally:
-        if made and lock.held and [one.name for one in folder.iterdir()] == [LOCK]:
-            lock.remove()
-            with suppress(OSError):
-                folder.rmdir()
-        lock.__exit__(None, None, None)
+        try:
+            yield
+        finally:
+            if made and [one.name for one in folder.iterdir()] == [LOCK]:
+                with suppress(OSError):
+                    (folder / LOCK).unlink()
+                    folder.rmdir()
 
 
 def former_files(folder: Path) -> list[Path]:

@@ -71,7 +71,7 @@ NOT_SIMULATED = -1
 
 
 @dataclass(frozen=True, eq=False)
-class Dataset(Presentable):
+class Dataset(Presentable, text="reports.dataset:dataset_text"):
     """Simulated tests: n samples of a law with its parameters and conditions.
 
     law, specimen : what was simulated. design_document : everything that decided what was drawn.

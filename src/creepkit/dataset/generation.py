@@ -5,18 +5,17 @@ Shards are taken in order and without gaps, so that the content of the file does
 
 from __future__ import annotations
 
-import logging
-import time
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.dataset import shards, storage
-from creepkit.dataset.shards import POLL_INTERVAL, GenerationJob, Waiting, is_complete, merge_shards
+from creepkit.dataset.shards import GenerationJob, is_complete, merge_shards
 from creepkit.errors import DatasetError
 from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord, ProgressReporter
-from creepkit.jobs.worker_pools import SHARD_ROWS, ParallelExecution, WorkerDeaths, Workers
+from creepkit.jobs.worker_pools import SHARD_ROWS, ParallelExecution, Workers
 from creepkit.jobs.worker_process import TaskResult
 
 if TYPE_CHECKING:
@@ -25,11 +24,8 @@ if TYPE_CHECKING:
     from creepkit.sampling.domains import SamplingDesign
 
 
-_log = logging.getLogger("creepkit.dataset")
-
-
-MOST_WORKER_DEATHS = 20
-"""Deaths of workers at one shard, after which something else than a sample must be wrong."""
+POLL_INTERVAL = 0.5
+"""s between reports of the progress, where no shard ends earlier."""
 
 
 def generate(
@@ -61,12 +57,13 @@ def generate(
     if execution.part is None and is_complete(job, record, path):
         return storage.read_dataset(path)
     job.open_folder()
-    record.scan_finished()
-    with execution.start(job) as workers:
-        run_until_enough(record, workers, progress)
-    if execution.part is not None:
-        return shards.read_shards(job, sorted(record.done))
-    merge_shards(job, record, path, progress)
+    with shards.generating_alone(folder, execution.part):
+        record.scan_finished()
+        with execution.start(job) as workers:
+            run_until_enough(record, workers, progress)
+        if execution.part is not None:
+            return shards.read_shards(job, sorted(record.done))
+        merge_shards(job, record, path, progress)
     return storage.read_dataset(path)
 
 
@@ -85,39 +82,28 @@ def _whole_number(name: str, value: object) -> int:
 def run_until_enough(record: ProgressRecord, workers: Workers, progress: ProgressCallback | None) -> None:
     """Have shards simulated until there are enough; DatasetError when one cannot be."""
     reporter = ProgressReporter(record, progress)
-    locked_elsewhere: dict[int, float] = {}
-    deaths, waiting = WorkerDeaths(MOST_WORKER_DEATHS), Waiting()
+    running: dict[Future[TaskResult], int] = {}
     while record.leading_run() is None:
-        due = [number for number, since in locked_elsewhere.items() if time.monotonic() - since > POLL_INTERVAL]
-        for number in due[: workers.free_slots]:
-            del locked_elsewhere[number]
-            workers.submit(number)
-        while workers.free_slots and (shard := record.next_shard()) is not None:
+        while len(running) < workers.size and (shard := record.next_shard()) is not None:
             record.running.add(shard)
-            workers.submit(shard)
-        for result in workers.results(POLL_INTERVAL):
-            if result.status == "taken":
-                locked_elsewhere[result.number] = time.monotonic()
-            elif result.status == "died":
-                _resubmit(result, record, deaths, workers)
-            else:
-                _record_result(result, record)
-        only_waiting = record.running == locked_elsewhere.keys()
-        waiting.note([record.job.lock_path(number) for number in locked_elsewhere] if only_waiting else [])
+            running[workers.submit(shard)] = shard
+        for future in wait(running, POLL_INTERVAL, FIRST_COMPLETED).done:
+            number = running.pop(future)
+            try:
+                result = future.result()
+            except DatasetError:
+                raise
+            except BaseException as error:  # of dask, whose workers died or whose scheduler is gone
+                if isinstance(error, KeyboardInterrupt | SystemExit):
+                    raise
+                text = " ".join(f"{type(error).__name__}: {error}".split())
+                raise DatasetError(f"shard {number} could not be simulated: {text}; the same call goes on") from None
+            if result.status == "error":
+                raise DatasetError(result.text)
+            if not record.job.path(number).exists():
+                raise DatasetError(
+                    f"a worker wrote {record.job.path(number)}, which is not there on this machine; name a file in a "
+                    "folder that all machines share"
+                )
+            record.mark_done(number, result.accepted)
         reporter.report()
-
-
-def _record_result(result: TaskResult, record: ProgressRecord) -> None:
-    """Enter a shard that is done; DatasetError for one that cannot be."""
-    if result.status == "error":
-        raise DatasetError(result.text)
-    record.mark_done(result.number, result.accepted)
-
-
-def _resubmit(result: TaskResult, record: ProgressRecord, deaths: WorkerDeaths, workers: Workers) -> None:
-    """Have a shard done again whose worker died."""
-    if not deaths.may_retry(result):
-        raise DatasetError(f"shard {result.number}: {deaths.description(result)}")
-    record.job.count_death(result.number)
-    _log.warning("a worker process died (%s); its shard %d is simulated again", result.text, result.number)
-    workers.submit(result.number)

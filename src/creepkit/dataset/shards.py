@@ -1,15 +1,14 @@
 """Shards: blocks of rows of a design, each simulated once, kept in its own file, and merged into one data set.
 
-A shard is done when its file exists, belongs to this generation and is complete. The file is written under a temporary
-name and renamed by the holder of the shard lock.
+A shard is done when its file exists, belongs to this generation and is complete.
 """
 
 from __future__ import annotations
 
 import hashlib
 import logging
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property
@@ -23,15 +22,14 @@ import numpy as np
 from creepkit import registry
 from creepkit.dataset import storage
 from creepkit.dataset.dataset import COLUMNS, Dataset, concatenate, first_difference
-from creepkit.dataset.simulation import SampleFailedError, empty_dataset, simulate_rows
+from creepkit.dataset.simulation import empty_dataset, simulate_rows
 from creepkit.dataset.storage import LAYOUT_VERSION
 from creepkit.errors import DatasetError
 from creepkit.files.hdf5_files import open_hdf5, write_hdf5
 from creepkit.files.json_documents import as_read_back, canonical_json, json_text, read_json
-from creepkit.files.owners import check_owner_by_name
+from creepkit.files.locking import locked
 from creepkit.files.reading import FileKind
-from creepkit.files.writing import remove_temporary_files, write_if_absent
-from creepkit.jobs.shard_progress import ShardLock, count_death
+from creepkit.files.writing import remove_temporary_files, write_text
 from creepkit.jobs.worker_pools import SHARD_ROWS
 from creepkit.jobs.worker_process import TaskResult
 from creepkit.language.law_codec import law_to_json
@@ -43,27 +41,12 @@ if TYPE_CHECKING:
     from creepkit.sampling.domains import SamplingDesign
 
 
-MOST_PROCESS_DEATHS = 2
-"""How often a sample may kill its process before it counts as failed."""
-
-
-SUSPICIOUS_INTERRUPTIONS = 3
-"""How often all processes may be killed while a sample is simulated before that is said, each time; it never fails."""
-
-
 GENERATION_NAME = "generation.json"
 
 
 GENERATION_FILE = FileKind(
-    "the settings of a data set",
-    DatasetError,
-    "it is damaged; remove it if the shards beside it are of this data set",
-    own=True,
+    "the settings of a data set", DatasetError, "it is damaged; remove it if the shards beside it are of this data set"
 )
-
-
-OWN_DATASET_FILE = replace(storage.DATASET_FILE, own=True)
-"""A shard, or the data set that they were merged to, of an earlier call or another process."""
 
 
 _log = logging.getLogger("creepkit.dataset")
@@ -134,14 +117,6 @@ class GenerationJob:
         """The file of a shard."""
         return self.folder / f"{number:05d}.h5"
 
-    def lock_path(self, number: int) -> Path:
-        """The file that is locked while a shard is simulated."""
-        return self.path(number).with_suffix(".lock")
-
-    def count_death(self, number: int) -> None:
-        """Count the death of a worker at the sample that it simulated; where this process goes on."""
-        count_death(self.lock_path(number))
-
     def accepted_count(self, number: int) -> int | None:
         """How many samples of a shard were accepted; None when it has to be simulated, or again, which is logged."""
         return accepted_count(self, number)
@@ -155,9 +130,8 @@ class GenerationJob:
             )
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            check_owner_by_name(self.folder, DatasetError)
             if not path.exists():
-                write_if_absent(path, json_text(self.document))
+                write_text(json_text(self.document), path, DatasetError, internal=True)
         except OSError as error:
             raise DatasetError(f"{self.folder}: no shards can be written there ({error.strerror})") from None
         existing = read_json(path, GENERATION_FILE)
@@ -171,47 +145,33 @@ class GenerationJob:
 
 def rows_of_folder(folder: Path) -> int | None:
     """Samples of a shard in a folder that was begun; None where there is none, or none that says so."""
-    check_owner_by_name(folder, DatasetError)
     path = folder / GENERATION_NAME
     document = read_json(path, GENERATION_FILE) if path.is_file() else None
     rows = document.get("rows") if isinstance(document, dict) else None
     return rows if isinstance(rows, int) and rows > 0 else None
 
 
-def run_shard(job: GenerationJob, number: int) -> TaskResult:
-    """Simulate a shard and write its file, unless it is done or another process is at it."""
-    path = job.path(number)
-    with ShardLock(job.lock_path(number)) as lock:
-        if not lock.held:
-            return TaskResult(number, "taken")
-        accepted = accepted_count(job, number, quiet=True)
-        if accepted is None:
-            remove_temporary_files(path)
-            first, rows = number * job.rows, job.rows
-            samples = simulate_rows(job.design, job.header, job.seed, first, rows, _death_check(lock, path))
-            write_shard(job, number, samples)
-            accepted = int((samples.reasons == 0).sum())
-        lock.remove()
-    return TaskResult(number, "done", accepted)
-
-
-def _death_check(lock: ShardLock, path: Path) -> Callable[[int], None]:
-    """Note each sample before it is simulated; those that killed their process too often are not."""
-
-    def starting(row: int) -> None:
-        if lock.deaths[row] >= MOST_PROCESS_DEATHS:
-            raise SampleFailedError(f"its process died {lock.deaths[row]} times while it was simulated")
-        if lock.interruptions[row] >= SUSPICIOUS_INTERRUPTIONS:
-            _log.warning(
-                "%s: sample %d was being simulated each of the %d times that this work was killed; it is simulated "
-                "again. If the system ran out of memory, use fewer workers or a machine with more",
-                path,
-                row,
-                lock.interruptions[row],
+@contextmanager
+def generating_alone(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
+    """DatasetError where another process of this machine is making the same shards."""
+    name = "generating.lock" if part is None else f"generating_{part[0]}_of_{part[1]}.lock"
+    with locked(folder / name) as held:
+        if not held:
+            raise DatasetError(
+                f"{folder}: another process is making these shards; wait for it or end it, or divide the work (part)"
             )
-        lock.record_start(row)
+        yield
 
-    return starting
+
+def run_shard(job: GenerationJob, number: int) -> TaskResult:
+    """Simulate a shard and write its file, unless it is done."""
+    accepted = accepted_count(job, number, quiet=True)
+    if accepted is None:
+        remove_temporary_files(job.path(number))
+        samples = simulate_rows(job.design, job.header, job.seed, number * job.rows, job.rows)
+        write_shard(job, number, samples)
+        accepted = int((samples.reasons == 0).sum())
+    return TaskResult(number, "done", accepted)
 
 
 def write_shard(job: GenerationJob, number: int, samples: Dataset) -> None:
@@ -233,7 +193,7 @@ def sample_checksum(samples: Dataset) -> str:
 def read_shard(job: GenerationJob, number: int) -> Dataset:
     """The samples of a shard; DatasetError when it is not whole, or of another data set."""
     path = job.path(number)
-    with open_hdf5(path, OWN_DATASET_FILE) as file:
+    with open_hdf5(path, storage.DATASET_FILE) as file:
         if file.attrs.get("generation") != job.fingerprint or file.attrs.get("shard") != number:
             raise DatasetError(f"{path}: a shard of another data set")
         samples = storage.read_samples(file, job.header)
@@ -248,7 +208,6 @@ def accepted_count(job: GenerationJob, number: int, *, quiet: bool = False) -> i
     path = job.path(number)
     if not path.exists():
         return None
-    check_owner_by_name(path, DatasetError)  # which is no reason to simulate it again
     try:
         return int((read_shard(job, number).reasons == 0).sum())
     except DatasetError as error:
@@ -262,39 +221,13 @@ def read_shards(job: GenerationJob, numbers: Sequence[int]) -> Dataset:
     return concatenate([job.header, *(read_shard(job, number) for number in numbers)])
 
 
-POLL_INTERVAL = 0.5
-"""s, after which a shard that another process holds is checked again."""
-
-
-SILENT_WAIT = 10.0
-"""s, after which it is said that nothing is done but to wait for another process."""
-
-
-class Waiting:
-    """Says once that locks are held by other processes, where that is all that this one waits for."""
-
-    def __init__(self) -> None:
-        self._since: float | None = None
-        self._said = False
-
-    def note(self, locks: Sequence[Path]) -> None:
-        """The locks that are waited for now; none where something else is done."""
-        if not locks:
-            self._since = None
-        elif self._since is None:
-            self._since = time.monotonic()
-        elif not self._said and time.monotonic() - self._since > SILENT_WAIT:
-            self._said = True
-            _log.warning("another process holds %s; waiting for it to finish or end", locks[0])
-
-
 def is_complete(job: GenerationJob, record: ProgressRecord, path: Path) -> bool:
     """Whether the file is there already and holds what is wanted; DatasetError when it is something else."""
     if not path.exists():
         return False
     if path.is_dir():
         raise DatasetError(f"{path}: is a folder; name a file for the data set")
-    with open_hdf5(path, OWN_DATASET_FILE) as file:
+    with open_hdf5(path, storage.DATASET_FILE) as file:
         header = storage.read_header(file, str(path))
         if header.provenance.get("fingerprint") != job.fingerprint:
             difference = first_difference(_identity(header), _identity(job.header), "")
@@ -307,24 +240,10 @@ def is_complete(job: GenerationJob, record: ProgressRecord, path: Path) -> bool:
 
 
 def merge_shards(job: GenerationJob, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
-    """Write the shortest leading run of shards that is enough, unless another process does so meanwhile."""
-    waiting = Waiting()
-    while True:
-        with ShardLock(job.folder / "merging.lock") as lock:
-            if lock.held:
-                if not is_complete(job, record, path):
-                    remove_temporary_files(path)
-                    _write_merged(job, record, path, progress)
-                    for number in record.done:  # of processes that died between writing a shard and saying so
-                        job.lock_path(number).unlink(missing_ok=True)
-                return
-        waiting.note([job.folder / "merging.lock"])
-        time.sleep(POLL_INTERVAL)
-
-
-def _write_merged(job: GenerationJob, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
+    """Write the shortest leading run of shards that is enough."""
     numbers, remaining = record.leading_run() or [], record.draws
-    # one that is there holds the first samples of the same data set, see is_complete()
+    remove_temporary_files(path)
+    # a file that is there holds the first samples of the same data set, see is_complete()
     with write_hdf5(path, DatasetError, storage.WRITE_ADVICE, force=True) as file:
         storage.write_header(file, job.header)
         for done, number in enumerate(numbers, start=1):

@@ -6,7 +6,6 @@ Samples are simulated one at a time on one thread.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -74,10 +73,6 @@ REJECTED_DIGITS = 12
 """Binary digits of the histories of rejected samples, 1 part in 4000: these serve inspection, not training."""
 
 
-class SampleFailedError(DatasetError):
-    """A simulation that left nothing; its text is kept."""
-
-
 def empty_dataset(design: SamplingDesign, specimen: Specimen, provenance: dict[str, object]) -> Dataset:
     """The data set of a design with no samples in it yet."""
     sizes = {
@@ -102,20 +97,14 @@ def empty_dataset(design: SamplingDesign, specimen: Specimen, provenance: dict[s
     )
 
 
-def simulate_rows(
-    design: SamplingDesign, header: Dataset, seed: int, first: int, count: int, before_sample: Callable[[int], None]
-) -> Dataset:
-    """Rows first to first + count of a design, simulated.
-
-    before_sample : called with the row that is about to be simulated; may raise SampleFailedError.
-    """
+def simulate_rows(design: SamplingDesign, header: Dataset, seed: int, first: int, count: int) -> Dataset:
+    """Rows first to first + count of a design, simulated."""
     draws = design.draw(first, count, seed)
     samples = _unsimulated(header, draws, _reasons_before(design, draws), first)
     samples.reasons[:] += rejected_by_screening(design, samples)
     failures: dict[int, str] = {}
     for attempt, row in enumerate(np.flatnonzero(samples.reasons == 0).tolist(), start=1):
         try:
-            before_sample(first + row)
             samples.reasons[row] = _simulate_sample(design, samples, row)
         except (MemoryError, OSError):
             raise
@@ -183,7 +172,7 @@ def _simulate_sample(design: SamplingDesign, samples: Dataset, row: int) -> int:
     samples.status[row], samples.end_times[row] = status, end_time
     shown = creep_output(samples.specimen)
     if status == Status.NOT_CONVERGED and not np.isfinite(observed[times > 0, shown.column]).any():
-        raise SampleFailedError(f"not converged from {end_time:g} s on, with nothing to show before")
+        raise DatasetError(f"not converged from {end_time:g} s on, with nothing to show before")
     reached = outputs[: test.times.size]
     outcome = SimulationOutcome(
         test.times, reached, hold_outputs, status, end_time, conditions, shown.column, shown.falls

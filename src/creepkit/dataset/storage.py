@@ -28,7 +28,6 @@ The group `failures` has `rows` (k,) int64 and `texts` (k,): which samples faile
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -40,7 +39,7 @@ from numpy.typing import NDArray
 from creepkit.arrays import Bools
 from creepkit.checked_arguments import checked
 from creepkit.dataset.dataset import COLUMNS, HOLD_TIMES, NOT_SIMULATED, Dataset, empty_columns
-from creepkit.errors import DatasetError, LawError, quoted_value, steering
+from creepkit.errors import DatasetError, LawError, printable, quoted, quoted_value
 from creepkit.files.hdf5_files import open_hdf5, write_hdf5, write_names
 from creepkit.files.json_documents import compact_json, parse_json
 from creepkit.files.reading import FileKind
@@ -69,43 +68,40 @@ FILE_UNITS = "MPa, mm, s, K"
 NAME_LISTS = ("outputs", "parameter_names", "condition_names", "reason_names", "reason_texts")
 
 
+def _damaged(source: str, problem: str) -> DatasetError:
+    return DatasetError(f"{source}: {problem}; the file is damaged")
+
+
 def check_format(file: h5py.File, source: str) -> None:
     """DatasetError when the file is not one of ours, or of another layout or unit."""
-    format_name = file.attrs.get("format")
+    format_name, layout, units = (file.attrs.get(name) for name in ("format", "layout", "units"))
     if not isinstance(format_name, str) or format_name != FORMAT:
         raise DatasetError(
             f"{source}: an HDF5 file, but no data set of creepkit (its format is {quoted_value(format_name)})"
         )
-    layout = file.attrs.get("layout")
-    whole = isinstance(layout, int | np.integer) and not isinstance(layout, bool)
-    if not whole or layout != LAYOUT_VERSION:
-        newer = whole and layout > LAYOUT_VERSION
+    if not isinstance(layout, int | np.integer) or layout != LAYOUT_VERSION:
+        newer = isinstance(layout, int | np.integer) and layout > LAYOUT_VERSION
         advice = "upgrade creepkit" if newer else "generate it again"
         raise DatasetError(
-            f"{source}: its layout is {layout if whole else quoted_value(layout)}, this creepkit reads layout "
-            f"{LAYOUT_VERSION}; {advice}"
+            f"{source}: its layout is {quoted(layout)}, this creepkit reads layout {LAYOUT_VERSION}; {advice}"
         )
-    units = file.attrs.get("units")
     if not isinstance(units, str) or units != FILE_UNITS:
         raise DatasetError(f"{source}: its units are {quoted_value(units)}; allowed are '{FILE_UNITS}'")
-    for name in (*NAME_LISTS, "law", "specimen", "design", "provenance"):
-        if name not in file.attrs:
-            raise DatasetError(f"{source}: the attribute '{name}' is missing; the file is damaged")
 
 
 def stored_array(file: h5py.File, name: str, kinds: str, source: str) -> h5py.Dataset:
     """An array of one axis or more; DatasetError when there is none, or its numbers are of another kind of NumPy."""
     array = file.get(name)
     if not isinstance(array, h5py.Dataset) or not array.shape or array.dtype.kind not in kinds:
-        raise DatasetError(f"{source}: the array '{name}' is missing, or is none of its kind; the file is damaged")
+        raise _damaged(source, f"the array '{name}' is missing, or is none of its kind")
     return array
 
 
 def stored_names(file: h5py.File, name: str, source: str) -> tuple[str, ...]:
     """An attribute that is a list of texts; DatasetError when it is something else."""
-    value = file.attrs[name]
+    value = file.attrs.get(name)
     if not (isinstance(value, np.ndarray) and value.ndim == 1 and all(isinstance(word, str) for word in value)):
-        raise DatasetError(f"{source}: the attribute '{name}' is no list of texts; the file is damaged")
+        raise _damaged(source, f"the attribute '{name}' is missing, or no list of texts")
     return tuple(str(word) for word in value)
 
 
@@ -113,90 +109,26 @@ def check_shapes(file: h5py.File, expected: dict[str, Any], source: str) -> None
     """DatasetError when an array is missing, or does not fit the words of the file."""
     samples = stored_array(file, "index", "i", source).shape[0]
     for name, empty in expected.items():
-        array = file.get(name)
-        if not isinstance(array, h5py.Dataset):
-            raise DatasetError(f"{source}: the array '{name}' is missing; the file is damaged")
-        kind = np.dtype(COLUMNS[name].file_type).kind
-        if array.shape != (samples, *empty.shape[1:]) or array.dtype.kind != kind:
-            description = f"{array.dtype} {array.shape}"
-            raise DatasetError(f"{source}: the array '{name}' is {description}, which does not fit the others")
-
-
-def check_attributes(attributes: dict[str, Any], source: str) -> None:
-    """DatasetError when the attributes of a file, by name and with documents parsed, do not fit each other."""
-    for name in ("design", "provenance"):
-        if not isinstance(attributes[name], dict):
-            raise DatasetError(f"{source}: the attribute '{name}' is no record; the file is damaged")
-    if not attributes["outputs"] or len(attributes["reason_names"]) != len(attributes["reason_texts"]):
-        raise DatasetError(f"{source}: names no output, or not a text for each reason; the file is damaged")
-    for name in (*NAME_LISTS, "design", "provenance"):
-        if found := steering("".join(_texts(attributes[name]))):
-            raise DatasetError(
-                f"{source}: the attribute '{name}' holds the character U+{ord(found):04X}; the file is damaged"
-            )
-
-
-def _texts(value: Any) -> Iterator[str]:
-    """All texts of a document, its keys among them."""
-    if isinstance(value, dict):
-        value = (*value, *value.values())
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, tuple | list):
-        for item in value:
-            yield from _texts(item)
+        array = stored_array(file, name, np.dtype(COLUMNS[name].file_type).kind, source)
+        if array.shape != (samples, *empty.shape[1:]):
+            raise _damaged(source, f"the array '{name}' is {array.dtype} {array.shape}, which does not fit the others")
 
 
 def check_values(columns: dict[str, Any], header: Dataset, source: str) -> None:
-    """DatasetError when what was drawn is no value of the law, a code is none, or a history contradicts its end."""
-    for name in ("parameters", "conditions"):
-        invalid = np.argwhere(~np.isfinite(columns[name]))
-        if invalid.size:
-            column_name = getattr(header, COLUMNS[name].axes[0])[invalid[0, 1]]
-            raise DatasetError(
-                f"{source}: {name} of sample {invalid[0, 0]} ({column_name}) are not finite; the file is damaged"
-            )
+    """DatasetError when what was drawn is no value of the law, a code is none, or an accepted sample has no history."""
     with np.errstate(invalid="ignore"):
         theta = header.law.to_internal(dict(zip(header.parameter_names, columns["parameters"].T, strict=True)))
-    if (impossible := np.argwhere(np.isnan(theta))).size:
-        row, name = impossible[0, 0], header.law.names[impossible[0, 1]]
-        raise DatasetError(f"{source}: the parameter {name} of sample {row} is below zero; the file is damaged")
-    known = [NOT_SIMULATED, *map(int, Status)]
-    invalid_status = np.flatnonzero(~np.isin(columns["status"], known))
-    if invalid_status.size:
-        row = invalid_status[0]
-        raise DatasetError(
-            f"{source}: the status of sample {row} is {columns['status'][row]}; allowed are {known[0]} to {known[-1]}; "
-            "the file is damaged"
-        )
-    invalid_reasons = np.flatnonzero((columns["reasons"] < -1) | (columns["reasons"] >= len(header.reason_names)))
-    if invalid_reasons.size:
-        raise DatasetError(
-            f"{source}: the reason of sample {invalid_reasons[0]} is {columns['reasons'][invalid_reasons[0]]}; allowed "
-            f"are -1 to {len(header.reason_names) - 1}; the file is damaged"
-        )
     accepted = columns["reasons"] == 0
-    has_history = np.isfinite(columns["values"][accepted, :, 0]).any(axis=1) & np.isfinite(
-        columns["end_times"][accepted]
-    )
-    if not has_history.all():
-        row = np.flatnonzero(accepted)[~has_history][0]
-        raise DatasetError(f"{source}: sample {row} was accepted and has no history; the file is damaged")
-    shown = np.isfinite(columns["values"]).any(axis=2)
-    begun = np.maximum.accumulate(shown, axis=1)
-    still = np.maximum.accumulate(shown[:, ::-1], axis=1)[:, ::-1]
-    broken = (begun & still & ~shown).any(axis=1) | np.isinf(columns["values"]).any(axis=(1, 2))
-    broken |= columns["end_times"] < 0.0
-    if broken.any():
-        row = np.flatnonzero(broken)[0]
-        raise DatasetError(
-            f"{source}: the history of sample {row} has a gap, an infinite number or an end before its begin; the file "
-            "is damaged"
-        )
-
-
-_TEXT_BYTES = 16_000_000
-"""Of texts that are read at once."""
+    drawn = np.isfinite(columns["parameters"]).all(1) & np.isfinite(columns["conditions"]).all(1)
+    has_history = np.isfinite(columns["values"][..., 0]).any(axis=1) & np.isfinite(columns["end_times"])
+    for what, sound in (
+        ("parameters or conditions are no numbers of its law", drawn & ~np.isnan(theta).any(axis=1)),
+        ("status is none", np.isin(columns["status"], [NOT_SIMULATED, *map(int, Status)])),
+        ("reason is none", (columns["reasons"] >= -1) & (columns["reasons"] < len(header.reason_names))),
+        ("history is missing, though it was accepted", ~accepted | has_history),
+    ):
+        if not sound.all():
+            raise _damaged(source, f"sample {np.flatnonzero(~sound)[0]}: its {what}")
 
 
 COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
@@ -274,25 +206,23 @@ def read_header(file: h5py.File, source: str) -> Dataset:
     """The data set of a file with no samples in it yet."""
     check_format(file, source)
     name_lists: dict[str, Any] = {name: stored_names(file, name, source) for name in NAME_LISTS}
-    documents = {}
+    documents: dict[str, Any] = {}
     for name in ("law", "specimen", "design", "provenance"):
-        text = file.attrs[name]
-        if not isinstance(text, str):
-            raise DatasetError(f"{source}: the attribute '{name}' is no text; the file is damaged")
-        documents[name] = parse_json(text, f"{source}: its {name}", DATASET_FILE)
-    check_attributes({**name_lists, **documents}, source)
-    sizes = {
-        **{name: len(values) for name, values in name_lists.items()},
-        "holds": HOLD_TIMES,
-        "frames": len(stored_array(file, "time_grid", "f", source)),
-    }
-    columns = empty_columns(sizes)
+        text = file.attrs.get(name)
+        documents[name] = parse_json(text, f"{source}: its {name}", DATASET_FILE) if isinstance(text, str) else None
+        if not isinstance(documents[name], dict):
+            raise _damaged(source, f"the attribute '{name}' is missing, or no record")
+    if not name_lists["outputs"] or len(name_lists["reason_names"]) != len(name_lists["reason_texts"]):
+        raise _damaged(source, "names no output, or not a text for each reason")
+    times = stored_array(file, "time_grid", "f", source)
+    lengths = {name: len(values) for name, values in name_lists.items()}
+    columns = empty_columns({**lengths, "holds": HOLD_TIMES, "frames": len(times)})
     check_shapes(file, columns, source)
     return Dataset(
         law=_read_law(documents["law"], name_lists["parameter_names"], source),
         specimen=specimen_from_json(documents["specimen"], source, specimen_by_name),
         design_document=documents["design"],
-        grid=_read_grid(file["time_grid"], source),
+        grid=_read_grid(times, source),
         provenance=documents["provenance"],
         **name_lists,
         **columns,
@@ -305,18 +235,15 @@ def _read_law(document: Any, names: tuple[str, ...], source: str) -> CreepLaw:
     except LawError as error:
         raise DatasetError(str(error)) from None
     if tuple(law.names) != names:
-        found = f"its parameters are {', '.join(names)}, those of its law {', '.join(law.names)}"
-        raise DatasetError(f"{source}: {found}; the file is damaged")
+        raise _damaged(source, f"its parameters are {', '.join(names)}, those of its law {', '.join(law.names)}")
     return law
 
 
 def _read_grid(array: h5py.Dataset, source: str) -> TimeGrid:
     relative = array.attrs.get("relative")
     if array.size > MOST_FRAMES or array.ndim != 1 or not isinstance(relative, bool | np.bool_):
-        raise DatasetError(
-            f"{source}: its time grid is {array.dtype} {array.shape}, relative {quoted_value(relative)}; the file is "
-            "damaged"
-        )
+        found = f"{array.dtype} {array.shape}, relative {quoted_value(relative)}"
+        raise _damaged(source, f"its time grid is {found}")
     try:
         return TimeGrid(array[:], bool(relative))
     except DatasetError as error:
@@ -328,30 +255,15 @@ def read_samples(file: h5py.File, header: Dataset, accepted_only: bool = False) 
     reasons = file["reasons"][:]
     selected = reasons == 0 if accepted_only else np.ones(len(reasons), dtype=bool)
     columns: dict[str, Any] = {name: _read_rows(file[name], selected, COLUMNS[name].memory_type) for name in COLUMNS}
+    rows = stored_array(file, "failures/rows", "i", file.filename)
+    texts = stored_array(file, "failures/texts", "O", file.filename)
+    if rows.shape != texts.shape or rows.ndim != 1 or not np.isin(rows[:], np.arange(len(reasons))).all():
+        raise _damaged(file.filename, "its failures are not of samples, each with one text")
     new_row = {int(row): k for k, row in enumerate(np.flatnonzero(selected))}
-    failures = {new_row[row]: text for row, text in _read_failures(file, len(reasons)).items() if row in new_row}
+    pairs = zip(rows[:].tolist(), texts.asstr()[:].tolist(), strict=True)
+    failures = {new_row[row]: printable(text) for row, text in pairs if row in new_row}
     check_values(columns, header, file.filename)
     return replace(header, **columns, failures=failures)
-
-
-def _read_failures(file: h5py.File, samples: int) -> dict[int, str]:
-    """{row: why it failed}; DatasetError for rows that are none, and for texts that no file of this size holds."""
-    source = file.filename
-    rows = stored_array(file, "failures/rows", "i", source)
-    texts = stored_array(file, "failures/texts", "O", source)
-    size = max(Path(source).stat().st_size, 1)
-    numbers = rows[:].tolist() if rows.ndim == 1 and rows.shape == texts.shape else [-1]
-    if len(set(numbers)) < len(numbers) or not all(0 <= row < samples for row in numbers):
-        raise DatasetError(f"{source}: its failures are not of samples, each with one text; the file is damaged")
-    found: list[str] = []
-    length, block = 0, max(_TEXT_BYTES // size, 1)  # every text may refer to all that the file holds
-    for start in range(0, len(numbers), block):
-        words = texts.asstr()[start : start + block].tolist()
-        length += sum(map(len, words))
-        if length > size or steering("".join(words)):
-            raise DatasetError(f"{source}: a text of its failures is none that creepkit wrote; the file is damaged")
-        found += words
-    return dict(zip(numbers, found, strict=True))
 
 
 def _read_rows(dataset: h5py.Dataset, selected: Bools, dtype: type, block: int = 4096) -> NDArray[Any]:

@@ -126,7 +126,7 @@ class FormOptions(TypedDict, total=False):
 
 
 @dataclass(frozen=True, eq=False)
-class TemperatureStudy(Presentable):
+class TemperatureStudy(Presentable, text="reports.temperature_law:temperature_study_text"):
     """The result of temperature_study().
 
     tests : with the moduli found, where they were. moduli_fit : None where no modulus could be identified.

@@ -30,7 +30,7 @@ _T0_BOUNDS = (100.0, 3000.0)
 
 
 @dataclass(frozen=True, eq=False)
-class ModulusEstimates(Presentable):
+class ModulusEstimates(Presentable, text="reports.temperature_law:modulus_estimates_text"):
     """What the first frames say of the modulus.
 
     names : of the tests. temperatures : (tests,) K; values, sd : (tests,) MPa.

@@ -130,7 +130,7 @@ class CandidateLaw:
 
 
 @dataclass(frozen=True, eq=False)
-class TemperatureLaw(Presentable):
+class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_text"):
     """The result of discover() and of refit().
 
     law : an ordinary law with temperature in it, printed and exported like any other; `valued` has its numbers.
@@ -203,7 +203,7 @@ class TemperatureLaw(Presentable):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Parameters against temperature, with intervals and the curves of the forms that remain."""
-        return present(self, "plot", path)
+        return present("reports.temperature_law:plot_temperature_law", self, path)
 
 
 def temperature_law_from_combinations(

@@ -76,7 +76,7 @@ class PlannedTest:
 
 
 @dataclass(frozen=True)
-class Design(Presentable):
+class Design(Presentable, text="reports.design:design_text"):
     """The next tests, the best first.
 
     goal : "parameters", "law", or the name of a quantity. laws, weights : that remain, the best first.
@@ -116,11 +116,11 @@ class Design(Presentable):
 
     def to_json(self) -> dict[str, object]:
         """Laws, advice, plan and every test considered, as JSON-able data."""
-        return present(self, "to_json")
+        return present("reports.design:design_to_json", self)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Map of what each candidate tells for an hour of machine time, over load and duration; written to `path`."""
-        return present(self, "plot", path)
+        return present("reports.design:design_figure", self, path)
 
 
 def machine_time_text(hours: float) -> str:

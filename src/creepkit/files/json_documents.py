@@ -10,16 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from creepkit.errors import LONGEST_QUOTE, nearest, quoted
-from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, read_text
 from creepkit.files.writing import write_text
 
 MAXIMUM_DEPTH = 200
 """Lists and objects inside one another; the equations of laws are the deepest, with some 60."""
-
-
-MAXIMUM_CONTAINERS, MAXIMUM_ENTRIES = 1_500_000, 5_000_000
-"""Lists, objects and keys of a document together, which take up to 300 bytes each, and entries of them, up to 60."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +68,6 @@ def read_json(path: Path, kind: FileKind) -> Any:
 
 def parse_json(text: str, source: str, kind: FileKind) -> Any:
     """The data of a JSON text; the error of `kind`, naming `source`, for any other text."""
-    _check_counts(text, source, kind)
     try:
         data = json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_no_constant, parse_float=_finite_number)
         _check_depth(data)
@@ -160,19 +154,6 @@ def check_keys(data: Mapping[str, Any], allowed: tuple[str, ...], place: str, *,
     return f"{place}: '{missing[0]}' is missing" if missing and not optional else ""
 
 
-def _check_counts(text: str, source: str, kind: FileKind) -> None:
-    """The error of `kind` for a text that would take too much time and memory, by its marks, before it is parsed."""
-    for noun, found, usual in (
-        ("lists, objects and keys", text.count("[") + text.count("{") + text.count(":"), MAXIMUM_CONTAINERS),
-        ("entries", text.count(","), MAXIMUM_ENTRIES),
-    ):
-        if found > usual and found > (most := raised(usual)):
-            raise kind.error(
-                f"{source}: some {found} {noun}, more than {most}, which {kind.noun} never has; {kind.advice}, or "
-                f"{how_to_raise(found, most)}"
-            )
-
-
 class _JsonError(ValueError):
     """Text that Python takes for JSON, and JSON does not."""
 
@@ -197,17 +178,10 @@ def _finite_number(text: str) -> float:
     return value
 
 
-def _check_depth(data: Any) -> None:
-    """RecursionError beyond the largest depth; by levels, so that the check itself cannot recurse too deep."""
-    level, depth = [data], 0
-    while level:
-        depth += 1
-        if depth > MAXIMUM_DEPTH:
-            raise RecursionError
-        inner: list[Any] = []
-        for item in level:
-            if isinstance(item, dict):
-                inner.extend(value for value in item.values() if isinstance(value, dict | list))
-            elif isinstance(item, list):
-                inner.extend(value for value in item if isinstance(value, dict | list))
-        level = inner
+def _check_depth(data: Any, depth: int = 1) -> None:
+    """RecursionError beyond the largest depth, before what reads the data meets one."""
+    if depth > MAXIMUM_DEPTH:
+        raise RecursionError
+    for item in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
+        if isinstance(item, dict | list):
+            _check_depth(item, depth + 1)

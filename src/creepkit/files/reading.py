@@ -1,36 +1,29 @@
-"""Opening files that a user hands over: regular files only, of limited size, text in UTF-8, one clear error for all.
-
-A file with holes (a "sparse" one) may say to be of terabytes and take up nothing: one of which hardly anything is
-stored is refused.
-"""
+"""Opening files that a user hands over: regular files only, of limited size, text in UTF-8, one clear error for all."""
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
 from creepkit.errors import CreepkitError, quoted
 from creepkit.files.limits import how_to_raise, raised
-from creepkit.files.owners import check_owner
 
 DEFAULT_MAXIMUM_BYTES = 50_000_000
 """Bytes; no document of creepkit is near it, and a reader must not load what memory cannot hold."""
 
 
+MAXIMUM_UNPACKED_BYTES = 500_000_000
+"""Of all that a compressed file holds together."""
+
+
 PIECE_BYTES = 1_000_000
 """Bytes that are read at once."""
-
-
-SMALL_BYTES, LEAST_STORED, MOST_PARTS = 1_000_000, 0.01, 10_000
-"""Up to which size a file may consist of holes; the share of a larger one that has to be stored, since compressing file
-systems store no fewer than that of numbers; and the parts between holes that are counted."""
 
 
 @dataclass(frozen=True)
@@ -39,15 +32,13 @@ class FileKind:
 
     noun : with its article, as messages name it: "an identification". error : what is raised for a file of this kind.
     advice : what to do about a file that is something else. maximum_bytes : largest size that is read, unless
-    `limits.VARIABLE` allows more. own : whether files of other users are refused, because what lies there counts as
-    work of ours that was begun or finished before.
+    `limits.VARIABLE` allows more.
     """
 
     noun: str
     error: type[CreepkitError]
     advice: str
     maximum_bytes: int = DEFAULT_MAXIMUM_BYTES
-    own: bool = False
 
     @property
     def most_bytes(self) -> int:
@@ -62,20 +53,9 @@ _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY
 def check_readable(path: Path, kind: FileKind) -> None:
     """Raise the error of `kind` unless `path` is a regular file that can be opened and is not too large.
 
-    For files that a library opens by name (see `private_copies`); all others are opened by `read_bytes` and
-    `read_text`.
+    For files that a library opens by name; all others are opened by `read_bytes` and `read_text`.
     """
     os.close(_open_regular(path, kind))
-
-
-@contextmanager
-def opened_regular(path: Path, kind: FileKind) -> Iterator[int]:
-    """The descriptor of a regular file of at most `kind.maximum_bytes`, open for reading."""
-    descriptor = _open_regular(path, kind)
-    try:
-        yield descriptor
-    finally:
-        os.close(descriptor)
 
 
 def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes:
@@ -106,7 +86,7 @@ def read_range(path: Path, kind: FileKind, start: int, count: int) -> bytes:
 
 
 @contextmanager
-def open_binary(path: Path, kind: FileKind) -> Iterator[BinaryIO]:
+def open_binary(path: Path, kind: FileKind) -> Iterator[BufferedReader]:
     """A regular file of at most `kind.maximum_bytes`, open for reading part by part; its error where reading fails."""
     descriptor = _open_regular(path, kind)
     try:
@@ -117,17 +97,12 @@ def open_binary(path: Path, kind: FileKind) -> Iterator[BinaryIO]:
 
 
 def sha256_of(path: Path, kind: FileKind) -> str:
-    """SHA-256 of the content of a regular file, of at most the bytes that it has when it is opened."""
-    digest = hashlib.sha256()
+    """SHA-256 of the content of a regular file."""
     with open_binary(path, kind) as stream:
-        remaining = os.fstat(stream.fileno()).st_size
-        while remaining > 0 and (piece := stream.read(min(remaining, PIECE_BYTES))):
-            digest.update(piece)
-            remaining -= len(piece)
-    return digest.hexdigest()
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _read_pieces(stream: BinaryIO, limit: int) -> bytes:
+def _read_pieces(stream: BufferedReader, limit: int) -> bytes:
     """At most `limit` bytes; piece by piece, for to ask for all at once would reserve memory for the limit."""
     pieces: list[bytes] = []
     while limit > 0 and (piece := stream.read(min(limit, PIECE_BYTES))):
@@ -164,45 +139,10 @@ def _open_regular(path: Path, kind: FileKind, *, any_size: bool = False) -> int:
         problem = f"{path}: is no regular file but a device, a pipe or the like; {kind.advice}"
     elif not any_size and status.st_size > kind.most_bytes:
         problem = _too_large(path, kind, status.st_size)
-    elif _has_holes(descriptor, status):
-        problem = (
-            f"{path}: nearly all of its {status.st_size / 1e6:g} MB are holes, which are not stored; {kind.advice}, "
-            "or copy it so that they are (cp --sparse=never)"
-        )
-    try:
-        if problem:
-            raise kind.error(problem)
-        if kind.own:
-            check_owner(path, status, kind.error)
-    except CreepkitError:
+    if problem:
         os.close(descriptor)
-        raise
+        raise kind.error(problem)
     return descriptor
-
-
-def _has_holes(descriptor: int, status: os.stat_result) -> bool:
-    """Whether hardly anything of a large file is stored.
-
-    The blocks that it takes up say so in most cases; those of compressing and of remote file systems may be few or
-    none for other reasons, so that the parts with data are asked for as well.
-    """
-    size, blocks = status.st_size, getattr(status, "st_blocks", None)
-    if size <= SMALL_BYTES or blocks is None or blocks * 512 >= LEAST_STORED * size or not hasattr(os, "SEEK_HOLE"):
-        return False
-    stored, place = 0, 0
-    try:
-        for _ in range(MOST_PARTS):
-            start = os.lseek(descriptor, place, os.SEEK_DATA)
-            place = os.lseek(descriptor, start, os.SEEK_HOLE)
-            stored += place - start
-            if stored >= LEAST_STORED * size or place >= size:
-                break
-    except OSError as error:
-        if error.errno != errno.ENXIO:  # no data behind this place
-            return False  # a file system that does not say
-    finally:
-        os.lseek(descriptor, 0, os.SEEK_SET)
-    return stored < LEAST_STORED * size
 
 
 def _too_large(path: Path, kind: FileKind, size: int) -> str:

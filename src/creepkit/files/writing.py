@@ -1,7 +1,9 @@
 """Writing files: whole or not at all, never through links or into devices, and never over what creepkit did not write.
 
-A file is creepkit's own while its content is what creepkit wrote under its name (see written_lists). Any other file is
-replaced by force alone, and so is one that was made from another study or measured file than the new one.
+What is written takes a temporary name in the same folder, then its own. RECORD lists what creepkit wrote in a folder,
+a line of JSON for each content: [name, bytes and SHA-256, what it was made from]. A file is creepkit's own while its
+content is listed under its name; any other file is replaced by force alone, and so is one that was made from another
+study or measured file than the new one. Without the list nothing is lost: its files then need force.
 
 Files in folders that creepkit keeps for itself (shards, caches) are `internal`: always replaced, and listed nowhere.
 """
@@ -9,89 +11,87 @@ Files in folders that creepkit keeps for itself (shards, caches) are `internal`:
 from __future__ import annotations
 
 import errno
+import json
 import os
+import secrets
+import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Literal
 
-from creepkit.checked_arguments import checked
-from creepkit.errors import CreepkitError
-from creepkit.files.temporary_names import is_temporary
-from creepkit.files.unfinished_files import ReplacedError, UnfinishedFile, is_own
-from creepkit.files.written_lists import is_foreign, note_written, other_origin
+from creepkit.errors import CreepkitError, quoted
+from creepkit.files.reading import FileKind, read_text, sha256_of
 
-ForeignRule = Literal["refuse", "beside", "replace"]
-"""What becomes of a result whose target is not creepkit's own: none is written, or under another name, or over it."""
+RECORD = ".creepkit-written"
+"""The list of what creepkit wrote in a folder."""
 
 
-_foreign_rule: ContextVar[ForeignRule] = ContextVar("foreign_rule", default="refuse")
+ADVICE = "choose a file in a folder that exists and has space"
 
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Numbers of errors of a disk, or of a user's share of it, that takes no more."""
 
 
-ADVICE = "choose a file in a folder that exists and has space"
+_RECORD_FILE = FileKind("a list of written files", CreepkitError, "remove it")
+_ANY_FILE = FileKind("a result", CreepkitError, "choose another name", maximum_bytes=2**62)
 
 
-@checked
+_force: ContextVar[bool] = ContextVar("force", default=False)
+_origin: ContextVar[str] = ContextVar("origin", default="")
+
+
 @contextmanager
-def overwriting(rule: ForeignRule = "replace") -> Iterator[None]:
-    """Allow files that creepkit did not write to be replaced by what is written in this block.
-
-    rule : "replace"; "refuse", as it is outside; or "beside", with which a result whose target is foreign is kept
-        under another name before that is said: for work that began when the target was free.
-    """
-    token = _foreign_rule.set(rule)
+def overwriting() -> Iterator[None]:
+    """Allow files that creepkit did not write to be replaced by what is written in this block."""
+    token = _force.set(True)
     try:
         yield
     finally:
-        _foreign_rule.reset(token)
+        _force.reset(token)
+
+
+@contextmanager
+def made_from(path: str | Path) -> Iterator[None]:
+    """Note with each file that is written in this block what it was made from, and keep those that were not.
+
+    For results whose names are not chosen by who calls the command, but stand in a study or in a measured file: names
+    such as D1 are the same for many recordings.
+    """
+    token = _origin.set(os.path.realpath(path) if str(path) else "")
+    try:
+        yield
+    finally:
+        _origin.reset(token)
 
 
 @contextmanager
 def replace_on_success(
     path: Path, error: type[CreepkitError], advice: str = ADVICE, *, force: bool = False, internal: bool = False
-) -> Iterator[UnfinishedFile]:
-    """A new file that takes the place of `path` at the end, and is removed when the writing fails.
+) -> Iterator[Path]:
+    """The temporary name of a file that takes the place of `path` at the end, and is removed when the writing fails.
 
     error : class of what is raised when the file cannot be written. advice : what to do then. force : whether a file
-    that creepkit did not write is replaced. internal : see above. Permissions of a file that is replaced are kept
-    where it is the user's.
+    that creepkit did not write is replaced. internal : see above.
     """
-    rule = "replace" if force or internal else _foreign_rule.get()
-    check_target(path, error, force=rule != "refuse")
-    unfinished: UnfinishedFile | None = None
+    check_target(path, error, force=force or internal)
+    temporary = temporary_name(path)
     try:
-        unfinished = UnfinishedFile(path)
-        yield unfinished
-        if internal:
-            unfinished.move_to(path)
-            return
-        unfinished.flush()
-        written = unfinished.summary()
-        if rule == "beside" and _is_kept(path):
-            raise error(_keep_beside(path, unfinished, written, "was made or changed by something else meanwhile"))
-        with suppress(OSError):
-            status = path.lstat()
-            if is_own(status):
-                unfinished.allow(stat.S_IMODE(status.st_mode) & 0o777)
-        note_written(path, *written)
-        try:
-            unfinished.move_to(path)
-        except PermissionError:  # although its folder takes files
-            kept = _keep_beside(path, unfinished, written, "cannot be replaced: another program holds it")
-            raise error(kept) from None
-    except ReplacedError as failure:
-        raise error(f"{path}: cannot be written: {failure}; choose a folder that nobody else may write to") from None
+        yield temporary
+        if not internal:
+            with suppress(OSError):
+                shutil.copymode(path, temporary)
+            _note_written(path, f"{temporary.stat().st_size} {sha256_of(temporary, _ANY_FILE)}")
+        os.replace(temporary, path)
     except OSError as failure:
-        raise error(f"{path}: cannot be written: {_cause(failure, advice)}") from None
+        message = os.strerror(failure.errno) if failure.errno else " ".join(str(failure).split())
+        remedy = "free some space and start again" if failure.errno in FULL else advice
+        raise error(f"{path}: cannot be written: {message}; {remedy}") from None
     finally:
-        if unfinished is not None:
-            unfinished.end()
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def write_text(
@@ -105,20 +105,9 @@ def write_bytes(
     content: bytes, path: Path, error: type[CreepkitError], *, force: bool = False, internal: bool = False
 ) -> Path:
     """Write a file whole or not at all, in the place of one that is there; as replace_on_success()."""
-    with replace_on_success(path, error, force=force, internal=internal) as unfinished:
-        unfinished.write_bytes(content)
+    with replace_on_success(path, error, force=force, internal=internal) as temporary:
+        temporary.write_bytes(content)
     return path
-
-
-def write_if_absent(path: Path, text: str) -> None:
-    """Write a file that the first of several writers decides; OSError when there is no space for it."""
-    unfinished = UnfinishedFile(path)
-    try:
-        unfinished.write_bytes(text.encode("utf-8"))
-        with suppress(FileExistsError):  # another process was faster; the caller compares what it wrote
-            unfinished.link_to(path)
-    finally:
-        unfinished.end()
 
 
 def check_target(path: Path, error: type[CreepkitError], *, force: bool = False) -> None:
@@ -127,8 +116,7 @@ def check_target(path: Path, error: type[CreepkitError], *, force: bool = False)
     Refused are folders, devices, pipes, symbolic links, files in folders that are missing or not open to writing,
     and, without `force`, files that are read-only or that creepkit did not write.
     """
-    problem = _problem(path, force=force or _foreign_rule.get() == "replace")
-    if problem:
+    if problem := _problem(path, force=force or _force.get()):
         raise error(f"{path}: cannot be written: {problem}")
 
 
@@ -146,25 +134,33 @@ def check_folder_target(folder: Path, error: type[CreepkitError], names: tuple[s
         check_target(folder / name, error)
 
 
+def temporary_name(path: Path) -> Path:
+    """A new name beside `path`; the beginning of a long name is enough, since 255 bytes are allowed."""
+    return path.with_name(f".{path.name[:40]}.{secrets.token_hex(4)}.part")
+
+
+def temporary_files(folder: Path) -> list[Path]:
+    """Files of a folder that processes were writing when they were killed, or are writing now."""
+    return [one for one in folder.glob(".*.????????.part") if one.is_file()]
+
+
 def remove_temporary_files(path: Path) -> None:
-    """Remove what processes that ended while they wrote `path` have left; none may be writing it now."""
-    for temporary in path.parent.iterdir():
-        if is_temporary(temporary, path):
+    """Remove what processes that were killed while they wrote `path` have left; none may be writing it now."""
+    for temporary in temporary_files(path.parent):
+        if temporary.name.startswith(f".{path.name[:40]}."):
             temporary.unlink(missing_ok=True)
-
-
-# ---- what a target is ----------------------------------------------------------------------------------------------
 
 
 def _problem(path: Path, *, force: bool) -> str:
     """Why nothing may be written to a path, and what to do; "" where it may."""
+    folder = path.absolute().parent
     try:
         mode = path.lstat().st_mode
     except FileNotFoundError:
-        return _folder_problem(path)
+        mode = stat.S_IFREG | 0o200
     except (OSError, ValueError) as failure:  # ValueError: a name with a null byte
-        cause = os.strerror(failure.errno) if isinstance(failure, OSError) and failure.errno else str(failure)
-        return f"{cause}; {ADVICE}"
+        return f"{getattr(failure, 'strerror', None) or failure}; {ADVICE}"
+    by_force = "choose another name, or overwrite it by force (--force, in Python creepkit.overwriting())"
     if stat.S_ISDIR(mode):
         return "it is a folder; name a file in it"
     if stat.S_ISLNK(mode):
@@ -172,49 +168,76 @@ def _problem(path: Path, *, force: bool) -> str:
         return f"it is a symbolic link to {target}, and nothing is written through links; name that file, or another"
     if not stat.S_ISREG(mode):
         return "it is a device, a pipe or the like; name a regular file"
-    if not force and not mode & 0o222:
-        return "it is there and read-only; choose another name, or overwrite it by force"
-    if not force and is_foreign(path):
-        return (
-            "it is there, and creepkit did not write it as it is now; choose another name, or overwrite it by force "
-            "(--force, in Python creepkit.overwriting())"
-        )
-    if not force and (origin := other_origin(path)):
-        return (
-            f"it is there, and creepkit made it {origin}; choose another name, or overwrite it by force (--force, in "
-            "Python creepkit.overwriting())"
-        )
-    return _folder_problem(path)
-
-
-def _is_kept(path: Path) -> bool:
-    """Whether a file is there that is replaced by force alone."""
-    return is_foreign(path) or bool(other_origin(path))
-
-
-def _folder_problem(path: Path) -> str:
-    folder = path.absolute().parent
     if not folder.is_dir():
         return f"there is no folder {path.parent}; {ADVICE}"
     if not os.access(folder, os.W_OK | os.X_OK):
         return f"the folder {path.parent} is not open to writing; {ADVICE}"
+    if not force and not mode & 0o222:
+        return f"it is there and read-only; {by_force}"
+    if not force and is_foreign(path):
+        return f"it is there, and creepkit did not write it as it is now; {by_force}"
+    if not force and (origin := _other_origin(path)):
+        return f"it is there, and creepkit made it {origin}; {by_force}"
     return ""
 
 
-# ---- the end of a writing, and failures -----------------------------------------------------------------------------
+# ---- the list of what was written ----------------------------------------------------------------------------------
 
 
-def _keep_beside(path: Path, unfinished: UnfinishedFile, written: tuple[str, int], reason: str) -> str:
-    """Give a result the first free name beside its own, whose file is foreign; the sentence that says so."""
-    for number in range(2, 1000):
-        other = path.with_name(f"{path.stem}-{number}{path.suffix}")
-        if not os.path.lexists(other):
-            note_written(other, *written)
-            unfinished.move_to(other)
-            return f"{path}: {reason}, and is left as it is; the result is {other}"
-    return f"{path}: {reason}, and is left as it is; the result is lost"
+def is_foreign(path: Path) -> bool:
+    """Whether a file is there that creepkit did not write as it is."""
+    return path.is_file() and _recorded_origin(path) is None
 
 
-def _cause(failure: OSError, advice: str) -> str:
-    message = os.strerror(failure.errno) if failure.errno else " ".join(str(failure).split())
-    return f"{message}; {'free some space and start again' if failure.errno in FULL else advice}"
+def is_listed(path: Path) -> bool:
+    """Whether creepkit wrote a file of this name in this folder, whatever it holds now."""
+    return path.name in _written(path.parent)
+
+
+def written_files(folder: Path, pattern: str = "*") -> list[Path]:
+    """Files of a folder, no links, that are as creepkit wrote them."""
+    return [one for one in folder.glob(pattern) if one.is_file() and not one.is_symlink() and not is_foreign(one)]
+
+
+def _recorded_origin(path: Path) -> str | None:
+    """What a file was made from, "" where that was not noted; None of a file that creepkit did not write as it is."""
+    size = path.stat().st_size
+    with suppress(CreepkitError):
+        if any(content.startswith(f"{size} ") for content in _written(path.parent).get(path.name, ())):
+            content = f"{size} {sha256_of(path, _ANY_FILE)}"
+            return _written(path.parent)[path.name].get(content)  # read anew: it names a content before that is there
+    return None
+
+
+def _other_origin(path: Path) -> str:
+    """How creepkit made a file that is there: "from X", if not from what is made from now; else ""."""
+    now, before = _origin_seen_from(path.parent), _recorded_origin(path) if path.is_file() else None
+    if not now or before is None or before == now:
+        return ""
+    return f"from {quoted(before, 120)}" if before else "by another command"
+
+
+def _origin_seen_from(folder: Path) -> str:
+    try:
+        return os.path.relpath(_origin.get(), os.path.realpath(folder)).replace(os.sep, "/") if _origin.get() else ""
+    except ValueError:  # on another drive
+        return _origin.get()
+
+
+def _written(folder: Path) -> dict[str, dict[str, str]]:
+    """{name: {bytes and SHA-256: origin}} of what creepkit wrote in a folder; other lines are passed over."""
+    contents: dict[str, dict[str, str]] = {}
+    with suppress(CreepkitError):
+        for line in read_text(folder / RECORD, _RECORD_FILE).splitlines():
+            with suppress(ValueError, TypeError):
+                name, content, origin = json.loads(line)
+                contents.setdefault(name, {})[str(content)] = origin
+    return contents
+
+
+def _note_written(path: Path, content: str) -> None:
+    """List a content; before it takes its place, so that a process that dies in between leaves no foreign file."""
+    origin = _origin_seen_from(path.parent)
+    if _written(path.parent).get(path.name, {}).get(content) != origin:
+        with suppress(OSError), open(path.parent / RECORD, "a", encoding="utf-8") as record:
+            record.write(json.dumps([path.name, content, origin]) + "\n")

@@ -43,7 +43,7 @@ DEFAULT_TARGETS: Mapping[str, Sequence[float]] = {"strain": (0.01,)}
 
 @checked
 @dataclass(frozen=True, eq=False)
-class Forecast(Presentable):
+class Forecast(Presentable, text="reports.forecast:forecast_text"):
     """What tests will show: the result of forecast().
 
     laws : {law: weight}; left_out : how many laws of a ranking have too little weight to count.
@@ -71,7 +71,7 @@ class Forecast(Presentable):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Curves with bands, measured points over them, times on the axis, and what the bands are made of."""
-        return present(self, "plot", path)
+        return present("reports.forecast_plot:forecast_figure", self, path)
 
 
 @checked_with_own_words("level", "targets", "tolerances")

@@ -31,7 +31,7 @@ MOST_ROWS = 200_000
 
 
 @dataclass(frozen=True, eq=False)
-class Imposed(Presentable):
+class Imposed(Presentable, text="reports.instrument_records:imposed_text"):
     """What one specimen was under, over the time of its history, which is zero where the first ramp of load starts.
 
     specimen : its name. channels : of load and temperature. time_zero : s, on the clock of the frames.

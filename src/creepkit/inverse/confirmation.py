@@ -72,7 +72,7 @@ class ConfirmedTest:
 
 
 @dataclass(frozen=True)
-class Confirmation(Presentable):
+class Confirmation(Presentable, text="reports.confirmation_text:confirmation_text"):
     """The result of confirm(). law, predictor_name : what was simulated, and by what."""
 
     law: str

@@ -86,7 +86,7 @@ class Fold:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CrossValidation(Presentable):
+class CrossValidation(Presentable, text="reports.confirmation_text:cross_validation_text"):
     """The result of cross_validate(): the fit to all histories, and its folds."""
 
     fit: Identification = field(repr=False)

@@ -47,7 +47,7 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 
 
 @dataclass(frozen=True, eq=False)
-class Identification(Presentable):
+class Identification(Presentable, text="reports.identification_text:identification_text"):
     """The result of identify().
 
     estimates : one Estimate for each parameter, in the order of the law.
@@ -118,7 +118,7 @@ class Identification(Presentable):
 
     def comments(self, verdict: str = "") -> list[str]:
         """Intervals, validity and provenance as lines, with the verdict of a comparison of laws where there was one."""
-        return present(self, "comments", verdict)
+        return present("reports.identification_text:identification_comments", self, verdict)
 
     @property
     def coordinates(self) -> Coordinates:
@@ -330,7 +330,7 @@ class Identification(Presentable):
             predictor = using
         else:
             raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")
-        return cast(Identification, present(self, "with_histories", tests, predictor))
+        return cast(Identification, present("inverse.attached_histories:with_attached", self, tests, predictor))
 
     def _predictor_or(self, using: Predictor | None) -> Predictor:
         """The predictor given, or the identification's own; FitError where a file does not give it."""
@@ -349,31 +349,33 @@ class Identification(Presentable):
 
         options : targets, tolerances, using, draws, progress, as creepkit.forecast() takes them.
         """
-        return present(self, "forecast", tests, level=level, **options)
+        return present("forecasts.forecast:forecast", self, tests, level=level, **options)
 
     def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> Any:
         """The ProfileLikelihood of a parameter, by name, or of another quantity (see uncertainty.quantities)."""
-        return present(self, "profile", quantity, level=level)
+        return present("inverse.uncertainty.profile_likelihood:profile", self, quantity, level=level)
 
     def sample(self, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None) -> Any:
         """PosteriorSamples by Markov chains (emcee, an optional dependency); `using` may be a surrogate."""
-        return present(self, "sample", walkers=walkers, steps=steps, seed=seed, using=using)
+        return present(
+            "inverse.uncertainty.posterior:sample_posterior", self, walkers=walkers, steps=steps, seed=seed, using=using
+        )
 
     def correlation(self, coordinates: Literal["author", "conditioned"] = "author") -> Any:
         """The Correlation of the estimates, of the author's parameters or of the conditioned coordinates."""
-        return present(self, "correlation", coordinates)
+        return present("inverse.uncertainty.correlation:correlation", self, coordinates)
 
     def undetermined(self) -> tuple[str, ...]:
         """What these tests do not determine, and which combination they do, one sentence each."""
-        return present(self, "undetermined")
+        return present("inverse.uncertainty.correlation:undetermined", self)
 
     def save(self, path: str | Path) -> Path:
         """Write the identification as JSON (to a temporary name, then renamed)."""
-        return present(self, "save", Path(path))
+        return present("inverse.identification_document:write_identification", self, Path(path))
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Measured against identified, and residuals; written to `path` when given."""
-        return present(self, "plot", path)
+        return present("reports.identification_plot:identification_figure", self, path)
 
     @property
     def _quantile(self) -> float:

@@ -33,7 +33,7 @@ from creepkit.files.json_documents import (
 )
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError
-from creepkit.files.written_lists import is_foreign
+from creepkit.files.writing import is_foreign
 from creepkit.inverse.composite_predictor import predictors_for_law
 from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.identification import Identification

@@ -1,153 +1,17 @@
-"""Progress of sharded work: a lock for each shard, the record of finished shards, and the rate with the time left.
-
-The operating system releases a lock when its process dies. The lock file names the sample being simulated, so that a
-sample that kills its process is known. It counts as such only where the process that gave the shard out has seen the
-death and goes on: where all of them are ended, by a batch system for example, the sample is not to blame. On a file
-system without locks a shard may be simulated twice, with the same result, and counts once.
-"""
+"""Progress of sharded work: the record of finished shards, and the rate with the time left."""
 
 from __future__ import annotations
 
-import errno
 import itertools
-import os
 import re
-import stat
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
-from types import TracebackType
 from typing import TypeAlias
 
 from creepkit import limits
-from creepkit.errors import CreepkitError, DatasetError
-from creepkit.files.locking import lock_file
-from creepkit.files.owners import check_owner, check_owner_by_name
+from creepkit.errors import DatasetError
 from creepkit.jobs.worker_process import ShardedJob
-
-OPEN_FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_NOINHERIT", "O_BINARY"))
-"""Neither through a link to another file, nor waiting for a pipe; a flag counts where the system has it."""
-
-
-MOST_DIGITS = 19
-"""Digits of the number of a sample; longer ones are damage."""
-
-
-DIED, INTERRUPTED = b"died", b"interrupted"
-"""What a lock file says of a sample: its process died and ours saw it, or all processes of the work were ended."""
-
-
-GRACE = 1.0
-"""s for which a process that sees another one die must outlive it: a batch system ends both, one after the other."""
-
-
-class ShardLock:
-    """The lock of a shard; a context, `held` in it when no other process has it.
-
-    The file is its owner's alone: whoever may read a file may lock it. `error` is raised for that of another user.
-
-    deaths : {sample: how often its process died in it, while the one that gave it the shard went on}.
-    interruptions : {sample: how often it was being simulated when all processes of the work were ended}.
-    """
-
-    def __init__(self, path: Path, error: type[CreepkitError] = DatasetError) -> None:
-        self._path = path
-        self._error = error
-        self._file = -1
-        self._last_started: int | None = None
-        self._removed_at_exit = False
-        self.held = False
-        self.deaths: Counter[int] = Counter()
-        self.interruptions: Counter[int] = Counter()
-
-    def __enter__(self) -> ShardLock:
-        check_owner_by_name(self._path, self._error)
-        self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | OPEN_FLAGS, 0o600)
-        try:
-            status = os.fstat(self._file)
-            if not stat.S_ISREG(status.st_mode):
-                raise OSError(errno.EINVAL, f"{self._path.name} is no regular file", str(self._path))
-            check_owner(self._path, status, self._error)
-            if hasattr(os, "fchmod"):
-                with suppress(OSError):  # of root's, or on a file system without modes
-                    os.fchmod(self._file, 0o600)
-            self.held = lock_file(self._file)
-            if self.held:
-                self._read()
-        except BaseException:
-            os.close(self._file)
-            raise
-        return self
-
-    def record_start(self, sample: int) -> None:
-        """Note that a sample is being simulated now."""
-        self._write(b"%d\n" % sample)
-
-    def count_death(self) -> None:
-        """Count that the process that simulated last has died, and not been ended with all others of the work."""
-        if self._last_started is not None:
-            self.interruptions[self._last_started] -= 1
-            self.deaths[self._last_started] += 1
-            self._last_started = None
-
-    def remove(self) -> None:
-        """Take the file away: the shard is done; on Windows, where an open file stays, after it is closed."""
-        try:
-            self._path.unlink(missing_ok=True)
-        except PermissionError:
-            self._removed_at_exit = True
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self.held:  # what ends here, be it by an error, has not died
-            self._write(b"")
-        os.close(self._file)
-        if self._removed_at_exit:
-            with suppress(OSError):  # another process may have opened it since
-                self._path.unlink()
-
-    def _read(self) -> None:
-        """Read what is known of samples: lines "died 7", "interrupted 7", and last "7", the one that was begun last."""
-        for line in os.read(self._file, 1 << 20).splitlines():
-            *words, number = line.split() or [b""]
-            if not number.isdigit() or len(number) >= MOST_DIGITS:
-                continue
-            self._last_started = int(number) if not words else None
-            if words == [DIED]:
-                self.deaths[int(number)] += 1
-            elif words == [INTERRUPTED]:
-                self.interruptions[int(number)] += 1
-        if self._last_started is not None:
-            self.interruptions[self._last_started] += 1
-
-    def _write(self, begun: bytes) -> None:
-        """Write what is known of samples, and the line of the one that begins now."""
-        known = (
-            b"%s %d\n" % (word, sample)
-            for word, counts in ((DIED, self.deaths), (INTERRUPTED, self.interruptions))
-            for sample in counts.elements()
-        )
-        content = b"".join(known) + begun
-        os.lseek(self._file, 0, os.SEEK_SET)
-        os.ftruncate(self._file, 0)
-        os.write(self._file, content)
-
-
-def count_death(path: Path) -> None:
-    """Count the death of a process that held the lock of a shard, seen by this one, which goes on.
-
-    The lock is held meanwhile for GRACE, so that nothing is counted where this process is ended as well, and no other
-    takes the shard up.
-    """
-    with ShardLock(path) as lock:
-        if lock.held:
-            time.sleep(GRACE)
-            lock.count_death()
-
 
 MOST_DRAWS_WITHOUT_ACCEPTED = 16384
 """Draws after which a design is given up of which none was accepted."""
@@ -159,7 +23,7 @@ class ProgressRecord:
 
     samples : accepted ones wanted; or draws : rows wanted, accepted or not. part : (k, n), only shards k-1, k-1+n ...,
         and as many samples as make an n-th of all.
-    done : {shard: accepted samples} of this part. running : shards that are being simulated, here or elsewhere.
+    done : {shard: accepted samples} of this part. running : shards that are being simulated.
     """
 
     job: ShardedJob

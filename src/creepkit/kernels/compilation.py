@@ -12,10 +12,8 @@ import hashlib
 import os
 import re
 import shutil
-import stat
 import sys
 import tempfile
-import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache, lru_cache, partial
@@ -26,9 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats, frozen
-from creepkit.errors import CacheWarning
-from creepkit.files.cache_folders import cache_folder, is_marked
-from creepkit.files.owners import SharedFolderError, check_own, check_private
+from creepkit.files.cache_folders import cache_folder, is_ours_alone
 from creepkit.kernels.interface import CompiledLaw, Entry
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, expression_source, law_comments
 from creepkit.kernels.llvm_code import Module, add_entry
@@ -52,22 +48,11 @@ def load_module(key: str, source: Callable[[], str]) -> ModuleType:
     """Return the module of `key`: from memory, from disk, or made from source() now."""
     if key not in _loaded_modules:
         cache_of_kernels = cache_folder(KERNELS)
-        if cache_of_kernels is None:
-            _loaded_modules[key] = _execute_module(key, Path(f"law_{key}"), _made_files(source()))
-            return _loaded_modules[key]
-        folder = cache_of_kernels / f"law_{key}"
-        files, shared = None, False
-        try:
-            files = _stored_files(folder)
-        except SharedFolderError as error:
-            shared = True
-            _warn(
-                f"{error}, so that the law is neither read from there nor kept there, and every process compiles it "
-                f"anew; delete it, or set CREEPKIT_CACHE to a folder of your own"
-            )
+        folder = (cache_of_kernels or Path()) / f"law_{key}"
+        files = None if cache_of_kernels is None else _stored_files(folder)
         if files is None:
             files = _made_files(source())
-            if not shared:
+            if cache_of_kernels is not None:
                 _store(folder, files)
         _loaded_modules[key] = _execute_module(key, folder, files)
     return _loaded_modules[key]
@@ -77,52 +62,20 @@ KERNELS = "kernels"
 """Name of the cache folder."""
 
 
-def is_intact(folder: Path) -> bool:
-    """Whether a folder holds source, code and their seal, unchanged, nothing else, and nobody else can write to it."""
-    try:
-        return _stored_files(folder) is not None
-    except SharedFolderError:
-        return False
-
-
 # ---- reading -------------------------------------------------------------------------------------------------------
 
 
 def _stored_files(folder: Path) -> dict[str, bytes] | None:
-    """Source and code of an intact folder, {name: content}, else None; SharedFolderError where others can write."""
-    names = (SOURCE_FILE, CODE_FILE, CHECKSUM_FILE)
+    """Source and code of a folder, {name: content}; None unless they are as they were written, and ours alone."""
     try:
-        check_private(folder.parent)
-        status = os.lstat(folder)
-        if not stat.S_ISDIR(status.st_mode):
+        paths = [folder / name for name in (SOURCE_FILE, CODE_FILE, CHECKSUM_FILE)]
+        if not all(is_ours_alone(path) for path in (folder, *paths)):
             return None
-        check_own(folder, status)
-        if {*os.listdir(folder)} != {*names}:
-            return None
-        contents = {name: _content(folder / name) for name in names}
+        contents = {path.name: path.read_bytes() for path in paths}
     except OSError:
         return None
     seal = contents.pop(CHECKSUM_FILE)
     return contents if seal == _seal(contents) else None
-
-
-_NEITHER_LINK_NOR_WAIT = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
-
-
-def _content(path: Path) -> bytes:
-    """The content of a regular file; OSError for links, pipes and devices, which are not waited for."""
-    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | _NEITHER_LINK_NOR_WAIT)) as stream:
-        status = os.fstat(stream.fileno())
-        if not stat.S_ISREG(status.st_mode):
-            raise OSError(f"{path} is not a regular file")
-        check_own(path, status)
-        return stream.read()
-
-
-@cache
-def _warn(sentence: str) -> None:
-    """Warn once."""
-    warnings.warn(sentence, CacheWarning, stacklevel=3)
 
 
 # ---- making and loading --------------------------------------------------------------------------------------------
@@ -144,30 +97,10 @@ def _store(folder: Path, files: dict[str, bytes]) -> None:
             for name, content in {**files, CHECKSUM_FILE: _seal(files)}.items():
                 (temporary / name).touch(mode=0o600)
                 (temporary / name).write_bytes(content)
-            _install_folder(temporary, folder)
+            shutil.rmtree(folder, ignore_errors=True)  # one whose checksums do not match
+            os.rename(temporary, folder)  # fails where another process has just done it
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _install_folder(temporary: Path, folder: Path) -> None:
-    """Rename the new folder into place; an intact one that is there already stays, a damaged one goes.
-
-    Only in a cache folder that creepkit has marked as its own is anything removed.
-    """
-    if os.path.lexists(folder) and is_marked(folder.parent) and not is_intact(folder):
-        _remove_folder(folder)
-    os.rename(temporary, folder)  # fails where another process has just done it
-
-
-def _remove_folder(folder: Path) -> None:
-    """Take a folder away whole, so that no process sees half of it."""
-    temporary = tempfile.mkdtemp(dir=folder.parent, prefix="damaged_")
-    try:
-        os.replace(folder, Path(temporary) / folder.name)
-    except FileNotFoundError:  # another process has just done it
-        return
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _execute_module(key: str, folder: Path, files: dict[str, bytes]) -> ModuleType:

@@ -14,7 +14,7 @@ from creepkit.presentation import Presentable
 
 @checked
 @dataclass(frozen=True, eq=False)
-class ClockAlignment(Presentable):
+class ClockAlignment(Presentable, text="reports.instrument_records:alignment_text"):
     """Times of a camera as times of an instrument's record: t - zero + lag + drift (t - middle).
 
     zero : s on the camera's clock, at which the record's own time is zero where lag and drift are zero.

@@ -55,7 +55,7 @@ class Channel:
 
 @checked
 @dataclass(frozen=True, eq=False)
-class InstrumentRecord(Presentable):
+class InstrumentRecord(Presentable, text="reports.instrument_records:record_text"):
     """Channels that one instrument recorded over one clock.
 
     times : (rows,) s, strictly increasing, from the record's own zero. channels : {name: channel}.
@@ -145,4 +145,4 @@ class InstrumentRecord(Presentable):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Every channel over time, one panel for each quantity; written to a file if a path is given."""
-        return present(self, "plot", path)
+        return present("reports.instrument_records:record_figure", self, path)

@@ -72,8 +72,8 @@ def save_figure(figure: Figure, path: str | Path | None, error_type: type[Creepk
         target = Path(path)
         check_picture_format(target, error_type)
         resolution = min(RESOLUTION, LARGEST_PIXELS / max(figure.get_size_inches()))
-        with replace_on_success(target, error_type) as unfinished, unfinished.stream() as stream:
-            figure.savefig(stream, dpi=resolution, format=target.suffix.lower().lstrip("."))
+        with replace_on_success(target, error_type) as temporary:
+            figure.savefig(temporary, dpi=resolution, format=target.suffix.lower().lstrip("."))
     return figure
 
 

@@ -105,7 +105,7 @@ class RankedRuptureFit:
 
 
 @dataclass(frozen=True, eq=False)
-class RuptureAssessment(Presentable):
+class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
     """The result of rupture().
 
     ranked : methods, each with every degree that was tried, the highest weight first. rejected : {method: why it is
@@ -262,11 +262,11 @@ class RuptureAssessment(Presentable):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Isotherms with tests and bounds, the master curve, and predicted against measured times."""
-        return present(self, "plot", path)
+        return present("reports.rupture_plot:rupture_figure", self, path)
 
     def save(self, path: str | Path) -> Path:
         """Write the assessment to a JSON file."""
-        return present(self, "save", path)
+        return present("rupture_assessment.assessment_document:write_assessment", self, path)
 
 
 ISOTHERMAL_TOLERANCE = 5.0

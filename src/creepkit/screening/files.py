@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 ALLOY_RESULT = DocumentFormat(
     "creepkit-alloy-result",
     2,
-    FileKind("the result of an alloy", FitError, "remove it, and it is worked out again", own=True),
+    FileKind("the result of an alloy", FitError, "remove it, and it is worked out again"),
     remedy="remove it, and it is worked out again",
 )
 

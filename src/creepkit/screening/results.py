@@ -103,7 +103,7 @@ def mean_chi_square(fit: Identification) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class ScreeningResult(Presentable):
+class ScreeningResult(Presentable, text="reports.screening:screening_text"):
     """The result of screen().
 
     results : one for each alloy, in the order of their first tests. histories : {alloy: its tests}.
@@ -176,12 +176,12 @@ class ScreeningResult(Presentable):
 
     def to_csv(self, path: str | Path) -> Path:
         """Write one row an alloy: class, law, weight, values with intervals, rate, misfits, notes."""
-        return present(self, "to_csv", Path(path))
+        return present("screening.files:write_csv", self, Path(path))
 
     def to_hdf5(self, path: str | Path) -> Path:
         """Write everything that is a number: values, covariances, tests as measured and as predicted."""
-        return present(self, "to_hdf5", Path(path))
+        return present("screening.files:write_plate", self, Path(path))
 
     def plot(self, folder: str | Path) -> list[Path]:
         """Draw measured against identified displacement, misfit with and without sparsity, and shares of laws."""
-        return present(self, "plot", Path(folder))
+        return present("reports.screening:plot_screening", self, Path(folder))

@@ -7,6 +7,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import as_completed
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,13 +15,12 @@ from typing import Literal
 
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import FitError, HistoryError
-from creepkit.files.owners import check_owner_by_name
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets, check_penalty
 from creepkit.jobs.shard_progress import ProgressCallback, duration_text
-from creepkit.jobs.worker_pools import ProcessWorkers, WorkerDeaths, process_count
+from creepkit.jobs.worker_pools import ProcessWorkers, process_count
 from creepkit.jobs.worker_process import TaskResult, run_task
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
@@ -38,14 +38,6 @@ CANDIDATE_LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-si
 
 DENSE_LAW = "combined"
 """The law of Eq. (2), which is identified without sparsity."""
-
-
-MOST_WORKER_DEATHS = 2
-"""How often an alloy may kill its worker process."""
-
-
-POLL_INTERVAL = 1.0
-"""s to wait for results before it is checked which processes have died."""
 
 
 _log = logging.getLogger("creepkit.screening")
@@ -194,7 +186,6 @@ def _stored_result(job: ScreeningJob, number: int) -> AlloyResult | None:
     path = job.path(number)
     if not path.exists():
         return None
-    check_owner_by_name(path, FitError)
     try:
         result = files.read_result(path)
     except FitError as error:
@@ -218,17 +209,5 @@ def _run_job(job: ScreeningJob, pending: Sequence[int], processes: int) -> Itera
     if min(processes, len(pending)) <= 1:
         yield from (run_task(job, number) for number in pending)
         return
-    queue, deaths, remaining = list(reversed(pending)), WorkerDeaths(MOST_WORKER_DEATHS), len(pending)
     with ProcessWorkers(job, min(processes, len(pending))) as workers:
-        while remaining:
-            while workers.free_slots and queue:
-                workers.submit(queue.pop())
-            for outcome in workers.results(POLL_INTERVAL):
-                if outcome.status != "died":
-                    yield outcome
-                elif deaths.may_retry(outcome):
-                    queue.append(outcome.number)
-                    continue
-                else:
-                    yield replace(outcome, text=deaths.description(outcome))
-                remaining -= 1
+        yield from (future.result() for future in as_completed([workers.submit(number) for number in pending]))

@@ -13,9 +13,10 @@ from types import FunctionType
 from typing import Any, Literal
 
 from creepkit.errors import CreepkitError, StudyError
+from creepkit.files.locking import locked
 from creepkit.files.record_codec import RecordError, record_to_json
 from creepkit.inverse.kept_fits import COMPUTING, keep_fits
-from creepkit.jobs.shard_progress import ProgressCallback, ShardLock, duration_text, series_of_task
+from creepkit.jobs.shard_progress import ProgressCallback, duration_text, series_of_task
 from creepkit.records import History
 from creepkit.reports.contents import StageFailure
 from creepkit.studies.kept_results import ResultFolder, codec_of, key_of
@@ -61,8 +62,8 @@ def running_alone(folder: Path) -> Iterator[None]:
     """StudyError where another process is carrying out the same study; the system frees the lock of one that dies."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with ShardLock(folder / "running.lock", StudyError) as lock:
-            if not lock.held:
+        with locked(folder / "running.lock") as held:
+            if not held:
                 raise StudyError(f"{folder}: another process is carrying out this study; wait for it, or end it")
             yield
     except OSError as error:

@@ -148,7 +148,7 @@ def _strain_method(specimen: Specimen, name: str) -> Any:
     return getattr(specimen, name, None) if only_strain else None
 
 
-class Surrogate(Presentable, ABC):
+class Surrogate(Presentable, ABC, text="reports.surrogate:surrogate_text"):
     """A trained network in the place of a specimen; a records.Predictor.
 
     recipe, weights, metadata : what it was trained as, the arrays of its network, and what is known of its training.

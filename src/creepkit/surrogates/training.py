@@ -30,7 +30,7 @@ from creepkit.surrogates.recipe import ProgressCallback, SurrogateMetadata, Trai
 from creepkit.surrogates.surrogate import Recipe, Surrogate
 from creepkit.surrogates.training_loop import NetworkTraining
 from creepkit.surrogates.training_rows import dataset_fingerprint, output_deviation, trainable_samples, training_split
-from creepkit.surrogates.weight_files import CHECKPOINT, OWN_SURROGATE, read_weights, write_weights
+from creepkit.surrogates.weight_files import CHECKPOINT, read_weights, write_weights
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -161,7 +161,7 @@ def _training_metadata(
 
 def _load_finished(path: Path, request: dict[str, Any]) -> Surrogate:
     """The surrogate that the same call has written; SurrogateError where something else lies there."""
-    finished = load_surrogate(path, OWN_SURROGATE)
+    finished = load_surrogate(path)
     provenance = finished.metadata.provenance
     if any(provenance.get(name) != value for name, value in request.items()):
         raise SurrogateError(f"{path}: another surrogate is there already; remove it or choose another name")

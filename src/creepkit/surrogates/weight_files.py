@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,14 +29,13 @@ SURROGATE = DocumentFormat(
 """Eight layers of 2048 units of a GRU take 0.8 GB, and one of the default size 1 MB."""
 
 
-OWN_SURROGATE = replace(SURROGATE, kind=replace(SURROGATE.kind, own=True))
 """The result of the same training, which is not trained again."""
 
 
 CHECKPOINT = DocumentFormat(
     "creepkit-training-checkpoint",
     1,
-    FileKind("a checkpoint of a training", SurrogateError, "remove it to begin again", maximum_bytes=2**32, own=True),
+    FileKind("a checkpoint of a training", SurrogateError, "remove it to begin again", maximum_bytes=2**32),
     remedy="remove it to begin again",
 )
 """It holds the weights, the best ones, and two moments of each."""

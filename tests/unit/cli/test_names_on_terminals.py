@@ -21,8 +21,6 @@ BARS = ck.example_data("planted creep curves")
 WAYS_TO_PRINT = {
     "creepkit.reports.terminal": "the functions that all others call",
     "creepkit.cli.failures": "what ends the command line, before anything is imported and without stderr that works",
-    "creepkit.files.hdf5_walk": "the answers of a process to the one that started it",
-    "creepkit.files.hdf5_trial": "the questions to that process",
     "creepkit.cli.new_package": "nothing: it holds the text of a module",
 }
 

@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,7 +24,7 @@ from helpers.written_files import names_in
 
 def simulated(tmp_path, design=None, first=0, rows=32, seed=0, specimen=BAR):
     job = GenerationJob(design or Planted(), specimen, seed, tmp_path / "parts", rows)
-    return simulate_rows(job.design, job.header, seed, first, rows, lambda row: None)
+    return simulate_rows(job.design, job.header, seed, first, rows)
 
 
 @pytest.fixture
@@ -217,7 +216,7 @@ def test_a_foreign_hdf5_file(tmp_path):
         ("law", "{}", "this is not a law that creepkit wrote"),
         ("specimen", '{"name": "bar of soap", "fields": {}}', "'bar of soap' cannot be rebuilt here"),
         ("specimen", '{"name": "uniaxial", "fields": {"colour": 1}}', "'uniaxial' cannot be rebuilt here"),
-        ("specimen", "[]", "does not say its specimen"),
+        ("specimen", "[]", "the attribute 'specimen' is missing, or no record"),
         ("outputs", None, "the attribute 'outputs' is missing"),
         ("outputs", ["a", "b"], "the array 'values' is .*, which does not fit"),
     ],
@@ -248,9 +247,9 @@ def test_columns_that_are_not_numbers(data, tmp_path):
     path = storage.write_dataset(
         replace(data, parameters=np.where(data.parameters > 0, np.nan, 0.0)), tmp_path / "a.h5"
     )
-    assert "parameters of sample 0 (A) are not finite" in sentence(path)
+    assert "sample 0: its parameters or conditions are no numbers of its law" in sentence(path)
     path = storage.write_dataset(replace(data, reasons=np.full(32, 6)), tmp_path / "b.h5")
-    assert "reason of sample 0 is 6; allowed are -1 to 3" in sentence(path)
+    assert "sample 0: its reason is none" in sentence(path)
 
 
 def test_every_truncation_of_a_file_is_noticed(data, tmp_path):
@@ -349,26 +348,13 @@ def of_accepted(name, value):
     return change
 
 
-def gap(file):
-    """A frame amid the first accepted history is empty."""
-    file["values"][np.flatnonzero(file["reasons"][:] == 0)[0], 1] = np.nan
-
-
-def stored_in_one_piece(file):
-    """The numbers of samples in a piece that would be unpacked into 0.8 GB."""
-    values = file["index"][:]
-    del file["index"]
-    file.create_dataset("index", (32,), "i8", chunks=(100_000_000,), maxshape=(None,), compression="gzip")
-    file["index"].id.write_direct_chunk((0,), zlib.compress(values.tobytes()))
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (enormous, "says to have .* bytes, and holds"),
-        (replaced("reasons", np.zeros(32)), r"the array 'reasons' is float64 \(32,\), which does not fit"),
-        (replaced("parameters", np.zeros((32, 2), complex)), "'parameters' is complex128"),
-        (replaced("parameters", np.full((32, 2), b"1e-12")), "'parameters' is |S5"),
+        (enormous, "its arrays have more than 500 MB unpacked"),
+        (replaced("reasons", np.zeros(32)), "the array 'reasons' is missing, or is none of its kind"),
+        (replaced("parameters", np.zeros((32, 2), complex)), "the array 'parameters' is missing, or is none"),
+        (replaced("parameters", np.full((32, 2), b"1e-12")), "the array 'parameters' is missing, or is none"),
         (replaced("time_grid", np.array([0.0, np.nan, 1000.0, 3600.0])), "a time grid needs two or more finite times"),
         (replaced("time_grid", np.array([0.0, 100.0, 100.0, 3600.0])), "must start at or after 0 and increase"),
         (replaced("time_grid", np.zeros((4, 4))), r"its time grid is float64 \(4, 4\)"),
@@ -376,31 +362,23 @@ def stored_in_one_piece(file):
         (lambda file: file["time_grid"].attrs.__delitem__("relative"), "its time grid is .*, relative None"),
         (lambda file: file.__setitem__("marks", h5py.ExternalLink("b.h5", "/values")), "is a link to elsewhere"),
         (lambda file: file.__setitem__("marks", h5py.SoftLink("/values")), "is a link to elsewhere"),
-        (lambda file: file.create_dataset("x", (4,), "i4", external="x.bin"), "'/x' lies in other files"),
-        (lambda file: file.__setitem__("failures/again", file["failures"]), "links in a circle"),
+        (lambda file: file.create_dataset("x", (4,), "i4", external="x.bin"), "'x' is a link to elsewhere"),
         (lambda file: file.__delitem__("time_grid"), "the array 'time_grid' is missing"),
         (lambda file: file.__delitem__("failures"), "the array 'failures/rows' is missing"),
         (replaced("failures/rows", np.array([1, 2, 3])), "its failures are not of samples, each with one text"),
         (replaced("failures/rows", np.array([1.5])), "'failures/rows' is missing, or is none of its kind"),
         (replaced("failures/rows", np.array([10**9])), "its failures are not of samples"),
-        (replaced("failures/texts", ["\x1b[2J"], dtype=h5py.string_dtype()), "a text of its failures is none that"),
         (put_group("time_grid"), "the array 'time_grid' is missing, or is none of its kind"),
         (put_group("failures/texts"), "the array 'failures/texts' is missing, or is none of its kind"),
-        (of_accepted("status", 77), "the status of sample .* is 77; allowed are -1 to 4"),
-        (of_accepted("end_times", -5.0), "the history of sample .* has a gap, an infinite number or an end before"),
-        (of_accepted("values", np.inf), "sample .* was accepted and has no history|has a gap, an infinite number"),
-        (of_accepted("parameters", -1.0), "the parameter A of sample .* is below zero"),
-        (gap, "the history of sample .* has a gap"),
-        (stored_in_one_piece, "'/index' is stored in pieces of 800000000 bytes, more than 64000000"),
-        (replaced("index", np.arange(32), chunks=(32,), scaleoffset=0), r"stored by the HDF5 filters \[6\]"),
-        (lambda file: file.attrs.__setitem__("layout", 1.0), r"its layout is np.float64\(1.0\)"),
-        (lambda file: file.attrs.__setitem__("provenance", "[]"), "the attribute 'provenance' is no record"),
-        (lambda file: file.attrs.__setitem__("design", "3"), "the attribute 'design' is no record"),
+        (of_accepted("status", 77), "sample .*: its status is none"),
+        (of_accepted("parameters", -1.0), "its parameters or conditions are no numbers of its law"),
+        (lambda file: file.attrs.__setitem__("layout", 1.0), "its layout is 1.0, this"),
+        (lambda file: file.attrs.__setitem__("provenance", "[]"), "'provenance' is missing, or no record"),
+        (lambda file: file.attrs.__setitem__("design", "3"), "the attribute 'design' is missing, or no record"),
         (lambda file: file.attrs.__setitem__("law", "[" * 100_000), "its law: lists nested too deep"),
-        (lambda file: file.attrs.__setitem__("outputs", 3.0), "the attribute 'outputs' is no list of texts"),
+        (lambda file: file.attrs.__setitem__("outputs", 3.0), "the attribute 'outputs' is missing, or no list"),
         (lambda file: file.attrs.__setitem__("parameter_names", ["n", "A"]), "its parameters are n, A, those of its"),
         (lambda file: file.attrs.__setitem__("reason_texts", ["met"]), "not a text for each reason"),
-        (lambda file: file.attrs.__setitem__("condition_names", ["\x1b[2J"]), r"'condition_names' .* U\+001B"),
     ],
 )
 def test_what_a_file_promises_is_checked(data, tmp_path, change, message):
@@ -414,12 +392,12 @@ def test_an_accepted_sample_needs_a_history(data, tmp_path):
     values = np.array(data.values)
     values[row] = np.nan
     path = storage.write_dataset(replace(data, values=values), tmp_path / "a.h5")
-    assert f"sample {row} was accepted and has no history" in sentence(path)
+    assert f"sample {row}: its history is missing, though it was accepted" in sentence(path)
 
 
 def test_nothing_from_a_file_is_unpickled():
     """Pickles travel between a campaign and its workers, through pipes; none is read from a file."""
     sources = {path: path.read_text() for path in Path(creepkit.__file__).parent.rglob("*.py")}
     unpickling = {path.name for path, text in sources.items() if "pickle.load" in text}
-    assert unpickling == {"worker_start.py", "law_checks.py", "predictor_checks.py"}  # kits: of what they pickled
+    assert unpickling == {"worker_process.py", "law_checks.py", "predictor_checks.py"}  # kits: of what they pickled
     assert not any("allow_pickle" in text or "torch.load" in text for text in sources.values())

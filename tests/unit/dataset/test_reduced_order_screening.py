@@ -57,7 +57,7 @@ def test_without_a_number_of_seconds_a_burst_rules_nothing_out():
 def few(screened, rows=24):
     """Few rows of the paper's sampling domain of Norton's law, at three times, its stresses high."""
     design = sampling_design(NORTON, DIMPLE, "paper", every=21600.0, screened=screened)
-    return simulate_rows(design, empty_dataset(design, DIMPLE, {}), 1, 0, rows, lambda row: None)
+    return simulate_rows(design, empty_dataset(design, DIMPLE, {}), 1, 0, rows)
 
 
 @pytest.fixture(scope="module")
@@ -121,6 +121,6 @@ def test_a_stand_in_that_fails_leaves_it_to_the_simulation():
     bar = Fragile()
     assert isinstance(bar, SupportsReducedOrderModel)
     design = sampling_design(NORTON, bar, "paper", every=21600.0)
-    found = simulate_rows(design, empty_dataset(design, bar, {}), 1, 0, 16, lambda row: None)
+    found = simulate_rows(design, empty_dataset(design, bar, {}), 1, 0, 16)
     assert not found.failures
     np.testing.assert_array_equal(found.status >= 0, (found.reasons == 0) | (found.reasons > 2))

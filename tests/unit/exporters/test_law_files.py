@@ -14,7 +14,7 @@ from creepkit.errors import CreepkitError, ExportError, LawError
 from creepkit.exporters.exporting import export
 from creepkit.exporters.latex import LatexExporter, latex_number
 from creepkit.exporters.law_files import JsonExporter, read_valued_law
-from creepkit.files.written_lists import RECORD
+from creepkit.files.writing import RECORD
 from creepkit.language import CreepLaw, Param, State, activated, arrhenius, linear, parameters, states, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT

@@ -71,15 +71,15 @@ def test_nothing_outside_an_hdf5_file_is_read(tmp_path, kind):
             layout = h5py.VirtualLayout((len(SECRET),), dtype="u1")
             layout[:] = h5py.VirtualSource("other.h5", "x", (len(SECRET),))
             file.create_virtual_dataset("x", layout)
-    with pytest.raises(FitError, match="x.h5: .*(is a link to elsewhere|lies in other files)"):
+    with pytest.raises(FitError, match="x.h5: 'x' is a link to elsewhere, which is not followed"):
         read_hdf5(path)
 
 
-def test_an_hdf5_array_is_not_larger_than_its_bytes_can_be(tmp_path):
+def test_an_hdf5_file_is_bounded_as_it_unpacks(tmp_path, monkeypatch):
     path = tmp_path / "x.h5"
     with h5py.File(path, "w") as file:
-        file.create_dataset("x", (10**12,), dtype="f8", chunks=(10**6,), compression="gzip")
-    with pytest.raises(FitError, match="'/x' says to have 8000000000000 bytes, and holds 0; give a note"):
+        file.create_dataset("x", (10**9,), dtype="f8", chunks=(10**6,), compression="gzip")
+    with pytest.raises(FitError, match="its arrays have more than 500 MB unpacked; give a note, or if it is right"):
         read_hdf5(path)
     with h5py.File(path, "w") as file:
         file.create_dataset("x", data=np.zeros(10_000), chunks=(10_000,), compression="gzip")
@@ -89,8 +89,8 @@ def test_an_hdf5_array_is_not_larger_than_its_bytes_can_be(tmp_path):
 def test_groups_in_a_circle_end(tmp_path):
     with h5py.File(tmp_path / "x.h5", "w") as file:
         file.create_group("a")["b"] = file["/"]
-    with pytest.raises(FitError, match="links in a circle"):
-        read_hdf5(tmp_path / "x.h5")
+    with open_hdf5(tmp_path / "x.h5", NOTE_HDF5) as file:
+        assert list(file) == ["a"]
 
 
 @pytest.mark.parametrize(
@@ -109,30 +109,10 @@ def test_json_is_refused_in_a_sentence(text, problem):
         parse_json(text, "x.json", NOTE)
 
 
-@pytest.mark.parametrize(
-    ("text", "noun"),
-    [
-        ("[" + "[]," * 1_500_000 + "1]", "1500001 lists, objects and keys, more than 1500000"),
-        ("[" + "{}," * 1_500_000 + "1]", "1500001 lists, objects and keys, more than 1500000"),
-        ("{" + '"k":1,' * 1_500_000 + "}", "1500001 lists, objects and keys, more than 1500000"),
-        ("[" + "1," * 5_000_001 + "1]", "5000001 entries, more than 5000000"),
-    ],
-    ids=["lists", "objects", "keys", "entries"],
-)
-def test_json_of_many_values_is_refused_before_it_is_parsed(text, noun, monkeypatch):
-    monkeypatch.setattr("json.loads", lambda *_, **__: pytest.fail("it was parsed"))
-    with pytest.raises(
-        FitError, match=f"x.json: some {noun}, which a note never has; give a note, or if it is right, C"
-    ):
-        parse_json(text, "x.json", NOTE)
-
-
-def test_json_of_honest_size_is_read(monkeypatch):
+def test_json_of_honest_size_is_read():
     """As of 50 MB of numbers of 15 digits, in rows of 8."""
     rows = ",".join(["[" + ",".join(["0.12345678901234"] * 8) + "]"] * 300_000)
     assert np.array(parse_json(f'{{"samples": [{rows}]}}', "x.json", NOTE)["samples"]).shape == (300_000, 8)
-    monkeypatch.setenv(VARIABLE, "2")
-    assert len(parse_json("[" + "[]," * 1_500_000 + "[]]", "x.json", NOTE)) == 1_500_001
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,16 @@ import pytest
 
 from creepkit.errors import ExportError
 from creepkit.files.writing import (
+    RECORD,
     check_folder_target,
     check_target,
+    is_foreign,
+    made_from,
     overwriting,
-    replace_on_success,
     write_bytes,
     write_text,
+    written_files,
 )
-from creepkit.files.written_lists import RECORD, is_foreign
 from helpers.command_line import creepkit, one_line
 
 FOREIGN = "creepkit did not write it as it is now"
@@ -91,47 +93,53 @@ def test_permissions_are_kept_and_read_only_files_stay(tmp_path):
     assert path.read_text() == "newer"
 
 
-def test_a_list_that_is_damaged_or_a_link_makes_no_file_ours(tmp_path):
+def test_a_list_that_is_damaged_makes_no_file_ours(tmp_path):
     path = write_text("old", tmp_path / "note", ExportError)
-    lines = (tmp_path / RECORD).read_bytes()
-    (tmp_path / RECORD).write_bytes(b"\xff\0 garbage\n" * 10)
-    assert is_foreign(path)
-    (tmp_path / RECORD).unlink()
-    (tmp_path / "elsewhere").write_bytes(lines)
-    (tmp_path / RECORD).symlink_to("elsewhere")
-    assert is_foreign(path)
+    for content in (b"\xff\0 garbage\n" * 10, b'["note", 1]\n[]\n7\n"note"\n', b""):
+        (tmp_path / RECORD).write_bytes(content)
+        assert is_foreign(path)
+        assert written_files(tmp_path) == []
     write_text("new", path, ExportError, force=True)
-    assert (tmp_path / "elsewhere").read_bytes() == lines
-
-
-def test_the_list_is_that_of_sha256sum_whatever_the_name(tmp_path):
-    for name in ("plain", "back\\slash", "line\nend", "\udcff"):
-        path = write_text(name.encode("utf-8", "replace").decode(), tmp_path / name, ExportError)
-        assert not is_foreign(path)
-    check = subprocess.run(["sha256sum", "--check", "--quiet", RECORD], cwd=tmp_path, capture_output=True, check=False)
-    assert (check.returncode, check.stderr) == (0, b"")
-
-
-def test_a_long_list_keeps_the_last_content_of_each_name(tmp_path):
-    path = write_text("old", tmp_path / "note", ExportError)
-    others = "".join(f"{k:064x}  other\n" for k in range(20_000))
-    (tmp_path / RECORD).write_text(others + (tmp_path / RECORD).read_text())
-    write_text("new", path, ExportError)
-    assert (tmp_path / RECORD).stat().st_size < 1000
     assert not is_foreign(path)
 
 
-def test_what_happens_meanwhile_is_kept_and_so_is_the_result(tmp_path):
-    path = tmp_path / "fit.json"
+def test_names_that_are_no_text_are_listed(tmp_path):
+    for name in ("plain", "back\\slash", "line\nend", "\udcff"):
+        assert not is_foreign(write_text("text", tmp_path / name, ExportError))
 
-    def write() -> None:
-        with overwriting("beside"), replace_on_success(path, ExportError) as temporary:
-            temporary.write_bytes(b"result")
-            path.write_text("mine")
 
-    with pytest.raises(ExportError, match=r"left as it is; the result is .*fit-2\.json"):
-        write()
-    assert (path.read_text(), (tmp_path / "fit-2.json").read_text()) == ("mine", "result")
+def test_what_was_made_from_another_file_stays(tmp_path, monkeypatch):
+    path = tmp_path / "tests" / "D1.csv"
+    path.parent.mkdir()
+    for text in ("first", "second"):  # the same again, whatever it holds now
+        with made_from(tmp_path / "camera.csv"):
+            write_text(text, path, ExportError)
+    with made_from(tmp_path / "b.csv"), pytest.raises(ExportError, match=r"creepkit made it from \.\./camera\.csv;"):
+        write_text("third", path, ExportError)
+    monkeypatch.chdir(tmp_path)
+    with made_from("b.csv"), overwriting():
+        write_text("third", path, ExportError)
+    write_text("fourth", path, ExportError)  # whose name a person chose
+    with made_from("camera.csv"), pytest.raises(ExportError, match=r"creepkit made it by another command;"):
+        write_text("fifth", path, ExportError)
+
+
+TABLE = (
+    "# name: D1\n# specimen: uniaxial\n# stress_MPa: {}\n# temperature_C: 750\ntime_h,strain_pct\n1,0.1\n2,0.2\n3,0.3\n"
+)
+
+
+def test_a_received_file_does_not_choose_which_converted_test_is_lost(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("camera.csv").write_text(TABLE.format(100))
+    Path("received.csv").write_text(TABLE.format(50))
+    for source in ("camera.csv", str(tmp_path / "camera.csv")):
+        assert creepkit("read", source, "--to", "tests").exit_code == 0
+    refused = creepkit("read", "received.csv", "--to", "tests")
+    assert refused.exit_code == 1
+    assert "tests/D1.csv: cannot be written: it is there, and creepkit made it from ../camera.csv;" in refused.stderr
+    assert "stress_MPa: 100" in Path("tests/D1.csv").read_text()
+    assert creepkit("read", "received.csv", "--to", "tests", "--force").exit_code == 0
 
 
 def test_a_folder_is_checked_with_what_goes_into_it(tmp_path):

@@ -1,7 +1,6 @@
 """Files of weights: round trips, and one sentence for each that is damaged, foreign or newer."""
 
 import json
-import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from safetensors.numpy import load_file, save_file
 
 import creepkit as ck
 from creepkit.errors import SurrogateError
-from creepkit.files.written_lists import RECORD
+from creepkit.files.writing import RECORD
 from creepkit.inverse.composite_predictor import refined_of
 from creepkit.surrogates.loading import load_surrogate, surrogate_by_name
 from creepkit.surrogates.weight_files import SURROGATE, read_weights, write_weights
@@ -92,7 +91,6 @@ def entry(dtype: object = "F32", shape: object = (2, 3), offsets: object = (0, 2
         ({"a": entry(shape=(2**62, 2**62, 0), offsets=(0, 0))}, 0),
         ({"a": entry(shape=(1,) * 100 + (6,))}, 24),
         ({"a": 1}, 24),
-        ({"a": {**entry(), "more": 1}}, 24),
     ],
 )  # fmt: skip
 def test_a_header_that_does_not_describe_its_file_is_refused(tmp_path: Path, entries: object, size: int) -> None:
@@ -129,21 +127,6 @@ def test_arrays_are_those_of_the_reference_reader(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found[name], array)
         assert found[name].flags.writeable
         assert found[name].flags.aligned
-
-
-def test_a_large_file_of_no_content_takes_no_memory(tmp_path: Path) -> None:
-    """Of 900 MB, which are on no disk."""
-    path, size = tmp_path / "m.safetensors", 900_000_000
-    with path.open("wb") as file:
-        file.write(file_of({"a": entry("U8", (size,), (0, size))}, 0, {"creepkit": "{}"}))
-        file.truncate(file.tell() + size)
-    tracemalloc.start()
-    try:
-        with pytest.raises(SurrogateError, match="nearly all of its 900 MB are holes"):
-            read_weights(path)
-        assert tracemalloc.get_traced_memory()[1] < 10_000_000
-    finally:
-        tracemalloc.stop()
 
 
 def test_weights_of_another_program_are_told_apart(tmp_path: Path) -> None:

@@ -11,14 +11,12 @@ import torch
 from creepkit.dataset.dataset import Dataset
 from creepkit.errors import DatasetError, SurrogateError
 from creepkit.surrogates.evaluation import evaluate
-from creepkit.surrogates.loading import load_surrogate
 from creepkit.surrogates.parameter_gru import ParameterGru
 from creepkit.surrogates.parameter_network import ParameterModule
 from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.training import train
 from creepkit.surrogates.training_loop import epochs_since_best, learning_rate
 from creepkit.surrogates.training_rows import dataset_fingerprint, training_split
-from helpers.other_users import HAS_OWNERS, give_to_another_user
 from helpers.planted_datasets import bars
 from helpers.written_files import names_in
 
@@ -81,24 +79,6 @@ def test_what_is_done_is_returned_and_what_is_another_is_kept(data: Dataset, tmp
     assert again.metadata.curves == once.metadata.curves
     with pytest.raises(SurrogateError, match="another surrogate is there already; remove it or choose another name"):
         train(data, SMALL, to=path, seed=4)
-
-
-@HAS_OWNERS
-@pytest.mark.parametrize("name", ["m.safetensors", "m.safetensors.checkpoint"])
-def test_what_another_user_planted_is_neither_returned_nor_gone_on_with(
-    data: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    path = tmp_path / "m.safetensors"
-    if name.endswith("checkpoint"):
-        with pytest.raises(Interrupted):
-            train(data, SMALL, to=path, progress=stop_at(1))
-    else:
-        train(data, SMALL, to=path)
-    give_to_another_user(tmp_path / name, monkeypatch)
-    with pytest.raises(SurrogateError, match=rf"{name}: belongs to another user \(mallory\)"):
-        train(data, SMALL, to=path)
-    if path.exists():
-        assert load_surrogate(path).weight_count > 0, "read where that is asked for"
 
 
 def test_the_checkpoint_of_another_training_is_kept(data: Dataset, tmp_path: Path) -> None:

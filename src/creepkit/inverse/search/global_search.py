@@ -68,4 +68,4 @@ class SearchTrace:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw the lowest cost, and how the candidates spread; written to `path` when given."""
-        return present(self, "plot", path)
+        return present("reports.search:search_figure", self, path)

@@ -63,7 +63,7 @@ class RankedLaw:
 
 
 @dataclass(frozen=True)
-class Ranking(Presentable):
+class Ranking(Presentable, text="reports.ranking:ranking_text"):
     """Identified laws, best first.
 
     criterion : by which; independent_frames : their number; failed : {law: why it could not be identified}.
@@ -137,19 +137,19 @@ class Ranking(Presentable):
 
     def forecast(self, tests: History | Sequence[History], *, level: float = 0.95, **options: Any) -> Any:
         """What tests will show, over all laws by their weights; as creepkit.forecast()."""
-        return present(self, "forecast", tests, level=level, **options)
+        return present("forecasts.forecast:forecast", self, tests, level=level, **options)
 
     def further_tests(self) -> Any:
         """A Design: variations of the tests, by how well they would separate the remaining laws (some seconds)."""
-        return present(self, "further_tests")
+        return present("experiments.design:further_tests", self)
 
     def save(self, path: str | Path) -> Path:
         """Write the ranking as JSON, and each law's identification as LAW.json beside it; load_ranking() reads them."""
-        return present(self, "save", Path(path))
+        return present("inverse.ranking_document:write_ranking", self, Path(path))
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Misfits and weights of the laws, and the curves of the credible ones; written to `path` when given."""
-        return present(self, "plot", path)
+        return present("reports.ranking_plot:ranking_figure", self, path)
 
 
 def verdict_of(ranking: Ranking) -> str:

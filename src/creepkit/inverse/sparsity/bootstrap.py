@@ -36,7 +36,7 @@ ZERO_WEIGHT = 1e-12
 
 
 @dataclass(frozen=True)
-class SelectionFrequencies(Presentable):
+class SelectionFrequencies(Presentable, text="reports.search:selection_frequencies_text"):
     """How often each term, and each set of terms, was kept.
 
     unit : "tests" or "blocks of frames"; resamples : number of draws; term_counts : {term: times kept};

@@ -32,7 +32,7 @@ class FitStatistics:
 
 
 @dataclass(frozen=True)
-class Sparsity(Presentable):
+class Sparsity(Presentable, text="reports.search:sparsity_text"):
     """How a sum was reduced; the terms are those of `law`, the sum.
 
     penalty : its class; strength : None of a choice among subsets, which has none.
@@ -116,7 +116,7 @@ def _quoted_list(names: list[str] | TermNames) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class PenaltyPath(Presentable):
+class PenaltyPath(Presentable, text="reports.search:penalty_path_text"):
     """One row for each strength, the first of which is 0.
 
     penalty : its class; terms : of the sum; strengths : (strengths,) -, half a chi-square.
@@ -141,7 +141,7 @@ class PenaltyPath(Presentable):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Contributions and rise of chi-square against the strength; written to `path` when given."""
-        return present(self, "plot", path)
+        return present("reports.search:penalty_path_figure", self, path)
 
 
 LEAST_CONTRIBUTION = 0.05

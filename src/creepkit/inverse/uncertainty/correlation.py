@@ -42,7 +42,7 @@ WELL_DETERMINED_SD = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Correlation(Presentable):
+class Correlation(Presentable, text="reports.uncertainty:correlation_text"):
     """The correlation of estimates: matrix (parameters, parameters) -, and sd (parameters,) on the internal scale.
 
     names : as the matrix is to be read, "ln A" where the logarithm is meant, "ln rate" of a conditioned coefficient.
@@ -62,7 +62,7 @@ class Correlation(Presentable):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The matrix in colours with its numbers; written to `path` when given."""
-        return present(self, "plot", path)
+        return present("reports.uncertainty:correlation_figure", self, path)
 
 
 def correlation(fit: Identification, coordinates: CoordinateSystem = "author") -> Correlation:

@@ -61,7 +61,7 @@ class WeightedLaws(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class ModelAverage(Presentable):
+class ModelAverage(Presentable, text="reports.uncertainty:model_average_text"):
     """Laws with weights that add up to one, each with its own posterior."""
 
     fits: tuple[Identification, ...]
@@ -124,7 +124,7 @@ class ModelAverage(Presentable):
 
     def forecast(self, tests: History | Sequence[History], *, level: float = 0.95, **options: Any) -> Any:
         """What tests will show, over the laws, so that bands hold the doubt about the law; as creepkit.forecast()."""
-        return present(self, "forecast", tests, level=level, **options)
+        return present("forecasts.forecast:forecast", self, tests, level=level, **options)
 
     def _check_point(self, warn: bool, **point: ArrayLike | None) -> None:
         if warn:
@@ -180,7 +180,7 @@ SAME_TEMPERATURE = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class RateBand(Presentable):
+class RateBand(Presentable, text="reports.uncertainty:rate_band_text"):
     """Creep rates over stress at an uncertain temperature.
 
     stress : (points,) MPa; rate, low, high : (points,) 1/s, median and 95 % band, by parameters, laws and temperature.
@@ -200,7 +200,7 @@ class RateBand(Presentable):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Rate over stress, both logarithmic, with both bands; written to `path` when given."""
-        return present(self, "plot", path)
+        return present("reports.uncertainty:rate_band_figure", self, path)
 
 
 @checked

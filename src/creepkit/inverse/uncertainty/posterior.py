@@ -208,7 +208,7 @@ MAX_START_DRAWS = 50
 
 
 @dataclass(frozen=True, eq=False)
-class PosteriorSamples(Presentable):
+class PosteriorSamples(Presentable, text="reports.uncertainty:posterior_text"):
     """Draws of a law's values from their posterior.
 
     chain : (steps, walkers, parameters) conditioned coordinates u, all of them; log_probability : (steps, walkers).
@@ -286,7 +286,7 @@ class PosteriorSamples(Presentable):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Every pair of parameters, and each alone; written to `path` when given."""
-        return present(self, "plot", path)
+        return present("reports.uncertainty:pairs_figure", self, path)
 
 
 def sample_posterior(

@@ -92,11 +92,11 @@ class BulgeRun(FiniteElementRun):
 
     def section(self, time: float | None = None, name: str = STRESS_FIELD, path: str | Path | None = None) -> Figure:
         """A picture of the deformed section, coloured by a field (see `field`), at a time; by default the last."""
-        return present(self, "section", time, name, path)
+        return present("reports.simulation:section_figure", self, time, name, path)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """A picture of what is observed, and of the pressure, over time."""
-        return present(self, "plot", path)
+        return present("reports.simulation:outputs_figure", self, path)
 
     @property
     def _profiles(self) -> Floats:
