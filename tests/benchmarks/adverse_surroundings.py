@@ -82,7 +82,19 @@ COMMANDS = {
     "simulate": Command((*SIMULATED, "--to", "@made.csv"), ("made.csv",), ("--points", "7")),
     "printed simulate": Command(SIMULATED),
     "generate": Command(
-        ("generate", "norton", "--specimen", "uniaxial", "--samples", "16", "--to", "@made.h5", "--workers", "2"),
+        (
+            "surrogate",
+            "generate",
+            "norton",
+            "--specimen",
+            "uniaxial",
+            "--samples",
+            "16",
+            "--to",
+            "@made.h5",
+            "--workers",
+            "2",
+        ),
         ("made.h5",),
     ),
     "identify": Command(
@@ -94,7 +106,19 @@ COMMANDS = {
     "report": Command(("report", "@fit.json", "--to", "@made.html"), ("made.html",), ("--title", "Older")),
     "export": Command(("export", "@fit.json", "--to", "abaqus", "-o", "@made.f"), ("made.f",), ("--name", "older")),
     "train": Command(
-        ("train", "@data.h5", "--to", "@net.safetensors", "--hidden", "4", "--layers", "1", "--epochs", "2"),
+        (
+            "surrogate",
+            "train",
+            "@data.h5",
+            "--to",
+            "@net.safetensors",
+            "--hidden",
+            "4",
+            "--layers",
+            "1",
+            "--epochs",
+            "2",
+        ),
         ("net.safetensors",),
     ),
 }

@@ -183,7 +183,19 @@ def kinds(folder: Path, short: bool) -> dict[str, Kind]:
 
     (folder / "more").mkdir()
     data_set(folder / "more")
-    words = ("train", "more/data.h5", "--to", "net.safetensors", "--hidden", "4", "--layers", "1", "--epochs", "1")
+    words = (
+        "surrogate",
+        "train",
+        "more/data.h5",
+        "--to",
+        "net.safetensors",
+        "--hidden",
+        "4",
+        "--layers",
+        "1",
+        "--epochs",
+        "1",
+    )
     ended = run(creepkit(*words), folder)
     if ended.code:
         raise RuntimeError(ended.problem)

@@ -25,10 +25,35 @@ OWN_BEFORE_US = {"creepkit", "sitecustomize", "usercustomize"}
 
 NETWORK = ("--hidden", "4", "--layers", "1", "--epochs", "1")
 COMMANDS = {
-    "generate": ("generate", "norton", "--specimen", "uniaxial", "--samples", "8", "--to", "m.h5", "--workers", "2"),
-    "screen": ("screen", "tests", "--law", "norton", "--dense", "none", "--to", "screened", "--workers", "2"),
-    "sweep": ("sweep", "data.h5", "--to", "nets", *NETWORK),
-    "train": ("train", "data.h5", "--to", "n.safetensors", *NETWORK),
+    "generate": (
+        "surrogate",
+        "generate",
+        "norton",
+        "--specimen",
+        "uniaxial",
+        "--samples",
+        "8",
+        "--to",
+        "m.h5",
+        "--workers",
+        "2",
+    ),
+    "screen": (
+        "identify",
+        "tests",
+        "--by",
+        "alloy",
+        "--law",
+        "norton",
+        "--dense",
+        "none",
+        "--to",
+        "screened",
+        "--workers",
+        "2",
+    ),
+    "sweep": ("surrogate", "sweep", "data.h5", "--to", "nets", *NETWORK),
+    "train": ("surrogate", "train", "data.h5", "--to", "n.safetensors", *NETWORK),
     "identify": ("identify", "tests", "--law", "norton", "--starts", "1", "--to", "identified"),
     "run": ("run", "study.toml"),
     "report": ("report", "fit.json", "--tests", "tests", "--to", "page.html"),
@@ -40,7 +65,7 @@ COMMANDS = {
     "data": ("data", "data.h5", "--plots", "pictures"),
     "simulate": ("simulate", "norton", "--set", "A=1e-16", "--set", "n=4", "--stress", "60", "--end-h", "10"),
     "check": ("check", "norton"),
-    "laws": ("laws", "norton"),
+    "laws": ("list", "laws", "norton"),
     "plugins": ("plugins",),
 }
 SHORT = ("generate", "read")
@@ -48,11 +73,11 @@ TOLD_APART = ("generate", "screen", "report", "predict", "export", "check", "plu
 """Commands of the further ways to start: those with workers, with files of matplotlib, and with modules by name."""
 
 REFUSED = {
-    "--plugin x.csv": ("--plugin", "x.csv", "laws"),
-    "--plugin without suffix": ("--plugin", "plain", "laws"),
-    "--plugin of a folder": ("--plugin", "tests", "laws"),
-    "--plugin of a pickle": ("--plugin", "data.pkl", "laws"),
-    "--plugin of a module's name": ("--plugin", "json", "laws"),
+    "--plugin x.csv": ("--plugin", "x.csv", "list", "laws"),
+    "--plugin without suffix": ("--plugin", "plain", "list", "laws"),
+    "--plugin of a folder": ("--plugin", "tests", "list", "laws"),
+    "--plugin of a pickle": ("--plugin", "data.pkl", "list", "laws"),
+    "--plugin of a module's name": ("--plugin", "json", "list", "laws"),
     "check x.csv": ("check", "x.csv"),
     "check without suffix": ("check", "plain"),
     "check of a shared library": ("check", "x.so"),
@@ -66,8 +91,8 @@ REFUSED = {
 }
 NAMES_FIRST = {
     "check norton, a file": ("check", "norton"),
-    "laws norton, a file": ("laws", "norton"),
-    "specimens bulge, a file": ("specimens", "bulge"),
+    "laws norton, a file": ("list", "laws", "norton"),
+    "specimens bulge, a file": ("list", "specimens", "bulge"),
     "identify --law norton, a file": ("identify", "tests", "--law", "norton", "--starts", "1", "--to", "by_name"),
 }
 SETTINGS = "backend: module://planted_backend\ntext.usetex: True\nsavefig.directory: .\n"
