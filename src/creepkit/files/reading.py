@@ -18,7 +18,7 @@ DEFAULT_MAXIMUM_BYTES = 50_000_000
 """Bytes; no document of creepkit is near it, and a reader must not load what memory cannot hold."""
 
 
-MAXIMUM_UNPACKED_BYTES = 500_000_000
+MAXIMUM_UNPACKED_BYTES = 100_000_000
 """Of all that a compressed file holds together."""
 
 
