@@ -69,6 +69,8 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
             content = _read_pieces(stream, kind.most_bytes + 1 if first is None else first)
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
+    except MemoryError:
+        raise kind.error(f"{path}: holds more than there is memory for") from None
     if first is None and len(content) > kind.most_bytes:
         raise kind.error(_too_large(path, kind, len(content)))
     return content
