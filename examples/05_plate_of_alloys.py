@@ -16,6 +16,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
+from planted_plate import planted_plate
+
 import creepkit as ck
 
 MEAN_THICKNESS, SD_THICKNESS = 0.4935, 0.027  # mm, of 25 measured dimples
@@ -33,7 +35,7 @@ alloys = 2 if arguments.quick else arguments.alloys
 # The plate: tests, compositions and the truth, as files
 # ------------------------------------------------------
 
-planted = ck.planted_plate(alloys, thickness_known=not arguments.unknown_thickness)
+planted = planted_plate(alloys, thickness_known=not arguments.unknown_thickness)
 tests, compositions = planted.write(arguments.to)
 for name, truth in planted.truth.items():
     mixed = ", ".join(f"{100 * share:.0f} % {base}" for base, share in truth.base_fractions.items() if share > 0.01)
@@ -43,7 +45,7 @@ for name, truth in planted.truth.items():
 # Screened
 # --------
 # Finite elements in the loop; few starts will do for laws of one term. The same from a shell:
-#     creepkit screen plate/tests --compositions plate/compositions.csv --confirm always --to plate/screened
+#     creepkit identify plate/tests --by alloy --compositions plate/compositions.csv --confirm --to plate/screened
 
 began = time.monotonic()
 nuisances = [ck.Nuisance("offset"), ck.Nuisance("rate")]

@@ -113,7 +113,6 @@ from .registry.reading import read_record as read_record
 from .rupture_assessment.assess import rupture as rupture
 from .rupture_assessment.assessment import RuptureSettings as RuptureSettings
 from .sampling.conditions import TimeGrid as TimeGrid
-from .screening.planted import planted_plate as planted_plate
 from .screening.screen import ScreeningOptions as ScreeningOptions
 from .screening.screen import screen as screen
 from .specimens.axisymmetric.displacements import Displacements as Displacements

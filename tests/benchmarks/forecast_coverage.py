@@ -38,8 +38,6 @@ from creepkit.errors import CreepkitError
 LEVEL = 0.95
 STARTS = 2
 """Of each search: the planted laws have one minimum."""
-NORMAL, STUDENT = "normal", "Student's t, 4"
-STUDENT_FREEDOM = 4
 QUICK = {"bar": 6, "dimple": 2}
 """Campaigns of a row in the quick form."""
 
@@ -58,7 +56,6 @@ class Row:
     tests: int
     rate: float = 0.0
     damage: float = 0.0
-    distribution: str = NORMAL
     heats: int = 0
     between: float = 0.0
     known: bool = False
@@ -104,29 +101,19 @@ def _dimples(title: str, tests: int, **further: object) -> Row:
 ROWS = {
     "sh-3-0.03": _hardening(3, 0.03),
     "sh-3-0.2": _hardening(3, 0.2),
-    "sh-4-0.1": _hardening(4, 0.1),
-    "sh-6-0.03": _hardening(6, 0.03),
     "sh-6-0.1": _hardening(6, 0.1),
-    "sh-6-0.2": _hardening(6, 0.2),
-    "sh-12-0.03": _hardening(12, 0.03),
     "sh-12-0.1": _hardening(12, 0.1),
-    "sh-12-0.2": _hardening(12, 0.2),
     "norton": Row("Norton, 6 tests, 0.1, noise estimated", "norton", 6, 0.1, states_noise=False),
-    "student": Row("strain hardening, 6 tests, 0.1, Student's t of 4", bars.HARDENING, 6, 0.1, distribution=STUDENT),
-    "likelihood": Row("strain hardening, 6 tests, 0.1, by likelihood", bars.HARDENING, 6, 0.1, weights="likelihood"),
     "heat-known": _heats(known=True),
     "heat-new": _heats(known=False),
     "kr-4-small": _rupture(bars.KACHANOV, 4, 0.03, 0.03, isothermal=True),
     "kr-7": _rupture(bars.KACHANOV, 7, 0.1, 0.05, isothermal=True),
-    "omega-5": _rupture(bars.OMEGA, 5, 0.05, 0.03),
     "omega-8": _rupture(bars.OMEGA, 8, 0.15, 0.08),
-    "omega-8-likelihood": _rupture(bars.OMEGA, 8, 0.15, 0.08, weights="likelihood"),
     "dimples-2": _dimples("", 2),
     "dimples-3": _dimples("", 3),
     "dimples-4": _dimples("", 4),
     "dimples-3-rate": _dimples(", rates scatter by 0.1", 3, rate=0.1),
     "dimples-3-correlated": _dimples(", AR(1) noise of D_amp (0.9, 5 um)", 3, correlated=(0.9, 5e-3)),
-    "dimples-3-likelihood": _dimples(", by likelihood", 3, weights="likelihood"),
 }
 
 
@@ -135,9 +122,7 @@ ROWS = {
 
 def drawn(row: Row, sd: float, count: int, rng: np.random.Generator) -> np.ndarray:
     """(count,) ln factors of standard deviation sd."""
-    if row.distribution == NORMAL:
-        return sd * rng.standard_normal(count)
-    return sd * np.sqrt((STUDENT_FREEDOM - 2) / STUDENT_FREEDOM) * rng.standard_t(STUDENT_FREEDOM, count)
+    return sd * rng.standard_normal(count)
 
 
 def bar_campaign(row: Row, rng: np.random.Generator):

@@ -42,7 +42,7 @@ Run = Callable[[], Any]
 def main() -> None:
     parser = arguments(__doc__)
     parser.add_argument("rows", nargs="?", type=int, default=20_000, help="points that a call is made for")
-    parser.add_argument("--laws", nargs="*", default=list(LAWS), choices=list(LAWS))
+    parser.add_argument("--laws", nargs="*", default=["norton", "hyperbolic-sine", "combined"], choices=list(LAWS))
     options = parser.parse_args()
     torch.set_num_threads(1)
     page = Page("kernel_speed" if options.rows == 20_000 else f"kernel_speed_{options.rows}", __doc__)

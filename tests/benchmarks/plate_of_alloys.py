@@ -13,6 +13,7 @@ inside their 95 % intervals.
 
 import os
 import resource
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -25,9 +26,11 @@ from measured import Page, arguments, progress
 from proportions import share_with_interval
 
 import creepkit as ck
-from creepkit.screening.planted import THICKNESS_MEAN_SD, planted_plate
 from creepkit.screening.results import mean_relative_squared_error
 from creepkit.screening.screen import screen
+
+sys.path.append(str(Path(__file__).parents[2] / "examples"))
+from planted_plate import THICKNESS_MEAN_SD, planted_plate
 
 MERGED = {"hyperbolic-sine": "norton"}
 """Laws that differ by a curvature alone, which one dimple hardly shows."""

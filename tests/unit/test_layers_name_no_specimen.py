@@ -22,7 +22,6 @@ PACKAGES_FOR_ANY_SPECIMEN = ("dataset", "sampling", "surrogates")
 ALLOWED = {
     "creepkit.cli.demo": "it shows a bulge test",
     "creepkit.cli.options": "what commands take where no specimen is named",
-    "creepkit.screening.planted": "the paper's plate of bulge tests",
 }
 
 

@@ -1,6 +1,7 @@
 """The planted plate: what it is mixed from, what it is drawn around, and that it is what it says."""
 
 import csv
+import sys
 
 import numpy as np
 import pytest
@@ -8,7 +9,10 @@ import pytest
 import creepkit as ck
 from creepkit.inverse.frame_noise import frame_noise
 from creepkit.screening.alloys import read_compositions
-from creepkit.screening.planted import BASE_ALLOYS, FIGURE_7A, mix_base_alloys, planted_plate
+from helpers.paths import EXAMPLES
+
+sys.path.append(str(EXAMPLES))
+from planted_plate import BASE_ALLOYS, FIGURE_7A, mix_base_alloys, planted_plate
 
 
 @pytest.fixture(scope="module")
