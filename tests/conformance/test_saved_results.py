@@ -15,7 +15,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import CreepkitError
-from creepkit.exporters.law_files import read_law_file
+from creepkit.exporters.law_files import read_valued_law
 from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.largest_deviation import LargestDeviation
@@ -28,7 +28,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "identification": ck.load,
     "ranking": ck.load_ranking,
     "rupture_assessment": ck.load_rupture_assessment,
-    "valued_law": read_law_file,
+    "valued_law": lambda path: read_valued_law(path.read_text(encoding="utf-8"), str(path)),
 }
 WRONG = (None, "text", -1e300, float("nan"), True, [], {}, [["text"]], {"text": 1})
 CHANGES = 250

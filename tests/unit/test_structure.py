@@ -7,7 +7,7 @@ from collections import defaultdict
 
 from helpers import source_tree
 
-MOST_LINES = 400
+MOST_LINES = 600
 MOST_PARAMETERS = 8
 
 

@@ -22,7 +22,6 @@ class Valued(Protocol):
     @property
     def valued(self) -> LawWithValues:
         """The law, its values, the ranges of the tests, and as notes the intervals and the verdict."""
-        ...
 
 
 @checked

@@ -111,10 +111,6 @@ class ArrayKernel:
         """The rate and its derivatives with respect to the point, the states and every internal parameter."""
         return self.internal_derivatives(*self._arguments(values, point))
 
-    def internal_rate(self, *arguments: Any) -> Any:
-        """The rate."""
-        return self._entries["rate"](*arguments)[0]
-
     def internal_rates(self, *arguments: Any) -> Any:
         """The rate and every state rate, a tuple."""
         return self._entries["rate"](*arguments)

@@ -1,64 +1,8 @@
-"""The language in which creep laws are written: all that a law plugin imports."""
+"""The language in which creep laws are written: all that a law plugin imports.
 
-from creepkit.hookspecs import hookimpl
-from creepkit.language.elastic import Elastic, wachtman
-from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import (
-    GAS_CONSTANT,
-    Param,
-    State,
-    mean_stress,
-    parameters,
-    principal_stress,
-    states,
-    strain,
-    stress,
-    temperature,
-    time,
-)
-from creepkit.language.temperature_forms import (
-    TemperatureFactor,
-    TemperatureForm,
-    activated,
-    arrhenius,
-    boltzmann,
-    curved,
-    exponential,
-    inverse_temperature,
-    linear,
-    logarithmic,
-    modified_arrhenius,
-    t_log_t,
-    wachtman_form,
-)
+Every name stands once, in __init__.pyi; its module is loaded when the name is first used.
+"""
 
-__all__ = [
-    "GAS_CONSTANT",
-    "CreepLaw",
-    "Elastic",
-    "Param",
-    "State",
-    "TemperatureFactor",
-    "TemperatureForm",
-    "activated",
-    "arrhenius",
-    "boltzmann",
-    "curved",
-    "exponential",
-    "hookimpl",
-    "inverse_temperature",
-    "linear",
-    "logarithmic",
-    "mean_stress",
-    "modified_arrhenius",
-    "parameters",
-    "principal_stress",
-    "states",
-    "strain",
-    "stress",
-    "t_log_t",
-    "temperature",
-    "time",
-    "wachtman",
-    "wachtman_form",
-]
+import lazy_loader as _lazy
+
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

@@ -21,6 +21,10 @@ ACTIVATION_ENERGY_BOUNDS = (5e4, 9e5)
 """Bounds of an activation energy, J/mol: grain-boundary diffusion to apparent values of precipitate-hardened alloys."""
 
 
+Built = tuple[sympy.Expr, dict[sympy.Symbol, Param]]
+"""A parameter as an expression of temperature, and the parameters that it introduces."""
+
+
 @dataclass(frozen=True)
 class TemperatureFactor:
     """A positive factor of temperature that multiplies rates, 1 at T_ref, with parameters of its own."""
@@ -32,6 +36,7 @@ class TemperatureFactor:
     T_ref: float
 
     def __post_init__(self) -> None:
+        check_reference_temperature(self.T_ref)
         object.__setattr__(self, "params", MappingProxyType(dict(self.params)))
 
 
@@ -43,15 +48,17 @@ class TemperatureForm:
     """
 
     name: str
-    build: Callable[[sympy.Symbol, Param], tuple[sympy.Expr, dict[sympy.Symbol, Param]]]
+    build: Callable[[sympy.Symbol, Param], Built]
     reference: str
     T_ref: float
+
+    def __post_init__(self) -> None:
+        check_reference_temperature(self.T_ref)
 
 
 @checked
 def arrhenius(T_ref: float = 1073.15, Q: float | None = None) -> TemperatureFactor:
     """The Arrhenius factor exp[-(Q/R)(1/T - 1/T_ref)] of Eq. (5); T_ref in K, Q in J/mol (a parameter unless given)."""
-    check_reference_temperature(T_ref)
     symbol = sympy.Symbol("Q", real=True)
     energy = symbol if Q is None else sympy.Float(Q)
     expression = sympy.exp(energy * _reciprocal_decrease(T_ref) / GAS_CONSTANT)
@@ -64,16 +71,11 @@ def arrhenius(T_ref: float = 1073.15, Q: float | None = None) -> TemperatureFact
 @checked
 def linear(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) -> TemperatureForm:
     """p(T) = p + p_T (T - T_ref); the slope p_T, per K, lies by default within half the range of p in 100 K."""
-    check_reference_temperature(T_ref)
 
-    def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
-        if param.scale == "log":
-            raise LawError(f"parameter '{symbol}' has a log scale: use exponential() or activated(), not linear()")
-        low, high = param.bounds
-        reach = slope or (-(high - low) / 200.0, (high - low) / 200.0)
-        rate = sympy.Symbol(f"{symbol.name}_T", real=True)
+    def build(symbol: sympy.Symbol, param: Param) -> Built:
+        reach = _slope_bounds(symbol, param, slope, 200.0, "use exponential() or activated(), not linear()")
         unit = "1/K" if param.unit == "1" else f"{param.unit}/K"
-        extra = {rate: Param(f"temperature slope of {param.meaning}", bounds=reach, unit=unit, off=0.0)}
+        rate, extra = _coefficient(f"{symbol.name}_T", f"temperature slope of {param.meaning}", reach, unit)
         return symbol + rate * (temperature - sympy.Float(T_ref)), extra
 
     return TemperatureForm("linear", build, "straight line about T_ref", float(T_ref))
@@ -82,16 +84,11 @@ def linear(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) -> 
 @checked
 def inverse_temperature(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) -> TemperatureForm:
     """p(T) = p + p_I (1000/T - 1000/T_ref); default bounds of p_I: the range of p over 0.5."""
-    check_reference_temperature(T_ref)
 
-    def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
-        if param.scale == "log":
-            raise LawError(f"parameter '{symbol}' has a log scale: use activated() for it, not inverse()")
-        low, high = param.bounds
-        reach = slope or (-2.0 * (high - low), 2.0 * (high - low))
-        rate = sympy.Symbol(f"{symbol.name}_I", real=True)
+    def build(symbol: sympy.Symbol, param: Param) -> Built:
+        reach = _slope_bounds(symbol, param, slope, 0.5, "use activated() for it, not inverse()")
         unit = "1000 K" if param.unit == "1" else f"{param.unit} 1000 K"
-        extra = {rate: Param(f"slope of {param.meaning} against 1000/T", bounds=reach, unit=unit, off=0.0)}
+        rate, extra = _coefficient(f"{symbol.name}_I", f"slope of {param.meaning} against 1000/T", reach, unit)
         return symbol - 1000 * rate * _reciprocal_decrease(T_ref), extra
 
     return TemperatureForm("inverse", build, "straight line in 1/T about T_ref", float(T_ref))
@@ -100,11 +97,9 @@ def inverse_temperature(T_ref: float = 1073.15, slope: tuple[float, float] | Non
 @checked
 def activated(T_ref: float = 1073.15, Q: tuple[float, float] = (-9e5, 9e5)) -> TemperatureForm:
     """p(T) = p exp[-(Q_p/R)(1/T - 1/T_ref)] for a positive parameter; Q_p in J/mol, of either sign."""
-    check_reference_temperature(T_ref)
 
-    def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
-        energy = sympy.Symbol(f"Q_{symbol.name}", real=True)
-        extra = {energy: Param(f"activation energy of {param.meaning}", bounds=Q, unit="J/mol", off=0.0)}
+    def build(symbol: sympy.Symbol, param: Param) -> Built:
+        energy, extra = _coefficient(f"Q_{symbol.name}", f"activation energy of {param.meaning}", Q, "J/mol")
         return symbol * sympy.exp(energy * _reciprocal_decrease(T_ref) / GAS_CONSTANT), extra
 
     return TemperatureForm("activated", build, "Arrhenius (1889), Z. Phys. Chem. 4, 226", float(T_ref))
@@ -113,14 +108,31 @@ def activated(T_ref: float = 1073.15, Q: tuple[float, float] = (-9e5, 9e5)) -> T
 @checked
 def exponential(T_ref: float = 1073.15, slope: tuple[float, float] = (-0.1, 0.1)) -> TemperatureForm:
     """p(T) = p exp[p_T (T - T_ref)] for a positive parameter; p_T in 1/K."""
-    check_reference_temperature(T_ref)
 
-    def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
-        rate = sympy.Symbol(f"{symbol.name}_T", real=True)
-        extra = {rate: Param(f"relative temperature slope of {param.meaning}", bounds=slope, unit="1/K", off=0.0)}
+    def build(symbol: sympy.Symbol, param: Param) -> Built:
+        meaning = f"relative temperature slope of {param.meaning}"
+        rate, extra = _coefficient(f"{symbol.name}_T", meaning, slope, "1/K")
         return symbol * sympy.exp(rate * (temperature - sympy.Float(T_ref))), extra
 
     return TemperatureForm("exponential", build, "exponential about T_ref", float(T_ref))
+
+
+def _coefficient(
+    name: str, meaning: str, bounds: tuple[float, float], unit: str
+) -> tuple[sympy.Symbol, dict[sympy.Symbol, Param]]:
+    """A parameter that a form introduces, which 0 switches off."""
+    symbol = sympy.Symbol(name, real=True)
+    return symbol, {symbol: Param(meaning, bounds=bounds, unit=unit, off=0.0)}
+
+
+def _slope_bounds(
+    symbol: sympy.Symbol, param: Param, given: tuple[float, float] | None, span: float, remedy: str
+) -> tuple[float, float]:
+    """Bounds of a slope: by default the parameter's range over a span to either side; LawError for one of log scale."""
+    if param.scale == "log":
+        raise LawError(f"parameter '{symbol}' has a log scale: {remedy}")
+    low, high = param.bounds
+    return given or (-(high - low) / span, (high - low) / span)
 
 
 def _reciprocal_decrease(T_ref: float) -> sympy.Expr:
@@ -131,7 +143,7 @@ def _reciprocal_decrease(T_ref: float) -> sympy.Expr:
 def check_reference_temperature(T_ref: float) -> None:
     """A reference temperature is one in K."""
     if not 0 < float(T_ref) < 1e4:
-        raise LawError(f"T_ref = {T_ref!r} is not a temperature in K (allowed: above 0, below 10000)")
+        raise LawError(f"T_ref = {T_ref:g} is not a temperature in K (allowed: above 0, below 10000)")
 
 
 TEMPERATURE_SPAN = 100.0
@@ -162,7 +174,6 @@ class _BasisFunction:
 
 def logarithmic(T_ref: float = 1073.15) -> TemperatureForm:
     """p(T) = p + p_L ln(T/T_ref); on a log scale the power p (T/T_ref)^p_L."""
-    check_reference_temperature(T_ref)
     basis_function = _BasisFunction(
         "L", sympy.log(temperature / sympy.Float(T_ref)), "slope against ln T of", "1", T_ref / (2 * TEMPERATURE_SPAN)
     )
@@ -181,9 +192,8 @@ def t_log_t(T_ref: float = 1073.15) -> TemperatureForm:
 
 def boltzmann(T_ref: float = 1073.15, T0: tuple[float, float] = T0_BOUNDS) -> TemperatureForm:
     """p(T) = p + p_E (T_ref^2/T0) [exp(-T0 (1/T - 1/T_ref)) - 1]: a + b exp(-T0/T) with slope p_E per K at T_ref."""
-    check_reference_temperature(T_ref)
 
-    def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
+    def build(symbol: sympy.Symbol, param: Param) -> Built:
         start, extra = _exponent_parameter(symbol, param, T0)
         expression = sympy.Float(T_ref) ** 2 / start * (sympy.exp(-start * _reciprocal_increase(T_ref)) - 1)
         shape = _BasisFunction("E", expression, "slope at T_ref of", "1/K", 1 / (2 * TEMPERATURE_SPAN))
@@ -195,9 +205,8 @@ def boltzmann(T_ref: float = 1073.15, T0: tuple[float, float] = T0_BOUNDS) -> Te
 
 def wachtman_form(T_ref: float = 1073.15, T0: tuple[float, float] = T0_BOUNDS) -> TemperatureForm:
     """p(T) = a + b T exp(-T0/T), the form of Wachtman's modulus, written with its slope p_W per K at T_ref."""
-    check_reference_temperature(T_ref)
 
-    def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
+    def build(symbol: sympy.Symbol, param: Param) -> Built:
         start, extra = _exponent_parameter(symbol, param, T0)
         grown = temperature * sympy.exp(-start * _reciprocal_increase(T_ref)) - sympy.Float(T_ref)
         shape = _BasisFunction(
@@ -211,7 +220,6 @@ def wachtman_form(T_ref: float = 1073.15, T0: tuple[float, float] = T0_BOUNDS) -
 
 def curved(T_ref: float = 1073.15) -> TemperatureForm:
     """p(T) = a + b T + c/T as p + p_T (T - T_ref) + p_C (T - T_ref)^2/T, which spans the same."""
-    check_reference_temperature(T_ref)
     difference = temperature - sympy.Float(T_ref)
     linear_term = _BasisFunction("T", difference, "slope at T_ref of", "1/K", 1 / (2 * TEMPERATURE_SPAN))
     curvature_term = _BasisFunction(
@@ -226,12 +234,11 @@ def modified_arrhenius(T_ref: float = 1073.15) -> TemperatureForm:
     ln p(T) = ln p - (Q_p/R)(1/T - 1/T_ref) + p_B [ln(T/T_ref) + T_ref/T - 1]; on a linear scale p + p_I (1/T_ref -
     1/T) 1000 and the same bend.
     """
-    check_reference_temperature(T_ref)
     per = sympy.Float(T_ref) * temperature
     reciprocal_decrease = (temperature - sympy.Float(T_ref)) / per
     curvature = sympy.log(temperature / sympy.Float(T_ref)) - sympy.Float(T_ref) * reciprocal_decrease
 
-    def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
+    def build(symbol: sympy.Symbol, param: Param) -> Built:
         bent = _BasisFunction("B", curvature, "bend against 1/T of", "1", 2 * (T_ref / TEMPERATURE_SPAN) ** 2)
         if param.scale == "log":
             first = _BasisFunction(
@@ -258,9 +265,7 @@ def _basis_form(name: str, reference: str, T_ref: float, basis: Sequence[_BasisF
     return TemperatureForm(name, lambda symbol, param: _basis_expansion(symbol, param, basis), reference, float(T_ref))
 
 
-def _basis_expansion(
-    symbol: sympy.Symbol, param: Param, basis: Sequence[_BasisFunction]
-) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
+def _basis_expansion(symbol: sympy.Symbol, param: Param, basis: Sequence[_BasisFunction]) -> Built:
     """The parameter with its shapes added on its own scale, and their coefficients."""
     low, high = param.bounds
     parameter_range = LOG_PARAMETER_RANGE if param.scale == "log" else high - low

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -123,30 +123,30 @@ class CameraFormat:
     layout: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.name, str) and self.name.strip()):
-            raise HistoryError(f"a camera format is called {self.name!r}; give it a short name in words")
-        for field in ("title", "unit", "confidence_unit"):
-            if not isinstance(getattr(self, field), str):
-                raise HistoryError(f"{self}: {field} is {quoted(repr(getattr(self, field)), 60)}; give a text")
-        if not isinstance(self.deformed, bool):
-            raise HistoryError(f"{self}: deformed is {quoted(repr(self.deformed), 60)}; write True or False")
         given = (self.columns,) if isinstance(self.columns, Mapping) else self.columns
-        if not isinstance(given, Sequence) or not given or not all(isinstance(one, Mapping) for one in given):
-            raise HistoryError(
-                f"{self}: columns are {{quantity: column}}, or a tuple of them, found {quoted(repr(given), 60)}"
-            )
-        object.__setattr__(self, "columns", tuple(self._checked_columns(one) for one in given))
+        if not given:
+            raise HistoryError(f"{self}: columns are empty; give {{quantity: column}}, or a tuple of them")
         if self.unit and self.unit not in LENGTH_UNITS:
             raise HistoryError(f"{self}: '{self.unit}' is no unit of length; {nearest(self.unit, LENGTH_UNITS)}")
-        axes = tuple(self.axes) if isinstance(self.axes, Sequence) else ()
-        if len(axes) != 3 or not all(isinstance(axis, int) and axis in (1, -1) for axis in axes):
+        if not {*self.axes} <= {1, -1}:
             raise HistoryError(f"{self}: axes are {quoted(repr(self.axes), 60)}; give three factors that are 1 or -1")
-        object.__setattr__(self, "axes", axes)
-        object.__setattr__(self, "lost", self._checked_rules())
-        for field in ("patterns", "planar", "time"):
-            object.__setattr__(self, field, self._checked_texts(field))
-        self._check_layout()
-        self._check_time()
+        if self.time and (self.time[0] not in ("head", "name") or self.time[2] not in TIME_UNITS):
+            raise HistoryError(
+                f"{self}: time is {self.time!r}; write ('head', key, unit) or ('name', '', unit) with one of the units "
+                f"{TIMES_ALLOWED}"
+            )
+        lost = tuple(self._rule(*rule) for rule in self.lost.items()) if isinstance(self.lost, Mapping) else self.lost
+        names = [column for column, _ in self.layout]
+        for column, kind in self.layout:
+            if not (column and _PACKED.fullmatch(kind)):
+                raise HistoryError(
+                    f"{self}: layout holds {quoted(repr((column, kind)), 60)}; give a column and its type, such as "
+                    "('stereo_x_mm', '<f8')"
+                )
+            if names.count(column) > 1:
+                raise HistoryError(f"{self}: layout has the column '{quoted(column)}' twice; give each its own name")
+        object.__setattr__(self, "columns", tuple(self._checked_columns(one) for one in given))
+        object.__setattr__(self, "lost", lost)
 
     def __str__(self) -> str:
         return f"camera format '{self.name}'"
@@ -173,8 +173,8 @@ class CameraFormat:
         result: dict[str, tuple[str, ...]] = {}
         taken: dict[ColumnName, str] = {}
         for quantity, one in given.items():
-            spellings = (one,) if isinstance(one, str) else tuple(one) if isinstance(one, Sequence) else ()
-            if not spellings or not all(isinstance(word, str) and ColumnName.of(word).name for word in spellings):
+            spellings = (one,) if isinstance(one, str) else tuple(one)
+            if not spellings or not all(ColumnName.of(word).name for word in spellings):
                 raise HistoryError(f"{self}: the column of {quantity} is {quoted(repr(one), 60)}; give its name")
             for name in map(ColumnName.of, spellings):
                 if taken.setdefault(name, quantity) != quantity:
@@ -184,48 +184,8 @@ class CameraFormat:
             result[quantity] = spellings
         return result
 
-    def _checked_texts(self, field: str) -> tuple[str, ...]:
-        value = getattr(self, field)
-        texts = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Sequence) else (None,)
-        if not all(isinstance(text, str) for text in texts):
-            raise HistoryError(f"{self}: {field} is {quoted(repr(value), 60)}; give a tuple of texts")
-        return texts
-
-    def _checked_rules(self) -> tuple[LostRule, ...]:
-        if isinstance(self.lost, Mapping):
-            return tuple(self._checked_rule(*rule) for rule in self.lost.items())
-        if not (isinstance(self.lost, tuple) and all(isinstance(rule, LostRule) for rule in self.lost)):
-            raise HistoryError(
-                f"{self}: lost is {quoted(repr(self.lost), 60)}; write {{column: rule}}, such as {{'sigma': '< 0'}}"
-            )
-        return self.lost
-
-    def _check_layout(self) -> None:
-        pairs = tuple(self.layout) if isinstance(self.layout, Sequence) else (self.layout,)
-        names = []
-        for pair in pairs:
-            column, kind = pair if isinstance(pair, (tuple, list)) and len(pair) == 2 else ("", "")
-            if not (isinstance(column, str) and column and isinstance(kind, str) and _PACKED.fullmatch(kind)):
-                raise HistoryError(
-                    f"{self}: layout holds {quoted(repr(pair), 60)}; give a column and its type, such as "
-                    "('stereo_x_mm', '<f8')"
-                )
-            if column in names:
-                raise HistoryError(f"{self}: layout has the column '{quoted(column)}' twice; give each its own name")
-            names.append(column)
-        object.__setattr__(self, "layout", tuple((column, kind) for column, kind in pairs))
-
-    def _checked_rule(self, column: str, rule: str) -> LostRule:
-        found = _RULE.fullmatch(rule) if isinstance(rule, str) else None
+    def _rule(self, column: str, rule: str) -> LostRule:
+        found = _RULE.fullmatch(rule)
         if found is None:
             raise HistoryError(f"{self}: the rule of '{column}' is {rule!r}; write one such as '< 0' or '== -1'")
         return LostRule(column, found[1], float(found[2]))
-
-    def _check_time(self) -> None:
-        if not self.time:
-            return
-        if len(self.time) != 3 or self.time[0] not in ("head", "name") or self.time[2] not in TIME_UNITS:
-            raise HistoryError(
-                f"{self}: time is {self.time!r}; write ('head', key, unit) or ('name', '', unit) with one of the units "
-                f"{TIMES_ALLOWED}"
-            )

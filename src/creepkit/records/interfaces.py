@@ -22,20 +22,16 @@ class Reader(Protocol):
     @property
     def name(self) -> str:
         """Short, lower case, unique in the registry."""
-        ...
 
     @property
     def title(self) -> str:
         """One line for people."""
-        ...
 
     def accepts(self, path: Path) -> bool:
         """Say whether this reader understands the file or folder, without reading all of it."""
-        ...
 
     def read(self, path: Path) -> list[History]:
         """Return the histories in the file or folder; HistoryError with file and line when it cannot."""
-        ...
 
 
 @runtime_checkable
@@ -48,24 +44,20 @@ class Exporter(Protocol):
     @property
     def name(self) -> str:
         """Short, lower case, unique in the registry."""
-        ...
 
     @property
     def title(self) -> str:
         """One line for people."""
-        ...
 
     @property
     def suffix(self) -> str:
         """Ending of a file's name, with its dot."""
-        ...
 
     def text(self, source: LawWithValues) -> str:
         """Return the text; notes (intervals, validity) become comments.
 
         ExportError, with the reason, when the target cannot express the law or its units.
         """
-        ...
 
 
 @runtime_checkable
@@ -102,7 +94,6 @@ class Predictor(Protocol):
         sensitivities : whether the prediction has its derivatives with respect to theta, in `jacobian`, and to the
             kinds of nuisances given, in `nuisance_jacobian`.
         """
-        ...
 
 
 @runtime_checkable
@@ -116,7 +107,6 @@ class SupportsRupturePrediction(Predictor, Protocol):
 
         theta : (candidates, parameters) internal values.
         """
-        ...
 
 
 @runtime_checkable
@@ -125,7 +115,6 @@ class SupportsReducedOrderModel(Predictor, Protocol):
 
     def reduced_order_model(self) -> Predictor:
         """Return the reduced-order model; it may be some per cent off and need not know derivatives."""
-        ...
 
 
 @runtime_checkable
@@ -137,12 +126,10 @@ class SupportsTraining(Predictor, Protocol):
 
     def train(self) -> str:
         """Train it, where that was not done before, and keep it; what it is, in a few words."""
-        ...
 
     @property
     def error(self) -> Mapping[str, float]:
         """{output: standard deviation of its error}, in the output's unit, from runs that training did not see."""
-        ...
 
 
 @runtime_checkable
@@ -154,7 +141,6 @@ class SupportsRefinement(Predictor, Protocol):
 
     def refined(self) -> Predictor:
         """Return the more exact predictor; a few runs of it may cost as much as the rest of an identification."""
-        ...
 
 
 @runtime_checkable
@@ -163,7 +149,6 @@ class SupportsSearchTolerance(Predictor, Protocol):
 
     def for_search(self) -> Predictor:
         """Return the same predictor at such tolerances; its error is far below that of any measurement."""
-        ...
 
 
 @runtime_checkable
@@ -173,25 +158,21 @@ class SupportsSurfaceObservation(Protocol):
     @property
     def surface_region(self) -> SurfaceRegion:
         """Return which part of the surface moves and which is clamped."""
-        ...
 
     def surface_operator(self, window: float | None = None, radii: Sequence[float] = ()) -> str:
         """Return the text of the operator within a window, mm, or at radii, mm; by default the region's own.
 
         SolveError where it cannot be.
         """
-        ...
 
     def surface_center(self, points: SurfacePoints) -> tuple[Floats, Floats]:
         """Return the one centre of all frames, (2,) mm, and its covariance, (2, 2) mm2, if points err independently.
 
         FitError where the points show no centre.
         """
-        ...
 
     def observe_surface(self, points: SurfacePoints, operator: str) -> SurfaceObservation:
         """Return the outputs of each frame, of points about the centre; SolveError for an operator not understood."""
-        ...
 
 
 @runtime_checkable
@@ -209,14 +190,11 @@ class Specimen(Predictor, Protocol):
     @property
     def name(self) -> str:
         """Short, lower case, unique in the registry."""
-        ...
 
     @property
     def title(self) -> str:
         """One line for people."""
-        ...
 
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of what is observed."""
-        ...

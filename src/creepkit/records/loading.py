@@ -86,11 +86,9 @@ class Loading(Protocol):
     @property
     def quantity(self) -> Quantity:
         """What is prescribed."""
-        ...
 
     def program(self) -> Program:
         """The prescribed quantity over time: MPa, or a strain."""
-        ...
 
 
 @checked
@@ -107,13 +105,7 @@ class StressSteps:
     quantity: Quantity = field(default="stress", init=False)
 
     def __post_init__(self) -> None:
-        try:
-            steps = tuple((float(t), float(s)) for t, s in self.steps)
-        except (TypeError, ValueError):
-            example = "((0.0, 50.0), (3600.0, 60.0)), s and MPa"
-            raise SolveError(f"stress steps are pairs such as {example}; found {self.steps!r}") from None
-        if not steps or steps[0][0] != 0.0 or any(b[0] <= a[0] for a, b in pairwise(steps)):
-            raise SolveError("stress steps must start at time 0 and follow one another in time")
+        steps = _checked_steps("stress steps", self.steps, "((0.0, 50.0), (3600.0, 60.0)), s and MPa")
         if any(not 0 <= s < 1e5 for _, s in steps):
             raise SolveError(f"stress must lie from 0 to 1e5 MPa in every step, found {[s for _, s in steps]}")
         if self.control not in ("load", "stress"):
@@ -144,25 +136,15 @@ class StrainSteps:
     quantity: Quantity = field(default="strain", init=False)
 
     def __post_init__(self) -> None:
-        steps = tuple((float(t), float(e)) for t, e in self.steps)
-        if not steps or steps[0][0] != 0.0 or any(b[0] <= a[0] for a, b in pairwise(steps)):
-            raise SolveError("strain steps must start at time 0 and follow one another in time")
+        steps = _checked_steps("strain steps", self.steps, "((0.0, 0.002), (3600.0, 0.003)), s and strain")
         if any(not 0 <= e <= 1 for _, e in steps):
             raise SolveError(f"total strain must lie from 0 to 1 in every step, found {[e for _, e in steps]}")
-        shortest_step = min([b[0] - a[0] for a, b in pairwise(steps)], default=np.inf)
-        if not 0 <= self.ramp <= shortest_step or not np.isfinite(self.ramp):
-            raise SolveError(
-                f"ramp is {self.ramp:g} s; it must not be negative nor outlast a step ({shortest_step:g} s)"
-            )
+        _check_ramp(self.ramp, steps)
         object.__setattr__(self, "steps", steps)
 
     def program(self) -> Program:
         """Total strain over time."""
-        if self.ramp == 0.0:
-            return Program.steps(self.steps)
-        times = [t for start, _ in self.steps for t in (start, start + self.ramp)]
-        strains = [0.0, *(e for _, e in self.steps)]
-        return Program(np.array(times), np.array([e for pair in pairwise(strains) for e in pair]))
+        return _ramped_program(self.steps, self.ramp)
 
 
 @checked
@@ -266,18 +248,35 @@ def load_steps(quantity: Quantity, steps: Sequence[tuple[float, float]], ramp: f
 
     steps : (time in s, value in the unit of the load). ramp : s, in which each value is reached; 0 is at once.
     """
-    pairs = [(float(t), float(value)) for t, value in steps]
-    starts = [t for t, _ in pairs]
-    if not pairs or starts[0] != 0.0 or any(b <= a for a, b in pairwise(starts)):
-        raise SolveError(f"steps of {quantity} must start at time 0 and follow one another in time")
-    shortest = min([b - a for a, b in pairwise(starts)], default=np.inf)
-    if not 0.0 <= ramp < min(shortest, np.inf):
+    pairs = _checked_steps(f"steps of {quantity}", steps, "[(0, 100), (3600, 120)], s and the load's unit")
+    _check_ramp(ramp, pairs)
+    return RecordedLoading(_ramped_program(pairs, ramp), quantity)
+
+
+def _checked_steps(what: str, steps: Sequence[tuple[float, float]], example: str) -> tuple[tuple[float, float], ...]:
+    """Steps as pairs of float; SolveError unless they start at 0 and follow one another."""
+    try:
+        pairs = tuple((float(t), float(value)) for t, value in steps)
+    except (TypeError, ValueError):
+        raise SolveError(f"{what} are pairs such as {example}; found {steps!r}") from None
+    if not pairs or pairs[0][0] != 0.0 or any(b[0] <= a[0] for a, b in pairwise(pairs)):
+        raise SolveError(f"{what} must start at time 0 and follow one another in time")
+    return pairs
+
+
+def _check_ramp(ramp: float, steps: Sequence[tuple[float, float]]) -> None:
+    shortest = min([b[0] - a[0] for a, b in pairwise(steps)], default=np.inf)
+    if not 0 <= ramp <= shortest or not np.isfinite(ramp):
         raise SolveError(f"ramp is {ramp:g} s; it must not be negative nor outlast a step ({shortest:g} s)")
+
+
+def _ramped_program(steps: Sequence[tuple[float, float]], ramp: float) -> Program:
+    """Each value reached after a ramp, from 0 on; at once where the ramp is 0 s."""
     if ramp == 0.0:
-        return RecordedLoading(Program.steps(pairs), quantity)
-    values = [0.0, *(value for _, value in pairs)]
-    times = np.array([t for start in starts for t in (start, start + ramp)])
-    return RecordedLoading(Program(times, np.array([v for pair in pairwise(values) for v in pair])), quantity)
+        return Program.steps(steps)
+    times = [t for start, _ in steps for t in (start, start + ramp)]
+    values = [0.0, *(value for _, value in steps)]
+    return Program(np.array(times), np.array([v for pair in pairwise(values) for v in pair]))
 
 
 TENSOR_COMPONENTS = ("11", "22", "33", "12", "23", "13")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from creepkit.errors import HistoryError
 from creepkit.records.camera_format import COORDINATES, DISPLACEMENTS, CameraFormat, ColumnName, LostRule
 from creepkit.registry import default_registry
 from creepkit.testing.reader_checks import FOREIGN_FILES
-from creepkit.testing.reports import ConformanceCheck
+from creepkit.testing.reports import finding
 
 POINTS = 25
 
@@ -26,86 +25,59 @@ LOST = 4
 """The point that is lost in the tables of the checks."""
 
 
-@dataclass(frozen=True)
-class CameraFormatCase:
-    """A camera format, and an example file or folder of its author's, if there is one."""
-
-    format: CameraFormat
-    path: Path | None = None
-
-
-def check_own_tables(case: CameraFormatCase) -> Iterator[ConformanceCheck]:
+@finding("tables in its own words")
+def check_own_tables(format: CameraFormat, _: Path | None) -> str:
     """Each version, with columns in another order, as a table with commas and with decimal commas, or as rows."""
-    for number, version in enumerate(case.format.versions, start=1):
-        name = f"a table of version {number}"
+    for number, version in enumerate(format.versions, start=1):
         with tempfile.TemporaryDirectory() as folder:
-            for label, content in _written(case.format, version).items():
-                path = Path(folder) / f"frame_{number}{_suffix(case.format)}"
+            for label, content in _written(format, version).items():
+                path = (
+                    Path(folder) / f"frame_{number}{format.patterns[0].removeprefix('*') if format.layout else '.csv'}"
+                )
                 path.write_bytes(content)
-                if gap := _difference(case.format, version, path):
-                    yield ConformanceCheck(name, False, f"{label}: {gap}".replace(f"{folder}/", ""))
-                    return
-                if not _without_head(case.format) and (others := _other_formats(case.format, path)):
-                    detail = f"the format '{others[0]}' takes it as well; name a column that only one of them has"
-                    yield ConformanceCheck("recognised by its head", False, detail)
-                    return
-        yield ConformanceCheck(name, True, f"{POINTS} points read as they were meant, 1 of them lost")
+                gap = _difference(format, version, path)
+                assert not gap, f"version {number}, {label}: {gap}".replace(f"{folder}/", "")
+                if not format.layout and not is_for_matlab(format):  # else others are meant than tables of text
+                    _require_alone(format, path)
+    return f"{len(format.versions)} versions of {POINTS} points read as they were meant, 1 of them lost"
 
 
-def check_foreign_files(case: CameraFormatCase) -> Iterator[ConformanceCheck]:
+@finding("foreign files")
+def check_foreign_files(format: CameraFormat, _: Path | None) -> str:
     """What holds no frame is refused in one sentence."""
     with tempfile.TemporaryDirectory() as folder:
         for name, content in FOREIGN_FILES.items():
             path = Path(folder) / name
             path.write_bytes(content)
             try:
-                frame = read_frames(path, [case.format], case.format)[0]
+                frame = read_frames(path, [format], format)[0]
             except HistoryError as error:
-                if "\n" in str(error):
-                    yield ConformanceCheck("foreign files", False, f"{str(error)!r}; an error is one sentence")
-                    return
+                assert "\n" not in str(error), f"{str(error)!r}; an error is one sentence"
             else:
-                yield ConformanceCheck("foreign files", False, f"{name} is taken for {frame.valid.size} points")
-                return
-    yield ConformanceCheck("foreign files", True, f"{len(FOREIGN_FILES)} files refused in one sentence")
+                raise AssertionError(f"{name} is taken for {frame.valid.size} points")
+    return f"{len(FOREIGN_FILES)} files refused in one sentence"
 
 
-def check_example(case: CameraFormatCase) -> Iterator[ConformanceCheck]:
+@finding("example")
+def check_example(format: CameraFormat, path: Path | None) -> str:
     """An example of the author's has this format alone, and points in every frame."""
-    if case.path is None:
-        detail = "none given; check_camera_format(format, path) checks what is read of it"
-        yield ConformanceCheck("example", True, detail)
-        return
-    if others := _other_formats(case.format, case.path):
-        yield ConformanceCheck("example", False, f"the format '{others[0]}' takes it as well")
-        return
-    frames = read_frames(case.path, [case.format])
-    found = [int(frame.valid.sum()) for frame in frames]
-    passed = all(found)
-    detail = f"{len(found)} frames of {min(found)} to {max(found)} valid points"
-    yield ConformanceCheck("example", passed, detail if passed else f"frame {found.index(0)} has no valid point")
+    if path is None:
+        return "none given; check_camera_format(format, path) checks what is read of it"
+    _require_alone(format, path)
+    found = [int(frame.valid.sum()) for frame in read_frames(path, [format])]
+    assert all(found), f"frame {found.index(0)} has no valid point"
+    return f"{len(found)} frames of {min(found)} to {max(found)} valid points"
 
 
-def _other_formats(format: CameraFormat, path: Path) -> list[str]:
-    """The registered formats that take a file, this one excepted."""
-    taking = []
+def _require_alone(format: CameraFormat, path: Path) -> None:
+    """AssertionError where another registered format takes a file as well."""
     for name, entry in default_registry().cameras().items():
         if name != format.name:
             try:
                 read_frames(path, [entry.value])
             except HistoryError:
                 continue
-            taking.append(name)
-    return taking
-
-
-def _without_head(format: CameraFormat) -> bool:
-    """Whether other files than tables of text are meant, which the checks write in its place."""
-    return bool(format.layout) or is_for_matlab(format)
-
-
-def _suffix(format: CameraFormat) -> str:
-    return format.patterns[0].removeprefix("*") if format.layout else ".csv"
+            raise AssertionError(f"the format '{name}' takes it as well; name a column that only one of them has")
 
 
 def _planted() -> dict[str, Floats]:

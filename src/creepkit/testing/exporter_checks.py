@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
 
 from creepkit.errors import CreepkitError, ExportError, quoted
 from creepkit.exporters.exporting import exported_text
@@ -12,7 +10,7 @@ from creepkit.language.elastic import Elastic
 from creepkit.language.symbols import temperature
 from creepkit.records import Exporter, LawWithValues
 from creepkit.registry import default_registry
-from creepkit.testing.reports import ConformanceCheck
+from creepkit.testing.reports import finding
 
 LONGEST_TEXT = 1_000_000
 """Characters of the text of one law."""
@@ -32,13 +30,6 @@ HOSTILE_NOTES = (
 HOSTILE_NAMES = ("two words", "9th", "class", "a\nb", "x*/ int y;", 'quote"d', "é")
 
 
-@dataclass(frozen=True)
-class ExporterCase:
-    """An exporter and what it is given."""
-
-    exporter: Exporter
-
-
 def registered_sources() -> list[LawWithValues]:
     """Every registered law at the middle of its bounds, and at 1073 K where it depends on temperature."""
     sources = []
@@ -49,74 +40,78 @@ def registered_sources() -> list[LawWithValues]:
     return sources
 
 
-def check_every_law(case: ExporterCase) -> Iterator[ConformanceCheck]:
+@finding("suffix")
+def check_suffix(exporter: Exporter) -> str:
+    """The ending of files begins with a dot."""
+    suffix = exporter.suffix
+    good = isinstance(suffix, str) and re.fullmatch(r"\.[A-Za-z0-9_.]+", suffix)
+    assert good, f"{suffix!r} is none; write one such as '.inp'"
+    return suffix
+
+
+@finding("text or a reason for every law")
+def check_every_law(exporter: Exporter) -> str:
     """Every law gives text, or an ExportError that says why not; never another error."""
-    written, refused = 0, 0
-    for source in registered_sources():
+    sources, refused = registered_sources(), 0
+    for source in sources:
+        law = f"law '{source.law.name}'"
         try:
-            text = exported_text(case.exporter, source)
-        except ExportError as error:
-            message = str(error)
-            if " raised " in message or "\n" in message or not message.strip():
-                detail = f"law '{source.law.name}': {message!r}; raise ExportError with the reason, one sentence"
-                yield ConformanceCheck("text or a reason for every law", False, detail)
-                return
-            refused += 1
-            continue
+            text = exported_text(exporter, source)
         except CreepkitError as error:
-            detail = f"law '{source.law.name}': {type(error).__name__}: {error}; raise ExportError with the reason"
-            yield ConformanceCheck("text or a reason for every law", False, detail)
-            return
-        if not 0 < len(text) <= LONGEST_TEXT or "\x00" in text:
-            detail = f"law '{source.law.name}': {len(text)} characters; a text of 1 to {LONGEST_TEXT} is wanted"
-            yield ConformanceCheck("text or a reason for every law", False, detail)
-            return
-        written += 1
-    detail = f"{written} texts, {refused} refused with a reason"
-    yield ConformanceCheck("text or a reason for every law", written > 0, detail)
+            said = str(error)
+            reason = isinstance(error, ExportError) and said.strip() and " raised " not in said and "\n" not in said
+            assert reason, f"{law}: {said!r}; raise ExportError with the reason, one sentence"
+            refused += 1
+        else:
+            sound = 0 < len(text) <= LONGEST_TEXT and "\x00" not in text
+            assert sound, f"{law}: {len(text)} characters; a text of 1 to {LONGEST_TEXT} is wanted"
+    assert refused < len(sources), f"no law is written, {refused} are refused"
+    return f"{len(sources) - refused} texts, {refused} refused with a reason"
 
 
-def check_determinism(case: ExporterCase) -> Iterator[ConformanceCheck]:
+@finding("deterministic")
+def check_determinism(exporter: Exporter) -> str | None:
     """The same law gives the same text."""
-    source = _first_source(case.exporter)
-    same = source is None or exported_text(case.exporter, source) == exported_text(case.exporter, source)
-    detail = "twice the same text" if same else "two texts of one law differ; leave out dates and orders of sets"
-    yield ConformanceCheck("deterministic", same, detail)
+    source = _first_source(exporter)
+    same = source is None or exported_text(exporter, source) == exported_text(exporter, source)
+    assert same, "two texts of one law differ; leave out dates and orders of sets"
+    return "twice the same text"
 
 
-def check_hostile_texts(case: ExporterCase) -> Iterator[ConformanceCheck]:
-    """Notes and names break no lines and end no comments."""
-    source = _first_source(case.exporter)
+@finding("notes")
+def check_notes(exporter: Exporter) -> str | None:
+    """Notes break no lines and end no comments."""
+    source = _first_source(exporter)
     if source is None:
-        return
-    text = exported_text(case.exporter, source.replace(notes=HOSTILE_NOTES))
-    problem = _note_problem(text)
-    yield ConformanceCheck("notes", not problem, problem or "stay in their comments")
-    for name in HOSTILE_NAMES:
-        try:
-            text = exported_text(case.exporter, source.replace(name=name))
-        except ExportError as error:
-            if " raised " in str(error):
-                yield ConformanceCheck("names", False, f"name {name!r}: {error}; raise ExportError, or change it")
-                return
-            continue
-        if "\n" in name and name in text:
-            yield ConformanceCheck("names", False, f"name {name!r} breaks a line; refuse it, or make it an identifier")
-            return
-    yield ConformanceCheck("names", True, f"{len(HOSTILE_NAMES)} names written or refused")
-
-
-def _note_problem(text: str) -> str:
+        return None
+    text = exported_text(exporter, source.replace(notes=HOSTILE_NOTES))
     lines = text.splitlines()
-    first = [line for line in lines if FIRST_LINE in line]
-    second = [line for line in lines if SECOND_LINE in line]
+    first, second = ([line for line in lines if mark in line] for mark in (FIRST_LINE, SECOND_LINE))
     for a, b in zip(first, second, strict=False):
-        if a is not b and _prefix(a, FIRST_LINE) != _prefix(b, SECOND_LINE):
-            found = quoted(repr(b), 60)
-            return f"the second line of a note stands alone, {found}; put the comment sign before each line of it"
-    if "\x00" in text:
-        return "a null character of a note is in the text; creepkit.exporters.law_description leaves them out"
-    return ""
+        stands_alone = a is not b and _prefix(a, FIRST_LINE) != _prefix(b, SECOND_LINE)
+        shown = quoted(repr(b), 60)
+        assert not stands_alone, (
+            f"the second line of a note stands alone, {shown}; put the comment sign before each line of it"
+        )
+    assert "\x00" not in text, (
+        "a null character of a note is in the text; creepkit.exporters.law_description leaves them out"
+    )
+    return "stay in their comments"
+
+
+@finding("names")
+def check_names(exporter: Exporter) -> str | None:
+    """Names break no lines."""
+    source = _first_source(exporter)
+    for name in HOSTILE_NAMES if source else ():
+        try:
+            text = exported_text(exporter, source.replace(name=name))  # type: ignore[union-attr]
+        except ExportError as error:
+            assert " raised " not in str(error), f"name {name!r}: {error}; raise ExportError, or change it"
+            continue
+        breaks = "\n" in name and name in text
+        assert not breaks, f"name {name!r} breaks a line; refuse it, or make it an identifier"
+    return f"{len(HOSTILE_NAMES)} names written or refused" if source else None
 
 
 def _prefix(line: str, marker: str) -> str:
@@ -132,10 +127,3 @@ def _first_source(exporter: Exporter) -> LawWithValues | None:
             continue
         return source
     return None
-
-
-def check_interface(case: ExporterCase) -> Iterator[ConformanceCheck]:
-    """The ending of files begins with a dot."""
-    suffix = case.exporter.suffix
-    good = isinstance(suffix, str) and bool(re.fullmatch(r"\.[A-Za-z0-9_.]+", suffix))
-    yield ConformanceCheck("suffix", good, suffix if good else f"{suffix!r} is none; write one such as '.inp'")

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from creepkit.files.time_stamps import DATE_ORDERS
 from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
 from creepkit.records import InstrumentFormat
-from creepkit.testing.reports import ConformanceCheck
+from creepkit.testing.reports import finding
 
 
-def check_declaration(declared: InstrumentFormat) -> Iterator[ConformanceCheck]:
+@finding("declaration")
+def check_declaration(declared: InstrumentFormat) -> str:
     """Units and the order of dates mean something; what else is declared was checked when the format was made."""
     unknown = [unit for unit in declared.units.values() if channel_unit(unit) is None]
-    detail = f"'{unknown[0]}' is no unit of a channel; write one such as barg, psia, C" if unknown else "known"
-    yield ConformanceCheck("units of channels", not unknown, detail)
-    time_known = declared.time_unit in ("", *TIME_UNITS)
-    yield ConformanceCheck("unit of times", time_known, f"'{declared.time_unit}' of {', '.join(TIME_UNITS)}")
-    order_known = declared.date_order in ("", *DATE_ORDERS)
-    yield ConformanceCheck("order of dates", order_known, f"'{declared.date_order}' of {', '.join(DATE_ORDERS)}")
+    assert not unknown, f"'{unknown[0]}' is no unit of a channel; write one such as barg, psia, C"
+    unit, order = declared.time_unit, declared.date_order
+    assert unit in ("", *TIME_UNITS), f"'{unit}' is no unit of times; write one of {', '.join(TIME_UNITS)}"
+    assert order in ("", *DATE_ORDERS), f"'{order}' is no order of dates; write one of {', '.join(DATE_ORDERS)}"
+    return "units of channels and times, and the order of dates, are known"

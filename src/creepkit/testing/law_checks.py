@@ -1,9 +1,9 @@
-"""The conformance checks of a law, one function each: it yields one ConformanceCheck a property."""
+"""Checks of what kernels make of a law: finite, monotonic, equal to 50 digits, with its switches."""
 
 from __future__ import annotations
 
-import pickle
-from collections.abc import Iterator
+from collections.abc import Mapping
+from functools import lru_cache
 
 import mpmath
 import numpy as np
@@ -11,7 +11,8 @@ import sympy
 
 from creepkit.arrays import Bools, Floats
 from creepkit.kernels.interface import call_entry
-from creepkit.kernels.lowering import ArrayKernel, lower
+from creepkit.kernels.log_form import log_form
+from creepkit.kernels.lowering import lower
 from creepkit.kernels.multiprecision import MultiprecisionLaw
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, strain, time
@@ -21,13 +22,11 @@ from creepkit.testing.parity import (
     NEGLIGIBLE_RATE,
     VALUE_TOLERANCE,
     MultiprecisionReference,
+    RelativeDifference,
     largest_differences,
 )
-from creepkit.testing.reports import ConformanceCheck
-from creepkit.testing.sample_points import LawSamples, constraints_hold
-
-_STRESS_COLUMNS = [0, 4, 5]
-
+from creepkit.testing.reports import finding
+from creepkit.testing.sample_points import STRESS_COLUMNS, LawSamples, constraints_hold, log_rate, point_text
 
 _SMALLEST_ACCURATE = 1e-290
 """Numbers below this may have lost digits."""
@@ -37,218 +36,159 @@ _LARGEST_LOG_RATE = 1e29
 """ln rates as far from 0 as this mean that no term is left, or that the rate is infinite."""
 
 
-# ---- what the author wrote -----------------------------------------------------------------------------------------
+_ZERO = {
+    "strain": ("strain",),
+    "time": ("time",),
+    "stress": ("stress", "principal_stress", "mean_stress"),
+    "strain and time and stress": ("strain", "time", "stress", "principal_stress", "mean_stress"),
+}
+"""{words: variables of the point that are zero}."""
 
 
-def check_declarations(law: CreepLaw, _: LawSamples) -> Iterator[ConformanceCheck]:
-    """Declared equals used; title, references and units are there."""
-    rates = (*law.terms.values(), *(state.rate for state in law.states.values()))
-    used = set().union(*(rate.free_symbols for rate in rates))
-    undeclared = sorted(s.name for s in (used - {*POINT_VARIABLES}) ^ {*law.params, *law.states})
-    description = (
-        f"{', '.join(undeclared)} is in the tables or in the rates, not in both"
-        if undeclared
-        else f"{len(law.params)} parameters"
-    )
-    yield ConformanceCheck("declared equals used", not undeclared, description)
-    stated = {
-        "title, such as title='Norton power law'": law.title.strip(),
-        "references, such as references=('Norton (1929), The Creep of Steel at High Temperatures',)": law.references,
-    }
-    missing = [what for what, there in stated.items() if not there]
-    missing += [f"unit of {name}" for name, param in law.table.items() if not param.unit]
-    yield ConformanceCheck(
-        "title, references, units", not missing, f"missing {', '.join(missing)}" if missing else "present"
-    )
+def _require(law: CreepLaw, samples: LawSamples, holds: Bools) -> str:
+    """AssertionError with the first sample at which something does not hold; holds : (samples,)."""
+    if not holds.all():
+        where = point_text(law, samples.points[int(np.flatnonzero(~holds)[0])])
+        raise AssertionError(f"not at {int((~holds).sum())} of {holds.size} points, such as {where}")
+    return f"{holds.size} points"
 
 
-def check_printing(law: CreepLaw, _: LawSamples) -> Iterator[ConformanceCheck]:
-    """LaTeX and source print, and the law survives pickling."""
-    text, source = law.latex(), lower(law, "numpy").source
-    balanced = text.count("{") == text.count("}") and text.count(r"\left") == text.count(r"\right")
-    description = f"{len(text)} and {len(source)} characters"
-    yield ConformanceCheck("LaTeX and source print", balanced and "def rate" in source, description)
-    again = pickle.loads(pickle.dumps(law))
-    yield ConformanceCheck(
-        "pickle and equality", again == law and again.fingerprint == law.fingerprint, law.fingerprint
-    )
+@finding("ln rate is finite")
+def check_finite(law: CreepLaw, samples: LawSamples) -> str:
+    """The log rate is a number wherever the constraints hold."""
+    return _require(law, samples, np.abs(log_rate(lower(law, "numpy"), samples)) < _LARGEST_LOG_RATE)
 
 
-def check_signs(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
-    """No term is negative: each is checked with the author's own expression."""
-    exact = MultiprecisionLaw(law)
-    for point, theta in zip(samples.points, samples.theta, strict=True):
-        for label, value in zip(law.terms, exact.terms(point, theta), strict=True):
-            if not (mpmath.im(value) == 0 and value >= 0):
-                remedy = (
-                    "say in constraints where the law holds, constraints=(stress > s0,), or use Max(stress - s0, 0)"
-                )
-                description = f"term '{label}' is {mpmath.nstr(value, 4)} 1/s at {point_text(law, point)}"
-                yield ConformanceCheck("no term is negative", False, f"{description}; {remedy}")
-                return
-    yield ConformanceCheck("no term is negative", True, f"{len(samples)} points")
+@finding("ln rate and its derivatives are finite at zero {}", each=lambda law, samples: _ZERO)
+def check_finite_at_zero(law: CreepLaw, samples: LawSamples, words: str) -> str:
+    """So are they at zero strain, time and stress, where the floors of powers count."""
+    at_zero = samples.at(**dict.fromkeys(_ZERO[words], 0.0))
+    finite = np.isfinite(log_rate(lower(law, "numpy"), at_zero)) & _updates(law, at_zero)
+    return _require(law, at_zero, finite)
 
 
-# ---- what kernels make of it ---------------------------------------------------------------------------------------
+def _updates(law: CreepLaw, samples: LawSamples) -> Bools:
+    """Where the compiled entry of implicit updates gives finite numbers, (samples,)."""
+    compiled, pairs = lower(law, "compiled"), zip(samples.points, samples.theta, strict=True)
+    return np.array([call_entry(compiled, "update", point[None], theta)[1] == 0 for point, theta in pairs])
 
 
-def check_finite(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
-    """The log rate and its derivatives are finite, at zero strain, time and stress too."""
-    kernel, compiled = lower(law, "numpy"), lower(law, "compiled")
-    yield check_at_samples("ln rate is finite", law, samples, np.abs(log_rate(kernel, samples)) < _LARGEST_LOG_RATE)
-    zeros = ({"strain": 0.0}, {"time": 0.0}, {"stress": 0.0, "principal_stress": 0.0, "mean_stress": 0.0})
-    for columns in (*zeros, zeros[0] | zeros[1] | zeros[2]):
-        at_zero = samples.at(**columns)
-        flags = [
-            call_entry(compiled, "update", p[None], t)[1] for p, t in zip(at_zero.points, at_zero.theta, strict=True)
-        ]
-        is_finite = np.isfinite(log_rate(kernel, at_zero)) & (np.array(flags) == 0)
-        zero_names = " and ".join(name for name in columns if "_" not in name)
-        yield check_at_samples(f"ln rate and its derivatives are finite at zero {zero_names}", law, at_zero, is_finite)
-
-
-def check_monotonic(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
+@finding("rate never falls with stress")
+def check_monotonic(law: CreepLaw, samples: LawSamples) -> str:
     """A higher stress of the same direction never lowers the rate."""
-    kernel, points = lower(law, "numpy"), samples.points.copy()
-    points[:, _STRESS_COLUMNS] *= 1.01
-    samples_at_higher_stress = LawSamples(points, samples.theta)
-    before, after = log_rate(kernel, samples), log_rate(kernel, samples_at_higher_stress)
-    is_monotonic = after >= before - 1e-9 * np.maximum(1.0, np.abs(before))
-    yield check_at_samples(
-        "rate never falls with stress", law, samples, is_monotonic | ~constraints_hold(law, points, samples.theta)
-    )
+    kernel, higher = lower(law, "numpy"), samples.scaled(STRESS_COLUMNS, 1.01)
+    before, after = log_rate(kernel, samples), log_rate(kernel, higher)
+    rises = after >= before - 1e-9 * np.maximum(1.0, np.abs(before))
+    return _require(law, samples, rises | ~constraints_hold(law, higher.points, higher.theta))
 
 
-def check_parity(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
+LIMITS = {"value": VALUE_TOLERANCE, "derivatives": DERIVATIVE_TOLERANCE}
+
+
+def _parities(law: CreepLaw, samples: LawSamples) -> list[str]:
+    return [f"{target} {what}" for target in KERNEL_EVALUATORS for what in LIMITS]
+
+
+@finding("{} against 50 digits", each=_parities)
+def check_parity(law: CreepLaw, samples: LawSamples, of: str) -> str:
     """Every target agrees with 50-digit arithmetic."""
+    target, what = of.split()
+    reference, differences = _differences(law, samples)[target]
+    difference = differences[list(LIMITS).index(what)]
+    assert difference.size <= LIMITS[what], f"{difference.size:.1e}, {reference.location_text(difference)}"
+    return f"{difference.size:.1e}"
+
+
+@lru_cache(maxsize=1)
+def _differences(
+    law: CreepLaw, samples: LawSamples
+) -> Mapping[str, tuple[MultiprecisionReference, tuple[RelativeDifference, RelativeDifference]]]:
     reference = MultiprecisionReference(MultiprecisionLaw(law), samples)
-    for target, evaluate in KERNEL_EVALUATORS.items():
-        values, derivatives = largest_differences(reference, evaluate(law, samples), allow_cancellation=True)
-        for what, result, limit in (
-            ("value", values, VALUE_TOLERANCE),
-            ("derivatives", derivatives, DERIVATIVE_TOLERANCE),
-        ):
-            where = "" if result.size <= limit else f", {reference.location_text(result)}"
-            yield ConformanceCheck(
-                f"{target} {what} against 50 digits", result.size <= limit, f"{result.size:.1e}{where}"
-            )
+    return {
+        target: (reference, largest_differences(reference, evaluate(law, samples), allow_cancellation=True))
+        for target, evaluate in KERNEL_EVALUATORS.items()
+    }
 
 
-def check_torch_gradients(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
+@finding("torch gradients{}", each=lambda law, samples: ("", " at zero strain and time"))
+def check_torch_gradients(law: CreepLaw, samples: LawSamples, where: str) -> str:
     """Torch gradients of the log rate equal the derivatives by symbols, and are finite at zero strain and time."""
-    differences = [_gradient_difference(law, samples), _gradient_difference(law, samples.at(strain=0.0, time=0.0))]
-    for where, difference in zip(("", " at zero strain and time"), differences, strict=True):
-        name = f"torch gradients{where}"
-        yield ConformanceCheck(
-            name, difference <= DERIVATIVE_TOLERANCE, f"{difference:.1e}" if np.isfinite(difference) else "NaN or inf"
-        )
-
-
-def check_switches(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
-    """A parameter that is off does what fixing it at its off value does; with every term off the rate is 0."""
-    off_values = {name: param.off for name, param in law.table.items() if param.off is not None}
-    differences = {name: _switch_difference(law, samples, name, value) for name, value in off_values.items()}
-    description = ", ".join(f"{name} {difference:.1e}" for name, difference in differences.items())
-    yield ConformanceCheck(
-        "off equals fix", all(gap <= 1e-11 for gap in differences.values()), description or "no switches"
-    )
-    columns = [k for k, p in enumerate(law.params.values()) if p.scale == "log" and p.off == 0]
-    coefficients = {k for own_values in _coefficient_positions(law) for k in own_values[:1]}
-    if coefficients <= {*columns} and all(_coefficient_positions(law)):
-        theta = samples.theta.copy()
-        theta[:, sorted(coefficients)] = -np.inf
-        yield ConformanceCheck("every term off", *_check_all_terms_off(law, LawSamples(samples.points, theta)))
-
-
-def check_leading_exponent(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
-    """The exponent of time at the start, against slopes of the author's terms at 1e-12 s; logarithms die out slowly."""
-    exact, compiled = MultiprecisionLaw(law), lower(law, "compiled")
-    differences = []
-    for start in ((1e-40, 1e-12), (1e-80, 1e-24)):
-        subset = LawSamples(samples.points[:16].copy(), samples.theta[:16])
-        subset.points[:, 1:3] = start
-        exact_exponents = [_leading_exponent(exact, p, t) for p, t in zip(subset.points, subset.theta, strict=True)]
-        differences.append(np.abs(compiled.leading_exponent(subset.theta, subset.points) - exact_exponents))
-    early, earlier = differences
-    is_converging = (earlier <= 1e-6) | (earlier <= 0.6 * early)
-    yield ConformanceCheck("leading exponent of time", bool(is_converging.all()), f"{earlier.max(initial=0.0):.1e}")
-
-
-# ---- mechanisms ----------------------------------------------------------------------------------------------------
-
-
-def check_at_samples(name: str, law: CreepLaw, samples: LawSamples, holds: Bools) -> ConformanceCheck:
-    """Whether something holds at all samples; if not, the first point where it does not; holds : (samples,)."""
-    if holds.all():
-        return ConformanceCheck(name, True, f"{holds.size} points")
-    first = int(np.flatnonzero(~holds)[0])
-    description = (
-        f"not at {int((~holds).sum())} of {holds.size} points, such as {point_text(law, samples.points[first])}"
-    )
-    return ConformanceCheck(name, False, description)
-
-
-def point_text(law: CreepLaw, point: Floats) -> str:
-    """What a law uses of a point, in words; point : (6 + states,) MPa, s and K."""
-    pairs = zip((*POINT_VARIABLES, *law.states), point, strict=True)
-    return ", ".join(f"{s.name} {value:.4g}" for s, value in pairs if law.uses(s))
-
-
-def log_rate(kernel: ArrayKernel, samples: LawSamples) -> Floats:
-    """The ln rate at samples, (samples,)."""
-    return np.asarray(kernel.internal_log_rate(*samples.arguments()), float)
-
-
-def _gradient_difference(law: CreepLaw, samples: LawSamples) -> float:
-    """Largest relative difference of torch's gradient of ln rate from d(rate)/rate; inf where one is not finite."""
     import torch
 
+    if where:
+        samples = samples.at(strain=0.0, time=0.0)
     inputs = [torch.tensor(column, requires_grad=True) for column in samples.arguments()]
     total = lower(law, "torch").internal_log_rate(*inputs).sum()
-    gradients_of_log_rate = torch.autograd.grad(total, inputs, allow_unused=True)
-    result = np.stack([np.zeros(len(samples)) if g is None else g.numpy() for g in gradients_of_log_rate], axis=1)
+    gradients = torch.autograd.grad(total, inputs, allow_unused=True)
+    found = np.stack([np.zeros(len(samples)) if g is None else g.numpy() for g in gradients], axis=1)
+    assert np.isfinite(found).all(), "NaN or inf"
     derivatives = lower(law, "numpy").internal_derivatives(*samples.arguments())
-    rate_derivatives = np.stack([*derivatives.point.values(), *derivatives.params.values()], axis=1)
-    expected = rate_derivatives / derivatives.rate[:, None]
-    difference = np.abs(result - expected) / np.abs(expected)
-    is_comparable = np.isfinite(expected) & (
-        np.minimum(np.abs(rate_derivatives), np.abs(expected)) > _SMALLEST_ACCURATE
-    )
-    return float(np.max(difference, where=is_comparable, initial=0.0)) if np.isfinite(result).all() else np.inf
+    exact = np.stack([*derivatives.point.values(), *derivatives.params.values()], axis=1)
+    expected = exact / derivatives.rate[:, None]
+    accurate = np.isfinite(expected) & (np.minimum(np.abs(exact), np.abs(expected)) > _SMALLEST_ACCURATE)
+    difference = float(np.max(np.abs(found - expected) / np.abs(expected), where=accurate, initial=0.0))
+    assert difference <= DERIVATIVE_TOLERANCE, f"{difference:.1e}"
+    return f"{difference:.1e}"
+
+
+@finding("off equals fix")
+def check_switches(law: CreepLaw, samples: LawSamples) -> str:
+    """A parameter that is off does what fixing it at its off value does."""
+    off = {name: param.off for name, param in law.table.items() if param.off is not None}
+    differences = {name: _switch_difference(law, samples, name, value) for name, value in off.items()}
+    detail = ", ".join(f"{name} {difference:.1e}" for name, difference in differences.items()) or "no switches"
+    assert all(gap <= 1e-11 for gap in differences.values()), detail
+    return detail
 
 
 def _switch_difference(law: CreepLaw, samples: LawSamples, name: str, value: float) -> float:
-    point_names = [s.name for s in (*POINT_VARIABLES, *law.states)]
-    point = dict(zip(point_names, samples.points.T, strict=True))
+    point = dict(zip((s.name for s in (*POINT_VARIABLES, *law.states)), samples.points.T, strict=True))
     pairs = zip(law.table.items(), samples.theta.T, strict=True)
     values = {n: np.exp(t) if p.scale == "log" else t for (n, p), t in pairs}
     off = lower(law, "numpy").rate({**values, name: value}, **point)
     if all(term.subs(law.symbol(name), value) == 0 for term in law.terms.values()):
         return 0.0 if (off < NEGLIGIBLE_RATE).all() else np.inf
     fixed = law.fix(**{name: value})
-    kept = {n: point[n] for n in (*(s.name for s in POINT_VARIABLES), *(s.name for s in fixed.states))}
+    kept = {s.name: point[s.name] for s in (*POINT_VARIABLES, *fixed.states)}
     expected = lower(fixed, "numpy").rate({n: values[n] for n in fixed.names}, **kept)
-    is_finite = np.isfinite(expected)
-    difference = np.abs(off[is_finite] - expected[is_finite]) / np.maximum(np.abs(expected[is_finite]), NEGLIGIBLE_RATE)
-    return float(difference.max(initial=0.0)) if np.isfinite(off[is_finite]).all() else np.inf
+    finite = np.isfinite(expected)
+    difference = np.abs(off[finite] - expected[finite]) / np.maximum(np.abs(expected[finite]), NEGLIGIBLE_RATE)
+    return float(difference.max(initial=0.0)) if np.isfinite(off[finite]).all() else np.inf
 
 
-def _coefficient_positions(law: CreepLaw) -> tuple[tuple[int, ...], ...]:
-    from creepkit.kernels.log_form import log_form
-
-    return log_form(law).coefficients
-
-
-def _check_all_terms_off(law: CreepLaw, samples: LawSamples) -> tuple[bool, str]:
-    """Rate 0 and a finite update, in every target."""
+@finding("every term off")
+def check_all_off(law: CreepLaw, samples: LawSamples) -> str | None:
+    """With every rate coefficient at zero the rate is 0 and the update finite, in every target."""
+    positions = log_form(law).coefficients
+    switches = {k for k, p in enumerate(law.params.values()) if p.scale == "log" and p.off == 0}
+    coefficients = {k for own in positions for k in own[:1]}
+    if not coefficients <= switches or not all(positions):
+        return None
+    theta = samples.theta.copy()
+    theta[:, sorted(coefficients)] = -np.inf
+    off = LawSamples(samples.points, theta)
     for target, evaluate in KERNEL_EVALUATORS.items():
-        result = evaluate(law, samples)
-        finite = np.isfinite(result.rows).all() and np.isfinite(result.log_rates).all()
-        if not (finite and (result.rows[:, 0, 0] < NEGLIGIBLE_RATE).all()):
-            return False, f"the {target} kernel leaves a rate, or a number that is not finite"
-    compiled = lower(law, "compiled")
-    flags = [call_entry(compiled, "update", p[None], t)[1] for p, t in zip(samples.points, samples.theta, strict=True)]
-    return not any(flags), "rate 0, update finite" if not any(flags) else "the update entry is not finite"
+        table = evaluate(law, off)
+        finite = np.isfinite(table.rows).all() and np.isfinite(table.log_rates).all()
+        zero = finite and (table.rows[:, 0, 0] < NEGLIGIBLE_RATE).all()
+        assert zero, f"the {target} kernel leaves a rate, or a number that is not finite"
+    assert _updates(law, off).all(), "the update entry is not finite"
+    return "rate 0, update finite"
+
+
+@finding("leading exponent of time")
+def check_leading_exponent(law: CreepLaw, samples: LawSamples) -> str:
+    """The exponent of time at the start, against slopes of the author's terms at 1e-12 s; logarithms die out slowly."""
+    exact, compiled = MultiprecisionLaw(law), lower(law, "compiled")
+    gaps = []
+    for start in ((1e-40, 1e-12), (1e-80, 1e-24)):
+        points, theta = samples.points[:16].copy(), samples.theta[:16]
+        points[:, 1:3] = start
+        slopes = [_leading_exponent(exact, p, t) for p, t in zip(points, theta, strict=True)]
+        gaps.append(np.abs(compiled.leading_exponent(theta, points) - slopes))
+    early, earlier = gaps
+    assert ((earlier <= 1e-6) | (earlier <= 0.6 * early)).all(), f"{earlier.max(initial=0.0):.1e}"
+    return f"{earlier.max(initial=0.0):.1e}"
 
 
 def _leading_exponent(exact: MultiprecisionLaw, point: Floats, theta: Floats) -> float:

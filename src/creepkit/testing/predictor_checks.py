@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import CreepkitError, quoted
+from creepkit.errors import CreepkitError, SolveError, quoted
+from creepkit.language import arrhenius
 from creepkit.language.law import CreepLaw
 from creepkit.records import (
     History,
@@ -23,7 +24,8 @@ from creepkit.records import (
     predict_with,
     typical_history,
 )
-from creepkit.testing.reports import ConformanceCheck
+from creepkit.registry import default_registry
+from creepkit.testing.reports import finding
 
 SAME = 1e-6
 """Relative difference, of the largest value of an output, that counts as none."""
@@ -41,8 +43,8 @@ SENSITIVITY_TOLERANCE = 0.02
 """Of the largest derivative; beside it, what two steps of the difference disagree by."""
 
 
-REDUCED_TOLERANCE, REFINED_TOLERANCE = 0.25, 0.1
-"""By how much a reduced-order model and a refined predictor may differ, of the largest value of an output."""
+RELATED = {"reduced_order_model": 0.25, "refined": 0.1}
+"""By how much such a model may differ, of the largest value of an output."""
 
 
 UNKNOWN_NUISANCE = "no_such_kind"
@@ -50,6 +52,10 @@ UNKNOWN_NUISANCE = "no_such_kind"
 
 STEPS = {"temperature": 0.5, "modulus": 0.01}
 """Of central differences in nuisances; lengths move by half a per cent."""
+
+
+TYPICAL_STRAIN, NORTON_REFERENCE = 0.005, 1050.0
+"""At the end of a test; K, at which a law with temperature has its rate coefficient."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +69,6 @@ class PredictorCase:
     law: CreepLaw
     theta: Floats
     histories: Sequence[History]
-    kind: str = "predictor"
 
     @property
     def candidates(self) -> Floats:
@@ -88,13 +93,58 @@ class PredictorCase:
         theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}.
         """
         return predict_with(
-            self.predictor if using is None else using,
-            self.law if law is None else law,
+            using or self.predictor,
+            law or self.law,
             self.theta if theta is None else theta,
             self.histories if histories is None else histories,
             nuisances=nuisances,
             sensitivities=sensitivities,
         )
+
+
+def default_histories(predictor: object) -> list[History]:
+    """Two tests of different lengths and loads, from the record of a specimen."""
+    first = typical_history(predictor, frames=20)
+    second = typical_history(predictor, level=0.45, frames=11, end=0.6 * float(first.times[-1]))
+    return [first, second.replace(name=f"{second.name}, shorter")]
+
+
+def law_of_check(predictor: Any, law: CreepLaw | str | None, history: History) -> tuple[CreepLaw, Mapping[str, float]]:
+    """The law that a predictor is checked with, and values of it: Norton's, with temperature if the predictor can."""
+    norton = default_registry().law("norton")
+    if law is not None:
+        chosen = default_registry().law(law) if isinstance(law, str) else law
+        return chosen, chosen.center()
+    rate, values = norton_at(predictor, history)
+    warm = norton.times(arrhenius(T_ref=NORTON_REFERENCE))
+    change = 1.0 / NORTON_REFERENCE - 1.0 / history.mean_temperature
+    values_warm = {**values, "A": float(rate * np.exp(-3e5 / 8.314462618 * change)), "Q": 3e5}
+    try:
+        prediction_or_refusal(
+            lambda: predict_with(predictor, warm, warm.to_internal(warm.values(values_warm)), [history])
+        )
+    except CreepkitError:  # a closed form of Norton's law alone
+        predict_with(predictor, norton, norton.to_internal(norton.values(values)), [history])  # says why it cannot
+        return norton, values
+    return warm, values_warm
+
+
+def norton_at(predictor: Any, history: History) -> tuple[float, dict[str, float]]:
+    """A, MPa^-4/s, and values of Norton's law with n = 4: a creep strain of half a per cent at the end of a test."""
+    record = getattr(predictor, "specimen", predictor)
+    found = float(np.max(record.reference_stress(history), initial=0.0)) if hasattr(record, "reference_stress") else 0.0
+    level = found if 0.0 < found < np.inf else 100.0
+    rate = TYPICAL_STRAIN / float(history.times[-1]) / level**4
+    return rate, {"A": rate, "n": 4.0}
+
+
+def prediction_or_refusal(call: Callable[[], Prediction]) -> Prediction:
+    """A prediction; CreepkitError where it is refused, as by status for a stated reason, or where the code fails."""
+    found = call()
+    refused = np.isin(found.status, (int(Status.NOT_CONVERGED), int(Status.OUTSIDE_CLASS)))
+    if found.reason and refused.all():
+        raise SolveError(found.reason)
+    return found
 
 
 def largest_difference(first: Floats, second: Floats) -> float:
@@ -110,116 +160,118 @@ def largest_difference(first: Floats, second: Floats) -> float:
     return float(np.max(gap / np.maximum(size, 1e-300)))
 
 
-def check_shapes(case: PredictorCase) -> Iterator[ConformanceCheck]:
-    """Arrays are of the shapes and types asked for; values are finite up to a row's end, and NaN beyond."""
+@finding("outputs")
+def check_outputs(case: PredictorCase) -> str:
+    """Outputs have names, and those of a test are among them."""
+    outputs = tuple(getattr(case.predictor, "outputs", ()))
+    assert outputs, "none; state outputs = (ck.Output('deflection', 'length'),)"
+    stated = outputs_of_tests(case.predictor, case.histories)
+    unknown = [name for name in stated if name not in outputs_of(case.predictor)]
+    assert not unknown, f"outputs_of_test() gives '{unknown[0]}'; name it among outputs or optional_outputs"
+    units = [f"{o} in {o.unit or 'no unit'}" if isinstance(o, Output) else str(o) for o in outputs]
+    return ", ".join(units[:4]) + ("" if len(units) <= 4 else f" and {len(units) - 4} more")
+
+
+@finding("a moderate test lasts to its end")
+def check_lasting(case: PredictorCase) -> str:
+    """The law is predicted, and the tests with moderate values do not end early."""
     found = case.predict(case.candidates)
-    sizes = ", ".join(str(h.times.size) for h in case.histories)
-    yield ConformanceCheck("shapes", True, f"{len(case.candidates)} candidates, tests of {sizes} times")
-    if (found.status[0] == Status.OUTSIDE_CLASS).all():
-        detail = f"{found.reason or 'the law is outside its class'}; give law= and values= that it knows"
-        yield ConformanceCheck("predicts the law", False, detail)
-        return
-    ended = found.status[0] != int(Status.COMPLETE)
-    outside = found.status[0] == int(Status.OUTSIDE_DOMAIN)
-    if (ended & ~outside).any():
-        k = int(np.flatnonzero(ended & ~outside)[0])
-        detail = (
-            f"test '{case.histories[k].name}' ended at {found.end_times[0, k]:g} s, "
-            f"{Status(int(found.status[0, k])).text}"
+    outside = f"{found.reason or 'the law is outside its class'}; give law= and values= that it knows"
+    assert not (found.status[0] == Status.OUTSIDE_CLASS).all(), outside
+    for history, status, end in zip(case.histories, found.status[0], found.end_times[0], strict=True):
+        assert status in (Status.COMPLETE, Status.OUTSIDE_DOMAIN), (
+            f"test '{history.name}' ended at {end:g} s, {Status(int(status)).text}"
             f"{f': {found.reason}' if found.reason else ''}; give histories= and values= that last to their end"
         )
-        yield ConformanceCheck("a moderate test lasts to its end", False, detail)
-    yield _check_ends(case, found)
-    yield _check_rest(case, found)
+    return f"tests of {', '.join(str(h.times.size) for h in case.histories)} times"
 
 
-def _check_ends(case: PredictorCase, found: Prediction) -> ConformanceCheck:
-    name = "NaN after an end only"
-    for c in range(found.status.shape[0]):
-        for k, history in enumerate(case.histories):
-            values, end = found.of(k, c), float(found.end_times[c, k])
-            status, missing = Status(int(found.status[c, k])), np.isnan(values).any(axis=1)
-            where = f"test '{history.name}', candidate {c}"
-            if np.isinf(values).any():
-                return ConformanceCheck(name, False, f"{where}: a value is infinite; end the row there, NaN after it")
-            if not np.isnan(found.values[c, k, history.times.size :]).all():
-                return ConformanceCheck(name, False, f"{where}: values beyond its last time; pad them with NaN")
-            if status in (Status.COMPLETE, Status.OUTSIDE_DOMAIN) and missing.any():
-                time = history.times[int(np.argmax(missing))]
-                detail = f"{where}: NaN at {time:g} s and status complete; state how and when it ended"
-                return ConformanceCheck(name, False, detail)
-            before = history.times < end * (1 - 1e-9)
-            if status is Status.RUPTURED and (missing & before).any():
-                time = history.times[int(np.argmax(missing & before))]
-                detail = f"{where}: NaN at {time:g} s, before its end at {end:g} s; values until then are wanted"
-                return ConformanceCheck(name, False, detail)
-            after = history.times > end * (1 + 1e-9)
-            if status is Status.RUPTURED and (~missing & after).any():
-                time = history.times[int(np.argmax(~missing & after))]
-                detail = f"{where}: values at {time:g} s, after its end at {end:g} s; NaN is wanted there"
-                return ConformanceCheck(name, False, detail)
-    ended = int((found.status != int(Status.COMPLETE)).sum())
-    return ConformanceCheck(name, True, f"{ended} of {found.status.size} rows ended early")
+@finding("NaN after an end only")
+def check_ends(case: PredictorCase) -> str:
+    """Values are finite up to a row's end, and NaN beyond."""
+    found = case.predict(case.candidates)
+    for c, k in np.ndindex(*found.status.shape):
+        history, values, end = case.histories[k], found.of(k, c), float(found.end_times[c, k])
+        status, missing = Status(int(found.status[c, k])), np.isnan(values).any(axis=1)
+        where, times = f"test '{history.name}', candidate {c}", history.times
+        assert not np.isinf(values).any(), f"{where}: a value is infinite; end the row there, NaN after it"
+        beyond = found.values[c, k, times.size :]
+        assert np.isnan(beyond).all(), f"{where}: values beyond its last time; pad them with NaN"
+        if status in (Status.COMPLETE, Status.OUTSIDE_DOMAIN):
+            assert not missing.any(), (
+                f"{where}: NaN at {times[np.argmax(missing)]:g} s and status complete; state how and when it ended"
+            )
+        if status is Status.RUPTURED:
+            early, late = missing & (times < end * (1 - 1e-9)), ~missing & (times > end * (1 + 1e-9))
+            assert not early.any(), (
+                f"{where}: NaN at {times[np.argmax(early)]:g} s, before its end at {end:g} s; "
+                "values until then are wanted"
+            )
+            assert not late.any(), (
+                f"{where}: values at {times[np.argmax(late)]:g} s, after its end at {end:g} s; NaN is wanted there"
+            )
+    return f"{int((found.status != int(Status.COMPLETE)).sum())} of {found.status.size} rows ended early"
 
 
-def _check_rest(case: PredictorCase, found: Prediction) -> ConformanceCheck:
-    starts = [(k, h) for k, h in enumerate(case.histories) if h.times[0] == 0.0]
+@finding("finite at time zero")
+def check_rest(case: PredictorCase) -> str:
+    """What is seen at rest is a number."""
+    found, starts = case.predict(), [(k, h) for k, h in enumerate(case.histories) if h.times[0] == 0.0]
     for k, history in starts:
         bad = [str(o) for o, v in zip(found.outputs, found.of(k)[0], strict=True) if not np.isfinite(v)]
-        if bad:
-            detail = f"test '{history.name}': {bad[0]} is not finite at time zero; state what is seen at rest"
-            return ConformanceCheck("finite at time zero", False, detail)
-    return ConformanceCheck("finite at time zero", True, f"{len(starts)} tests")
+        assert not bad, f"test '{history.name}': {bad[0]} is not finite at time zero; state what is seen at rest"
+    return f"{len(starts)} tests"
 
 
-def check_batches(case: PredictorCase) -> Iterator[ConformanceCheck]:
-    """Candidates and tests together are what each is alone; the same call gives the same numbers; copies too."""
+@finding("a batch equals one by one")
+def check_batches(case: PredictorCase) -> str:
+    """Candidates and tests together are what each is alone."""
     thetas = case.candidates[:2]
-    together = case.predict(thetas)
-    gap, where = 0.0, ""
-    for c in range(len(thetas)):
-        for k, history in enumerate(case.histories):
-            alone = case.predict(thetas[c : c + 1], [history])
-            difference = largest_difference(alone.of(0), together.of(k, c))
-            if difference > gap:
-                gap, where = difference, f" at test '{history.name}', candidate {c}"
-    detail = f"{gap:.1e}{where}" + ("" if gap <= SAME else "; one row must not depend on the others")
-    yield ConformanceCheck("a batch equals one by one", gap <= SAME, detail)
-    again = case.predict(thetas)
-    same = np.array_equal(again.values, together.values, equal_nan=True)
-    detail = "equal to the last bit" if same else "two calls differ; take no random numbers and keep no state"
-    yield ConformanceCheck("deterministic", same, detail)
+    together, worst = case.predict(thetas), (0.0, "")
+    for c, k in np.ndindex(len(thetas), len(case.histories)):
+        alone = case.predict(thetas[c : c + 1], [case.histories[k]])
+        where = f" at test '{case.histories[k].name}', candidate {c}"
+        worst = max(worst, (largest_difference(alone.of(0), together.of(k, c)), where))
+    assert worst[0] <= SAME, f"{worst[0]:.1e}{worst[1]}; one row must not depend on the others"
+    return f"{worst[0]:.1e}{worst[1] if worst[0] else ''}"
+
+
+@finding("deterministic")
+def check_determinism(case: PredictorCase) -> str:
+    """The same call gives the same numbers."""
+    first, second = (case.predict(case.candidates[:2]).values for _ in range(2))
+    assert np.array_equal(first, second, equal_nan=True), "two calls differ; take no random numbers and keep no state"
+    return "equal to the last bit"
+
+
+@finding("pickles")
+def check_pickling(case: PredictorCase) -> str:
+    """A copy in another process predicts the same."""
     copy = pickle.loads(pickle.dumps(case.predictor))
-    gap = largest_difference(together.values, case.predict(thetas, using=copy).values)
-    detail = f"{gap:.1e}" + ("" if gap <= SAME else "; a copy in another process must predict the same")
-    yield ConformanceCheck("pickles", gap <= SAME, detail)
+    gap = largest_difference(case.predict().values, case.predict(using=copy).values)
+    assert gap <= SAME, f"{gap:.1e}; a copy in another process must predict the same"
+    return f"{gap:.1e}"
 
 
-def check_sensitivities(case: PredictorCase) -> Iterator[ConformanceCheck]:
+@finding("sensitivities")
+def check_sensitivities(case: PredictorCase) -> str:
     """Derivatives to the law's internal parameters against central differences."""
     history = case.histories[:1]
     found = case.predict(histories=history, sensitivities=True)
     if found.jacobian is None:
-        yield ConformanceCheck("sensitivities", True, "none, differences are taken in their place")
-        return
-    plain = case.predict(histories=history)
-    gap = largest_difference(plain.values, found.values)
-    detail = f"{gap:.1e}" + ("" if gap <= STEPPING else "; sensitivities=True must not change the values")
-    yield ConformanceCheck("values with sensitivities", gap <= STEPPING, detail)
+        return "none, differences are taken in their place"
+    gap = largest_difference(case.predict(histories=history).values, found.values)
+    assert gap <= STEPPING, f"values differ by {gap:.1e}; sensitivities=True must not change the values"
     steps = np.where(case.law.log_scale, 0.02, 5e-3 * np.maximum(1.0, np.abs(case.theta[0])))
     shifts = np.concatenate([sign * np.diag(steps) for sign in (1, -1, 2, -2)])
     values = case.predict(case.theta + shifts, history).values[:, 0].reshape(4, steps.size, *found.values.shape[2:])
-    worst, of = 0.0, ""
-    for p, name in enumerate(case.law.names):
-        excess = _excess(found.jacobian[0, 0, ..., p], values[:, p], steps[p])
-        if excess > worst:
-            worst, of = excess, name
-    passed = worst <= SENSITIVITY_TOLERANCE
-    detail = f"{worst:.1e} beyond what differences leave open" if passed else (
-        f"the derivative to {of} is off by {worst:.2g} of its largest value; it is to the internal parameter, the "
-        "natural logarithm where the scale is log"
-    )  # fmt: skip
-    yield ConformanceCheck("sensitivities to the law", passed, detail)
+    excess = [_excess(found.jacobian[0, 0, ..., p], values[:, p], steps[p]) for p in range(steps.size)]
+    worst = int(np.argmax(excess))
+    assert excess[worst] <= SENSITIVITY_TOLERANCE, (
+        f"the derivative to {case.law.names[worst]} is off by {excess[worst]:.2g} of its largest value; it is to the "
+        "internal parameter, the natural logarithm where the scale is log"
+    )
+    return f"{excess[worst]:.1e} beyond what differences leave open"
 
 
 def _excess(derivative: Floats, values: Floats, step: float) -> float:
@@ -228,12 +280,12 @@ def _excess(derivative: Floats, values: Floats, step: float) -> float:
     derivative : (times, outputs). values : (4, times, outputs) at steps 1, -1, 2 and -2.
     """
     narrow, wide = (values[0] - values[1]) / (2 * step), (values[2] - values[3]) / (4 * step)
-    error = np.nanmax(np.abs(derivative - narrow), axis=0, initial=0.0)
-    doubt = np.nanmax(np.abs(narrow - wide), axis=0, initial=0.0)
-    size = np.nanmax(np.abs(narrow), axis=0, initial=0.0)
-    noise = STEPPING_NOISE * np.nanmax(np.abs(values), axis=(0, 1), initial=0.0) / step
     if not np.isfinite(derivative[np.isfinite(narrow)]).all():
         return float("inf")
+    error, doubt, size = (
+        np.nanmax(np.abs(part), axis=0, initial=0.0) for part in (derivative - narrow, narrow - wide, narrow)
+    )
+    noise = STEPPING_NOISE * np.nanmax(np.abs(values), axis=(0, 1), initial=0.0) / step
     return float(np.max(np.maximum(error - 2 * doubt - noise, 0.0) / np.maximum(size, 1e-300)))
 
 
@@ -255,95 +307,65 @@ def nuisance_value(case: PredictorCase, kind: str) -> tuple[float, float]:
     return float(length.default), step
 
 
-def check_nuisances(case: PredictorCase) -> Iterator[ConformanceCheck]:
-    """Each declared kind is taken, with its derivative where that is given; another kind is refused."""
-    history = case.histories[:1]
-    plain = case.predict(histories=history)
-    for kind in getattr(case.predictor, "nuisances", ()):
-        value, step = nuisance_value(case, kind)
-        found = case.predict(histories=history, nuisances={kind: np.array([[value]])}, sensitivities=True)
-        effect = largest_difference(plain.values, found.values)
-        is_length = dimension_named(case.predictor, kind) is not None
-        if is_length and effect == 0.0:
-            detail = "no output depends on this length; let predict() follow it, or leave it out of the record"
-            yield ConformanceCheck(f"nuisance {kind}", False, detail)
-            continue
-        detail = f"changes outputs by {effect:.1e}" if effect else "taken; no output depends on it here"
-        slope = found.nuisance_jacobian.get(kind)
-        if slope is not None:
-            values = np.array([[value + sign * step] for sign in (1, -1, 2, -2)])
-            moved = case.predict(np.repeat(case.theta, 4, axis=0), history, {kind: values}).values[:, 0]
-            excess = _excess(slope[0, 0], moved, step)
-            if not excess <= SENSITIVITY_TOLERANCE:
-                detail = f"its derivative is off by {excess:.2g} of the largest; it is to the value in its own unit"
-                yield ConformanceCheck(f"nuisance {kind}", False, detail)
-                continue
-            detail += f", derivative {excess:.1e} beyond what differences leave open"
-        yield ConformanceCheck(f"nuisance {kind}", True, detail)
-    yield must_refuse(
-        "an undeclared nuisance is refused",
-        lambda: case.predict(histories=history, nuisances={UNKNOWN_NUISANCE: np.array([[0.1]])}),
+@finding("nuisance {}", each=lambda case: getattr(case.predictor, "nuisances", ()))
+def check_nuisance(case: PredictorCase, kind: str) -> str:
+    """Each declared kind is taken, with its derivative where that is given."""
+    history, (value, step) = case.histories[:1], nuisance_value(case, kind)
+    found = case.predict(histories=history, nuisances={kind: np.array([[value]])}, sensitivities=True)
+    effect = largest_difference(case.predict(histories=history).values, found.values)
+    assert effect or dimension_named(case.predictor, kind) is None, (
+        "no output depends on this length; let predict() follow it, or leave it out of the record"
+    )
+    detail = f"changes outputs by {effect:.1e}" if effect else "taken; no output depends on it here"
+    slope = found.nuisance_jacobian.get(kind)
+    if slope is None:
+        return detail
+    values = np.array([[value + sign * step] for sign in (1, -1, 2, -2)])
+    moved = case.predict(np.repeat(case.theta, 4, axis=0), history, {kind: values}).values[:, 0]
+    excess = _excess(slope[0, 0], moved, step)
+    assert excess <= SENSITIVITY_TOLERANCE, (
+        f"its derivative is off by {excess:.2g} of the largest; it is to the value in its own unit"
+    )
+    return f"{detail}, derivative {excess:.1e} beyond what differences leave open"
+
+
+@finding("an undeclared nuisance is refused")
+def check_unknown_nuisance(case: PredictorCase) -> str:
+    """A nuisance of a kind that there is not is an error."""
+    refusal = refusal_of(
+        lambda: case.predict(histories=case.histories[:1], nuisances={UNKNOWN_NUISANCE: np.array([[0.1]])}),
         f"nuisance '{UNKNOWN_NUISANCE}' is taken in silence; call creepkit.records.check_nuisances() in predict()",
     )
+    other = "raised TypeError" in refusal and UNKNOWN_NUISANCE not in refusal
+    assert not other, f"{refusal}; take nuisances= and sensitivities= in predict()"
+    return refusal
 
 
-def must_refuse(name: str, call: Any, remedy: str) -> ConformanceCheck:
-    """Whether a call raises an error of creepkit's, of one line; remedy : what to say where it raises none."""
+def refusal_of(call: Callable[[], object], remedy: str) -> str:
+    """The one line that a call is refused in; remedy : what to say where it is not."""
     try:
         call()
     except CreepkitError as error:
-        text = str(error)
-        if "raised TypeError" in text and UNKNOWN_NUISANCE not in text:
-            return ConformanceCheck(name, False, f"{text}; take nuisances= and sensitivities= in predict()")
-        one_line = "\n" not in text
-        return ConformanceCheck(
-            name, one_line, text if one_line else f"in several lines, {quoted(repr(text), 80)}; say it in one"
-        )
-    return ConformanceCheck(name, False, remedy)
+        assert "\n" not in str(error), f"in several lines, {quoted(repr(str(error)), 80)}; say it in one"
+        return str(error)
+    raise AssertionError(remedy)
 
 
-def check_related_models(case: PredictorCase) -> Iterator[ConformanceCheck]:
+def _related(case: PredictorCase) -> Iterable[str]:
+    return (method for method in RELATED if hasattr(case.predictor, method))
+
+
+@finding("{}()", each=_related)
+def check_related_model(case: PredictorCase, method: str) -> str:
     """A reduced-order model and a refined predictor have the same outputs and about the same values."""
     history = case.histories[-1:]
-    wanted = case.predict(histories=history)
-    for method, limit in (("reduced_order_model", REDUCED_TOLERANCE), ("refined", REFINED_TOLERANCE)):
-        if not hasattr(case.predictor, method):
-            continue
-        model = getattr(case.predictor, method)()
-        found = case.predict(histories=history, using=model)
-        if tuple(found.outputs) != tuple(wanted.outputs):
-            detail = f"it predicts {', '.join(found.outputs)}; it must predict {', '.join(wanted.outputs)}"
-            yield ConformanceCheck(f"{method}()", False, detail)
-            continue
-        last = largest_difference(wanted.of(0)[-1:], found.of(0)[-1:])
-        detail = f"{last:.1e} off at the last time" + (
-            "" if last <= limit else f"; {limit:g} is allowed, relative to the output"
-        )
-        yield ConformanceCheck(f"{method}()", last <= limit, detail)
-
-
-def check_outputs(case: PredictorCase) -> Iterator[ConformanceCheck]:
-    """Outputs have names, and of a specimen a quantity, unit and noise."""
-    outputs = tuple(getattr(case.predictor, "outputs", ()))
-    if not outputs:
-        yield ConformanceCheck("outputs", False, "none; state outputs = (ck.Output('deflection', 'length'),)")
-        return
-    plain = [str(o) for o in outputs if not isinstance(o, Output)]
-    if plain and case.kind == "specimen":
-        detail = f"'{plain[0]}' is a plain name; write ck.Output('{plain[0]}', 'length') with its quantity"
-        yield ConformanceCheck("outputs", False, detail)
-        return
-    units = [f"{o} in {o.unit or 'no unit'}" if isinstance(o, Output) else str(o) for o in outputs]
-    detail = ", ".join(units[:4]) + ("" if len(units) <= 4 else f" and {len(units) - 4} more")
-    yield ConformanceCheck("outputs", True, detail)
-    stated = outputs_of_tests(case.predictor, case.histories)
-    if unknown := [name for name in stated if name not in outputs_of(case.predictor)]:
-        detail = f"outputs_of_test() gives '{unknown[0]}'; name it among outputs or optional_outputs"
-        yield ConformanceCheck("outputs_of_test()", False, detail)
-
-
-def default_histories(predictor: object) -> list[History]:
-    """Two tests of different lengths and loads, from the record of a specimen."""
-    first = typical_history(predictor, frames=20)
-    second = typical_history(predictor, level=0.45, frames=11, end=0.6 * float(first.times[-1]))
-    return [first, second.replace(name=f"{second.name}, shorter")]
+    wanted, found = (
+        case.predict(histories=history, using=using) for using in (None, getattr(case.predictor, method)())
+    )
+    assert tuple(found.outputs) == tuple(wanted.outputs), (
+        f"it predicts {', '.join(found.outputs)}; it must predict {', '.join(wanted.outputs)}"
+    )
+    last = largest_difference(wanted.of(0)[-1:], found.of(0)[-1:])
+    detail = f"{last:.1e} off at the last time"
+    assert last <= RELATED[method], f"{detail}; {RELATED[method]:g} is allowed, relative to the output"
+    return detail

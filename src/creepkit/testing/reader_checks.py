@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from creepkit.errors import HistoryError, nearest
 from creepkit.readers.history_csv import HISTORY_CSV, write_history
-from creepkit.records import History, Reader, accepts_path, histories_in, known_specimens, outputs_of
-from creepkit.testing.reports import ConformanceCheck
+from creepkit.records import History, Reader, accepts_path, constant_stress, histories_in, known_specimens, outputs_of
+from creepkit.testing.reports import finding
 
 FOREIGN_FILES: dict[str, bytes] = {
     "empty.csv": b"",
@@ -30,40 +31,34 @@ FOREIGN_FILES: dict[str, bytes] = {
 """{name: content} of files that are none of a laboratory's tests."""
 
 
-@dataclass(frozen=True)
-class ReaderCase:
-    """A reader, and an example file or folder of its author's, if there is one."""
-
-    reader: Reader
-    path: Path | None = None
-
-
-def check_foreign_files(case: ReaderCase) -> Iterator[ConformanceCheck]:
-    """accepts() says no or yes to whatever there is, and read() refuses in one sentence what holds no test."""
-    reader = case.reader
+@finding("accepts() of foreign files")
+def check_accepts(reader: Reader, _: Path | None) -> str:
+    """accepts() says no or yes to whatever there is."""
     with tempfile.TemporaryDirectory() as folder:
         places = _foreign_paths(Path(folder))
         for place in places:
-            try:
-                accepts_path(reader, place)
-            except HistoryError as error:
-                detail = f"{error}; answer False for what is not understood".replace(f"{folder}/", "")
-                yield ConformanceCheck("accepts() of foreign files", False, detail)
-                return
-        yield ConformanceCheck("accepts() of foreign files", True, f"{len(places)} files and folders")
-        refused = 0
-        for place in places:
-            try:
-                histories_in(reader, place)
-            except HistoryError as error:
-                text = str(error).replace(f"{folder}/", "")
-                if " raised " in text or "\n" in text:
-                    detail = f"{text!r}; raise creepkit.errors.HistoryError with the file, one sentence"
-                    yield ConformanceCheck("read() of foreign files", False, detail)
-                    return
-                refused += 1
-        detail = f"{refused} of {len(places)} refused in one sentence, the others are tests to it"
-        yield ConformanceCheck("read() of foreign files", True, detail)
+            error = _error(lambda place=place: accepts_path(reader, place), folder)  # type: ignore[misc]
+            assert not error, f"{error}; answer False for what is not understood"
+    return f"{len(places)} files and folders"
+
+
+@finding("read() of foreign files")
+def check_refusals(reader: Reader, _: Path | None) -> str:
+    """read() refuses in one sentence what holds no test."""
+    with tempfile.TemporaryDirectory() as folder:
+        places = _foreign_paths(Path(folder))
+        errors = [_error(lambda place=place: histories_in(reader, place), folder) for place in places]  # type: ignore[misc]
+    bad = [error for error in errors if " raised " in error or "\n" in error]
+    assert not bad, f"{bad[0]!r}; raise creepkit.errors.HistoryError with the file, one sentence"
+    return f"{sum(map(bool, errors))} of {len(places)} refused in one sentence, the others are tests to it"
+
+
+def _error(call: Callable[[], object], folder: str) -> str:
+    try:
+        call()
+    except HistoryError as error:
+        return str(error).replace(f"{folder}/", "")
+    return ""
 
 
 def _foreign_paths(folder: Path) -> list[Path]:
@@ -75,132 +70,123 @@ def _foreign_paths(folder: Path) -> list[Path]:
     return [*sorted(folder.iterdir()), folder, folder / "missing.csv"]
 
 
-def check_own_files(case: ReaderCase) -> Iterator[ConformanceCheck]:
+@finding("files of write_history()")
+def check_own_files(reader: Reader, _: Path | None) -> str:
     """What write_history() writes is read back equal by a reader that accepts it."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = write_history(_written_example(), Path(folder) / "example.csv")
-        if not accepts_path(case.reader, file):
-            yield ConformanceCheck("files of write_history()", True, "not accepted; they are left to the reader csv")
-            return
-        found = histories_in(case.reader, file)
-        difference = "it finds none" if not found else history_difference(_written_example(), found[0])
-        yield ConformanceCheck("files of write_history()", not difference, difference or "read back equal")
-
-
-def _written_example() -> History:
-    from creepkit.records import constant_stress
-
     times = np.array([0.0, 3600.0, 7200.0])
-    return History("example", times, {"strain": np.array([0.0, 1e-3, 1.5e-3])}, constant_stress(120.0), 1033.15)
+    example = History("example", times, {"strain": np.array([0.0, 1e-3, 1.5e-3])}, constant_stress(120.0), 1033.15)
+    with tempfile.TemporaryDirectory() as folder:
+        file = write_history(example, Path(folder) / "example.csv")
+        if not accepts_path(reader, file):
+            return "not accepted; they are left to the reader csv"
+        found = histories_in(reader, file)
+    assert found, "it finds none"
+    difference = history_difference(example, found[0])
+    assert not difference, difference
+    return "read back equal"
 
 
-def check_example(case: ReaderCase) -> Iterator[ConformanceCheck]:
-    """An example of the author's is accepted, and its histories are equal after writing as CSV and reading."""
-    path, reader = case.path, case.reader
+@finding("example file")
+def check_example(reader: Reader, path: Path | None) -> str:
+    """An example of the author's is accepted."""
     if path is None:
-        yield ConformanceCheck(
-            "example file", True, "not checked: no example file; --example FILE, or check_reader(reader, path)"
-        )
-        return
-    if not accepts_path(reader, path):
-        yield ConformanceCheck("example file", False, f"{path} is not accepted by accepts(); recognise it there")
-        return
+        return "not checked: no example file; --example FILE, or check_reader(reader, path)"
+    assert accepts_path(reader, path), f"{path} is not accepted by accepts(); recognise it there"
     found = histories_in(reader, path)
-    if not found:
-        yield ConformanceCheck(
-            "example file", False, f"{path} holds no history; raise HistoryError where there is none"
-        )
-        return
-    yield ConformanceCheck("example file", True, f"{len(found)} histories")
+    assert found, f"{path} holds no history; raise HistoryError where there is none"
+    return f"{len(found)} histories"
+
+
+def _of_example(reader: Reader, path: Path | None) -> Iterable[list[History]]:
+    """The histories of an example that can be read; none, once, without one."""
+    if path is not None and accepts_path(reader, path) and (found := histories_in(reader, path)):
+        yield found
+
+
+@finding("names of tests", each=_of_example)
+def check_test_names(_: Reader, __: Path, found: list[History]) -> str:
+    """Every test has a name of its own."""
     names = [history.name for history in found]
     repeated = sorted({name for name in names if names.count(name) > 1})
-    detail = f"'{repeated[0]}' comes twice; name each test" if repeated else "each once"
-    yield ConformanceCheck("names of tests", not repeated, detail)
+    assert not repeated, f"'{repeated[0]}' comes twice; name each test"
+    return "each once"
+
+
+@finding("reading twice", each=_of_example)
+def check_reading_twice(reader: Reader, path: Path, found: list[History]) -> str:
+    """The same file gives the same histories."""
     again = histories_in(reader, path)
     gaps = [gap for a, b in zip(found, again, strict=False) if (gap := history_difference(a, b))]
-    yield ConformanceCheck("reading twice", not gaps and len(again) == len(found), gaps[0] if gaps else "equal")
+    assert not gaps and len(again) == len(found), gaps[0] if gaps else f"{len(found)} and {len(again)} histories"
+    return "equal"
+
+
+@finding("specimens and outputs", each=_of_example)
+def check_specimens(_: Reader, __: Path, found: list[History]) -> str:
+    """Specimens are registered, and outputs are theirs."""
     known = known_specimens()
-    foreign = sorted({h.specimen for h in found} - set(known))
-    detail = f"'{foreign[0]}' is not registered; known are {', '.join(sorted(known))}" if foreign else "registered"
-    yield ConformanceCheck("specimens", not foreign, detail)
-    yield _known_outputs([history for history in found if history.specimen in known])
-    yield _round_trip(found)
+    for history in found:
+        assert history.specimen in known, (
+            f"'{history.specimen}' is not registered; known are {', '.join(sorted(known))}"
+        )
+        names = [str(name) for name in outputs_of(known[history.specimen])]
+        for name in history.outputs:
+            assert name in names, (
+                f"test '{history.name}': a {history.specimen} specimen shows no '{name}'; {nearest(name, names)}"
+            )
+    return "registered"
 
 
-def _known_outputs(histories: list[History]) -> ConformanceCheck:
-    """Outputs are those of the specimen that a history names."""
-    for history in histories:
-        names = [str(name) for name in outputs_of(known_specimens()[history.specimen])]
-        unknown = [name for name in history.outputs if name not in names]
-        if unknown:
-            detail = f"test '{history.name}': a {history.specimen} specimen shows no '{unknown[0]}'"
-            return ConformanceCheck("outputs", False, f"{detail}; {nearest(unknown[0], names)}")
-    return ConformanceCheck("outputs", True, "those of the specimens")
-
-
-def _round_trip(histories: list[History]) -> ConformanceCheck:
-    name = "written as CSV and read back"
+@finding("written as CSV and read back", each=_of_example)
+def check_round_trip(_: Reader, __: Path, found: list[History]) -> str:
+    """Histories are equal after writing as CSV and reading."""
     with tempfile.TemporaryDirectory() as folder:
-        for position, history in enumerate(histories):
+        for position, history in enumerate(found):
             file = Path(folder) / f"{position}.csv"
             try:
                 write_history(history, file)
                 (back,) = HISTORY_CSV.read(file)
             except HistoryError as error:
-                return ConformanceCheck(name, False, str(error).replace(f"{folder}/", ""))
+                raise AssertionError(str(error).replace(f"{folder}/", "")) from None
             difference = history_difference(history, back)
-            if difference:
-                return ConformanceCheck(name, False, f"test '{history.name}': {difference}")
-    return ConformanceCheck(name, True, f"{len(histories)} histories equal")
-
-
-_PLAIN = (
-    *("name", "specimen", "strain_measure", "includes_elastic", "operator", "alloy", "rupture_time", "unruptured"),
-    *("minimum_rate", "minimum_rate_sd"),
-)
+            assert not difference, f"test '{history.name}': {difference}"
+    return f"{len(found)} histories equal"
 
 
 def history_difference(first: History, second: History) -> str:
     """In which field two histories differ, in a sentence; "" where they are equal but for their source."""
-    for field in _PLAIN:
-        a, b = getattr(first, field), getattr(second, field)
-        if a != b:
-            return f"{field} is {a!r} and {b!r}"
-    for field in ("geometry", "labels", "noise_correlation"):
-        a, b = dict(getattr(first, field)), dict(getattr(second, field))
-        if a != b:
-            return f"{field} is {a} and {b}"
-    if first.times.shape != second.times.shape:
-        return f"there are {first.times.size} and {second.times.size} frames"
-    for field in ("outputs", "standard_deviation"):
-        one, other = getattr(first, field), getattr(second, field)
-        if list(one) != list(other):
-            return f"{field} are {', '.join(one) or 'none'} and {', '.join(other) or 'none'}"
-        for name, values in one.items():
-            if not np.allclose(values, other[name], rtol=1e-12, atol=0.0, equal_nan=True):
-                return f"{field} of '{name}' differ"
-    if not np.allclose(first.times, second.times, rtol=1e-12, atol=0.0):
-        return "times differ"
-    if not np.array_equal(first.used, second.used):
-        return "the frames that are used differ"
-    marks = np.union1d(first.times, first.loading.program().times)
-    programs = {
-        "temperature": (first.temperature_program(), second.temperature_program()),
-        "loading": (first.loading.program(), second.loading.program()),
-    }
-    for what, (a, b) in programs.items():
-        if not np.allclose(a.at(marks), b.at(marks), rtol=1e-12, atol=1e-12):
-            return f"{what} differs"
     if first.loading.quantity != second.loading.quantity:
         return f"loading is {first.loading.quantity} and {second.loading.quantity}"
-    return _elastic_difference(first, second)
+    marks = np.union1d(first.times, first.loading.program().times)
+    for field in fields(History):
+        a, b = (_comparable(getattr(history, field.name), history, marks) for history in (first, second))
+        if field.name != "source" and (gap := _gap(a, b)) is not None:
+            return f"{field.name}{gap}"
+    return ""
 
 
-def _elastic_difference(first: History, second: History) -> str:
-    if (first.elastic is None) != (second.elastic is None):
-        return "elastic data are there in one of them only"
-    if first.elastic is None or second.elastic is None:
-        return ""
-    a, b = (h.elastic.at(h.mean_temperature) for h in (first, second) if h.elastic is not None)
-    same = np.allclose([float(a.E), float(a.nu)], [float(b.E), float(b.nu)], rtol=1e-9)
-    return "" if same else f"elastic data are {a} and {b}"
+def _comparable(value: Any, history: History, marks: Any) -> Any:
+    """A field of a history as numbers; loads and temperatures at these times, elastic data at the mean temperature."""
+    if value is history.loading or value is history.temperature:
+        program = history.loading.program() if value is history.loading else history.temperature_program()
+        return np.asarray(program.at(marks), float)
+    if history.elastic is not None and value is history.elastic:
+        elastic = history.elastic.at(history.mean_temperature)
+        return np.array([float(elastic.E), float(elastic.nu)])
+    return value
+
+
+def _gap(a: Any, b: Any) -> str | None:
+    """How two values of a field differ, after its name; None where they do not."""
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        if a.shape != b.shape:
+            return f" are {a.size} and {b.size}"
+        if a.dtype.kind not in "fiu":
+            return None if np.array_equal(a, b) else " differ"
+        rounding = 1e-15 * float(np.nanmax(np.abs(a), initial=0.0))
+        return None if np.allclose(a, b, rtol=1e-12, atol=rounding, equal_nan=True) else " differ"
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        if list(a) != list(b):
+            return f" are {', '.join(a) or 'none'} and {', '.join(b) or 'none'}"
+        return next((f" of '{name}'{gap}" for name in a if (gap := _gap(a[name], b[name])) is not None), None)
+    return None if a is b or a == b else f" is {a!r} and {b!r}"

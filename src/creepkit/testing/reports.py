@@ -1,15 +1,25 @@
-"""What a conformance kit found: one ConformanceCheck a property, and the report of all of them."""
+"""Checks as functions of asserts, and the report of what they find, one ConformanceCheck a property.
+
+@finding("load {}", each=lambda case: loads_of(case.predictor))
+def check_load(case, load):
+    assert ..., "what is wrong; what to write"
+    return "what a passing report says of it"
+
+A check of a module is found by its decorator and run in the order of the file. Its name holds the item that it is run
+for; one that returns None has nothing to say of this subject. Whatever the code of a plugin raises is a finding too.
+"""
 
 from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, PluginError
 
 
 @dataclass(frozen=True)
@@ -35,7 +45,7 @@ class ConformanceReport:
     @property
     def passed(self) -> bool:
         """Whether every check holds."""
-        return all(check.passed for check in self.checks)
+        return not self.failures
 
     @property
     def failures(self) -> tuple[ConformanceCheck, ...]:
@@ -49,19 +59,44 @@ class ConformanceReport:
         return "\n".join(lines)
 
 
-def findings(name: str, check: Callable[[], Iterable[ConformanceCheck]]) -> list[ConformanceCheck]:
-    """The findings of one property of a plugin's object; whatever its code raises is a finding too, with its line."""
-    found = []
+Checking = Callable[..., "str | None"]
+
+
+def finding(name: str, each: Callable[..., Iterable[Any]] | None = None) -> Callable[[Checking], Checking]:
+    """Mark a function as a check. name : of what it finds. each : gives the items for each of which it is run."""
+
+    def decorate(check: Checking) -> Checking:
+        check.__dict__.update(finding=name, each=each)
+        return check
+
+    return decorate
+
+
+def run(checks: ModuleType | Iterable[Checking], *case: Any) -> list[ConformanceCheck]:
+    """The findings of the checks of a module, or of these, about what they take."""
+    if not __debug__:
+        raise PluginError("checks are assertions, which python -O leaves out; run them without -O")
+    listed: Iterable[Any] = vars(checks).values() if isinstance(checks, ModuleType) else checks
+    return [found for check in listed if hasattr(check, "finding") for found in _findings(check, case)]
+
+
+def _findings(check: Any, case: tuple[Any, ...]) -> list[ConformanceCheck]:
+    if check.each is None:
+        return _found(check.finding, lambda: check(*case))
+    items: list[Any] = []
+    problem = _found(check.finding.format("").strip(), lambda: items.extend(check.each(*case)))
+    named = [(check.finding.format(getattr(item, "name", item)), item) for item in items]
+    return problem + [found for name, item in named for found in _found(name, lambda item=item: check(*case, item))]  # type: ignore[misc]
+
+
+def _found(name: str, check: Callable[[], str | None]) -> list[ConformanceCheck]:
     try:
         with np.errstate(all="ignore"):
-            for one in check():
-                found.append(one)
-    except CreepkitError as error:
-        found.append(ConformanceCheck(name, False, " ".join(str(error).split())))
+            detail = check()
+    except (AssertionError, CreepkitError) as error:
+        return [ConformanceCheck(name, False, " ".join(str(error).split()))]
     except Exception as error:  # of the code that is checked, whatever it is
         last = traceback.extract_tb(error.__traceback__)[-1]
-        message = " ".join(str(error).split()) or "no message"
-        found.append(
-            ConformanceCheck(name, False, f"{type(error).__name__}: {message} ({last.filename}, line {last.lineno})")
-        )
-    return found
+        message = f"{type(error).__name__}: {' '.join(str(error).split()) or 'no message'}"
+        return [ConformanceCheck(name, False, f"{message} ({last.filename}, line {last.lineno})")]
+    return [] if detail is None else [ConformanceCheck(name, True, detail)]

@@ -13,6 +13,7 @@ from scipy.stats import qmc
 
 from creepkit.arrays import Bools, Floats
 from creepkit.kernels.interface import POINT_SIZE
+from creepkit.kernels.lowering import ArrayKernel
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, State
 
@@ -24,7 +25,11 @@ _MOST_BATCHES = 64
 """How many times as many points are drawn, at most, to find enough where the law's constraints hold."""
 
 
-@dataclass(frozen=True)
+STRESS_COLUMNS = [0, 4, 5]
+"""Of a point, which grow together."""
+
+
+@dataclass(frozen=True, eq=False)
 class LawSamples:
     """Points at which the constraints of a law hold.
 
@@ -48,6 +53,23 @@ class LawSamples:
         for name, value in columns.items():
             points[:, [s.name for s in POINT_VARIABLES].index(name)] = value
         return LawSamples(points, self.theta)
+
+    def scaled(self, columns: list[int], factor: float) -> LawSamples:
+        """The same with columns of the point times a factor."""
+        points = self.points.copy()
+        points[:, columns] *= factor
+        return LawSamples(points, self.theta)
+
+
+def log_rate(kernel: ArrayKernel, samples: LawSamples) -> Floats:
+    """The ln rate at samples, (samples,)."""
+    return np.asarray(kernel.internal_log_rate(*samples.arguments()), float)
+
+
+def point_text(law: CreepLaw, point: Floats) -> str:
+    """What a law uses of a point, in words; point : (6 + states,) MPa, s and K."""
+    pairs = zip((*POINT_VARIABLES, *law.states), point, strict=True)
+    return ", ".join(f"{s.name} {value:.4g}" for s, value in pairs if law.uses(s))
 
 
 def draw_samples(law: CreepLaw, samples: int, seed: int = 0) -> LawSamples:

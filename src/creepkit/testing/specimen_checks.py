@@ -1,148 +1,241 @@
-"""Checks of a specimen's own record: its name, loads, lengths and reference stress."""
+"""Checks of a specimen: its own record, what it makes of loads, their steps, lengths and laws."""
 
 from __future__ import annotations
 
-import os
-import re
-import sys
-from collections.abc import Iterator
+from collections.abc import Iterable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from creepkit.errors import CreepkitError
+from creepkit.language import Param, parameters, stress
+from creepkit.language.law import CreepLaw
 from creepkit.records import (
     Dimension,
     Load,
+    Loading,
+    Output,
+    PointLoading,
     Program,
     RecordedLoading,
     Status,
     dimensions_of,
+    loading_of,
     loads_of,
     predict_with,
     typical_history,
 )
 from creepkit.registry import default_registry
-from creepkit.testing.predictor_checks import SAME, PredictorCase, largest_difference, must_refuse, nuisance_value
-from creepkit.testing.reports import ConformanceCheck
-
-NAME_OF_RECORD = re.compile(r"[a-z0-9]+([-_][a-z0-9]+)*")
-
+from creepkit.testing.predictor_checks import (
+    SAME,
+    STEPPING,
+    PredictorCase,
+    largest_difference,
+    norton_at,
+    nuisance_value,
+    prediction_or_refusal,
+    refusal_of,
+)
+from creepkit.testing.reports import finding
 
 UNKNOWN_LOAD, UNKNOWN_LENGTH = "no_such_load", "no_such_length"
 
 
-def check_record_name(subject: Any, kind: str) -> Iterator[ConformanceCheck]:
-    """Name and title are texts of the stated pattern, and no other plugin has the name."""
-    name, title = subject.name, subject.title
-    if not (isinstance(name, str) and NAME_OF_RECORD.fullmatch(name)):
-        detail = f"{name!r} is not in small letters and digits joined by hyphens, such as four-point; rename it"
-        yield ConformanceCheck("name", False, detail)
-        return
-    if not (isinstance(title, str) and title.strip() and title.isprintable()):
-        yield ConformanceCheck("title", False, f"{title!r} is not one line of text; say what it is")
-        return
-    for plugin in default_registry().plugins():
-        other = plugin.contributions.get(kind, {}).get(name)
-        if other is not None and not _same_class(type(other), type(subject)):
-            detail = f"'{name}' is taken, by {plugin.provenance}; give the {kind} another name"
-            yield ConformanceCheck("name", False, detail)
-            return
-    yield ConformanceCheck("name and title", True, f"{name}: {title}")
+STEPPED = ((0.0, 0.8), (0.3, 1.0), (0.6, 0.85))
+"""(time, level) of a load with steps, relative to the duration of the test and the typical level."""
 
 
-def _same_class(first: type, second: type) -> bool:
-    """Whether two classes are one, or one of them is the other loaded from the same file as a plugin."""
-    files = [getattr(sys.modules.get(one.__module__), "__file__", None) for one in (first, second)]
-    same_file = None not in files and os.path.realpath(str(files[0])) == os.path.realpath(str(files[1]))
-    return first is second or (first.__qualname__ == second.__qualname__ and same_file)
+FOLLOWED = 1e-3
+"""By so much, of the largest value of an output, a test with steps differs from one in which a level is held."""
 
 
-def check_loads(case: PredictorCase) -> Iterator[ConformanceCheck]:
-    """Every load that is declared works, and another is refused."""
+@finding("quantities of outputs")
+def check_quantities(case: PredictorCase) -> str:
+    """Outputs have a quantity, unit and noise."""
+    plain = [str(o) for o in getattr(case.predictor, "outputs", ()) if not isinstance(o, Output)]
+    assert not plain, f"'{plain[0]}' is a plain name; write ck.Output('{plain[0]}', 'length') with its quantity"
+    return "stated"
+
+
+@finding("reference stress")
+def check_reference_stress(case: PredictorCase) -> str:
+    """The stress that stands for a test is positive, MPa."""
+    if not hasattr(case.predictor, "reference_stress"):
+        assert {load.name for load in loads_of(case.predictor)} == {"stress"}, (
+            "reference_stress(history) is missing; return the von Mises stress, MPa, that stands for a test"
+        )
+        return "the load itself, MPa"
+    found = np.atleast_1d(np.asarray(case.predictor.reference_stress(case.histories[0]), float))
+    detail = f"{', '.join(f'{value:.4g}' for value in found[:3])} MPa"
+    assert found.size and (np.isfinite(found) & (found > 0)).all(), f"{detail}; return finite stresses above zero"
+    return detail
+
+
+@finding("frozen")
+def check_frozen(case: PredictorCase) -> str:
+    """The record cannot change, is a key of dictionaries, and a copy with the same fields equals it."""
+    specimen: Any = case.predictor
+    settings = getattr(type(specimen), "__dataclass_params__", None)
+    assert settings is None or settings.frozen, (
+        f"{type(specimen).__name__} can be changed after it was made; write @dataclass(frozen=True) over its class"
+    )
+    try:
+        hash(specimen)
+    except TypeError as error:
+        raise AssertionError(
+            f"{error}; a specimen is a key of dictionaries: let every field be hashable, a tuple for a list"
+        ) from None
+    if settings is not None and hasattr(specimen, "replace"):
+        lengths = {length.name: length.default for length in getattr(specimen, "dimensions", ())}
+        same = specimen.replace(**{name: value for name, value in lengths.items() if hasattr(specimen, name)})
+        equal = same == specimen and hash(same) == hash(specimen)
+        assert equal, "replace() with its own lengths gives another specimen"
+    return "hashable; a copy with the same lengths is equal"
+
+
+@finding("loads")
+def check_loads(case: PredictorCase) -> str:
+    """Loads are declared, and another is refused."""
     loads: tuple[Any, ...] = loads_of(case.predictor)
-    if not loads:
-        yield ConformanceCheck("loads", False, "none is declared; state loads = (ck.Load('force', 'force'),)")
-        return
-    for load in loads:
-        if not isinstance(load, Load):
-            yield ConformanceCheck("loads", False, f"{load!r} is no load; write ck.Load('force', 'force')")
-            return
-        plan = typical_history(case.predictor, load.name, frames=8)
-        found = predict_with(case.predictor, case.law, case.theta, [plan])
-        status = Status(int(found.status[0, 0]))
-        passed = status is Status.COMPLETE and bool(np.isfinite(found.of(0)).all())
-        detail = f"{load.quantity} in {load.unit or 'no unit'}" if passed else (
-            f"a typical test ends early, {status.text}{f': {found.reason}' if found.reason else ''}; state the range "
-            f"of this load, conditions = {{'{load.name}': (low, high)}}"
-        )  # fmt: skip
-        yield ConformanceCheck(f"load {load.name}", passed, detail)
+    assert loads, "none is declared; state loads = (ck.Load('force', 'force'),)"
+    wrong = [load for load in loads if not isinstance(load, Load)]
+    assert not wrong, f"{wrong[0]!r} is no load; write ck.Load('force', 'force')"
     other = case.histories[0].replace(loading=RecordedLoading(Program.constant(1.0), UNKNOWN_LOAD))
-    yield must_refuse(
-        "an undeclared load is refused",
-        lambda: _predicted_or_refused(case, other),
+    return refusal_of(
+        lambda: prediction_or_refusal(lambda: case.predict(histories=[other])),
         f"a test under '{UNKNOWN_LOAD}' is simulated; call creepkit.records.check_load() in predict()",
     )
 
 
-def check_dimensions(case: PredictorCase) -> Iterator[ConformanceCheck]:
+def _loads(case: PredictorCase) -> Iterable[Load]:
+    return (load for load in loads_of(case.predictor) if isinstance(load, Load))
+
+
+@finding("load {}", each=_loads)
+def check_load(case: PredictorCase, load: Load) -> str:
+    """Every load that is declared works."""
+    plan = typical_history(case.predictor, load.name, frames=8)
+    found = predict_with(case.predictor, case.law, case.theta, [plan])
+    status = Status(int(found.status[0, 0]))
+    assert status is Status.COMPLETE and np.isfinite(found.of(0)).all(), (
+        f"a typical test ends early, {status.text}{f': {found.reason}' if found.reason else ''}; state the range of "
+        f"this load, conditions = {{'{load.name}': (low, high)}}"
+    )
+    return f"{load.quantity} in {load.unit or 'no unit'}"
+
+
+@finding("steps of load {}", each=_loads)
+def check_load_steps(case: PredictorCase, load: Load) -> str:
+    """A load that steps up and down is followed, or refused in a sentence; before its first step nothing shows it."""
+    plan = typical_history(case.predictor, load.name, frames=7)
+    point = isinstance(plan.loading, PointLoading)
+    program = plan.loading.stress["11"] if isinstance(plan.loading, PointLoading) else plan.loading.program()
+    value, end = float(program.values[-1]), float(plan.times[-1])
+    steps = [(share * end, level * value) for share, level in STEPPED]
+    ramp = 0.0 if load.name in ("stress", "strain") else 5.0
+
+    def loading(steps: list[tuple[float, float]]) -> Loading:
+        return PointLoading(stress={"11": steps}) if point else loading_of(load.name, steps, ramp=ramp)
+
+    try:
+        stepped = prediction_or_refusal(lambda: case.predict(histories=[plan.replace(loading=loading(steps))])).of(0)
+    except CreepkitError as error:
+        return _refused(error, "say in a SolveError that only a load that is held can be predicted")
+    held = [case.predict(histories=[plan.replace(loading=loading([(0.0, level)]))]).of(0) for _, level in steps]
+    for alone, (_, level) in zip(held, steps, strict=True):
+        assert largest_difference(stepped, alone) > FOLLOWED, (
+            f"a test of steps is simulated as one of {level:.4g} {load.unit} held; follow "
+            "history.loading.program() over time, or refuse such a loading with a SolveError"
+        )
+    before = plan.times < steps[1][0]
+    gap = largest_difference(stepped[before], held[0][before])
+    assert gap <= STEPPING, f"{gap:.1e} before the first step; what is seen before a step must not depend on it"
+    return f"followed, {gap:.1e} before the first step"
+
+
+def _refused(error: CreepkitError, remedy: str) -> str:
+    """A refusal in a sentence passes; an exception of the plugin's code, such as a KeyError, does not."""
+    text, cause = " ".join(str(error).split()), error.__cause__
+    crash = cause is not None and not isinstance(cause, CreepkitError) and type(cause).__name__ in text
+    assert not crash, f"{text}; {remedy}"
+    return f"refused: {text}"
+
+
+def _other_laws(case: PredictorCase) -> list[CreepLaw]:
+    return [
+        _norton_like("a law with other parameters", "B", "m", 1.0),
+        _norton_like("another law with the same parameters", "A", "n", 2.0),
+    ]
+
+
+@finding("{}", each=_other_laws)
+def check_other_law(case: PredictorCase, law: CreepLaw) -> str:
+    """Norton's law under other names of its parameters, and half of it doubled, is predicted as Norton's, or refused.
+
+    A specimen that reads values["A"] for itself fails at the first and is wrong by a factor of two at the second.
+    """
+    history, norton = case.histories[0], default_registry().law("norton")
+    rate, values = norton_at(case.predictor, history)
+    own = {"B": rate, "m": 4.0} if "B" in law.names else {"A": 0.5 * rate, "n": 4.0}
+    predicted = []
+    for one, given in ((norton, values), (law, own)):
+        theta = one.to_internal(one.values(given))
+        try:
+            found = prediction_or_refusal(partial(case.predict, theta, [history], law=one))
+        except CreepkitError as error:
+            return _refused(error, "integrate the law that is given, or refuse all but those known")
+        predicted.append(found.of(0))
+    gap = largest_difference(*predicted)
+    assert gap <= STEPPING, (
+        f"{gap:.1e} off; use the rate of the law that is given, ck.lower(law, 'numpy').rate(), or refuse every law but "
+        "the one known: if law != ck.law('norton')"
+    )
+    return f"{gap:.1e}"
+
+
+def _norton_like(name: str, coefficient: str, exponent: str, factor: float) -> CreepLaw:
+    """Norton's law with names of its own, times a factor."""
+    A, n = parameters(f"{coefficient} {exponent}")
+    norton = default_registry().law("norton")
+    kinds: tuple[Param, ...] = tuple(norton.params.values())
+    return CreepLaw(name, {"creep": factor * A * stress**n}, dict(zip((A, n), kinds, strict=True)), title=name)
+
+
+def _lengths(case: PredictorCase) -> tuple[Any, ...]:
+    return tuple(dimensions_of(case.predictor))
+
+
+@finding("length {}", each=_lengths)
+def check_length(case: PredictorCase, length: Any) -> str:
     """Each length is followed when a test states it, as it is when it is a nuisance parameter."""
-    history = case.histories[0]
-    plain = case.predict(histories=[history]).values
-    lengths: tuple[Any, ...] = dimensions_of(case.predictor)
+    assert isinstance(length, Dimension), f"{length!r} is none; write ck.dimension(50.0) for a field"
     kinds = getattr(case.predictor, "nuisances", ())
-    for length in lengths:
-        if not isinstance(length, Dimension):
-            yield ConformanceCheck("lengths", False, f"{length!r} is none; write ck.dimension(50.0) for a field")
-            return
-        name = f"length {length.name}"
-        as_nuisance = next((kind for kind in length.names if kind in kinds), None)
-        if as_nuisance is None:
-            yield ConformanceCheck(name, False, f"it is no nuisance parameter; add '{length.name}' to nuisances")
-            continue
-        if not length.of_piece:
-            yield ConformanceCheck(name, True, "of the observation; no test states it as geometry")
-            continue
-        value, _ = nuisance_value(case, length.name)
-        stated = history.replace(geometry={**history.geometry, length.name: value})
-        found = case.predict(histories=[stated]).values
-        if largest_difference(plain, found) == 0.0:
-            detail = (
-                f"a test that states {value:g} mm is simulated as one of {length.default:g} mm; follow its geometry"
-            )
-            yield ConformanceCheck(name, False, detail)
-            continue
-        other = case.predict(histories=[history], nuisances={as_nuisance: np.array([[value]])}).values
-        gap = largest_difference(found, other)
-        detail = f"{gap:.1e}" + ("" if gap <= SAME else "; geometry and nuisance parameter of one length differ")
-        yield ConformanceCheck(f"{name} stated and as a nuisance", gap <= SAME, detail)
-    if lengths:
-        foreign = history.replace(geometry={UNKNOWN_LENGTH: 1.0})
-        yield must_refuse(
-            "an unknown length is refused",
-            lambda: _predicted_or_refused(case, foreign),
+    kind = next((kind for kind in length.names if kind in kinds), None)
+    assert kind is not None, f"it is no nuisance parameter; add '{length.name}' to nuisances"
+    if not length.of_piece:
+        return "of the observation; no test states it as geometry"
+    history, (value, _) = case.histories[0], nuisance_value(case, length.name)
+    stated = history.replace(geometry={**history.geometry, length.name: value})
+    plain, found = (case.predict(histories=[one]).values for one in (history, stated))
+    assert largest_difference(plain, found) > 0.0, (
+        f"a test that states {value:g} mm is simulated as one of {length.default:g} mm; follow its geometry"
+    )
+    other = case.predict(histories=[history], nuisances={kind: np.array([[value]])}).values
+    gap = largest_difference(found, other)
+    assert gap <= SAME, f"{gap:.1e}; geometry and nuisance parameter of one length differ"
+    return f"{gap:.1e} between geometry and nuisance parameter"
+
+
+@finding("an unknown length is refused")
+def check_unknown_length(case: PredictorCase) -> str | None:
+    """A test that states a length that there is not is an error."""
+    foreign = case.histories[0].replace(geometry={UNKNOWN_LENGTH: 1.0})
+    return (
+        None
+        if not _lengths(case)
+        else refusal_of(
+            lambda: prediction_or_refusal(lambda: case.predict(histories=[foreign])),
             f"a test that states '{UNKNOWN_LENGTH}' is simulated; call creepkit.records.check_geometry() in predict()",
         )
-
-
-def _predicted_or_refused(case: PredictorCase, history: Any) -> None:
-    """Predict; a candidate that did not converge for a stated reason is a refusal as well."""
-    found = case.predict(histories=[history])
-    if found.reason and (found.status == int(Status.NOT_CONVERGED)).all():
-        raise CreepkitError(found.reason)
-
-
-def check_reference_stress(case: PredictorCase) -> Iterator[ConformanceCheck]:
-    """The stress that stands for a test is positive, MPa."""
-    if not hasattr(case.predictor, "reference_stress"):
-        if {load.name for load in loads_of(case.predictor)} == {"stress"}:
-            yield ConformanceCheck("reference stress", True, "the load itself, MPa")
-            return
-        detail = "reference_stress(history) is missing; return the von Mises stress, MPa, that stands for a test"
-        yield ConformanceCheck("reference stress", False, detail)
-        return
-    stress = np.atleast_1d(np.asarray(case.predictor.reference_stress(case.histories[0]), float))
-    passed = stress.size > 0 and bool((np.isfinite(stress) & (stress > 0)).all())
-    shown = ", ".join(f"{value:.4g}" for value in stress[:3])
-    detail = f"{shown} MPa" + ("" if passed else "; return finite stresses above zero")
-    yield ConformanceCheck("reference stress", passed, detail)
+    )

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from creepkit.errors import LawError
 from creepkit.kernels.lowering import lower
-from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import Param, parameters, stress
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
-from creepkit.testing.reports import ConformanceCheck
+from creepkit.registry import default_registry
+from creepkit.testing.reports import finding
 
 REFERENCE = 1073.15
 """K."""
@@ -23,52 +21,25 @@ TEMPERATURES = (900.0, 1000.0, 1200.0)
 """K, at which the rate must be a number above zero."""
 
 
-@dataclass(frozen=True)
-class TemperatureFormCase:
-    """A function of T_ref that gives a form or a factor, under its name."""
-
-    name: str
-    form: Callable[..., Any]
-
-    def check(self) -> Iterator[ConformanceCheck]:
-        """It gives a form or a factor, equal to one at T_ref, and finite rates elsewhere."""
-        made = self.form(T_ref=REFERENCE)
-        if not isinstance(made, TemperatureForm | TemperatureFactor):
-            detail = f"it returned a {type(made).__name__}; return a TemperatureForm or a TemperatureFactor"
-            yield ConformanceCheck("kind", False, detail)
-            return
-        yield ConformanceCheck("kind", True, type(made).__name__)
-        plain = _plain_law()
-        law = _applied(plain, made)
-        values = law.center() | plain.center()
-        values |= {name: 0.1 * law.table[name].bounds[1] for name in law.names if name not in plain.names}
-        kernel = lower(law, "numpy")
-        at = {T: float(kernel.rate(values, stress=100.0, temperature=T)) for T in (REFERENCE, *TEMPERATURES)}
-        wanted = float(lower(plain, "numpy").rate(plain.center(), stress=100.0))
-        gap = abs(at[REFERENCE] / wanted - 1.0)
-        detail = f"{gap:.1e}" + ("" if gap <= 1e-9 else "; the parameter must be its own value at T_ref")
-        yield ConformanceCheck("the same at T_ref", gap <= 1e-9, detail)
-        bad = [T for T, rate in at.items() if not (np.isfinite(rate) and rate > 0)]
-        detail = f"the rate at {bad[0]:g} K is {at[bad[0]]:g} 1/s" if bad else f"at {len(at)} temperatures"
-        yield ConformanceCheck("rates are above zero", not bad, detail)
-
-
-def _plain_law() -> CreepLaw:
-    A, n = parameters("A n")
-    return CreepLaw(
-        name="plain",
-        title="A plain law",
-        terms={"power law": A * stress**n},
-        params={A: Param("rate coefficient", (1e-20, 1e-10), "1/s", "log"), n: Param("stress exponent", (1, 8))},
-        references=("none, for a check",),
+@finding("temperature form")
+def check_form(form: Callable[..., Any]) -> str:
+    """A function of T_ref gives a form or a factor, equal to one at T_ref, and finite rates elsewhere."""
+    made, plain = form(T_ref=REFERENCE), default_registry().law("norton")
+    assert isinstance(made, TemperatureForm | TemperatureFactor), (
+        f"it returned a {type(made).__name__}; return a TemperatureForm or a TemperatureFactor"
     )
-
-
-def _applied(law: CreepLaw, made: TemperatureForm | TemperatureFactor) -> CreepLaw:
-    """The law with the factor, or with a parameter of log or of linear scale in that form, whichever it takes."""
     if isinstance(made, TemperatureFactor):
-        return law.times(made)
-    try:
-        return law.with_temperature(A=made)
-    except LawError:
-        return law.with_temperature(n=made)
+        law = plain.times(made)
+    else:
+        try:  # of a parameter of log scale, or else of a linear one
+            law = plain.with_temperature(A=made)
+        except LawError:
+            law = plain.with_temperature(n=made)
+    own = {name: 0.1 * law.table[name].bounds[1] for name in law.names if name not in plain.names}
+    values, kernel = law.center() | plain.center() | own, lower(law, "numpy")
+    rates = {T: float(kernel.rate(values, stress=100.0, temperature=T)) for T in (REFERENCE, *TEMPERATURES)}
+    gap = abs(rates[REFERENCE] / float(lower(plain, "numpy").rate(plain.center(), stress=100.0)) - 1.0)
+    assert gap <= 1e-9, f"{gap:.1e}; the parameter must be its own value at T_ref"
+    for T, rate in rates.items():
+        assert np.isfinite(rate) and rate > 0, f"the rate at {T:g} K is {rate:g} 1/s"
+    return f"{type(made).__name__}; {gap:.1e} off at T_ref, rates above zero at {len(rates)} temperatures"

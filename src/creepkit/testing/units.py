@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,15 +12,6 @@ from creepkit.records.units import factors, spelled_factors
 
 PRESSURE, SECOND, KELVIN, LENGTH, AMOUNT = "MPa", "s", "K", "mm", "mol"
 """Base units; an energy is MPa mm^3, which is N mm."""
-
-
-_LEVEL = factors("MPa", "Pa", "kPa", "GPa", "psi", "ksi")
-
-
-_TIMES = spelled_factors("s", "min", "h", "d", "year")
-
-
-_LENGTHS = factors("mm", "m", "cm", "um", "nm")
 
 
 _ENERGIES = {"J": 1e3, "kJ": 1e6, "MJ": 1e9, "eV": 1.602176634e-16, "cal": 4184.0, "kcal": 4.184e6}
@@ -34,17 +26,13 @@ class UnitPowers:
     powers: Mapping[str, Fraction]
 
     def __mul__(self, other: UnitPowers) -> UnitPowers:
-        powers = {u: self.powers.get(u, Fraction()) + other.powers.get(u, Fraction()) for u in self._units(other)}
+        powers = {u: self.powers.get(u, 0) + other.powers.get(u, Fraction()) for u in {**self.powers, **other.powers}}
         return UnitPowers(self.factor * other.factor, {u: p for u, p in powers.items() if p})
 
     def power(self, exponent: Fraction) -> UnitPowers:
         """It to a power."""
-        return UnitPowers(
-            self.factor ** float(exponent), {u: p * exponent for u, p in self.powers.items() if p * exponent}
-        )
-
-    def _units(self, other: UnitPowers) -> list[str]:
-        return list(dict.fromkeys((*self.powers, *other.powers)))
+        powers = {u: p * exponent for u, p in self.powers.items() if exponent}
+        return UnitPowers(self.factor ** float(exponent), powers)
 
     def __str__(self) -> str:
         text = " ".join(u if p == 1 else f"{u}^{p}" for u, p in self.powers.items()) or "1"
@@ -54,24 +42,20 @@ class UnitPowers:
 NO_UNIT = UnitPowers(1.0, {})
 
 
-def _known() -> dict[str, UnitPowers]:
-    table = {name: UnitPowers(f, {PRESSURE: Fraction(1)}) for name, f in _LEVEL.items()}
-    table |= {name: UnitPowers(f, {SECOND: Fraction(1)}) for name, f in _TIMES.items()}
-    table |= {name: UnitPowers(f, {LENGTH: Fraction(1)}) for name, f in _LENGTHS.items()}
-    energy = {PRESSURE: Fraction(1), LENGTH: Fraction(3)}
-    table |= {name: UnitPowers(f, energy) for name, f in _ENERGIES.items()}
-    table |= {"N": UnitPowers(1.0, {PRESSURE: Fraction(1), LENGTH: Fraction(2)})}
-    table |= {"K": UnitPowers(1.0, {KELVIN: Fraction(1)}), "mol": UnitPowers(1.0, {AMOUNT: Fraction(1)})}
-    return table | {"%": UnitPowers(0.01, {}), "rad": NO_UNIT}
+def _table(known: Mapping[str, float], **powers: int) -> dict[str, UnitPowers]:
+    return {name: UnitPowers(factor, {u: Fraction(p) for u, p in powers.items()}) for name, factor in known.items()}
 
 
-KNOWN_UNITS = _known()
-
-
-_TOKEN = re.compile(r"\s*(?:(?P<number>\d+(?:\.\d+)?(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z%]+)|(?P<sign>\*\*|[*/()^.]|·))")
-_EXPONENT = re.compile(
-    r"\s*(?:\^|\*\*)\s*(?:\(\s*)?(?P<sign>[+-]?)\s*(?P<value>\d+(?:/\d+|\.\d+)?)(?:\s*\))?|(?P<bare>-?\d)(?!\d)"
-)
+KNOWN_UNITS = {
+    **_table(factors("MPa", "Pa", "kPa", "GPa", "psi", "ksi"), MPa=1),
+    **_table(spelled_factors("s", "min", "h", "d", "year"), s=1),
+    **_table(factors("mm", "m", "cm", "um", "nm"), mm=1),
+    **_table(_ENERGIES, MPa=1, mm=3),
+    **_table({"N": 1.0}, MPa=1, mm=2),
+    **_table({"K": 1.0}, K=1),
+    **_table({"mol": 1.0}, mol=1),
+    **_table({"percent": 0.01, "rad": 1.0}),
+}
 
 
 class UnknownUnitError(ValueError):
@@ -80,41 +64,37 @@ class UnknownUnitError(ValueError):
 
 def parse_unit(text: str) -> UnitPowers:
     """The unit of a text such as "1/(MPa s)", "J/(mol K)" and "mm^2/s"; UnknownUnitError for anything else."""
-    result, rest = _product(text.strip(), text)
-    if rest.strip():
-        raise UnknownUnitError(f"'{rest.strip()}' in '{text}'")
-    return result
+    spelled = text.strip().replace("^", "**").replace("·", "*").replace("%", "percent")
+    spelled = re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z])", "*", spelled)
+    spelled = re.sub(r"(?<=[A-Za-z])(-?\d)", r"**\1", spelled)  # mm2 and s-1
+    spelled = re.sub(r"(?<=[\w)])\s+(?=[\w(])", "*", spelled)
+    try:
+        return _of(ast.parse(spelled, mode="eval").body, text)
+    except (SyntaxError, RecursionError, ValueError) as error:
+        if isinstance(error, UnknownUnitError):
+            raise
+        raise UnknownUnitError(f"'{text}'") from None
 
 
-def _product(text: str, whole: str) -> tuple[UnitPowers, str]:
-    result, inverse = NO_UNIT, False
-    while True:
-        match = _TOKEN.match(text)
-        if match is None or match["sign"] == ")":
-            if text.strip() and match is None:
-                raise UnknownUnitError(f"'{text.strip()}' in '{whole}'")
-            return result, text
-        text = text[match.end() :]
-        if match["sign"] in ("*", ".", "·"):
-            continue
-        if match["sign"] == "/":
-            inverse = True
-            continue
-        if match["sign"] == "(":
-            factor, text = _product(text, whole)
-            if not text.lstrip().startswith(")"):
-                raise UnknownUnitError(f"a bracket that is not closed in '{whole}'")
-            text = text.lstrip()[1:]
-        elif match["number"]:
-            factor = UnitPowers(float(match["number"]), {})
-        elif match["name"] in KNOWN_UNITS:
-            factor = KNOWN_UNITS[match["name"]]
-        else:
-            raise UnknownUnitError(f"'{match['name'] or match['sign']}' in '{whole}'")
-        exponent = _EXPONENT.match(text)
-        if exponent is not None:
-            text = text[exponent.end() :]
-            value = exponent["bare"] or f"{exponent['sign']}{exponent['value']}"
-            factor = factor.power(Fraction(value))
-        result = result * (factor.power(Fraction(-1)) if inverse else factor)
-        inverse = False
+def _of(node: ast.expr, whole: str) -> UnitPowers:
+    """The unit of a part of the text as Python's parser has it."""
+    if isinstance(node, ast.Name) and node.id in KNOWN_UNITS:
+        return KNOWN_UNITS[node.id]
+    if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+        return UnitPowers(float(node.value), {})
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+        return _of(node.left, whole).power(_number(node.right, whole))
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
+        left, right = _of(node.left, whole), _of(node.right, whole)
+        return left * (right.power(Fraction(-1)) if isinstance(node.op, ast.Div) else right)
+    raise UnknownUnitError(f"'{ast.unparse(node)}' in '{whole}'")
+
+
+def _number(node: ast.expr, whole: str) -> Fraction:
+    if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+        return Fraction(str(node.value))
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        return -_number(node.operand, whole)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div):
+        return _number(node.left, whole) / _number(node.right, whole)
+    raise UnknownUnitError(f"the exponent '{ast.unparse(node)}' in '{whole}'")

@@ -38,7 +38,7 @@ class PolarGrid:
 
     @property
     def numbers(self) -> Floats:
-        """All of them one after another, as functions of the core take them."""
+        """All of them one after another, (numbers,), as functions of the core take them."""
         return np.concatenate([self.log_radius, self.radial, self.log_cosine, self.log_sine, self.angular])
 
 

@@ -1,0 +1,30 @@
+"""The language in which creep laws are written, each name once."""
+
+from .elastic import Elastic as Elastic
+from .elastic import wachtman as wachtman
+from .law import CreepLaw as CreepLaw
+from .law import hookimpl as hookimpl
+from .symbols import GAS_CONSTANT as GAS_CONSTANT
+from .symbols import Param as Param
+from .symbols import State as State
+from .symbols import mean_stress as mean_stress
+from .symbols import parameters as parameters
+from .symbols import principal_stress as principal_stress
+from .symbols import states as states
+from .symbols import strain as strain
+from .symbols import stress as stress
+from .symbols import temperature as temperature
+from .symbols import time as time
+from .temperature_forms import TemperatureFactor as TemperatureFactor
+from .temperature_forms import TemperatureForm as TemperatureForm
+from .temperature_forms import activated as activated
+from .temperature_forms import arrhenius as arrhenius
+from .temperature_forms import boltzmann as boltzmann
+from .temperature_forms import curved as curved
+from .temperature_forms import exponential as exponential
+from .temperature_forms import inverse_temperature as inverse_temperature
+from .temperature_forms import linear as linear
+from .temperature_forms import logarithmic as logarithmic
+from .temperature_forms import modified_arrhenius as modified_arrhenius
+from .temperature_forms import t_log_t as t_log_t
+from .temperature_forms import wachtman_form as wachtman_form
