@@ -29,13 +29,15 @@ class Benchmark:
 
     minutes : of CPU, expected, of all its commands on an AMD EPYC core. commands : options, a list for each run.
     needs : files and programs that are neither in the project nor among its dependencies, or "". short : options of a
-    form of a minute or two, whose figures are compared with none; () where there is none.
+    form of a minute or two, whose figures are compared with none; () where there is none. nightly : whether .ci/nightly
+    runs it although it has none.
     """
 
     minutes: float
     commands: tuple[tuple[str, ...], ...] = ((),)
     needs: str = ""
     short: tuple[str, ...] = ()
+    nightly: bool = False
 
 
 DATA = "measured data in ../shared/data"
@@ -44,7 +46,7 @@ BENCHMARKS = {
     "page_latency": Benchmark(1, needs="Chromium and playwright"),
     "core_speed": Benchmark(2),
     "random_simulations": Benchmark(30, short=("--cases", "1000", "--laws", "10", "--seed", "7", "--jobs", "2")),
-    "killed_runs": Benchmark(90, short=("--runs", "2", "--kills-in-a-run", "3", "--seed", "7", "--jobs", "2")),
+    "killed_runs": Benchmark(90, (("--runs", "20", "--seed", "7", "--jobs", "2"),), nightly=True),
     "rendered_speckle": Benchmark(1, needs="pyvale 2026.10, here or in the Python of the option --python"),
     "user_costs": Benchmark(2, needs=DATA),
     "studies": Benchmark(4, needs=DATA),
@@ -132,11 +134,11 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="programs to run, or 'everything'; none: list them")
     parser.add_argument("--write", action="store_true", help="write the tables to docs/measured")
     parser.add_argument("--short", action="store_true", help="the short forms, whose tables are not written")
-    parser.add_argument("--nightly", action="store_true", help="the commands of programs with a short form")
+    parser.add_argument("--nightly", action="store_true", help="programs with a short form, and killed_runs")
     options = parser.parse_args()
     names, with_short = options.names, [name for name, benchmark in BENCHMARKS.items() if benchmark.short]
     if options.nightly:
-        names = with_short
+        names = [name for name, benchmark in BENCHMARKS.items() if benchmark.short or benchmark.nightly]
     elif options.short:
         if options.write or not set(names) <= set(with_short):
             parser.error(f"--short goes without --write, and with {', '.join(with_short)}")
