@@ -45,7 +45,7 @@ for name, truth in planted.truth.items():
 # Screened
 # --------
 # Finite elements in the loop; few starts will do for laws of one term. The same from a shell:
-#     creepkit screen plate/tests --compositions plate/compositions.csv --confirm always --to plate/screened
+#     creepkit identify plate/tests --by alloy --compositions plate/compositions.csv --confirm --to plate/screened
 
 began = time.monotonic()
 nuisances = [ck.Nuisance("offset"), ck.Nuisance("rate")]

@@ -10,7 +10,7 @@ set -euo pipefail
 
 : "${SLURM_ARRAY_TASK_ID:=1}" "${SLURM_ARRAY_TASK_COUNT:=1}" "${SLURM_CPUS_PER_TASK:=1}"
 : "${SAMPLES:=155186}" "${FILE:=combined.h5}"
-COMMAND=(creepkit generate combined --specimen bulge --domain conditioned --samples "$SAMPLES" --seed 1 --to "$FILE")
+COMMAND=(creepkit surrogate generate combined --specimen bulge --domain conditioned --samples "$SAMPLES" --seed 1 --to "$FILE")
 
 "${COMMAND[@]}" --workers "$SLURM_CPUS_PER_TASK" --part "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT"
 

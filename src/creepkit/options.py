@@ -88,6 +88,12 @@ class Option:
         """Whether None is a value."""
         return type(None) in _alternatives(self.type)
 
+    def named(self, name: str, type: Any) -> Option:
+        """The option of a field or an argument of this name and type, with its key and its flag."""
+        key = self.key or (f"{name}_{self.unit}" if self.unit else name)
+        flag = f"--{self.flag or key.lower().replace('_', '-')}"
+        return replace(self, name=name, type=type, key=key, flag=flag)
+
     def converted(self, value: Any) -> Any:
         """A value of a command or a study file, numbers at any depth, in the unit of Python; lists as tuples."""
         if isinstance(value, list | tuple):
@@ -153,11 +159,9 @@ def options_of(record: type[Any]) -> tuple[Option, ...]:
         return record.__dict__["_options"]  # type: ignore[no-any-return]
     hints, options = get_type_hints(record), []
     for one in fields(record):
-        declared = one.metadata.get("option", Option(python_only=True))
+        declared = one.metadata.get("option", Option(python_only=True)).named(one.name, hints[one.name])
         default = one.default_factory() if one.default_factory is not MISSING else one.default
-        key = declared.key or (f"{one.name}_{declared.unit}" if declared.unit else one.name)
-        flag = f"--{declared.flag or key.lower().replace('_', '-')}"
-        options.append(replace(declared, name=one.name, type=hints[one.name], default=default, key=key, flag=flag))
+        options.append(replace(declared, default=default))
     record._options = tuple(options)
     return tuple(options)
 

@@ -29,15 +29,13 @@ class Benchmark:
 
     minutes : of CPU, expected, of all its commands on an AMD EPYC core. commands : options, a list for each run.
     needs : files and programs that are neither in the project nor among its dependencies, or "". short : options of a
-    form of a minute or two, whose figures are compared with none; () where there is none. nightly : whether .ci/nightly
-    runs it although it has none.
+    form of a minute or two, whose figures are compared with none; () where there is none.
     """
 
     minutes: float
     commands: tuple[tuple[str, ...], ...] = ((),)
     needs: str = ""
     short: tuple[str, ...] = ()
-    nightly: bool = False
 
 
 DATA = "measured data in ../shared/data"
@@ -46,7 +44,6 @@ BENCHMARKS = {
     "page_latency": Benchmark(1, needs="Chromium and playwright"),
     "core_speed": Benchmark(2),
     "random_simulations": Benchmark(30, short=("--cases", "1000", "--laws", "10", "--seed", "7", "--jobs", "2")),
-    "killed_runs": Benchmark(90, (("--runs", "20", "--seed", "7", "--jobs", "2"),), nightly=True),
     "rendered_speckle": Benchmark(1, needs="pyvale 2026.10, here or in the Python of the option --python"),
     "user_costs": Benchmark(2, needs=DATA),
     "studies": Benchmark(4, needs=DATA),
@@ -78,17 +75,7 @@ BENCHMARKS = {
     "noise_correlation": Benchmark(4),
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "rate_tables": Benchmark(20, needs=DATA),
-    "reader_fuzz": Benchmark(
-        25, (("--per-kind", "10000", "--first", "2000000"),), short=("--short", "--first", "700000", "--jobs", "2")
-    ),
-    "large_files": Benchmark(3, short=("--megabytes", "10")),
-    "adverse_surroundings": Benchmark(25, short=("--short", "--jobs", "2")),
-    "code_execution": Benchmark(
-        15,
-        (("--jobs", "2"),),
-        "gfortran, gcc, g++, node, Chromium and playwright; root, for all caches",
-        short=("--short", "--jobs", "2"),
-    ),
+    "hostile_files": Benchmark(40, needs="gcc, for exported C", short=("--short", "--first", "700000")),
     "mutations": Benchmark(90, (("build/mutations.jsonl",),), "g++"),
 }
 """{name of the program: what it costs and how it is run}."""
@@ -134,11 +121,11 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="programs to run, or 'everything'; none: list them")
     parser.add_argument("--write", action="store_true", help="write the tables to docs/measured")
     parser.add_argument("--short", action="store_true", help="the short forms, whose tables are not written")
-    parser.add_argument("--nightly", action="store_true", help="programs with a short form, and killed_runs")
+    parser.add_argument("--nightly", action="store_true", help="the commands of programs with a short form")
     options = parser.parse_args()
     names, with_short = options.names, [name for name, benchmark in BENCHMARKS.items() if benchmark.short]
     if options.nightly:
-        names = [name for name, benchmark in BENCHMARKS.items() if benchmark.short or benchmark.nightly]
+        names = with_short
     elif options.short:
         if options.write or not set(names) <= set(with_short):
             parser.error(f"--short goes without --write, and with {', '.join(with_short)}")

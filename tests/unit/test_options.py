@@ -10,8 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from typer.testing import CliRunner
 
 import creepkit as ck
-from creepkit.cli.declared_options import checked
-from creepkit.cli.given_options import CheckedCommand
+from creepkit.cli.command_options import CheckedCommand, checked
 from creepkit.errors import FitError
 from creepkit.limits import Limits
 from creepkit.options import CELSIUS, HOURS, Options, option, options_of, table_of, takes_options, values_of_table

@@ -104,13 +104,13 @@ def test_the_command_line_generates_and_trains_for_a_specimen_of_a_plugin_file(t
     try:
         ck.load_plugin(Path(sys.modules["helpers.cantilever"].__file__))
         to, model = tmp_path / "beams.h5", tmp_path / "beam.safetensors"
-        words = ["generate", "norton", "--specimen", "cantilever", "--samples", "16", "--interval", "7200"]
+        words = ["surrogate", "generate", "norton", "--specimen", "cantilever", "--samples", "16", "--interval", "7200"]
         made = CliRunner().invoke(
             app, [*words, "--range", "force=6:12", "--range", "span=40:60", "--to", str(to), "--workers", "1"]
         )
         assert made.exit_code == 0, made.output
         assert "norton on cantilever" in made.output
-        words = ["train", str(to), "--to", str(model), "--hidden", "4", "--layers", "1", "--epochs", "2"]
+        words = ["surrogate", "train", str(to), "--to", str(model), "--hidden", "4", "--layers", "1", "--epochs", "2"]
         trained = CliRunner().invoke(app, [*words, "--base", "reference-stress"])
         assert trained.exit_code == 0, trained.output
         assert "parameter-gru of cantilever" in ck.surrogate(model).name

@@ -41,11 +41,21 @@ def words_of(command, folder):
     """The words of a command that works for minutes."""
     if command == "train":
         ck.write_dataset(bars(), folder / "data.h5")
-        return ("train", folder / "data.h5", "--to", folder / "out" / "net.safetensors", "--epochs", "100000")
+        return (
+            "surrogate",
+            "train",
+            folder / "data.h5",
+            "--to",
+            folder / "out" / "net.safetensors",
+            "--epochs",
+            "100000",
+        )
     if command == "screen":
         return (
-            "screen",
+            "identify",
             PLANTED_BULGE,
+            "--by",
+            "alloy",
             "--law",
             "combined",
             "--dense",
@@ -95,6 +105,7 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_half_written(command, sent,
         line for line in stderr.splitlines() if line.startswith(("creepkit:", "Traceback", "Exception", "Aborted"))
     ]
     assert len(lines) == 1
-    assert lines[0].startswith(f"creepkit: {command} {said}")
+    name = {"screen": "identify", "train": "surrogate"}.get(command, command)
+    assert lines[0].startswith(f"creepkit: {name} {said}")
     left = [path.name for path in tmp_path.rglob("*") if path.name.endswith((".part", ".lock"))]
     assert left == (["running.lock"] if command == "run" else [])  # empty, and locked by nobody

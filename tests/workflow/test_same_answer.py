@@ -165,8 +165,10 @@ def test_screen(tests_folder, tmp_path):
     for test in tests:
         ck.write_history(test, tmp_path / "tests" / f"{test.name}.csv")
     plate = ck.screen(tests, ["norton"], predictor(surrogate), options=options, workers=1)
-    words = ("--law", "norton", "--dense", "none", "--confirm", "never", "--workers", "1", *QUICK_WORDS)
-    command("screen", tmp_path / "tests", "--to", tmp_path / "out", *words, *surrogate_words(surrogate))
+    words = ("--law", "norton", "--dense", "none", "--no-confirm", "--workers", "1", *QUICK_WORDS)
+    command(
+        "identify", tmp_path / "tests", "--by", "alloy", "--to", tmp_path / "out", *words, *surrogate_words(surrogate)
+    )
     (result,) = plate.results
     assert same(ck.load(tmp_path / "out" / "fits" / "A.json"), result.best)
     assert any("suspect frames were left out: 1 of" in note for note in result.notes)

@@ -1,14 +1,15 @@
-"""The command `creepkit`: its global options, its commands, and how errors end it.
+"""The command `creepkit`: its global options, its commands by stage, and how errors end it.
 
-Exit 0 fine, 1 an error that we can explain in one line, 2 wrong usage, 70 a fault of creepkit, 130 interrupted by
-Ctrl-C, 143 by SIGTERM, 129 by SIGHUP, 141 nobody reads the output any more.
+Exit 0 fine, 1 an error that we can explain in one line, 2 wrong usage, 128 and its number after a signal. A command is
+imported when it is asked for; `creepkit --help` imports none.
 """
 
 from __future__ import annotations
 
+import importlib
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,45 +17,75 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from creepkit.cli import (
-    app_page,
-    check,
-    confirm,
-    data,
-    demo,
-    design,
-    discover,
-    export,
-    extract,
-    generate,
-    identify,
-    init,
-    laws,
-    new_exporter,
-    new_law,
-    new_reader,
-    new_specimen,
-    plugins,
-    predict,
-    read,
-    reduced_model,
-    report,
-    run,
-    rupture,
-    screen,
-    simulate,
-    specimens,
-    sweep,
-    train,
-)
-from creepkit.cli.declared_options import checked
-from creepkit.cli.described_test import TestCommand
-from creepkit.cli.failures import NO_READER, failure_sentence, output_sentence, say
-from creepkit.cli.given_options import CheckedCommand
-from creepkit.cli.interrupts import exit_code, interrupted_sentence, was_interrupted
-from creepkit.errors import CreepkitError, PluginError
-from creepkit.files.writing import FULL
-from creepkit.reports.terminal import printable, tell
+from creepkit.cli.ending import exit_code_of_signal, interrupted_sentence, say, sentence_of
+from creepkit.errors import PluginError, nearest, printable
+
+STAGES: dict[str, dict[str, str]] = {
+    "Begin": {
+        "demo": "Run the studies that ship: creep curves, a bulge test.",
+        "init": "Write a study file for a folder of data.",
+        "run": "Carry out a study, from data to its report.",
+    },
+    "Data": {
+        "read": "Show what measured files hold, and what looks wrong.",
+        "extract": "Extract measured histories from camera frames.",
+    },
+    "Laws": {
+        "identify": "Fit laws to creep tests and rank them, for one alloy or many.",
+        "discover": "Find forms of temperature for the parameters of a law.",
+    },
+    "What follows": {
+        "predict": "Forecast tests by an identified law.",
+        "design": "Say which test to make next.",
+        "rupture": "Assess rupture tests by parametric methods.",
+        "export": "Write a law with its values as text, or for a solver.",
+        "report": "Write results as a page to read, or as a page of sliders.",
+    },
+    "Simulation": {
+        "simulate": "Simulate a test of a bar, a dimple or another specimen.",
+        "surrogate": "Data sets, networks and reduced-order models.",
+    },
+    "Plugins": {
+        "list": "List laws, specimens, targets or plugins, or show one in full.",
+        "check": "Check that laws, specimens, readers, exporters are fit.",
+        "new": "Write a law, specimen, reader or exporter to start from.",
+    },
+}
+"""{stage: {command: the first sentence of its help}}, in the order of work; the module of a command has its name."""
+
+
+COMMANDS = {name: sentence for stage in STAGES.values() for name, sentence in stage.items()}
+
+
+ALIASES = {"fit": "identify"}
+
+
+KEPT_WHEN_INTERRUPTED = {
+    "run": "stages that are finished are kept, and the same command goes on with the others",
+    "identify --by": "alloys that are finished are kept, and the same command goes on with the others",
+    "surrogate generate": "shards that are finished are kept, and the same command goes on with the others",
+    "surrogate train": "the last checkpoint is kept, and the same command goes on from there",
+    "surrogate sweep": "what is trained and the last checkpoint are kept, and the same command goes on from there",
+}
+"""Half a sentence of each command that goes on where it was."""
+
+
+def built(name: str) -> Any:
+    """The command of this name, with its options made of the records that it takes."""
+    from creepkit.cli.command_options import CheckedCommand, checked
+
+    module = importlib.import_module(f"creepkit.cli.{name.replace('list', 'listing')}")
+    app = typer.Typer(rich_markup_mode=None)
+    functions = getattr(module, "COMMANDS", None)
+    if functions is None:
+        help = f"{COMMANDS[name]}\n\n{module.command.__doc__}"
+        app.command(name, cls=getattr(module, "Command", CheckedCommand), help=help)(checked(module.command))
+    else:
+        group = typer.Typer(rich_markup_mode=None, no_args_is_help=True, help=COMMANDS[name])
+        for one, function in functions.items():
+            group.command(one, cls=CheckedCommand)(checked(function))
+        app.add_typer(group, name=name)
+    return typer.main.get_group(app).commands[name]
 
 
 class CommandGroup(TyperGroup):
@@ -73,7 +104,10 @@ class CommandGroup(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an error of ours becomes one line on stderr and exit code 1."""
         with self._errors_in_one_line(ctx.params["debug"], ctx):
-            _check_files_in_environment()
+            if os.environ.get("CREEPKIT_PLUGINS"):
+                from creepkit.registry.plugin_sources import check_files_in_environment
+
+                check_files_in_environment()
             _load_plugin_files(ctx.params["plugin"])
             return super().invoke(ctx)
 
@@ -82,51 +116,60 @@ class CommandGroup(TyperGroup):
         try:
             yield
         except KeyboardInterrupt as error:
-            raise self._interrupted(ctx, error) from None
+            words = [word for word in sys.argv[1:] if not word.startswith("-")][:2]
+            name = (ctx.invoked_subcommand if ctx is not None else "") or ""
+            long = next((key for key in (" ".join(words), name) if key in KEPT_WHEN_INTERRUPTED), name)
+            long = f"{name} --by" if name == "identify" and "--by" in sys.argv else long
+            say(interrupted_sentence(name, str(error) or KEPT_WHEN_INTERRUPTED.get(long, "")))
+            raise typer.Exit(exit_code_of_signal()) from None
         except Exception as error:
-            if debug or _is_of_the_command_line(error):
+            if debug or _is_of_the_command_line(error) or isinstance(error, BrokenPipeError):
                 if isinstance(getattr(error, "message", None), str):  # it names options and arguments as they came
                     error.message = printable(error.message)  # type: ignore[attr-defined]
                 raise
-            if was_interrupted():
-                raise self._interrupted(ctx, error) from None
-            if isinstance(error, BrokenPipeError):
-                raise typer.Exit(NO_READER) from None
-            if isinstance(error, CreepkitError | OSError):
-                raise _ended(_sentence(error), 1) from None
-            raise _ended(*failure_sentence(error)) from None
+            say(sentence_of(error))
+            raise typer.Exit(1) from None
 
-    def _interrupted(self, ctx: Any, error: BaseException) -> typer.Exit:
-        if ctx is None:
-            return _ended(interrupted_sentence(None), exit_code())
-        name = ctx.invoked_subcommand or ""
-        kept = str(error) if isinstance(error, KeyboardInterrupt) else ""
-        return _ended(interrupted_sentence(name, self.commands.get(name), kept), exit_code())
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Creepkit's own commands, in the order of work."""
+        return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of this name, creepkit's own or a plugin's; say which plugins failed where none has it."""
-        if cmd_name not in self.commands and not self._plugins_asked:
+        name = ALIASES.get(cmd_name, cmd_name)
+        if name in COMMANDS and name not in self.commands:
+            self.commands[name] = built(name)
+        if name not in self.commands and not self._plugins_asked:
             self._plugins_asked = True
-            added, problems = _plugin_commands(set(self.commands))
+            added, problems = _plugin_commands()
             self.commands.update(added)
-            for problem in problems if cmd_name not in added else ():
-                tell(f"creepkit: {problem}", err=True)
-        return super().get_command(ctx, cmd_name)
+            for problem in problems if name not in added else ():
+                say(problem)
+        return self.commands.get(name)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the command of the first word; a usage error with the nearest for one that there is not."""
+        word = args[0]
+        if not word.startswith("-") and self.get_command(ctx, word) is None:
+            known = [*COMMANDS, *self.commands]
+            ctx.fail(f"No such command '{printable(word)}'; {nearest(word, known)}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write creepkit's own commands, those of plugins, and what is wrong with plugins that add commands."""
-        super().format_commands(ctx, formatter)
+        """Write creepkit's own commands by stage, those of plugins, and what is wrong with plugins."""
+        for stage, commands in STAGES.items():
+            with formatter.section(stage):
+                formatter.write_dl([(f"{name:12}", sentence) for name, sentence in commands.items()])
+        failed = []
         try:
             _load_plugin_files(ctx.params.get("plugin"))
-            failed: tuple[str, ...] = ()
         except PluginError as error:
-            failed = (str(error),)
-        added, problems = _plugin_commands(set(self.commands))
-        shown = {name: command for name, command in sorted(added.items()) if not command.hidden}
+            failed = [str(error)]
+        added, problems = _plugin_commands()
+        shown = [(name, one.get_short_help_str(80)) for name, one in sorted(added.items()) if not one.hidden]
         if shown:
-            limit = formatter.width - 6 - max(map(len, shown))
             with formatter.section("Commands of plugins"):
-                formatter.write_dl([(name, command.get_short_help_str(limit)) for name, command in shown.items()])
+                formatter.write_dl(shown)
         if failed or problems:
             with formatter.section("Plugins that failed"):
                 for problem in (*failed, *problems):
@@ -143,52 +186,11 @@ app = typer.Typer(
 )
 
 
-COMMANDS: dict[str, Callable[..., None]] = {
-    "init": init.command,
-    "run": run.command,
-    "laws": laws.command,
-    "specimens": specimens.command,
-    "plugins": plugins.command,
-    "check": check.command,
-    "new-law": new_law.command,
-    "new-specimen": new_specimen.command,
-    "new-reader": new_reader.command,
-    "new-exporter": new_exporter.command,
-    "simulate": simulate.command,
-    "reduced-model": reduced_model.command,
-    "train": train.command,
-    "sweep": sweep.command,
-    "generate": generate.command,
-    "read": read.command,
-    "data": data.command,
-    "extract": extract.command,
-    "identify": identify.command,
-    "discover": discover.command,
-    "screen": screen.command,
-    "confirm": confirm.command,
-    "predict": predict.command,
-    "design": design.command,
-    "rupture": rupture.command,
-    "export": export.command,
-    "report": report.command,
-    "app": app_page.command,
-    "demo": demo.command,
-}
-
-
-TEST_COMMANDS = ("simulate", "predict")
-"""Commands whose options describe a test, of any specimen."""
-
-
-for name, command in COMMANDS.items():
-    app.command(name, cls=TestCommand if name in TEST_COMMANDS else CheckedCommand)(checked(command))
-
-
 def _print_version(requested: bool) -> None:
     if requested:
         import creepkit
 
-        tell(f"creepkit {creepkit.__version__}")
+        typer.echo(f"creepkit {creepkit.__version__}")
         raise typer.Exit
 
 
@@ -203,17 +205,10 @@ def global_options(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
-    """Creep laws: list them, simulate them, and identify them from creep curves.
+    """Creep laws: read tests, identify laws from them, and simulate, forecast and export what was identified.
 
-    Plugins may add laws and commands: 'creepkit plugins' lists what they bring.
+    'creepkit COMMAND --help' describes a command; 'creepkit demo' shows what comes out.
     """
-
-
-def _check_files_in_environment() -> None:
-    if os.environ.get("CREEPKIT_PLUGINS"):
-        from creepkit.registry.plugin_sources import check_files_in_environment
-
-        check_files_in_environment()
 
 
 def _load_plugin_files(files: list[Path] | None) -> None:
@@ -223,50 +218,32 @@ def _load_plugin_files(files: list[Path] | None) -> None:
         known = registry.default_registry()
         for plugin in [known.load_file(file) for file in files]:
             for sentence in known.replaced(plugin):
-                tell(f"creepkit: {sentence}", err=True)
+                say(sentence)
 
 
-def _plugin_commands(own_names: set[str]) -> tuple[dict[str, Any], list[str]]:
+def _plugin_commands() -> tuple[dict[str, Any], list[str]]:
     """Return {name: command} of what plugins add, and a sentence for each plugin or command that cannot be used."""
     from creepkit import registry
 
     added: dict[str, Any] = {}
     problems: list[str] = []
-    for plugin, app in registry.default_registry().command_lines():
+    for plugin, commands_of_plugin in registry.default_registry().command_lines():
         try:
-            commands = typer.main.get_group(app).commands
+            commands = typer.main.get_group(commands_of_plugin).commands
         except Exception as error:  # of the signature of somebody else's command
             problems.append(f"{plugin.provenance}: its commands cannot be used: {' '.join(str(error).split())}")
             continue
         problems += [plugin.problem] if plugin.problem else []
         for name, command in commands.items():
-            if name in own_names or name in added:
-                other = "creepkit" if name in own_names else "another plugin"
+            if name in COMMANDS or name in added:
+                other = "creepkit" if name in COMMANDS else "another plugin"
                 problems.append(f"{plugin.provenance} adds the command '{name}', which {other} has already; rename it")
             else:
                 added[name] = command
     return added, problems
 
 
-def _ended(sentence: str, code: int) -> typer.Exit:
-    """The end of the command, after one line on stderr."""
-    say(" ".join(sentence.split()))
-    return typer.Exit(code)
-
-
 def _is_of_the_command_line(error: Exception) -> bool:
     """Whether typer ends by this exception, or says in its own words what is wrong with the options."""
     usage_error = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
     return isinstance(error, typer.Exit | typer.Abort | usage_error)
-
-
-def _sentence(error: Exception) -> str:
-    """What an error says; with advice where it is the system's."""
-    if not isinstance(error, OSError) or isinstance(error, CreepkitError) or not error.strerror:
-        return str(error)
-    if error.filename is None and error.errno in FULL:  # errors of files that we write have their names
-        return output_sentence(error)
-    place = f"{error.filename}: " if error.filename is not None else ""
-    if error.strerror.startswith("No usable temporary directory"):  # PyTorch wants one to train networks
-        return f"{error.strerror}; set the environment variable TMPDIR to a folder that you can write to"
-    return f"{place}{error.strerror}; check the name, who may read and write there, and the space of the disk"

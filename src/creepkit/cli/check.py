@@ -26,7 +26,7 @@ def command(
         typer.Option(metavar="FILE", help="Example file or folder for a reader; may be given several times."),
     ] = None,
 ) -> None:
-    """Check that laws, specimens, readers, exporters are fit."""
+    """Each promise that is not kept is a sentence that says what to change."""
     reports = [report for target in targets for report in _reports_of(target)]
     if example:
         reports = _with_examples(reports, example)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.command_options import OutputPath
 from creepkit.reports.terminal import ProgressBar, tell, tell_written
 
 if TYPE_CHECKING:

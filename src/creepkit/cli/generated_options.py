@@ -1,21 +1,18 @@
-"""Command options made of records of options: a text form for each type of a field, stated once.
-
-A parameter `settings: Annotated[dict[str, Any], IdentificationSettings]` of a command stands for an option of every
-field of that record; the command is called with {field: value} of those that were given, in creepkit's units.
-"""
+"""How options are written on the command line: a text form for each type, stated once."""
 
 from __future__ import annotations
 
 import functools
+import inspect
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, replace
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
-
-import typer
+from pathlib import Path
+from typing import Any, Literal, Union, get_args, get_origin
 
 from creepkit.errors import CreepkitError, quoted
-from creepkit.options import Option, Options, options_of
+from creepkit.options import Option
 
 
 def parsed_number(text: str) -> float:
@@ -55,16 +52,31 @@ def _words(words: Sequence[str], text: str) -> str:
     return text
 
 
-def _by_name(parse: Callable[[str], Any], texts: Sequence[str]) -> dict[str, Any]:
-    """{name: value} from texts NAME=VALUE; a name with a dot, A.C=20, leads into a dictionary of its own."""
+NEXT_NAME = re.compile(r",(?=\s*\w[\w.-]*\s*=)")
+"""The comma before another NAME=VALUE."""
+
+
+def _by_name(parse: Callable[[str], Any], texts: Sequence[str], *, nested: bool = False) -> dict[str, Any]:
+    """{name: value} from texts NAME=VALUE or A=VALUE,B=VALUE; nested : {group: {name: value}} from GROUP.NAME=VALUE."""
     values: dict[str, Any] = {}
-    for text in texts:
+    for text in (part for whole in texts for part in NEXT_NAME.split(whole)):
         name, value = pair(text)
-        group, _, key = name.rpartition(".")
-        inner = values.setdefault(group, {}) if group else values
+        group, dot, key = name.rpartition(".") if nested else ("", "", name)
+        if nested and not dot:
+            raise ValueError(text)
+        inner = values.setdefault(group, {}) if nested else values
         if key in inner:
-            raise CreepkitError(f"{text}: {name} is given twice; keep one of them")
+            raise CreepkitError(f"{name} is given twice; keep one of them")
         inner[key] = parse(value)
+    return values
+
+
+def _lists_by_name(parse: Callable[[str], Any], texts: Sequence[str]) -> dict[str, tuple[Any, ...]]:
+    """{name: values} from texts NAME=VALUE,...; a name that is given again has further values."""
+    values: dict[str, tuple[Any, ...]] = {}
+    for text in texts:
+        name, listed = pair(text)
+        values[name] = (*values.get(name, ()), *_listed(parse, listed))
     return values
 
 
@@ -78,7 +90,12 @@ def _range(text: str) -> tuple[float, float]:
 
 
 def _output_weights(words: Sequence[str], text: str) -> Any:
-    return text if text in words else _by_name(parsed_number, text.split(","))
+    return text if text in words else _by_name(parsed_number, [text])
+
+
+def _is_mapping(hint: Any) -> bool:
+    origin = get_origin(hint)
+    return isinstance(origin, type) and issubclass(origin, Mapping)
 
 
 @functools.cache
@@ -95,17 +112,24 @@ def text_form(hint: Any) -> TextForm:
         return text_form(others[0])
     if origin is Literal:
         return TextForm("|".join(parts), functools.partial(_words, parts))
+    if origin is tuple and Ellipsis in parts and get_origin(parts[0]) is tuple:
+        item = text_form(parts[0])
+        return TextForm(item.metavar, lambda texts: tuple(item.parse(text) for text in texts), several=True)
     if origin is tuple and Ellipsis in parts:
         item = text_form(parts[0])
         return TextForm(f"{item.metavar},...", functools.partial(_listed, item.parse))
     if origin is tuple and parts == (float, float):
         return TextForm("LOW:HIGH", _range)
-    if isinstance(origin, type) and issubclass(origin, Mapping):
+    if _is_mapping(hint):
         inner = get_args(parts[1])
-        is_nested = isinstance(get_origin(parts[1]), type) and issubclass(get_origin(parts[1]), Mapping)
-        item = text_form(inner[1] if is_nested else parts[1])
-        name = "GROUP.NAME" if is_nested else "NAME"
-        return TextForm(f"{name}={item.metavar}", functools.partial(_by_name, item.parse), several=True)
+        if get_origin(parts[1]) is not None and not _is_mapping(parts[1]) and inner != (float, float):
+            item = text_form(inner[0])
+            parse = functools.partial(_lists_by_name, item.parse)
+            return TextForm(f"NAME={item.metavar},...", parse, several=True)
+        item = text_form(inner[1] if _is_mapping(parts[1]) else parts[1])
+        nested = _is_mapping(parts[1])
+        metavar = f"{'GROUP.' if nested else ''}NAME={item.metavar}"
+        return TextForm(metavar, functools.partial(_by_name, item.parse, nested=nested), several=True)
     raise TypeError(f"no option is made of {hint}; give its text form in SPECIAL")
 
 
@@ -140,11 +164,34 @@ def _nuisance(text: str) -> Any:
     )
 
 
+def steps(texts: Sequence[str]) -> tuple[tuple[float, float], ...]:
+    """(start in s, value) pairs from texts such as 100 and 3600:120."""
+    parts = [text.rpartition(":") for text in texts]
+    return tuple((parsed_number(start or "0"), parsed_number(value)) for start, _, value in parts)
+
+
+def _part(text: str) -> tuple[int, int]:
+    k, n = (parsed_integer(part) for part in pair(text, "/"))
+    if not 1 <= k <= n:
+        raise ValueError(text)
+    return k, n
+
+
+def _surrogate(name: str) -> Any:
+    import creepkit as ck
+
+    return ck.surrogate(name)
+
+
 def _special() -> dict[Any, TextForm]:
     """Text forms of types that are not made of others."""
-    from creepkit.records import Nuisance
+    from creepkit.records import Nuisance, Predictor
 
     return {
+        tuple[int, int]: TextForm("K/N", _part),
+        tuple[tuple[float, float], ...]: TextForm("[S:]NUMBER", steps, several=True),
+        Path: TextForm("PATH", Path),
+        Predictor: TextForm("NAME", _surrogate),
         int: TextForm("INTEGER", parsed_integer),
         float: TextForm("NUMBER", parsed_number),
         str: TextForm("TEXT", str),
@@ -155,27 +202,11 @@ def _special() -> dict[Any, TextForm]:
 SPECIAL = _special()
 
 
-def command_options(record: type[Any]) -> list[Option]:
-    """The options of a record that commands have."""
-    return [one for one in options_of(record) if not one.python_only]
-
-
-def parameter_of(one: Option) -> Any:
-    """The annotation with which typer makes the option of a field."""
-    name = one.flag
-    help = f"{one.help}{_default_text(one)}"
-    if one.type is bool:
-        return Annotated[bool | None, typer.Option(f"{name}/--no-{name[2:]}", help=help)]
-    form = text_form(one.type)
-    several: Any = list[str] if form.several else str
-    return Annotated[several | None, typer.Option(name, metavar=one.metavar or form.metavar, help=help)]
-
-
-def _default_text(one: Option) -> str:
+def default_text(one: Option) -> str:
     """The limits and the default, where a line can say it."""
     limits = f"{one.limits.low:g} to {one.limits.high:g}" if one.limits and one.limits.high < 1e6 else ""
     default = one.default
-    if default is MISSING or default is None or isinstance(default, bool):
+    if default in (MISSING, None, inspect.Parameter.empty) or isinstance(default, bool):
         text = ""
     elif isinstance(default, int | float):
         text = f"{(default - one.offset) / one.scale:g}"
@@ -187,30 +218,23 @@ def _default_text(one: Option) -> str:
     return f" [{'; '.join(parts)}]" if parts else ""
 
 
-def given_values(record: type[Options], texts: Mapping[str, Any]) -> dict[str, Any]:
-    """{field: value} of the options that were given; an error of the record's kind names the option."""
-    values = {}
-    for one in command_options(record):
-        text = texts.get(one.name)
-        if text is None or text == []:
-            continue
-        values[one.name] = text if one.type is bool else _parsed(one, text, record.error)
-        if one.limits is not None:
-            _check_limits(one, values[one.name], record.error)
-        values[one.name] = one.converted(values[one.name])
-    return values
+NOTHING = object()
+"""What `none` is of an option that may be None, and is not without it."""
 
 
-def _check_limits(one: Option, value: Any, error: type[CreepkitError]) -> None:
-    """The error for a number beyond its limits, in the unit in which it was written."""
-    replace(one, name=one.flag, scale=1.0, offset=0.0).check(value, error)
+def given_value(one: Option, text: Any, error: type[CreepkitError]) -> Any:
+    """The value of what was written, in creepkit's unit; None where the option was not given.
 
-
-def _parsed(one: Option, text: Any, error: type[CreepkitError]) -> Any:
+    Raises `error`, which names the option, for what is not understood or beyond its limits.
+    """
+    if text is None or text == [] or isinstance(text, bool):
+        return text if isinstance(text, bool) else None
+    if text == "none" and one.is_optional and one.default is not None:
+        return NOTHING
     form = text_form(one.type)
     shown = quoted(" ".join(text) if isinstance(text, list) else text)
     try:
-        return form.parse(text)
+        value = form.parse(text)
     except ValueError as problem:
         if isinstance(problem, CreepkitError):
             raise error(f"{one.flag} {shown}: {problem}") from None
@@ -218,3 +242,5 @@ def _parsed(one: Option, text: Any, error: type[CreepkitError]) -> Any:
         raise error(f"{one.flag} {shown} is not known; write {one.metavar or form.metavar}{example}") from None
     except CreepkitError as problem:
         raise error(f"{one.flag} {shown}: {problem}") from None
+    replace(one, name=one.flag, scale=1.0, offset=0.0).check(value, error)
+    return one.converted(value)

@@ -1,119 +1,189 @@
-"""`creepkit identify`: from a folder of creep curves to a ranking of laws with intervals, and its files."""
+"""`creepkit identify`: from creep tests to a ranking of laws with intervals, for one alloy or for many."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from creepkit import limits
-from creepkit.cli.declared_options import OutputPath
-from creepkit.cli.identification_options import (
-    BoundOption,
-    FixOption,
-    OnlyOption,
-    SurrogateOption,
-    change_laws,
-    select_by_label,
-    surrogate_named,
-)
+from creepkit.cli.command_options import OutputPath
 from creepkit.cli.identified_folder import identifying_alone, write_ranking
-from creepkit.cli.options import penalty_named, search_named
+from creepkit.cli.shared import Files, Json, Only, Reader, Workers, is_file_name, selected
+from creepkit.errors import FitError
+from creepkit.inverse.candidate_laws import LawChanges
+from creepkit.inverse.search_options import SearchOptions
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.limits import STRAIN
+from creepkit.options import Option
+from creepkit.records import Predictor
 from creepkit.reports.ranking import print_ranking, ranking_to_json
-from creepkit.reports.terminal import ProgressBar, print_json, tell
+from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+    from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection import Ranking
     from creepkit.language import CreepLaw
     from creepkit.records import History
+    from creepkit.screening.screen import ScreeningOptions
 
 
 def command(
-    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Measured files, folders or patterns.")],
+    files: Files,
     law: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option(
-            "--law", metavar="NAME", help="A law to fit, or a sum, norton+strain-hardening; may be given several times."
+            "--law",
+            metavar="NAME",
+            help="A law, or a sum, norton+strain-hardening; may be given several times; by default those of Table 1.",
         ),
-    ],
+    ] = None,
+    *,
     settings: Annotated[dict[str, Any], IdentificationSettings],
+    changes: Annotated[dict[str, Any], LawChanges],
+    how: Annotated[dict[str, Any], SearchOptions],
     to: Annotated[
-        Path,
-        typer.Option(help="Folder for results; made if needed."),
-        OutputPath("folder", ("ranking.json", "ranking.png")),
+        Path, typer.Option(help="Folder for results; made if needed."), OutputPath("folder", ("ranking.json",))
     ] = Path("identified"),
-    reader: Annotated[str | None, typer.Option(help="Reader to use; by default the one that accepts the file.")] = None,
-    temperature: Annotated[
-        str, typer.Option(help="auto: an Arrhenius factor when the tests span several temperatures; or none.")
-    ] = "auto",
-    only: OnlyOption = None,
-    fix: FixOption = None,
-    bound: BoundOption = None,
-    surrogate: SurrogateOption = None,
+    reader: Reader = None,
+    only: Only = None,
     up_to: Annotated[
-        float | None, typer.Option(help="Use frames up to this strain only, such as 0.05."), limits.STRAIN
+        float | None, Option(help="Frames up to this strain alone.", limits=STRAIN, example="0.05")
     ] = None,
-    search: Annotated[str, typer.Option(help="How to begin: multi-start, swarm or cma-es.")] = "multi-start",
-    penalty: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Reduce a sum of terms: l2, group-l2, sqrt or subsets.")
+    surrogate: Annotated[Predictor | None, Option(help="Identify through a surrogate alone, such as dimple.")] = None,
+    through: Annotated[
+        Predictor | None, Option(help="Search through a surrogate, and end with the specimen itself.")
     ] = None,
-    sums: Annotated[
-        bool | None, typer.Option("--sums/--no-sums", help="Whether sums of two laws are tried as well.")
+    confirm: Annotated[
+        bool | None, Option(help="Simulate the best law by the specimen itself; a law may be a saved FIT.json.")
     ] = None,
-    further: Annotated[
-        bool, typer.Option("--further-tests", help="Say which tests would distinguish the remaining laws.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    further_tests: Annotated[bool, Option(help="Say which tests would distinguish the remaining laws.")] = False,
+    each: Annotated[
+        Literal["alloy"] | None,
+        Option(help="Every alloy by itself: a plate. What the folder holds already is not done again.", flag="by"),
+    ] = None,
+    compositions: Annotated[
+        Path | None, Option(help="Table alloy,Fe,Ni,... of a plate, below a line '# unit: wt.%'.")
+    ] = None,
+    dense: Annotated[
+        str | None, Option(help="Of a plate: the law without sparsity, to compare with; or none.")
+    ] = "combined",
+    workers: Workers = None,
+    as_json: Json = False,
 ) -> None:
-    """Fit laws to creep curves and rank them.
+    """Every law is fitted to all tests at once.
 
-    Every law is fitted to all curves at once. Several are compared by their likelihood, as by select() in Python,
-    unless --weights, --search, --penalty or --loss ask for something else; one is identified as by identify(). JSON
-    and plots of each, LaTeX and Python of the best, go to a folder.
+    Several are compared by their likelihood, as by select() in Python, unless --weights, --search, --penalty or --loss
+    ask for something else; one is identified as by identify(). JSON and plots of each, LaTeX and Python of the best,
+    go to a folder.
     """
     import creepkit as ck
-    from creepkit.errors import FitError
+    from creepkit.screening.screen import CANDIDATE_LAWS
 
-    if temperature not in ("auto", "none"):
-        raise FitError(f"--temperature {temperature} is not known; allowed are auto and none")
-    candidate_laws = [ck.law(name) for name in dict.fromkeys(law)]
-    histories = select_by_label(ck.read_histories(files, reader), only)
+    search = SearchOptions().changed(how)
+    histories = selected(ck.read_histories(_without(files, compositions), reader), only)
     if up_to is not None:
         histories = _truncate_at_strain(histories, up_to)
+    if law and confirm and all(is_file_name(name) for name in law):
+        _confirm([ck.load(name) for name in law], histories, surrogate, as_json)
+        return
+    candidates = [ck.law(name) for name in dict.fromkeys(law or CANDIDATE_LAWS)]
+    if each is not None:
+        options = ck.ScreeningOptions(
+            settings=ck.IdentificationSettings().changed(settings),
+            through=through,
+            dense=dense,
+            penalty=search.term_penalty,
+            confirm="when in doubt" if confirm is None else confirm,
+        )
+        laws = LawChanges(temperature="none").changed({**changes, "temperature": "none"}).applied(candidates, [])
+        _screen(histories, laws, surrogate, compositions, to, options, workers, as_json)
+        return
     _tell_assumptions(histories)
-    _warn_of_duplicates(histories)
-    if temperature == "auto":
-        candidate_laws = [ck.with_arrhenius(candidate_law, histories) for candidate_law in candidate_laws]
-    candidate_laws = change_laws(candidate_laws, fix, bound)
-    options: dict[str, Any] = {"using": surrogate_named(surrogate), **settings}
-    weights, loss = settings.get("weights"), settings.get("loss")
-    by_likelihood = weights in (None, "likelihood") and loss in (None, "linear") and search == "multi-start"
-    by_likelihood = by_likelihood and penalty is None
-    if sums is not None and not by_likelihood:
-        raise FitError("--sums compares laws by their likelihood: leave out --weights, --search, --penalty and --loss")
-    with identifying_alone(to, candidate_laws):
-        if by_likelihood and (len(candidate_laws) > 1 or sums is not None):
-            ranking = select_laws(candidate_laws, histories, **({} if sums is None else {"sums": sums}), **options)
-        else:
-            ranking = rank_laws(
-                candidate_laws, histories, search=search_named(search), penalty=penalty_named(penalty), **options
+    candidates = LawChanges().changed(changes).applied(candidates, histories)
+    options_of_fits: dict[str, Any] = {
+        "using": surrogate,
+        **settings,
+        **({} if through is None else {"through": through}),
+    }
+    likelihood = {"weights": ("likelihood",), "loss": ("linear",)}
+    by_likelihood = search.global_search is None and search.penalty is None
+    by_likelihood &= all(settings.get(name, words[0]) in words for name, words in likelihood.items())
+    if (search.sums is not None or "by" in how) and not by_likelihood:
+        raise FitError(
+            "--sums and --criterion compare laws by their likelihood: leave out --weights, --search, --penalty, --loss"
+        )
+    with identifying_alone(to, candidates), ProgressBar() as progress:
+        if by_likelihood and (len(candidates) > 1 or search.sums is not None):
+            ranking = ck.select(
+                candidates, histories, sums=search.sums, by=search.by, progress=progress.tick, **options_of_fits
             )
+        else:
+            searched = {"search": search.global_search, "penalty": search.term_penalty}
+            ranking = _ranked(candidates, histories, progress, **searched, **options_of_fits)
         written = write_ranking(ranking, to)
     if as_json:
         print_json(ranking_to_json(ranking, written))
     else:
         print_ranking(ranking, written, len(histories))
-    if further:
+    if confirm:
+        _confirm([ranking.best], histories, surrogate, as_json)
+    if further_tests:
         tell(ranking.further_tests(), err=as_json)
+
+
+def _without(files: list[str], compositions: Path | None) -> list[str | Path]:
+    """The files; of a single folder those in it beside the table of compositions."""
+    folder = Path(files[0])
+    if compositions is None or len(files) > 1 or not folder.is_dir():
+        return list(files)
+    inside = [one for one in sorted(folder.iterdir()) if one.resolve() != compositions.resolve()]
+    return list(files) if len(inside) == len([*folder.iterdir()]) else [one for one in inside if one.is_file()]
+
+
+def _screen(
+    histories: list[History],
+    laws: list[CreepLaw],
+    surrogate: Predictor | None,
+    compositions: Path | None,
+    to: Path,
+    options: ScreeningOptions,
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """Identify every alloy by itself, and write the plate."""
+    import creepkit as ck
+    from creepkit.reports.screening import print_screening
+
+    with ProgressBar() as progress:
+        plate = ck.screen(
+            histories, laws, surrogate, compositions=compositions, to=to, options=options, workers=workers,
+            progress=progress.tick,
+        )  # fmt: skip
+    written = [plate.to_csv(to / "plate.csv"), plate.to_hdf5(to / "plate.h5")]
+    if plate.identified:
+        written += [to / "fits", *plate.plot(to / "pictures")]
+    print_screening(plate, written, as_json)
+
+
+def _confirm(fits: list[Identification], histories: list[History], surrogate: Predictor | None, as_json: bool) -> None:
+    """Simulate identified laws for each test; surrogate : what they were identified through."""
+    import creepkit as ck
+    from creepkit.reports.confirmation_text import CONFIRMATION_COLUMNS, confirmation_rows, confirmation_to_json
+
+    for fit in fits:
+        found = ck.confirm(fit if surrogate is None else replace(fit, predictor=surrogate), histories)
+        if as_json:
+            print_json(confirmation_to_json(found))
+        else:
+            print_table(f"{found.law} by {found.predictor_name}", CONFIRMATION_COLUMNS, confirmation_rows(found))
+            tell(found.verdict)
 
 
 def _truncate_at_strain(histories: list[History], limit: float) -> list[History]:
     """Frames up to a strain; a curve that has fewer than two of them is left out, and said."""
-    from creepkit.errors import FitError
     from creepkit.inverse.history_checks import truncated_at_strain
 
     retained = truncated_at_strain(histories, limit)
@@ -127,44 +197,30 @@ def _truncate_at_strain(histories: list[History], limit: float) -> list[History]
 
 
 def _tell_assumptions(histories: list[History]) -> None:
-    """What readers assumed of the tests, for a fit rests on it."""
+    """What readers assumed of the tests, for a fit rests on it, and tests that may be one."""
+    from creepkit.quality import without_copies
+    from creepkit.quality.comparison import duplicate_tests
     from creepkit.reports.histories import assumptions_text
 
     for line in assumptions_text(histories).splitlines():
         tell(f"note: {line}", err=True)
-
-
-def _warn_of_duplicates(histories: list[History]) -> None:
-    """Tests that end alike; those with the same readings are left out, and a note of the identification says so."""
-    from creepkit.quality import without_copies
-    from creepkit.quality.comparison import duplicate_tests
-
     for first, second in duplicate_tests(without_copies(histories)[0]):
         tell(f"note: {first} and {second} look like one test published twice; both count", err=True)
 
 
-def select_laws(laws: Sequence[CreepLaw], histories: list[History], **options: Any) -> Ranking:
-    """Identify the laws by likelihood and rank them, showing progress."""
-    import creepkit as ck
-
-    with ProgressBar() as progress:
-        return ck.select(laws, histories, progress=progress.tick, **options)
-
-
-def rank_laws(laws: Sequence[CreepLaw], histories: list[History], **options: Any) -> Ranking:
-    """Fit each law, showing progress, and rank them."""
+def _ranked(laws: Sequence[CreepLaw], histories: list[History], progress: ProgressBar, **options: Any) -> Ranking:
+    """Fit each law, and rank them."""
     import creepkit as ck
     from creepkit.inverse.rupture_use import common_rupture_times
     from creepkit.inverse.selection import rank
 
-    fits = []
     asked = ck.IdentificationSettings(rupture_times=options.get("rupture_times", "auto"))
     options["rupture_times"] = common_rupture_times(laws, asked).rupture_times
-    with ProgressBar() as progress:
-        for law in laws:
+    fits = []
+    for law in laws:
 
-            def tick(task: str, done: int, total: int, name: str = law.name) -> None:
-                progress.tick(f"{name}, {task}", done, total)
+        def tick(task: str, done: int, total: int, name: str = law.name) -> None:
+            progress.tick(f"{name}, {task}", done, total)
 
-            fits.append(ck.identify(law, histories, progress=tick, **options))
+        fits.append(ck.identify(law, histories, progress=tick, **options))
     return rank(fits)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.command_options import OutputPath
 from creepkit.reports.terminal import tell, tell_written
 
 
@@ -20,10 +20,7 @@ def command(
     ] = None,
     reader: Annotated[str | None, typer.Option(help="Reader of the files; by default what accepts them.")] = None,
 ) -> None:
-    """Write a study file for a folder of data.
-
-    The files are read as 'creepkit read' reads them; candidate laws and stages follow from what the tests hold.
-    """
+    """The files are read as 'creepkit read' reads them; candidate laws and stages follow from what the tests hold."""
     from creepkit.errors import StudyError
     from creepkit.files.writing import check_target, write_text
     from creepkit.studies.proposal import propose_study

@@ -1,139 +1,235 @@
-"""Options that describe a test, of simulate and predict, and the history that they describe."""
+"""A test that options describe: its specimen, its loading and the lengths of its test piece.
+
+A load or a length of a specimen is an option of its name, `--force 250` or `--outer-radius 12`, whether creepkit knows
+the specimen or a plugin brings it; `creepkit list specimens NAME` lists them.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Any, Literal
 
-import typer
-
-from creepkit import limits
-from creepkit.cli.described_test import (
-    check_modulus,
-    check_options,
-    further_options,
-    parse_lengths,
-    parse_loading,
-    specimen_for,
-    specimen_options,
+from creepkit.api.planned_tests import planned_history, stepped_load
+from creepkit.cli.command_options import CheckedCommand
+from creepkit.cli.generated_options import pair, steps
+from creepkit.errors import SolveError
+from creepkit.limits import GIGAPASCAL, HOURS, RAMP
+from creepkit.options import GIGAPASCAL as IN_GIGAPASCAL
+from creepkit.options import HOURS as IN_HOURS
+from creepkit.options import Options, option
+from creepkit.records import (
+    ZERO_CELSIUS,
+    History,
+    PointLoading,
+    Program,
+    check_geometry,
+    dimension_named,
+    dimensions_of,
+    known_specimens,
+    loads_of,
 )
-from creepkit.cli.options import DEFAULT_SPECIMEN, parse_steps
 
 if TYPE_CHECKING:
-    from creepkit.records import History, Loading, Program, Specimen
+    from creepkit.records import Load, Loading, Specimen
+
+COMPONENTS = "components"
+"""The load of a material point, which --stress and --strain state with the names of components."""
 
 
-StressOption = Annotated[
-    list[str] | None,
-    typer.Option(metavar="[NN=][S:]MPA", help="Of a bar, from S seconds on; of a point, of component NN (11=80)."),
-]
-
-
-StrainOption = Annotated[
-    list[str] | None,
-    typer.Option(metavar="[NN=][S:]STRAIN", help="Total strain of a bar in relaxation, or of a point's component."),
-]
-
-
-PressureOption = Annotated[
-    list[str] | None, typer.Option(metavar="[S:]MPA", help="Gas pressure, from S seconds on, after a ramp of 5 s.")
-]
-
-
-ModulusOption = Annotated[
-    float | None, typer.Option(help="Young's modulus, GPa; a bulge and a prescribed strain need it."), limits.GIGAPASCAL
-]
-
-
-GeometryOption = Annotated[
-    list[str] | None, typer.Option(metavar="NAME=MM", help="A length of the test piece, such as apex_thickness=0.48.")
-]
-
-
-ControlOption = Annotated[str | None, typer.Option(help="Of a bar: load (held in each step) or stress (true).")]
-
-
-RampOption = Annotated[float | None, typer.Option(help="s in which each level of a load is reached."), limits.RAMP]
-
-
-def parse_temperature(texts: Sequence[str]) -> float | Program:
-    """K, a number or a program, of texts such as 800 and 3600:820 in C."""
-    from creepkit.errors import SolveError
-    from creepkit.records import ZERO_CELSIUS, Program
-
-    levels = [(start, celsius + ZERO_CELSIUS) for start, celsius in parse_steps(texts, "--temperature-c")]
-    if levels[0][0] != 0.0:
-        raise SolveError(
-            f"--temperature-c {texts[0]}: nothing is said of the time before; give the first one from 0 s on"
-        )
-    return levels[0][1] if len(levels) == 1 else Program.steps(levels)
+LOAD_TEXT = re.compile(r"([0-9.]+:)?[+-]?[0-9.]+([eE][+-]?[0-9]+)?")
+"""The value of a load: a number, or SECONDS:NUMBER."""
 
 
 @dataclass(frozen=True)
-class TestOptions:
-    """The options that describe a test, as they were given; end_h : h, temperature : K, None where the law has none.
+class TestOptions(Options, title="options of a test", error=SolveError):
+    """What is said of a test beside its load and lengths. temperature : (start in s, C) of its levels.
 
-    context : of the command, which keeps options that only the specimen knows, its loads and lengths.
+    end : s. modulus : MPa. control : of a bar under stress. ramp : s in which each level of a load is reached.
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
 
-    end_h: float
-    specimen: str | None = None
-    stress: Sequence[str] | None = None
-    strain: Sequence[str] | None = None
-    pressure: Sequence[str] | None = None
-    modulus_gpa: float | None = None
-    geometry: Sequence[str] | None = None
-    control: str | None = None
-    ramp: float | None = None
-    context: typer.Context | None = None
+    end: float | None = option(None, "End of the test.", HOURS, **IN_HOURS)
+    specimen: str | None = option(None, "By default one that takes the load; see 'creepkit list specimens'.")
+    temperature: tuple[tuple[float, float], ...] = option(
+        (), "Temperature, from S seconds on.", unit="C", metavar="[S:]C"
+    )
+    modulus: float | None = option(None, "Young's modulus; some specimens need it.", GIGAPASCAL, **IN_GIGAPASCAL)
+    control: Literal["load", "stress"] | None = option(None, "Of a bar: the load or the true stress is held.")
+    ramp: float | None = option(None, "s in which each level of a load is reached.", RAMP)
+
+
+class Command(CheckedCommand):
+    """A command that takes the loads and lengths of any specimen as options, beside its own."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Keep options that are none of the command's own for the specimen; each has one value.
+
+        A number behind a flag makes it a load: `--force 250` is one, `--force` alone lets files be replaced.
+        """
+        takes_value = {
+            name: not getattr(param, "is_flag", False)
+            for param in self.params
+            for name in (*param.opts, *param.secondary_opts)
+        } | {"--help": False}
+        kept: list[str] = []
+        others: dict[str, list[str]] = {}
+        waiting = list(args)
+        while waiting:
+            word = waiting.pop(0)
+            name, separator, value = word.partition("=")
+            is_own = name in takes_value
+            is_load = is_own and not takes_value[name] and bool(waiting and LOAD_TEXT.fullmatch(waiting[0]))
+            if not name.startswith("--") or name == "--" or (is_own and not is_load):
+                kept.append(word)
+                if is_own and not separator and takes_value[name] and waiting:
+                    kept.append(waiting.pop(0))
+                continue
+            others.setdefault(name[2:].replace("-", "_"), []).append(
+                value if separator else waiting.pop(0) if waiting else ""
+            )
+        ctx.obj = others
+        return list(super().parse_args(ctx, kept))
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """Name the loads and lengths of all specimens, which are options as well."""
+        with formatter.section("Loads, [S:]NUMBER from S seconds on, and lengths, mm, by specimen"):
+            rows = [(name, ", ".join(_flags(one))) for name, one in known_specimens().items()]
+            formatter.write_dl([(name, text) for name, text in rows if text])
+
+
+def _flags(specimen: object) -> list[str]:
+    """The options of a specimen; a material point has those of stress and strain."""
+    loads = [load.name for load in loads_of(specimen)]
+    loads = ["stress", "strain"] if COMPONENTS in loads else loads
+    return [f"--{name.replace('_', '-')}" for name in (*loads, *(d.name for d in dimensions_of(specimen)))]
 
 
 @dataclass(frozen=True)
 class DescribedTest:
-    """The specimen, the loading and the lengths, mm, of a test that options describe."""
+    """What options say of a test; lengths : mm of its test piece, temperature : K, None where nothing is said."""
 
+    options: TestOptions
     specimen: Specimen
     loading: Loading
     lengths: Mapping[str, float]
+    temperature: float | Program | None
+
+    def history(self, temperature: float | Program) -> History:
+        """The planned test, without outputs; temperature : K, where the options say none."""
+        from creepkit.language import Elastic
+
+        chosen = self.options
+        return planned_history(
+            self.specimen,
+            self.loading,
+            float(chosen.end or 0.0),
+            temperature=temperature if self.temperature is None else self.temperature,
+            elastic=None if chosen.modulus is None else Elastic(chosen.modulus),
+            lengths=self.lengths,
+        )
 
 
-def described_test(options: TestOptions) -> DescribedTest:
-    """What the options say of a test; SolveError where they contradict each other or leave out what is needed."""
+def described_test(given: Mapping[str, Any], others: Mapping[str, Sequence[str]]) -> DescribedTest:
+    """The test of options and of loads and lengths by name; SolveError where they contradict each other."""
     import creepkit as ck
-    from creepkit.errors import SolveError
 
-    usual = {"stress": options.stress, "strain": options.strain, "pressure": options.pressure}
-    loads = {name: texts for name, texts in usual.items() if texts}
-    specimen = ck.specimen(
-        options.specimen or specimen_for({**loads, **further_options(options.context)}, DEFAULT_SPECIMEN)
-    )
-    further, lengths = specimen_options(specimen, options.context)
-    loads |= further
-    check_options(specimen, loads, options.control, options.ramp)
-    for name, value in parse_lengths(specimen, options.geometry).items():
-        if name in lengths:
-            raise SolveError(f"--geometry {name}: {name} is given twice; keep one of them")
-        lengths[name] = value
-    loading = parse_loading(specimen, loads, options.control, options.ramp, 3600.0 * options.end_h)
-    check_modulus(specimen, options.modulus_gpa, loads)
-    return DescribedTest(specimen, loading, lengths)
+    options = TestOptions().changed(given)
+    specimen = ck.specimen(options.specimen or _specimen_for(others))
+    own = {load.name: load for load in loads_of(specimen)}
+    loads: dict[str, Sequence[str]] = {}
+    lengths: dict[str, float] = {}
+    for name, texts in others.items():
+        dimension = dimension_named(specimen, name)
+        flag = f"--{name.replace('_', '-')}"
+        if name in own or (name in ("stress", "strain") and COMPONENTS in own):
+            loads[name] = texts
+        elif dimension is None:
+            taken = ", ".join(_flags(specimen))
+            raise SolveError(f"there is no option {flag}; --specimen {specimen.name} takes {taken or 'none'}")
+        elif len(texts) > 1 or dimension.name in lengths:
+            raise SolveError(f"{flag}: {dimension.name} is given twice; keep one of them")
+        else:
+            ((_, lengths[dimension.name]),) = steps_of(texts, flag)
+    check_geometry(specimen, lengths, "a length")
+    end = float(options.end or 0.0)
+    loading = _components(specimen, loads) if COMPONENTS in own else _loading(specimen, own, loads, options, end)
+    needed = "modulus" in getattr(specimen, "conditions", {}) or (COMPONENTS in own and "strain" in loads)
+    if options.modulus is None and needed:
+        raise SolveError(f"specimen '{specimen.name}' needs a modulus: give --modulus-gpa, such as 150")
+    temperature: float | Program | None = None
+    if options.temperature:
+        if options.temperature[0][0] != 0.0:
+            raise SolveError("--temperature-c: nothing is said of the time before; give the first one from 0 s on")
+        levels = [(start, celsius + ZERO_CELSIUS) for start, celsius in options.temperature]
+        temperature = levels[0][1] if len(levels) == 1 else Program.steps(levels)
+    return DescribedTest(options, specimen, loading, lengths, temperature)
 
 
-def planned_test(options: TestOptions, temperature: float | Program) -> History:
-    """The history of a test that is described by options, without outputs; temperature : K."""
-    from creepkit.api.planned_tests import planned_history
-    from creepkit.language import Elastic
+def _specimen_for(others: Mapping[str, Sequence[str]]) -> str:
+    """The specimen that takes the loads, where none is named: a bar if it does, else the first that does."""
+    names = {COMPONENTS} if any("=" in text for texts in others.values() for text in texts) else set(others)
+    taking = [name for name, one in known_specimens().items() if names & {load.name for load in loads_of(one)}]
+    return "uniaxial" if "uniaxial" in taking or not taking else taking[0]
 
-    test = described_test(options)
-    elastic = None if options.modulus_gpa is None else Elastic(1e3 * options.modulus_gpa)
-    return planned_history(
-        test.specimen,
-        test.loading,
-        3600.0 * options.end_h,
-        temperature=temperature,
-        elastic=elastic,
-        lengths=test.lengths,
-    )
+
+def steps_of(texts: Sequence[str], flag: str) -> list[tuple[float, float]]:
+    """(start in s, value) pairs from texts such as 100 and 3600:120."""
+    try:
+        return list(steps(texts))
+    except ValueError:
+        raise SolveError(f"{flag} {' '.join(texts)}: write a number, or SECONDS:NUMBER for a later step") from None
+
+
+def _loading(
+    specimen: Specimen, own: Mapping[str, Load], loads: Mapping[str, Sequence[str]], options: TestOptions, end: float
+) -> Loading:
+    """One load by steps; its ramp is the load's own where none is given."""
+    if len(loads) != 1:
+        flags = [f"--{name.replace('_', '-')}" for name in (loads or own or ("stress",))]
+        if loads:
+            raise SolveError(f"{' and '.join(flags)} are different loads of one test; leave all but one out")
+        level = _usual_level(specimen, next(iter(own), ""))
+        named = " or ".join(own) or "load"
+        raise SolveError(f"specimen '{specimen.name}' needs a {named}: give {' or '.join(flags)}, such as {level}")
+    ((name, texts),) = loads.items()
+    component = next((text for text in texts if "=" in text), None)
+    if component is not None:
+        raise SolveError(
+            f"{component} names a component, which --specimen {specimen.name} has not; give --specimen point"
+        )
+    flag = f"--{name.replace('_', '-')}"
+    unknown = "control" if name != "stress" else "ramp"
+    if getattr(options, unknown) is not None:
+        raise SolveError(f"--{unknown} does not belong to {flag} of --specimen {specimen.name}; leave it out")
+    try:
+        return stepped_load(name, own[name], steps_of(texts, flag), control=options.control, ramp=options.ramp, end=end)
+    except SolveError as error:
+        raise SolveError(f"{flag} {' '.join(texts)}: {error}" if flag not in str(error) else str(error)) from None
+
+
+def _usual_level(specimen: Specimen, load: str) -> str:
+    low, high = getattr(specimen, "conditions", {}).get(load, (100.0, 100.0))
+    return f"{float(f'{(low * high) ** 0.5:.1g}'):g}"
+
+
+def _components(specimen: Specimen, loads: Mapping[str, Sequence[str]]) -> Loading:
+    """Stresses and strains of components; until its first step a component is at rest."""
+    if not loads:
+        raise SolveError(f"specimen '{specimen.name}' needs a component: give --stress 11=100, or --strain 12=0.001")
+    components: dict[str, dict[str, list[tuple[float, float]]]] = {"stress": {}, "strain": {}}
+    for kind, texts in loads.items():
+        for text in texts:
+            try:
+                name, value = pair(text)
+            except ValueError:
+                raise SolveError(f"--{kind} {text}: name the component, such as 11={text}") from None
+            components[kind].setdefault(name, []).extend(steps_of([value], f"--{kind}"))
+        for name, pairs in components[kind].items():
+            if pairs[0][0] != 0.0:
+                pairs.insert(0, (0.0, 0.0))
+            if sorted(pairs) != pairs:
+                raise SolveError(f"--{kind}: the steps of component {name} must follow one another in time")
+    return PointLoading(**components)

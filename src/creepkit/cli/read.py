@@ -1,4 +1,4 @@
-"""`creepkit read`: measured files as they are understood, and as files of creepkit's own."""
+"""`creepkit read`: measured files as they are understood and what looks wrong in them, or what a data set holds."""
 
 from __future__ import annotations
 
@@ -7,63 +7,72 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.command_options import OutputPath
+from creepkit.cli.shared import Json
+from creepkit.errors import HistoryError
+from creepkit.limits import ENERGY
+from creepkit.options import Option
 from creepkit.reports.terminal import print_json, tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.errors import CreepkitError
     from creepkit.records import History, InstrumentRecord
 
+DATA_SET_SUFFIXES = (".h5", ".hdf5")
+"""Endings of data sets of simulated tests."""
+
 
 def command(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Tables as text or .xlsx, folders, or any file of a reader.")
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Tables as text or .xlsx, folders, files of readers, or a data set."),
     ],
-    reader: Annotated[
-        str | None, typer.Option(help="Reader of the files, or format of records; by default what accepts them.")
-    ] = None,
-    ignore: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Columns that nobody needs, such as load_kN,date.")
+    *,
+    reader: Annotated[str | None, Option(help="Reader of the files, or format of records.")] = None,
+    ignore: Annotated[tuple[str, ...], Option(help="Columns that nobody needs.", example="load_kN,date")] = (),
+    activation_energy: Annotated[
+        float | None, Option(help="J/mol, to put a factor on the creep rate as a step of temperature.", limits=ENERGY)
     ] = None,
     to: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="Write each test there as CSV, in s, MPa, mm and K."),
+        typer.Option(metavar="FOLDER", help="Each test as CSV, in s, MPa, mm and K; of a data set pictures."),
         OutputPath("folder"),
     ] = None,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the outputs over time."), OutputPath("picture")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
-    """Show what measured files are understood to hold.
+    """Tests, conditions, units, what was assumed, and what is suspect.
 
-    Tests, conditions, units, what was assumed, and what is suspect. A record of an instrument is shown with its
-    channels, units, gaps and clock.
+    A record of an instrument is shown with its channels, units, gaps and clock.
     """
     import creepkit as ck
     from creepkit.readers.table_summary import summarise_tables
     from creepkit.reports import histories as report
     from creepkit.reports.data_quality import data_quality_to_json
 
+    if len(files) == 1 and files[0].suffix.lower() in DATA_SET_SUFFIXES and reader is None:
+        _describe_data_set(files[0], to, as_json)
+        return
     records = _records(files, reader)
     if records:
         _show_records(records, to, plot, as_json)
         return
-    ignored = [name.strip() for name in (ignore or "").split(",") if name.strip()]
+    ignored = list(ignore)
     found, unread = _readable_tests(files, reader, ignored)
     general = {str(path) for path in files if path.is_file() and reader in (None, "csv", "xlsx")}
     sources = {history.source.partition(" (")[0] for history in found}
     tables = [table for path in sorted(general & sources) for table in summarise_tables(Path(path), ignored)]
     framed = [history for history in found if history.outputs]
-    quality = ck.check_data_quality(framed)
+    quality = ck.check_data_quality(framed, activation_energy=activation_energy)
     if as_json:
         document = {**report.histories_to_json(found, tables), "quality": data_quality_to_json(quality)}
         print_json({**document, "not read": [str(error) for error in unread]} if unread else document)
     else:
         without = len(found) - len(framed)
         counted = f"{without} test{'' if without == 1 else 's'} without frames" if without else ""
-        checked = str(quality) if framed else ""
-        parts = (report.tables_text(tables), report.histories_text(found), counted, checked)
+        parts = (report.tables_text(tables), report.histories_text(found), counted, str(quality) if framed else "")
         tell("\n".join(part for part in parts if part))
     if to is not None:
         for path in _write(found, to):
@@ -77,6 +86,22 @@ def command(
         raise typer.Exit(1)
 
 
+def _describe_data_set(file: Path, to: Path | None, as_json: bool) -> None:
+    import creepkit as ck
+    from creepkit.dataset.dataset import summary
+
+    data = ck.read_dataset(file)
+    if as_json:
+        print_json(summary(data))
+    else:
+        tell(data)
+    if to is not None:
+        from creepkit.reports.dataset import write_dataset_figures
+
+        for path in write_dataset_figures(data, to, 0):
+            tell_written(path, err=as_json)
+
+
 def _readable_tests(
     files: list[Path], reader: str | None, ignored: list[str]
 ) -> tuple[list[History], list[CreepkitError]]:
@@ -86,8 +111,7 @@ def _readable_tests(
     try:
         return ck.read_histories(files, reader=reader, ignore=ignored), []
     except ck.errors.CreepkitError:
-        folders = [path for path in files if path.is_dir()]
-        single = [one for path in files for one in (_files_in(path, reader) if path in folders else [path])]
+        single = [one for path in files for one in (_files_in(path, reader) if path.is_dir() else [path])]
         if len(single) < 2:
             raise
         read: list[Path] = []
@@ -95,10 +119,9 @@ def _readable_tests(
         for path in single:
             try:
                 ck.read_histories([path], reader=reader, ignore=ignored)
+                read.append(path)
             except ck.errors.CreepkitError as error:
                 unread.append(error)
-            else:
-                read.append(path)
         if not read or not unread:
             raise
     return ck.read_histories(read, reader=reader, ignore=ignored), unread
@@ -129,13 +152,13 @@ def _write(histories: list[History], folder: Path) -> list[Path]:
     names = stems if distinct else [f"{number}_{stem}" for number, stem in enumerate(stems, 1)]
     for history in histories:
         history_text(history)  # an error of the last one must not leave the others written
-    check_folder_target(folder, ck.errors.HistoryError)
+    check_folder_target(folder, HistoryError)
     sources = [_source_file(history.source) for history in histories]
     paths = [folder / f"{name}.csv" for name in names]
     for path, source in zip(paths, sources, strict=True):
         with made_from(source):  # its name stands in that file, which must not choose that of another measurement
-            check_folder_target(folder, ck.errors.HistoryError, (path.name,))
-    make_folder(folder, ck.errors.HistoryError)
+            check_folder_target(folder, HistoryError, (path.name,))
+    make_folder(folder, HistoryError)
     for history, path, source in zip(histories, paths, sources, strict=True):
         with made_from(source):
             ck.write_history(history, path)
@@ -175,23 +198,19 @@ def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:
                 return []
             except ck.errors.CreepkitError:
                 pass
-    except ck.errors.HistoryError:
+    except HistoryError:
         return []
     return [ck.read_record(path) for path in files]
 
 
 def _show_records(records: list[InstrumentRecord], to: Path | None, plot: Path | None, as_json: bool) -> None:
     """Print records, and draw the one there is."""
-    from creepkit.errors import HistoryError
-    from creepkit.reports.figures import check_figure_target
     from creepkit.reports.instrument_records import record_to_json
 
     if to is not None:
         raise HistoryError(f"--to writes tests, and {records[0].origin} is an instrument's record; leave --to away")
-    if plot is not None:
-        check_figure_target(plot, HistoryError)
-        if len(records) > 1:
-            raise HistoryError(f"--plot draws one record, found {len(records)}; name one file")
+    if plot is not None and len(records) > 1:
+        raise HistoryError(f"--plot draws one record, found {len(records)}; name one file")
     if as_json:
         print_json({"records": [record_to_json(record) for record in records]})
     else:

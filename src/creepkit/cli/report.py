@@ -1,16 +1,22 @@
-"""`creepkit report`: saved results as one page of HTML that a colleague can read."""
+"""`creepkit report`: saved results as one page that a colleague can read, or as a page of sliders."""
 
 from __future__ import annotations
 
+import sys
+import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.command_options import OutputPath
+from creepkit.cli.shared import is_file_name, law_source
+from creepkit.errors import FitError, ReportError
+from creepkit.options import Option
 from creepkit.reports.terminal import tell_written
 
 if TYPE_CHECKING:
+    from creepkit.app.contents import PageSource
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.records import History
@@ -19,31 +25,60 @@ if TYPE_CHECKING:
 
 def command(
     results: Annotated[
-        list[Path], typer.Argument(metavar="RESULT.json...", help="Identifications, rankings, or rupture assessments.")
+        list[str],
+        typer.Argument(
+            metavar="RESULT.json...", help="Identifications, rankings, rupture assessments; with --app one, or a law."
+        ),
     ],
+    *,
     tests: Annotated[
         list[str] | None,
         typer.Option("--tests", metavar="TESTS", help="Their measured files, folders or patterns, for the curves."),
     ] = None,
-    to: Annotated[Path, typer.Option(help="File for the page."), OutputPath()] = Path("report.html"),
-    title: Annotated[str, typer.Option(help="Of the page.")] = "",
+    to: Annotated[Path | None, typer.Option(help="File for the page; report.html, or page.html."), OutputPath()] = None,
+    title: Annotated[str, Option(help="Of the page.")] = "",
+    app: Annotated[bool, Option(help="A page on which the law's parameters are moved by sliders.")] = False,
+    specimen: Annotated[str | None, Option(help="Of a page of sliders: which is shown first.")] = None,
 ) -> None:
-    """Write results as a page to read, HTML.
+    """One file, complete without scripts: findings, curves, tests, laws tried, data, files to download, methods.
 
-    One file, complete without scripts: findings, curves, tests, laws tried, data, files to download, methods,
-    provenance. It prints, and opens anywhere. Identifications of the same tests are ranked.
+    It prints, and opens anywhere. Identifications of the same tests are ranked. With --app, curves are computed in the
+    browser while sliders move, and measured tests are laid over.
     """
     import creepkit as ck
 
-    histories = ck.read_histories(tests) if tests else []
-    written = ck.report([_read(path, histories) for path in results], to, title=title)
-    tell_written(written, err=True)
+    histories = list(ck.read_histories(tests)) if tests else []
+    if app:
+        if len(results) > 1:
+            raise FitError(f"{len(results)} laws or results are named; name one, and tests by --tests")
+        source = _page_source(results[0])
+        path = ck.interactive_page(source, to or Path("page.html"), tests=histories, specimen=specimen, title=title)
+        if sys.stdout.isatty():
+            webbrowser.open(path.resolve().as_uri())
+    else:
+        if specimen is not None:
+            raise ReportError("--specimen belongs to a page of sliders: give --app as well")
+        found = [_read(Path(name), histories) for name in results]
+        path = ck.report(found, to or Path("report.html"), title=title)
+    tell_written(path, err=True)
+
+
+def _page_source(name: str) -> PageSource:
+    """A law by its name, or what a file holds."""
+    from creepkit.exporters.law_files import VALUED_LAW
+    from creepkit.files.json_documents import read_json
+    from creepkit.inverse.ranking_document import RANKING, read_ranking
+
+    if is_file_name(name):
+        data = read_json(Path(name), VALUED_LAW.kind)
+        if isinstance(data, dict) and data.get("format") == RANKING.name:
+            return read_ranking(name)
+    return law_source(name)
 
 
 def _read(path: Path, histories: list[History]) -> Identification | ModelAverage | RuptureAssessment:
     """What a file holds, with the tests that it was made from where they are given."""
     import creepkit as ck
-    from creepkit.errors import ReportError
     from creepkit.files.json_documents import read_json
     from creepkit.files.reading import FileKind
     from creepkit.inverse.identification import Identification

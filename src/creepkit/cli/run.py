@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.cli.declared_options import OutputPath
-from creepkit.cli.interrupts import kept_when_interrupted
+from creepkit.cli.command_options import OutputPath
 from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell
 
 if TYPE_CHECKING:
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
 REPORT_SUFFIXES = (".html", ".htm")
 
 
-@kept_when_interrupted("stages that are finished are kept, and the same command goes on with the others")
 def command(
     study: Annotated[Path, typer.Argument(metavar="STUDY.toml|REPORT.html", help="A study file, or a study's report.")],
     only: Annotated[
@@ -39,9 +37,7 @@ def command(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print how each stage ended as JSON.")] = False,
 ) -> None:
-    """Carry out a study, from data to its report.
-
-    Only what changed runs again. Interrupted, it goes on where it was when it is started again. A report is written
+    """Only what changed runs again. Interrupted, it goes on where it was when it is started again. A report is written
     back to its study and data in a folder, which then runs.
     """
     from creepkit.errors import StudyError

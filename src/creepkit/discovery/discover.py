@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import TypedDict, Unpack
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +26,8 @@ from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_te
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, temperature
+from creepkit.limits import numbers
+from creepkit.options import Options, option, takes_options
 from creepkit.presentation import Presentable
 from creepkit.records import History, Predictor
 from creepkit.records.units import celsius_text
@@ -117,12 +119,27 @@ def check_form_options(
     check_form_names(chain(listed, *(prior or {}).values()))
 
 
-class FormOptions(TypedDict, total=False):
-    """Which forms discover() tries, by the names of its parameters."""
+@dataclass(frozen=True)
+class DiscoveryOptions(Options, title="options of a temperature study", error=FitError):
+    """What temperature_study() is asked beside the settings of its identifications.
 
-    forms: Forms | None
-    prior: PriorOdds | None
-    parameters: Sequence[str] | None
+    forms : names of registered temperature forms, or {parameter: names}; by default all that suit a parameter.
+    prior : {parameter: {form: odds}}. parameters : those that may depend on temperature; by default all.
+    moduli : whether to find each test's modulus from its first 15 frames before; every test states one to begin from.
+    within : K, tests so near to the coldest of a group are at one temperature.
+    """
+
+    forms: Mapping[str, Sequence[str]] | Sequence[str] | None = option(
+        None, "Forms that a parameter may take.", flag="form", example="n=constant,linear"
+    )
+    prior: Mapping[str, Mapping[str, float]] | None = option(
+        None, "Prior odds of a form.", key="prior_odds", flag="prior", example="A.arrhenius=10"
+    )
+    parameters: tuple[str, ...] | None = option(None, "Those that may depend on temperature; by default all.")
+    moduli: bool = option(False, "First find each test's modulus from its first 15 frames.")
+    within: float = option(
+        ISOTHERMAL_RANGE, "Tests so near are at one temperature.", numbers(0, 1e5), unit="K", flag="within"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,28 +159,29 @@ class TemperatureStudy(Presentable, text="reports.temperature_law:temperature_st
     notes: tuple[str, ...]
 
 
+@takes_options(DiscoveryOptions)
 @checked
 def temperature_study(
     law: CreepLaw | str,
     tests: Sequence[History],
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     *,
-    moduli: bool = False,
-    within: float = ISOTHERMAL_RANGE,
     settings: IdentificationSettings | None = None,
     progress: IterationCallback | None = None,
-    **form_options: Unpack[FormOptions],
+    **changes: Any,
 ) -> TemperatureStudy:
     """Identify moduli, then the law times Arrhenius, then each temperature alone, and discover forms of temperature.
 
     law : without temperature. using : a predictor, or the name of a specimen; by default those that the tests name.
-    moduli : whether to find each test's modulus from its first 15 frames before; every test states one to begin from.
-    within : K, tests so near to the coldest of a group are at one temperature.
-    form_options : forms, prior and parameters, as discover() takes them.
+    changes : fields of DiscoveryOptions.
 
     Tests whose used frames are not at one temperature are left out, and a temperature that cannot be identified alone
     is left out of the forms; both are noted.
     """
+    options = DiscoveryOptions().changed(changes)
+    form_options: dict[str, Any] = {
+        "forms": options.forms, "prior": options.prior, "parameters": options.parameters
+    }  # fmt: skip
     law, resolved = resolve_law(law), resolve_predictors(using, check_histories(tests))
     predictor = CompositePredictor(resolved) if isinstance(resolved, dict) else resolved
     if law.uses(temperature):
@@ -173,17 +191,17 @@ def temperature_study(
         raise FitError("there are no histories to study")
     settings = settings or IdentificationSettings()
     histories, left_out = sound_tests(tests, settings)
-    histories, not_isothermal = isothermal_tests(histories, within)
+    histories, not_isothermal = isothermal_tests(histories, options.within)
     if not histories:
         raise FitError(f"no test is at one temperature: {not_isothermal}; forms are found through single temperatures")
     notes = [*left_out, *([not_isothermal] if not_isothermal else [])]
     moduli_fit = None
-    if moduli:
+    if options.moduli:
         moduli_fit = identify_moduli(with_arrhenius(law, histories), histories, predictor, frames=FIRST_FRAMES)
         if moduli_fit.elastic is not None:
             histories = [h.replace(elastic=moduli_fit.elastic) for h in histories]
     joint_fit = identify(with_arrhenius(law, histories), histories, predictor, settings=settings, progress=progress)
-    isothermal_fits, failures = _isothermal_fits(law, histories, predictor, within, settings, progress)
+    isothermal_fits, failures = _isothermal_fits(law, histories, predictor, options.within, settings, progress)
     notes += [*suspect_frames_note(histories), *failures]
     temperature_law = None
     try:

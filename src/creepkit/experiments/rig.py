@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -13,6 +13,9 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.held_levels import held_temperatures
+from creepkit.limits import Limits
+from creepkit.limits import numbers as numbers_between
+from creepkit.options import CELSIUS, Options, option
 from creepkit.records import History, Predictor, dimension_named, dimensions_of, load_unit, outputs_of_test
 
 LOWER_LEVEL, HIGHER_LEVEL, EXTENSION = 0.7, 1.4, 2.0
@@ -38,7 +41,7 @@ ROUNDED_TEMPERATURE = 5.0
 
 @checked
 @dataclass(frozen=True)
-class Rig:
+class Rig(Options, title="settings of a rig", error=FitError):
     """What the equipment can do with one kind of specimen.
 
     specimen : its name, as histories have it. levels : (least, greatest) load, in its unit.
@@ -49,14 +52,24 @@ class Rig:
     changed during a test. largest_output : up to which the leading output may grow, in its unit.
     """
 
-    specimen: str
-    levels: tuple[float, float]
-    longest_hours: float
-    temperatures: tuple[float, ...]
-    dimensions: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    tests_per_run: int = 1
-    setup_hours: float = SETUP_HOURS
-    frame_interval: float = 900.0
+    specimen: str = option(MISSING, "Whose rig is described, where tests are of several specimens.")
+    levels: tuple[float, float] = option(MISSING, "What it can load, MPa, or a strain.", example="4:14")
+    longest_hours: float = option(MISSING, "The longest test.", numbers_between(1e-9, 1e7), key="longest_h")
+    temperatures: tuple[float, ...] = option(
+        MISSING,
+        "At which tests can be made.",
+        numbers_between(-273.15, 9726.85, above=True),
+        flag="temperature-c",
+        **CELSIUS,
+    )
+    dimensions: Mapping[str, tuple[float, ...]] = option(
+        dict, "Test pieces that can be made, mm.", flag="dimension", example="apex_thickness=0.44,0.5,0.58"
+    )
+    tests_per_run: int = option(1, "Test pieces that the oven takes at once.", Limits(1, 25))
+    setup_hours: float = option(
+        SETUP_HOURS, "Of the oven for each run, beside its test.", numbers_between(0, 1e7), key="setup_h"
+    )
+    frame_interval: float = option(900.0, "Between frames.", numbers_between(0, 1e7, above=True), unit="s")
     load_changes: bool = True
     largest_output: float = float("inf")
 
@@ -64,23 +77,11 @@ class Rig:
         low, high = numbers(self.levels, "a rig's levels", "(least, greatest) above zero, such as (4, 14) MPa", count=2)
         if not 0 < low <= high < np.inf:
             raise FitError(f"a rig's levels are (least, greatest) above zero, such as (4, 14) MPa; found {self.levels}")
-        for name in ("longest_hours", "frame_interval", "largest_output"):
-            (value,) = numbers([getattr(self, name)], f"a rig's {name}", "a number", count=1)
-            if not 0 < value <= (np.inf if name == "largest_output" else LARGEST_HOURS):
-                raise FitError(f"a rig's {name} must be above zero and at most {LARGEST_HOURS:g}, found {value:g}")
-        (setup_hours,) = numbers([self.setup_hours], "a rig's setup_hours", "a number", count=1)
-        if not 0 <= setup_hours <= LARGEST_HOURS:
-            raise FitError(f"a rig's setup_hours must be zero or more, found {self.setup_hours!r}")
-        (count,) = numbers([self.tests_per_run], "a rig's tests_per_run", "a number", count=1)
-        if not (1 <= count <= MOST_TESTS_PER_RUN and int(count) == count):
-            raise FitError(
-                f"a rig's tests_per_run is a whole number from 1 to {MOST_TESTS_PER_RUN}, found {self.tests_per_run!r}"
-            )
+        if not self.largest_output > 0:
+            raise FitError(f"a rig's largest_output must be above zero, found {quoted(repr(self.largest_output), 60)}")
         temperatures = list(dict.fromkeys(numbers(self.temperatures, "a rig's temperatures", "numbers in K, above 0")))
         if len(temperatures) > MOST_VALUES:
             raise FitError(f"a rig has {len(temperatures)} temperatures; give {MOST_VALUES} at most")
-        if any(not 0 < T < 1e4 for T in temperatures):
-            raise FitError(f"a rig's temperatures are numbers in K, above 0; found {self.temperatures!r}")
         if not isinstance(self.dimensions, Mapping):
             raise FitError(f"a rig's dimensions are lengths in mm by name, found {quoted(repr(self.dimensions), 60)}")
         dimensions = {
@@ -95,6 +96,7 @@ class Rig:
         object.__setattr__(self, "levels", (low, high))
         object.__setattr__(self, "temperatures", tuple(temperatures))
         object.__setattr__(self, "dimensions", MappingProxyType(dimensions))
+        super().__post_init__()
 
     def __hash__(self) -> int:
         return hash((self.specimen, self.levels, self.longest_hours, self.temperatures, *self.dimensions.items()))
@@ -105,11 +107,7 @@ class Rig:
 
     def replace(self, **changes: Any) -> Rig:
         """The same rig with some fields changed."""
-        known = list(self.__dataclass_fields__)
-        for name in changes:
-            if name not in known:
-                raise FitError(f"a rig has no '{name}'; its fields are {', '.join(known)}")
-        return replace(self, **changes)
+        return self.changed(changes)
 
     def refusal(self, history: History) -> str:
         """Why this rig cannot make a planned test, in a sentence; "" where it can."""
@@ -131,6 +129,17 @@ class Rig:
 
 def _rebuild(state: dict[str, Any]) -> Rig:
     return Rig(**state)
+
+
+def changed_rigs(rigs: Sequence[Rig], changes: Mapping[str, Any]) -> list[Rig]:
+    """The rigs with what was said of one of them; changes : {field: value}, the specimen among them."""
+    names = [rig.specimen for rig in rigs]
+    specimen = changes.get("specimen")
+    if specimen is not None and specimen not in names:
+        raise FitError(f"the rig of specimen '{specimen}' is described, and the tests are of {' and '.join(names)}")
+    if changes and len(rigs) > 1 and specimen is None:
+        raise FitError(f"the tests are of {' and '.join(names)}: say by specimen whose rig is described")
+    return [rig.changed(changes) if rig.specimen == (specimen or names[0]) else rig for rig in rigs]
 
 
 def rigs_of(histories: Sequence[History], predictor: Predictor) -> tuple[Rig, ...]:
@@ -187,8 +196,8 @@ MOST_VALUES = 20
 """Temperatures of a rig, and values of one dimension."""
 
 
-LARGEST_HOURS, LONGEST_DIMENSION, MOST_TESTS_PER_RUN = 1e7, 1e4, 25
-"""Of a rig: h (or s between frames), mm, and test pieces that an oven takes at once."""
+LONGEST_DIMENSION = 1e4
+"""mm."""
 
 
 def numbers(values: Iterable[float] | object, what: str, allowed: str, count: int | None = None) -> list[float]:

@@ -24,6 +24,7 @@ from creepkit.arrays import usable_cores
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, DatasetError, quoted
 from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task, send, setup_message, start_worker
+from creepkit.options import Options, option
 
 SHARD_ROWS = 256
 """Samples of a shard: some seconds of work, so that little is lost when a process dies."""
@@ -66,7 +67,7 @@ class Workers(Protocol):
 
 @checked
 @dataclass(frozen=True)
-class ParallelExecution:
+class ParallelExecution(Options, title="settings of an execution", error=DatasetError):
     """How the shards of a data set are divided among processes and machines.
 
     workers : processes of this machine, by default one for each core; of a cluster, its threads that are used at once.
@@ -76,9 +77,9 @@ class ParallelExecution:
         there already, else 256, or as many as are wanted where these are fewer.
     """
 
-    workers: int | None = None
-    cluster: str | None = None
-    part: tuple[int, int] | None = None
+    workers: int | None = option(None, "Processes; one for each core by default.", limits.WORKERS)
+    cluster: str | None = option(None, "A dask scheduler, tcp://host:port.", metavar="URL")
+    part: tuple[int, int] | None = option(None, "Every N-th shard alone, from the K-th on.", example="3/16")
     shard_rows: int | None = None
 
     def __post_init__(self) -> None:

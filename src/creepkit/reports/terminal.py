@@ -64,13 +64,13 @@ def print_json(value: Any) -> None:
 class ProgressBar:
     """Use as a context; call `tick(task, done, total)`, maybe with a note, from the work. Writes to stderr."""
 
-    LINE_INTERVAL, ELAPSED_FRACTION = 2.0, 0.01
-    """s between plain lines, and the share of the time so far that passes between two: long runs print few."""
+    LONG_STAGE = 60.0
+    """s after which a stage that goes on has a plain line more, the next one after twice that time, and so on."""
 
     def __init__(self) -> None:
         self._bar: Any = None
         self._tasks: dict[str, Any] = {}
-        self._start = self._last_line = time.monotonic()
+        self._stage, self._due = "", time.monotonic() + self.LONG_STAGE
 
     def __enter__(self) -> ProgressBar:
         if sys.stderr.isatty():
@@ -104,10 +104,9 @@ class ProgressBar:
             if task not in self._tasks:
                 self._tasks[task] = self._bar.add_task(task, total=total, note=note)
             self._bar.update(self._tasks[task], completed=done, total=total, note=note)
-        elif done == total or self._is_due():
-            self._last_line = time.monotonic()
+        elif task != self._stage:
+            self._stage, self._due = task, time.monotonic() + self.LONG_STAGE
+            tell(f"{task} ...", err=True)
+        elif time.monotonic() > self._due:
+            self._due += 2 * (time.monotonic() - self._due + self.LONG_STAGE)
             tell(f"{task}: {done} of {total}{note and f' ({note})'}", err=True)
-
-    def _is_due(self) -> bool:
-        now = time.monotonic()
-        return now - self._last_line > max(self.LINE_INTERVAL, self.ELAPSED_FRACTION * (now - self._start))

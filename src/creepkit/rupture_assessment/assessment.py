@@ -14,11 +14,13 @@ from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest, quoted
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
+from creepkit.limits import PROBABILITY, SEED, Limits, numbers
+from creepkit.options import CELSIUS, Options, option
 from creepkit.presentation import Presentable, present
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.checks import AssessmentCheck
-from creepkit.rupture_assessment.likelihood import DISTRIBUTIONS, Distribution
+from creepkit.rupture_assessment.likelihood import Distribution
 from creepkit.rupture_assessment.log_time_distributions import power_of_ten
 from creepkit.rupture_assessment.methods import METHODS, Conditions
 from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
@@ -49,7 +51,7 @@ LARGEST_CONSTANT = 1e7
 
 @checked
 @dataclass(frozen=True)
-class RuptureSettings:
+class RuptureSettings(Options, title="settings of an assessment", error=FitError):
     """How rupture tests are assessed.
 
     degrees : of polynomials of log10 of the stress that are tried. distribution : of rupture times, "lognormal" or
@@ -59,25 +61,20 @@ class RuptureSettings:
     seed : of the tests that a check of repeatability leaves out.
     """
 
-    degrees: tuple[int, ...] = (1, 2, 3)
-    distribution: Distribution = "lognormal"
-    criterion: Literal["bic", "aicc"] = "bic"
-    fixed: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    random_effects: bool = True
-    level: float = 0.95
-    seed: int = 0
+    degrees: tuple[int, ...] = option((1, 2, 3), "Of polynomials of log stress that are tried.", Limits(1, 5))
+    distribution: Distribution = option("lognormal", "Of rupture times.")
+    criterion: Literal["bic", "aicc"] = option("bic", "Of the ranking.")
+    fixed: Mapping[str, Mapping[str, float]] = option(
+        dict, "A constant that is given.", flag="fix", example="larson-miller.C=20"
+    )
+    random_effects: bool = option(True, "Whether heats and laboratories scatter.")
+    level: float = option(0.95, "Probability of intervals and bounds.", PROBABILITY)
+    seed: int = option(0, "Of the tests that a check of repeatability leaves out.", SEED)
 
     def __post_init__(self) -> None:
-        if not self.degrees or any(type(d) is not int or not 1 <= d <= 5 for d in self.degrees):
-            raise FitError(
-                f"degrees are {quoted(repr(self.degrees))}; give whole numbers from 1 to 5, such as (1, 2, 3)"
-            )
-        if self.distribution not in DISTRIBUTIONS:
-            raise FitError(f"distribution is {quoted(repr(self.distribution))}; allowed are {', '.join(DISTRIBUTIONS)}")
-        if self.criterion not in ("bic", "aicc"):
-            raise FitError(f"criterion is {quoted(repr(self.criterion))}; allowed are bic and aicc")
-        if not (isinstance(self.level, float) and 0.5 <= self.level < 1.0):
-            raise FitError(f"level is {quoted(repr(self.level))}; give a probability from 0.5 to below 1, such as 0.95")
+        if not self.degrees:
+            raise FitError("degrees are (); give whole numbers from 1 to 5, such as (1, 2, 3)")
+        super().__post_init__()
         for method, constants in self.fixed.items():
             if method not in METHODS:
                 raise FitError(f"fixed= names a method '{method}'; {nearest(method, METHODS)}")
@@ -89,6 +86,21 @@ class RuptureSettings:
                     raise FitError(
                         f"fixed= gives {method} {name}={quoted(repr(value))}; give a number, at most 1e7 in size"
                     )
+
+
+@dataclass(frozen=True)
+class RuptureQuestion(Options, title="arguments of an assessment", error=FitError):
+    """What rupture() is asked beside its settings, as its arguments of these names have it; K, h."""
+
+    methods: tuple[str, ...] | None = option(
+        None, "larson-miller, orr-sherby-dorn, manson-haferd, wilshire, monkman-grant or isothermal.", flag="method"
+    )
+    hours: tuple[float, ...] = option(
+        (1e3, 1e4, 1e5), "At which strengths are stated.", numbers(0, 1e12, above=True), key="times_h"
+    )
+    temperatures: tuple[float, ...] | None = option(
+        None, "Of strengths; by default those of the tests.", numbers(-273.15, 1e4), flag="temperature-c", **CELSIUS
+    )
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,13 @@ def study(folder: Path) -> list[str]:
 def tests_of_cameras(laws: Sequence[str]) -> list[list[str]]:
     """What follows the cameras of a study without files of tests: what they hold is known when it was extracted."""
     first = ["# The tests are not known before the frames are extracted.", "[identification]"]
-    identification = [*first, f"laws = {quoted_list(laws)}  # creepkit laws lists all", "", "[selection]", 'by = "bic"']
+    identification = [
+        *first,
+        f"laws = {quoted_list(laws)}  # creepkit list laws lists all",
+        "",
+        "[selection]",
+        'by = "bic"',
+    ]
     return [["# [data]", CITATION_LINE], identification, REPORT]
 
 
@@ -179,7 +185,7 @@ def _identification(summary: DataSummary, laws: Sequence[str], of_tension: Itera
             summary.durations_known and not any(history.outputs for history in summary.tests)
         ),
         "[identification]": True,
-        f"laws = {quoted_list(laws)}  # creepkit laws lists all": True,
+        f"laws = {quoted_list(laws)}  # creepkit list laws lists all": True,
         "fix = { alpha = 0, m = 0 }  # tables do not say how damage depends on principal stress and time": (
             with_alpha and summary.rupture_table
         ),

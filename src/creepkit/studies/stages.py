@@ -9,13 +9,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import creepkit as ck
-from creepkit.api.searches import penalty_of_name, search_of_name
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.files.file_names import hashed_stem
 from creepkit.files.record_codec import record_to_json
 from creepkit.inverse.fingerprints import predictor_fingerprint, short_hash
 from creepkit.inverse.kept_fits import history_digest
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
+from creepkit.inverse.search_options import SearchOptions
 from creepkit.quality import DataQuality
 from creepkit.records import History
 from creepkit.registry import default_registry
@@ -123,8 +123,8 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
     part, selection = model.identification, model.selection
     assert part is not None
     laws, tests = [fitted for _, fitted in study.laws(group)], list(group.histories)
-    search = search_of_name(part.search)
-    penalty = None if part.penalty is None else penalty_of_name(part.penalty)
+    how = SearchOptions(part.search, part.penalty)
+    search, penalty = how.global_search, how.term_penalty
     by_likelihood = part.weights in (None, "likelihood") and part.loss in (None, "linear")
     by_likelihood = by_likelihood and search is None and penalty is None
     if selection is not None and not by_likelihood:

@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
-from creepkit.api.searches import PenaltyName, SearchName
 from creepkit.inverse.settings import IdentificationSettings, OutputWeights
 from creepkit.options import table_of
 
@@ -231,8 +230,8 @@ class IdentificationTable(_IdentificationKeys, Table):  # type: ignore[misc]
     bounds: dict[Text, Bounds] = {}
     nuisances: Annotated[list[NuisanceTable], Field(max_length=50)] = []
     without_nuisances: Texts = []
-    search: SearchName = "multi-start"
-    penalty: PenaltyName | None = None
+    search: Literal["multi-start", "swarm", "cma-es"] = "multi-start"
+    penalty: Literal["l2", "group-l2", "sqrt", "subsets"] | None = None
 
 
 class SelectionTable(Table):

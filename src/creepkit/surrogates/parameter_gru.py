@@ -10,6 +10,7 @@ import numpy as np
 from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.errors import SurrogateError, nearest
+from creepkit.options import Options, option
 from creepkit.records import Specimen, outputs_of
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.network_evaluation import ParameterNetwork, RecurrentCell
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 @checked
 @dataclass(frozen=True)
-class ParameterGru:
+class ParameterGru(Options, title="settings of a network", error=SurrogateError, prefix="ParameterGru: "):
     """A recurrent network whose inputs are a law's parameters and the load: the paper's, at its defaults.
 
     hidden, layers, cell : of the network; cell "gru" or "lstm".
@@ -48,28 +49,19 @@ class ParameterGru:
         record does. Derivatives are then left to differences.
     """
 
-    hidden: int = 128
-    layers: int = 3
-    cell: RecurrentCell = "gru"
-    inputs: tuple[str, ...] = ()
-    target: Literal["value", "log", "record"] = "value"
-    base: Literal["none", "reduced-order", "reference-stress"] = "none"
+    hidden: int = option(128, "Width of a layer.", limits.HIDDEN)
+    layers: int = option(3, "Layers.", limits.LAYERS)
+    cell: RecurrentCell = option("gru", "Of the network.")
+    inputs: tuple[str, ...] = option((), "Of load, mean_load, time and step; by default what the grid needs.")
+    target: Literal["value", "log", "record"] = option("value", "Of the first output; record: as its record says.")
+    base: Literal["none", "reduced-order", "reference-stress"] = option("none", "The model that the network corrects.")
     training: Training = field(default_factory=Training)
 
     kind: ClassVar[str] = "parameter-gru"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "inputs", tuple(self.inputs))
-        for name, allowed in (("hidden", limits.HIDDEN), ("layers", limits.LAYERS)):
-            limits.check_number(f"ParameterGru: {name}", getattr(self, name), allowed, SurrogateError)
-        choices = {
-            "cell": ("gru", "lstm"),
-            "target": ("value", "log", "record"),
-            "base": ("none", "reduced-order", "reference-stress"),
-        }
-        for name, words in choices.items():
-            if getattr(self, name) not in words:
-                raise SurrogateError(f"ParameterGru: {name} is '{getattr(self, name)}'; allowed are {', '.join(words)}")
+        super().__post_init__()
         for name in self.inputs:
             if name not in SERIES_INPUTS:
                 raise SurrogateError(f"ParameterGru: there is no input '{name}': {nearest(name, SERIES_INPUTS)}")
@@ -164,3 +156,16 @@ def _scale_pairs(names: tuple[str, ...], scale: Any) -> dict[str, list[float]]:
 def _is_constant(column: Tensor) -> bool:
     finite = column[~column.isnan()]
     return not len(finite) or bool((finite - finite[0]).abs().max() <= 1e-6 * finite.abs().max())
+
+
+@dataclass(frozen=True)
+class NetworkSizes(Options, title="sizes of networks", error=SurrogateError):
+    """Values to be combined in a size study; what is () stays as the recipe has it.
+
+    samples : numbers of samples to learn from.
+    """
+
+    layers: tuple[int, ...] = option((), "Numbers of layers.", limits.LAYERS)
+    hidden: tuple[int, ...] = option((), "Widths of a layer.", limits.HIDDEN)
+    cells: tuple[RecurrentCell, ...] = option((), "Of the network.")
+    samples: tuple[int, ...] = option((), "Numbers of samples to learn from; all by default.", limits.SAMPLES)

@@ -12,6 +12,7 @@ from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.errors import SurrogateError
 from creepkit.jobs.shard_progress import ProgressCallback as ProgressCallback
+from creepkit.options import Options, option
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -32,7 +33,7 @@ Weights: TypeAlias = Mapping[str, NDArray[Any]]
 
 @checked
 @dataclass(frozen=True)
-class Training:
+class Training(Options, title="settings of a training", error=SurrogateError, prefix="training: "):
     """How a network is trained: with Adam, on batches of whole histories.
 
     epochs : passes over the training rows. batch : histories in a step. rate : Adam's, at the beginning.
@@ -44,32 +45,15 @@ class Training:
     from, the first so many; None takes them all. The rows set aside are the same for every number of samples.
     """
 
-    epochs: int = 500
-    batch: int = 64
-    rate: float = 1e-3
-    schedule: Literal["plateau", "cosine", "constant"] = "plateau"
-    patience: int = 15
-    early_stop: int | None = None
-    clip: float | None = None
-    validation: float = 0.2
-    samples: int | None = None
-
-    def __post_init__(self) -> None:
-        for name, allowed in (
-            ("epochs", limits.EPOCHS),
-            ("batch", limits.BATCH),
-            ("patience", limits.EPOCHS),
-            ("early_stop", limits.EPOCHS),
-            ("samples", limits.SAMPLES),
-        ):
-            if (value := getattr(self, name)) is not None:
-                limits.check_number(f"training: {name}", value, allowed, SurrogateError)
-        if self.schedule not in ("plateau", "cosine", "constant"):
-            raise SurrogateError(f"training: schedule is '{self.schedule}'; allowed are plateau, cosine and constant")
-        if not 0 < self.rate <= 1 or not (self.clip is None or self.clip > 0):
-            raise SurrogateError(f"training: rate {self.rate} and clip {self.clip} must be above zero, rate at most 1")
-        if not 0 < self.validation < 1:
-            raise SurrogateError(f"training: validation is {self.validation}; allowed are shares between 0 and 1")
+    epochs: int = option(500, "Passes over the training rows.", limits.EPOCHS)
+    batch: int = option(64, "Histories in a step.", limits.BATCH)
+    rate: float = option(1e-3, "Rate of Adam at the beginning.", limits.LEARNING_RATE)
+    schedule: Literal["plateau", "cosine", "constant"] = option("plateau", "Of the rate.")
+    patience: int = option(15, "Epochs without gain after which a plateau lowers the rate.", limits.EPOCHS)
+    early_stop: int | None = option(None, "Stop after so many epochs without gain.", limits.EPOCHS)
+    clip: float | None = option(None, "Largest norm of the gradient.", limits.LARGEST_GRADIENT)
+    validation: float = option(0.2, "Share of the rows that are set aside.", limits.numbers(0.001, 0.999))
+    samples: int | None = option(None, "Rows of the others that are learnt from, the first so many.", limits.SAMPLES)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -24,7 +24,7 @@ from creepkit.surrogates.evaluation import (
 )
 from creepkit.surrogates.loading import load_surrogate
 from creepkit.surrogates.network_evaluation import RecurrentCell
-from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru
 from creepkit.surrogates.parameter_network import sample_tensors, weights_of
 from creepkit.surrogates.recipe import ProgressCallback, SurrogateMetadata, Training
 from creepkit.surrogates.surrogate import Recipe, Surrogate
@@ -203,19 +203,6 @@ class SizeStudyResult:
     def label(self) -> str:
         """In words."""
         return f"{self.cell} {self.hidden} x {self.layers}, {self.samples} samples"
-
-
-@dataclass(frozen=True)
-class NetworkSizes:
-    """Values to be combined in a size study; what is empty stays as the recipe has it.
-
-    samples : numbers of samples to learn from.
-    """
-
-    layers: Sequence[int] = ()
-    hidden: Sequence[int] = ()
-    cells: Sequence[RecurrentCell] = ()
-    samples: Sequence[int] = ()
 
 
 def size_study(

@@ -1,41 +1,56 @@
-"""What options declare: limits of every number, places of everything that is written, and what holds without words."""
+"""What options declare: limits of every number, places of all that is written; what cannot be meant is refused."""
 
+import importlib
+import inspect
 import types
 from pathlib import Path
 from typing import Annotated, Union, get_args, get_origin, get_type_hints
 
 import pytest
 
-from creepkit import limits
-from creepkit.cli.app import COMMANDS
-from creepkit.cli.declared_options import OutputPath
+from creepkit.cli.app import COMMANDS, STAGES
+from creepkit.cli.command_options import OutputPath
+from creepkit.cli.shared import is_file_name
+from creepkit.options import Option, Options, options_of
 from helpers.command_line import creepkit, one_line
 
-READ = {
-    ("generate", "to"), ("train", "to"),  # see OutputPath("resumed")
-}  # fmt: skip
-
-INPUTS = {"surrogate", "times", "record", "compositions", "plugin", "example"}
+INPUTS = {"surrogate", "times", "record", "compositions", "example"}
 """Options that name files to read."""
+
+UNBOUNDED = {"largest_output"}
+
+
+def functions():
+    """(words of a command, its function) of all commands."""
+    for name in COMMANDS:
+        module = importlib.import_module(f"creepkit.cli.{name.replace('list', 'listing')}")
+        for one, function in getattr(
+            module, "COMMANDS", {"": module.command} if hasattr(module, "command") else {}
+        ).items():
+            yield " ".join(filter(None, (name, one))), function
 
 
 def parameters():
-    """(command, option, its type without None and lists, what stands beside it) of all options of all commands."""
-    for command, function in COMMANDS.items():
+    """(command, option, its type without None, tuples and lists, what stands beside it) of all options."""
+    for command, function in functions():
         for name, hint in get_type_hints(function, include_extras=True).items():
             kind, *beside = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-            while get_origin(kind) in (Union, types.UnionType, list):
+            for record in beside:
+                if isinstance(record, type) and issubclass(record, Options):
+                    for one in options_of(record):
+                        yield command, one.name, one.type, [one]
+            while get_origin(kind) in (Union, types.UnionType, list, tuple):
                 kind = next(one for one in get_args(kind) if one is not type(None))
             yield command, name, kind, beside
 
 
 def test_every_number_has_limits():
-    without = [
+    without = {
         (command, name)
         for command, name, kind, beside in parameters()
-        if kind in (int, float) and not any(isinstance(one, limits.Limits) for one in beside)
-    ]
-    assert without == []
+        if kind in (int, float) and not any(isinstance(one, Option) and one.limits for one in beside)
+    }
+    assert {name for _, name in without} <= UNBOUNDED, without
 
 
 def test_every_path_that_an_option_names_is_read_or_declared_as_written():
@@ -44,22 +59,55 @@ def test_every_path_that_an_option_names_is_read_or_declared_as_written():
         for command, name, kind, beside in parameters()
         if kind is Path
         and name not in INPUTS
-        and "Option" in type(next(iter(beside), None)).__name__
+        and "Argument" not in type(next(iter(beside), None)).__name__
         and not any(isinstance(one, OutputPath) for one in beside)
     ]
     assert undeclared == []
 
 
 def test_a_command_that_writes_has_force_and_no_other_has():
-    for command in COMMANDS:
-        writes = any(
-            isinstance(one, OutputPath) for name, _, _, beside in parameters() if name == command for one in beside
-        )
-        shown = creepkit(command, "--help").output
-        assert ("--force " in shown) == writes, command
+    for command, function in functions():
+        hints = get_type_hints(function, include_extras=True).values()
+        writes = any(isinstance(one, OutputPath) for hint in hints for one in get_args(hint)[1:])
+        assert ("--force " in creepkit(*command.split(), "--help").output) == writes, command
 
 
-@pytest.mark.parametrize("value", ["1e9", "nan", "-inf", "0"])
-def test_a_number_beyond_its_limits_is_one_line(value):
-    message = one_line(creepkit("simulate", "norton", "--set", "A=1e-9", "--end-h", "1", "--modulus-gpa", value))
-    assert message.endswith("allowed are numbers above 0 up to 1000000\n")
+def test_commands_are_in_one_table_by_stage_and_each_has_its_module():
+    modules = {path.stem for path in Path(inspect.getfile(OutputPath)).parent.glob("*.py")}
+    assert {name.replace("list", "listing") for name in COMMANDS} <= modules
+    assert sum(map(len, STAGES.values())) == len(COMMANDS) <= 18
+
+
+SIMULATE = ["simulate", "norton", "--set", "A=1e-16", "--set", "n=4", "--stress", "100"]
+GENERATE = ["surrogate", "generate", "norton", "--dry-run"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([*SIMULATE, "--end-h", "10", "--end-h", "20"], "--end-h is given twice; keep one of them"),
+        ([*SIMULATE, "--end-h", "1_0"], "--end-h 1_0 is not known; write NUMBER"),
+        ([*SIMULATE, "--end-h", "1e-320"], "--end-h is 1e-320; allowed are numbers from 1e-09"),
+        ([*SIMULATE, "--end-h", "10", "--specimen", ""], "--specimen is empty; give a value, or leave the option out"),
+        ([*SIMULATE, "--end-h", "10", "--set", "n"], "--set A=1e-16 n=4 n is not known; write NAME=NUMBER"),
+        ([*SIMULATE, "--end-h", "10", "--set", "n=5"], "n is given twice"),
+        ([*SIMULATE, "--end-h", "1", "--modulus-gpa", "nan"], "--modulus-gpa nan is not known; write NUMBER"),
+        ([*SIMULATE, "--end-h", "1", "--modulus-gpa", "0"], "allowed are numbers above 0 up to 1000000"),
+        ([*GENERATE, "--part", "-1"], "--part -1 is not known; write K/N"),
+        ([*GENERATE, "--cluster", "garbage"], "'garbage' is no address of a dask scheduler"),
+    ],
+)
+def test_options_that_cannot_be_meant_are_one_sentence(words: list[str], message: str) -> None:
+    assert message in one_line(creepkit(*words))
+
+
+def test_a_registered_law_comes_before_a_file_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    values = ("--set", "A=1e-16", "--set", "n=4")
+    expected = creepkit("export", "norton", *values, "--to", "latex").output
+    for name in ("norton", "norton+strain-hardening"):
+        Path(name).write_text("{}")
+    assert creepkit("export", "norton", *values, "--to", "latex").output == expected
+    assert "./norton: this is not an identification" in one_line(creepkit("export", "./norton", "--to", "latex"))
+    named = {"norton": False, "norton+strain-hardening": False, "./norton": True, "fit.json": True, "unknown": False}
+    assert {word: is_file_name(word) for word in named} == named

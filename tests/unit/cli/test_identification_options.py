@@ -1,4 +1,4 @@
-"""Options that identify, screen and discover share: changes of laws, subsets of tests, settings."""
+"""Options that identify and discover share: changes of laws, subsets of tests."""
 
 import json
 from pathlib import Path
@@ -7,9 +7,19 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.cli.identification_options import change_laws, select_by_label
+from creepkit.cli.generated_options import given_value
+from creepkit.cli.shared import selected
 from creepkit.errors import FitError, HistoryError, LawError
+from creepkit.inverse.candidate_laws import LawChanges
+from creepkit.options import options_of
 from helpers.command_line import creepkit, one_line
+
+
+def change_laws(laws, fix, bound):
+    given = {"fix": fix, "bounds": bound}
+    texts = {one.name: given_value(one, given.get(one.name), FitError) for one in options_of(LawChanges)}
+    return LawChanges(temperature="none").changed(texts).applied(laws, [])
+
 
 NORTON, HARDENING = ck.law("norton"), ck.law("strain-hardening")
 
@@ -26,12 +36,12 @@ def test_parameters_are_fixed_and_bounded_where_a_law_has_them() -> None:
 @pytest.mark.parametrize(
     ("fix", "bound", "message"),
     [
-        (["nn=5"], None, "--fix nn: no parameter of norton, strain-hardening is called 'nn'; did you mean 'n'"),
-        (None, ["m_1=0:1"], "--bound m_1: no parameter of norton, strain-hardening is called 'm_1'; "),
-        (["n"], None, "--fix n is not known; write n=5, finite numbers in the law's unit"),
-        (["n=inf"], None, "--fix n=inf is not known; write n=5"),
-        (["n=5", "n=6"], None, "--fix n=6: n is given twice; keep one of them"),
-        (None, ["n=5"], "--bound n=5 is not known; write n=1:8"),
+        (["nn=5"], None, "fix: no parameter of norton, strain-hardening is called 'nn'; did you mean 'n'"),
+        (None, ["m_1=0:1"], "bounds: no parameter of norton, strain-hardening is called 'm_1'; "),
+        (["n"], None, "--fix n is not known; write NAME=NUMBER, such as n=5"),
+        (["n=inf"], None, "--fix n=inf is not known; write NAME=NUMBER, such as n=5"),
+        (["n=5", "n=6"], None, "--fix n=5 n=6: n=6: n is given twice; keep one of them"),
+        (None, ["n=5"], "--bound n=5 is not known; write NAME=LOW:HIGH, such as n=1:8"),
     ],
 )
 def test_a_wrong_change_of_a_law_is_one_sentence(fix: list[str] | None, bound: list[str] | None, message: str) -> None:
@@ -50,12 +60,10 @@ def test_bounds_and_fixed_values_must_make_sense() -> None:
 def test_only_takes_labels() -> None:
     times = np.array([1.0, 2.0])
     tests = [ck.History(name, times, {"strain": times}, ck.constant_stress(50), 1073.15) for name in ("a", "b", "c")]
-    assert [h.name for h in select_by_label(tests, ["name=a", "name=c", "temperature=1073"])] == ["a", "c"]
-    assert select_by_label(tests, None) == tests
-    with pytest.raises(FitError, match="--only a: write LABEL=VALUE, such as temperature=1073"):
-        select_by_label(tests, ["a"])
+    assert [h.name for h in selected(tests, {"name": ("a", "c"), "temperature": ("1073",)})] == ["a", "c"]
+    assert selected(tests, None) == tests
     with pytest.raises(HistoryError, match="no test has name=d; there are a, b, c"):
-        select_by_label(tests, ["name=d"])
+        selected(tests, {"name": ("d",)})
 
 
 def test_a_sum_by_name_is_the_sum_of_the_laws() -> None:
@@ -84,6 +92,6 @@ def test_weights_that_select_does_not_take_are_an_error() -> None:
 
 
 def test_options_for_measured_tests_are_refused_with_identifications() -> None:
-    assert "--only, --fix, --bound and --surrogate are for measured tests" in one_line(
+    assert "--only, --fix, --bound and --surrogate are for tests" in one_line(
         creepkit("discover", "fit.json", "--fix", "n=5")
     )

@@ -4,18 +4,21 @@ from dataclasses import replace
 
 import pytest
 
-from creepkit.cli.generated_options import given_values
+from creepkit.cli.generated_options import given_value
 from creepkit.errors import FitError
 from creepkit.inverse.settings import IdentificationSettings, default_nuisances
+from creepkit.options import options_of
 from creepkit.records import Nuisance
+
+OPTIONS = {one.name: one for one in options_of(IdentificationSettings)}
 
 
 def parse_nuisances(texts):
-    return given_values(IdentificationSettings, {"nuisances": texts}).get("nuisances")
+    return given_value(OPTIONS["nuisances"], texts, FitError)
 
 
 def parse_weights(text):
-    return given_values(IdentificationSettings, {"weights": text})["weights"]
+    return given_value(OPTIONS["weights"], text, FitError)
 
 
 def test_weights():

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("own_registry")
 
 @kinds
 def test_a_new_package_says_what_to_do_next(kind: str) -> None:
-    told = creepkit(f"new-{kind}", "my-own").stdout
+    told = creepkit("new", kind, "my-own").stdout
     project = tomllib.loads(Path("my-own", "pyproject.toml").read_text())
 
     assert project["project"]["entry-points"][f"creepkit.{kind}s"] == {"my-own": "creepkit_my_own"}
@@ -39,7 +39,7 @@ def test_their_tests_pass_once_they_are_installed(tmp_path: Path) -> None:
     """Each is on the path with its entry point, as `pip install -e` puts it there."""
     site, places = tmp_path / "site", []
     for kind in KINDS:
-        creepkit(f"new-{kind}", f"my-{kind}")
+        creepkit("new", kind, f"my-{kind}")
         (name, module) = next(iter(_project(kind)["entry-points"][f"creepkit.{kind}s"].items()))
         info = site / f"{module}-0.1.0.dist-info"
         info.mkdir(parents=True)
@@ -66,7 +66,7 @@ def _project(kind: str) -> dict:
 
 @pytest.mark.parametrize("kind", ["law", "specimen"])
 def test_what_it_writes_is_fit_for_use(kind: str) -> None:
-    creepkit(f"new-{kind}", "my-own")
+    creepkit("new", kind, "my-own")
     checked = creepkit("check", "my-own/creepkit_my_own.py")
     assert checked.exit_code == 0, checked.stdout
     assert "my-own: conforms" in checked.stdout
@@ -74,11 +74,11 @@ def test_what_it_writes_is_fit_for_use(kind: str) -> None:
 
 @kinds
 def test_one_file_is_enough_for_a_start(kind: str) -> None:
-    written = creepkit(f"new-{kind}", "my-own", "--file")
+    written = creepkit("new", kind, "my-own", "--file")
     assert written.exit_code == 0
     assert "my_own.py" in written.stdout
     assert len(Path("my_own.py").read_text().splitlines()) <= 50
-    plugins = json.loads(creepkit("--plugin", "my_own.py", "plugins", "--json").stdout)["plugins"]
+    plugins = json.loads(creepkit("--plugin", "my_own.py", "list", "plugins", "--json").stdout)["plugins"]
     (mine,) = (plugin for plugin in plugins if plugin["name"] == "my_own")
     assert (mine["status"], mine["offers"]) == ("ok", {kind: ["my-own"]})
 
@@ -87,17 +87,17 @@ def test_one_file_is_enough_for_a_start(kind: str) -> None:
 @pytest.mark.parametrize(("words", "place"), [((), "my-own"), (("--file",), "my_own.py")])
 def test_what_exists_is_left_as_it_is(kind: str, words: tuple[str, ...], place: str) -> None:
     Path(place).write_text("precious")
-    assert f"{place} exists already" in one_line(creepkit(f"new-{kind}", "my-own", *words))
+    assert f"{place} exists already" in one_line(creepkit("new", kind, "my-own", *words))
     assert Path(place).read_text() == "precious"
 
 
 @kinds
 def test_a_name_must_be_new_and_words_of_lower_case(kind: str) -> None:
     taken = TAKEN[kind]
-    assert f"there is a {kind} '{taken}' already" in one_line(creepkit(f"new-{kind}", taken))
+    assert f"there is a {kind} '{taken}' already" in one_line(creepkit("new", kind, taken))
     assert not Path(taken).exists()
     for name in ("Bad", "two words", "under_score", "../up", "9lives", "a--b", ""):
-        refused = creepkit(f"new-{kind}", name)
+        refused = creepkit("new", kind, name)
         assert refused.exit_code == 2
         assert f"is not a {kind}'s name" in " ".join(refused.stderr.split())
     assert not any(Path().iterdir())
@@ -106,10 +106,10 @@ def test_a_name_must_be_new_and_words_of_lower_case(kind: str) -> None:
 @kinds
 @pytest.mark.parametrize("name", ["none", "a", "class", "history"])
 def test_a_name_that_python_uses_does_no_harm(kind: str, name: str) -> None:
-    creepkit(f"new-{kind}", name, "--file")
-    assert creepkit("--plugin", f"{name}.py", "plugins").exit_code == 0
+    creepkit("new", kind, name, "--file")
+    assert creepkit("--plugin", f"{name}.py", "list", "plugins").exit_code == 0
 
 
 def test_a_package_does_not_hide_one_that_is_installed() -> None:
-    assert "a module 'creepkit_logarithmic' is installed already" in one_line(creepkit("new-reader", "logarithmic"))
+    assert "a module 'creepkit_logarithmic' is installed already" in one_line(creepkit("new", "reader", "logarithmic"))
     assert not Path("logarithmic").exists()

@@ -141,17 +141,17 @@ def test_a_plugin_file_that_is_missing_is_told_in_the_help() -> None:
 
 
 def test_a_plugin_cannot_take_the_place_of_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
-    Path("mine.py").write_text(COMMAND.format(name="laws"))
+    Path("mine.py").write_text(COMMAND.format(name="list"))
     Path("first.py").write_text(COMMAND.format(name="greet"))
     Path("second.py").write_text(COMMAND.format(name="greet").replace("from a", "from another"))
     monkeypatch.setenv("CREEPKIT_PLUGINS", os.pathsep.join(["mine.py", "first.py", "second.py"]))
 
     laws, greet = section(creepkit("--help").stdout, "Plugins that failed")
 
-    assert "adds the command 'laws', which creepkit has already; rename it" in laws
+    assert "adds the command 'list', which creepkit has already; rename it" in laws
     assert f"plugin 'second' ({Path('second.py').resolve()}) adds the command 'greet', which another plugin" in greet
     assert creepkit("greet").stdout == "from a plugin\n"
-    assert "norton" in creepkit("laws").stdout
+    assert "norton" in creepkit("list", "laws").stdout
 
 
 @pytest.mark.parametrize(("files", "advice"), [("none.py", "correct or unset it"), ("a.py,b.py", "separate several")])
@@ -159,7 +159,7 @@ def test_a_file_of_the_environment_that_is_not_there_is_one_sentence(
     files: str, advice: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("CREEPKIT_PLUGINS", files)
-    result = creepkit("laws")
+    result = creepkit("list", "laws")
     assert (result.exit_code, result.stdout) == (1, "")
     assert f"CREEPKIT_PLUGINS names the plugin file {files}, which does not exist; {advice}" in result.stderr
 
@@ -171,9 +171,9 @@ EXECUTED = "from pathlib import Path\nPath('executed').touch()\n"
 def test_no_file_is_executed_but_one_whose_name_ends_in_py(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     Path(name).write_text(EXECUTED)
 
-    option = creepkit("--plugin", name, "laws")
+    option = creepkit("--plugin", name, "list", "laws")
     monkeypatch.setenv("CREEPKIT_PLUGINS", name)
-    variable = creepkit("laws")
+    variable = creepkit("list", "laws")
 
     for result in (option, variable):
         assert (result.exit_code, result.stdout, result.stderr.count("\n")) == (1, "", 1)

@@ -63,14 +63,17 @@ def test_targets_of_a_dimple(saved):
         (["--stress", "80"], "--stress describes a planned test, which needs an end"),
         (["--stress", "80", "--end-h", "100"], "the fitted tests were made at 750 to 850 °C: give --temperature-c"),
         (["--pressure", "8", "--end-h", "1", "--temperature-c", "800"], "'bulge' needs a modulus"),
-        (["--stress", "80", "--end-h", "1", "--temperature-c", "800", "--target", "strain=x"], "write OUTPUT=NUMBER"),
+        (
+            ["--stress", "80", "--end-h", "1", "--temperature-c", "800", "--target", "strain=x"],
+            "write NAME=NUMBER,..., such as strain=0.01,0.05",
+        ),
         (
             ["--stress", "80", "--end-h", "1", "--temperature-c", "800", "--level", "2"],
-            "--level 2: allowed are numbers from 0.5 to 0.999999",
+            "--level is 2.0; allowed are numbers from 0.5 to 0.999999",
         ),
         (
             ["--stress", "80", "--end-h", "-1", "--temperature-c", "800"],
-            "--end-h -1: allowed are numbers from 1e-09 to 1000000000",
+            "--end-h is -1.0; allowed are numbers from 1e-09 to 1000000000",
         ),
         (["--stress", "80", "--end-h", "1", "--temperature-c", "800", "--plot", "x.txt"], "is no format of pictures"),
     ],

@@ -1,4 +1,4 @@
-"""`creepkit train` and `creepkit sweep`: files, tables, pictures, and one line for what cannot be."""
+"""`creepkit surrogate train` and `sweep`: files, tables, pictures, and one line for what cannot be."""
 
 import json
 from pathlib import Path
@@ -10,6 +10,7 @@ from creepkit.dataset.storage import write_dataset
 from creepkit.reports.surrogate import size_study_rows
 from creepkit.surrogates import training as sweeping
 from creepkit.surrogates.evaluation import evaluate
+from creepkit.surrogates.parameter_gru import NetworkSizes
 from creepkit.surrogates.training_rows import training_split
 from helpers.command_line import creepkit, one_line
 from helpers.planted_datasets import bars
@@ -26,7 +27,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_train_writes_a_surrogate_and_its_pictures(file: Path, tmp_path: Path) -> None:
-    words = ("train", str(file), "--to", str(tmp_path / "m.safetensors"), "--hidden", "6", "--layers", "1")
+    words = ("surrogate", "train", str(file), "--to", str(tmp_path / "m.safetensors"), "--hidden", "6", "--layers", "1")
     shown = creepkit(*words, "--epochs", "3", "--target", "log")
     assert shown.exit_code == 0, shown.output
     assert "validation loss (Eq. 4, outputs together)" in shown.stdout
@@ -39,7 +40,7 @@ def test_train_writes_a_surrogate_and_its_pictures(file: Path, tmp_path: Path) -
 
 
 def test_train_tells_its_errors_as_json(file: Path, tmp_path: Path) -> None:
-    words = ("train", str(file), "--to", str(tmp_path / "m.safetensors"), "--hidden", "4", "--layers", "1")
+    words = ("surrogate", "train", str(file), "--to", str(tmp_path / "m.safetensors"), "--hidden", "4", "--layers", "1")
     shown = creepkit(*words, "--epochs", "1", "--json")
     told = json.loads(shown.stdout)
     assert set(told["metrics"]["outputs"]["strain"]) >= {"rse", "mse", "mae", "r2"}
@@ -47,7 +48,19 @@ def test_train_tells_its_errors_as_json(file: Path, tmp_path: Path) -> None:
 
 
 def test_a_sweep_is_a_table_and_a_picture_and_is_not_redone(file: Path, tmp_path: Path) -> None:
-    words = ("sweep", str(file), "--to", str(tmp_path), "--layers", "1", "--hidden", "4,6", "--cell", "gru,lstm")
+    words = (
+        "surrogate",
+        "sweep",
+        str(file),
+        "--to",
+        str(tmp_path),
+        "--layers",
+        "1",
+        "--hidden",
+        "4,6",
+        "--cells",
+        "gru,lstm",
+    )
     first = creepkit(*words, "--samples", "20,48", "--epochs", "2", "--json")
     assert first.exit_code == 0, first.output
     found = json.loads(first.stdout)["trainings"]
@@ -67,7 +80,7 @@ def test_a_sweep_is_a_table_and_a_picture_and_is_not_redone(file: Path, tmp_path
 
 def test_a_sweep_judges_every_number_of_samples_by_the_same_rows(tmp_path: Path) -> None:
     data, recipe = bars(60), ck.ParameterGru(4, 1, training=ck.Training(epochs=2))
-    entries = sweeping.size_study(data, recipe, sweeping.NetworkSizes(samples=(10, 20, 48)), to=tmp_path)
+    entries = sweeping.size_study(data, recipe, NetworkSizes(samples=(10, 20, 48)), to=tmp_path)
     judged = [evaluate(ck.surrogate(tmp_path / e.file), data) for e in entries]
     for entry, one in zip(entries, judged, strict=True):
         assert one.comparison.index.tolist() == judged[0].comparison.index.tolist()
@@ -79,7 +92,7 @@ def test_a_sweep_judges_every_number_of_samples_by_the_same_rows(tmp_path: Path)
 
 def test_the_best_of_a_sweep_stands_on_top(file: Path, tmp_path: Path) -> None:
     recipe = ck.ParameterGru(4, 1, training=ck.Training(epochs=2))
-    entries = sweeping.size_study(bars(60), recipe, sweeping.NetworkSizes(hidden=(2, 8)), to=tmp_path)
+    entries = sweeping.size_study(bars(60), recipe, NetworkSizes(hidden=(2, 8)), to=tmp_path)
     _, rows = size_study_rows(entries)
     losses = [float(row[5]) for row in rows]
     assert losses == sorted(losses)
@@ -88,11 +101,14 @@ def test_the_best_of_a_sweep_stands_on_top(file: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("train", "{set}", "--to", "{to}", "--cell", "rnn"), "cell is 'rnn'; allowed are gru, lstm"),
-        (("train", "{to}", "--to", "{to}"), "no such"),
-        (("sweep", "{set}", "--to", "{to}", "--hidden", "64;128"), "--hidden 64;128 is not understood"),
+        (("surrogate", "train", "{set}", "--to", "{to}", "--cell", "rnn"), "--cell rnn is not known; write gru|lstm"),
+        (("surrogate", "train", "{to}", "--to", "{to}"), "no such"),
         (
-            ("sweep", "{set}", "--to", "{to}", "--samples", "900"),
+            ("surrogate", "sweep", "{set}", "--to", "{to}", "--hidden", "64;128"),
+            "--hidden 64;128 is not known; write INTEGER,...",
+        ),
+        (
+            ("surrogate", "sweep", "{set}", "--to", "{to}", "--samples", "900"),
             "there are not 900 samples to learn from: the data set has 60 accepted ones, of which 12",
         ),
     ],

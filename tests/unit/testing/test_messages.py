@@ -110,7 +110,7 @@ def test_a_method_that_is_missing_is_told_with_its_arguments() -> None:
 
 def test_a_folder_and_an_unknown_name_are_told_what_to_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert creepkit("new-law", "soft-hard").exit_code == 0
+    assert creepkit("new", "law", "soft-hard").exit_code == 0
     said = one_line(creepkit("check", "soft-hard/"))
     assert said.endswith(f"name the file in it: creepkit check {Path('soft-hard', 'creepkit_soft_hard.py')}\n")
     assert creepkit("check", str(Path("soft-hard", "creepkit_soft_hard.py"))).exit_code == 0

@@ -1,0 +1,104 @@
+"""What several commands share: arguments and options, laws by name or file, and subsets of tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from creepkit.cli.generated_options import TextForm, text_form
+from creepkit.errors import CreepkitError, FitError, LawError
+from creepkit.limits import Limits
+from creepkit.options import Option
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+    from creepkit.language import CreepLaw
+    from creepkit.records import History, LawWithValues
+
+PAPER_SPECIMEN = "bulge"
+"""What a data set is made of, and what a camera watches, where nothing is said."""
+
+
+Files = Annotated[list[str], typer.Argument(metavar="FILE...", help="Measured files, folders or patterns.")]
+Tests = Annotated[list[str] | None, typer.Argument(metavar="[TESTS]...", help="Measured files, folders or patterns.")]
+Law = Annotated[str, typer.Argument(metavar="LAW|RESULT.json", help="A law's name, or a file that creepkit wrote.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Reader = Annotated[str | None, Option(help="Reader of the files; by default the one that accepts them.")]
+Values = Annotated[dict[str, float] | None, Option(help="A parameter's value.", flag="set", example="n=5.2")]
+Seed = Annotated[int, Option(help="Of random draws.", limits=Limits(0, 2**63 - 1))]
+Workers = Annotated[int | None, Option(help="Processes; one for each core by default.", limits=Limits(1, 1024))]
+Only = Annotated[
+    dict[str, tuple[str, ...]] | None,
+    Option(help="Tests with this label alone: name, alloy, temperature (K), stress (MPa).", example="name=test_1"),
+]
+
+
+def is_law_name(word: str) -> bool:
+    """Whether a word names a registered law, or a sum of them as norton+strain-hardening, whatever files there are."""
+    import creepkit as ck
+
+    try:
+        ck.law(word)
+    except LawError:
+        return False
+    return True
+
+
+def is_file_name(word: str) -> bool:
+    """Whether a word that may name a law names a file: it has a suffix or a folder, as ./norton, and is no law."""
+    return (Path(word).suffix != "" or Path(word).name != word) and not is_law_name(word)
+
+
+def read_law_file(path: str | Path) -> Identification | LawWithValues:
+    """What a file holds that creepkit wrote: an identification, or a law with its values."""
+    from creepkit.exporters.law_files import VALUED_LAW, valued_law_from_json
+    from creepkit.files.json_documents import read_json
+
+    data = read_json(Path(path), VALUED_LAW.kind)
+    if isinstance(data, dict) and data.get("format") == VALUED_LAW.name:
+        return valued_law_from_json(data, str(path))
+    from creepkit.inverse.identification_document import identification_from_json
+
+    return identification_from_json(data, str(path))
+
+
+def law_source(text: str) -> CreepLaw | Identification | LawWithValues:
+    """A law by name, or else what a file holds: an identification, or a law with values."""
+    import creepkit as ck
+
+    if is_file_name(text):
+        return read_law_file(text)
+    try:
+        return ck.law(text)
+    except LawError as error:
+        if Path(text).is_file():
+            raise LawError(f"{error}; for the file of that name write ./{text}") from None
+        raise
+
+
+def merged_values(source: Any, given: Mapping[str, float] | None) -> dict[str, float] | None:
+    """The values of the source with those given by --set in their place; None for a source's own."""
+    own: Mapping[str, float] | None = getattr(source, "values", None) if hasattr(source, "law") else None
+    if own is None:
+        return dict(given or {})
+    return {**own, **given} if given else None
+
+
+def parsed(kind: Any, text: str, option: str, example: str) -> Any:
+    """A text as a value of a type; CreepkitError that names the option for one that is not understood."""
+    form: TextForm = text_form(kind)
+    try:
+        return form.parse([text] if form.several else text)
+    except (ValueError, CreepkitError) as error:
+        said = f": {error}" if isinstance(error, CreepkitError) else f" is not known; write {example}"
+        raise FitError(f"{option} {text}{said}") from None
+
+
+def selected(histories: Sequence[History], only: Mapping[str, Sequence[str]] | None) -> list[History]:
+    """The tests that --only names; values of one label are alternatives."""
+    from creepkit.records.history_selection import select_tests
+
+    return select_tests(histories, **{label: list(values) for label, values in (only or {}).items()})

@@ -1,0 +1,65 @@
+"""ExtractionOptions and ImposedOptions: what is said of a camera's frames and of an instrument's record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from creepkit.errors import HistoryError, quoted
+from creepkit.limits import CELSIUS as CELSIUS_LIMITS
+from creepkit.limits import GIGAPASCAL as GIGAPASCAL_LIMITS
+from creepkit.limits import MEGAPASCAL, MILLIMETRE, SECONDS
+from creepkit.options import CELSIUS, GIGAPASCAL, Options, option
+
+
+@dataclass(frozen=True)
+class ExtractionOptions(Options, title="options of an extraction", error=HistoryError):
+    """What is said of frames and of what they show; mm, s.
+
+    columns : {quantity: column} of files of no known format. interval : between frames whose files hold no times.
+    times : a file of these. names : of what is found. centers : in mm, in the axes of the frames. window : radius of
+    the fitted window. rings : radii of means in the place of a fit. rest : first and last frame at rest, "0-39".
+    subset : side of a subset, whose smoothing is taken out.
+    """
+
+    format: str | None = option(None, "Camera format; by default by the head.")
+    columns: Mapping[str, str] | None = option(None, "Columns x, y, z, u, v, w of no known format.", example="x=X_mm")
+    interval: float | None = option(None, "Between frames whose files hold no times.", SECONDS, unit="s")
+    times: Path | None = option(None, "Times of frames, a column in s, or in ms since 1970.")
+    names: tuple[str, ...] = option((), "Names of what is found, as the record has them.")
+    centers: tuple[tuple[float, ...], ...] = option(
+        (), "Centre in mm, in the frames' axes; for several, repeat it.", unit="mm", flag="center", metavar="X,Y"
+    )
+    window: float | None = option(None, "Radius of the fitted window.", MILLIMETRE, unit="mm", flag="window")
+    rings: tuple[float, ...] = option((), "Radii: means on rings in place of a fit.", unit="mm", flag="rings")
+    rest: str | None = option(None, "Frames at rest, where they are not to be found.", key="rest_frames", flag="rest")
+    subset: float = option(0.0, "Side of a subset, taken out.", MILLIMETRE, unit="mm", flag="subset")
+
+    @property
+    def frames_at_rest(self) -> slice | None:
+        """The frames at rest; HistoryError for a text that is not as 0-39."""
+        if self.rest is None:
+            return None
+        first, _, last = self.rest.partition("-")
+        whole = (first + last).isascii() and first.isdecimal() and last.isdecimal()
+        if not (whole and int(first) <= int(last) < 10**9):
+            raise HistoryError(
+                f"rest is {quoted(self.rest)}: write the first and the last frame at rest, counted from 0, as in 0-39"
+            )
+        return slice(int(first), int(last) + 1)
+
+
+@dataclass(frozen=True)
+class ImposedOptions(Options, title="options of a test under a camera", error=HistoryError):
+    """What was imposed on a test piece: by an instrument's record, or constant; MPa, K. modulus : of the history."""
+
+    record: Path | None = option(None, "Instrument record of loads, temperatures.")
+    time_zone: str = option("", "Of the record's times, as America/Chicago.")
+    date_order: str = option("", "Of its dates: 'month first' or 'day first'.")
+    pressure_reference: Literal["gauge", "absolute"] | None = option(None, "Of its pressures.")
+    channels: tuple[str, ...] = option((), "Load and temperature, where its format names none.", example="P1,T1")
+    load: float | None = option(None, "Constant load, for no record.", MEGAPASCAL, unit="MPa")
+    temperature: float | None = option(None, "Constant temperature, for no record.", CELSIUS_LIMITS, **CELSIUS)
+    modulus: float | None = option(None, "Young's modulus, for the history.", GIGAPASCAL_LIMITS, **GIGAPASCAL)
