@@ -29,7 +29,7 @@ def environment(**variables: str) -> dict[str, str]:
 
 
 def test_the_command_as_a_module_imports_nothing_from_the_working_folder(folder: Path) -> None:
-    words = [sys.executable, "-m", "creepkit", "laws"]
+    words = [sys.executable, "-m", "creepkit", "list"]
     done = subprocess.run(words, cwd=folder, env=environment(), capture_output=True, text=True, check=False)
 
     assert done.returncode == 0, done.stderr
