@@ -44,7 +44,6 @@ BENCHMARKS = {
     "page_latency": Benchmark(1, needs="Chromium and playwright"),
     "core_speed": Benchmark(2),
     "random_simulations": Benchmark(30, short=("--cases", "1000", "--laws", "10", "--seed", "7", "--jobs", "2")),
-    "killed_runs": Benchmark(90, short=("--runs", "2", "--kills-in-a-run", "3", "--seed", "7", "--jobs", "2")),
     "rendered_speckle": Benchmark(1, needs="pyvale 2026.10, here or in the Python of the option --python"),
     "user_costs": Benchmark(2, needs=DATA),
     "studies": Benchmark(4, needs=DATA),
@@ -76,17 +75,7 @@ BENCHMARKS = {
     "noise_correlation": Benchmark(4),
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "rate_tables": Benchmark(20, needs=DATA),
-    "reader_fuzz": Benchmark(
-        25, (("--per-kind", "10000", "--first", "2000000"),), short=("--short", "--first", "700000", "--jobs", "2")
-    ),
-    "large_files": Benchmark(3, short=("--megabytes", "10")),
-    "adverse_surroundings": Benchmark(25, short=("--short", "--jobs", "2")),
-    "code_execution": Benchmark(
-        15,
-        (("--jobs", "2"),),
-        "gfortran, gcc, g++, node, Chromium and playwright; root, for all caches",
-        short=("--short", "--jobs", "2"),
-    ),
+    "hostile_files": Benchmark(40, needs="gcc, for exported C", short=("--short", "--first", "700000")),
     "mutations": Benchmark(90, (("build/mutations.jsonl",),), "g++"),
 }
 """{name of the program: what it costs and how it is run}."""

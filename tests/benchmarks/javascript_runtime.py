@@ -1,6 +1,6 @@
 """Laws in JavaScript and the runtime of the page: accuracy against 50 digits and the core, processor time and size.
 
-    python tests/benchmarks/javascript_runtime.py [--points 512] [--write]
+    python tests/benchmarks/javascript_runtime.py [--points 128] [--write]
 
 Needs node. Kernels: the largest relative difference of the rate, of rates of internal variables and of all derivatives
 to the point from 50-digit arithmetic, at Sobol points of the full bounds and of the ranges of creep tests; where a
@@ -132,7 +132,7 @@ def largest(found: Any, exact: Any) -> float:
 
 def main() -> None:
     parser = arguments(__doc__)
-    parser.add_argument("--points", type=int, default=512)
+    parser.add_argument("--points", type=int, default=128)
     chosen = parser.parse_args()
     page = Page("javascript_runtime", __doc__)
     model = ck.surrogate("dimple")

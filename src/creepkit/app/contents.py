@@ -9,15 +9,26 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from creepkit.errors import CreepkitError, FitError, quoted
 from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.identification import Identification
 from creepkit.inverse.reference_conditions import ReferencePoint
-from creepkit.language import temperature
-from creepkit.records import History, LawWithValues, Specimen, dimensions_of, known_specimens, predict_with
+from creepkit.inverse.selection.ranking import Ranking
+from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.language import CreepLaw, temperature
+from creepkit.records import (
+    History,
+    LawWithValues,
+    Specimen,
+    constant_stress,
+    dimensions_of,
+    known_specimens,
+    predict_with,
+)
 from creepkit.records.units import celsius_text
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import check_histories
@@ -25,14 +36,7 @@ from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.relaxation import Relaxation
 from creepkit.specimens.uniaxial import Uniaxial
 
-if TYPE_CHECKING:
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection.ranking import Ranking
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-    from creepkit.language import CreepLaw
-
-
-PageSource: TypeAlias = "CreepLaw | Identification | Ranking | ModelAverage | LawWithValues | str"
+PageSource: TypeAlias = CreepLaw | Identification | Ranking | ModelAverage | LawWithValues | str
 
 
 MOST_LAWS = 12
@@ -87,13 +91,8 @@ class PageContents:
     temperature: float = USUAL_TEMPERATURE
 
     def specimen(self, name: str) -> Specimen:
-        """The specimen of this name; FitError where the page has none."""
-        for one in self.specimens:
-            if one.name == name:
-                return one
-        raise FitError(
-            f"this page has no specimen '{quoted(name, 60)}'; it has {', '.join(s.name for s in self.specimens)}"
-        )
+        """The specimen of this name, such as that of a test of the page."""
+        return next(one for one in self.specimens if one.name == name)
 
 
 def page_contents(
@@ -123,10 +122,6 @@ def page_contents(
 
 def _page_laws(source: PageSource) -> tuple[PageLaw, ...]:
     """The laws of a source, those of a ranking by falling weight."""
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection.ranking import Ranking
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-
     if isinstance(source, LawWithValues):
         return (PageLaw(source.law, dict(source.values)),)
     if isinstance(source, ModelAverage):  # the laws of a ranking, from its file
@@ -183,7 +178,7 @@ def usual_end(page_law: PageLaw, stress: float, kelvin: float) -> float:
     stress : MPa. kelvin : K.
     """
     times = np.geomspace(1e-6, 1e22, 561)
-    plan = History(name="first curve", times=times, outputs={}, loading=_held_stress(stress), temperature=kelvin)
+    plan = History(name="first curve", times=times, outputs={}, loading=constant_stress(stress), temperature=kelvin)
     law = page_law.law
     try:
         prediction = predict_with(known_specimens()[plan.specimen], law, law.to_internal(dict(page_law.values)), [plan])
@@ -214,9 +209,3 @@ def temperature_warning(law: CreepLaw, histories: Sequence[History]) -> str:
         f"The law does not depend on temperature, and these tests are at {span}: its curves are the same at every "
         "temperature, so that they cannot follow all of them."
     )
-
-
-def _held_stress(stress: float) -> Any:
-    from creepkit.records import constant_stress
-
-    return constant_stress(stress)

@@ -18,7 +18,7 @@ DEFAULT_MAXIMUM_BYTES = 50_000_000
 """Bytes; no document of creepkit is near it, and a reader must not load what memory cannot hold."""
 
 
-MAXIMUM_UNPACKED_BYTES = 500_000_000
+MAXIMUM_UNPACKED_BYTES = 100_000_000
 """Of all that a compressed file holds together."""
 
 
@@ -69,6 +69,8 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
             content = _read_pieces(stream, kind.most_bytes + 1 if first is None else first)
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
+    except MemoryError:
+        raise kind.error(f"{path}: holds more than there is memory for") from None
     if first is None and len(content) > kind.most_bytes:
         raise kind.error(_too_large(path, kind, len(content)))
     return content

@@ -139,14 +139,9 @@ def temporary_name(path: Path) -> Path:
     return path.with_name(f".{path.name[:40]}.{secrets.token_hex(4)}.part")
 
 
-def temporary_files(folder: Path) -> list[Path]:
-    """Files of a folder that processes were writing when they were killed, or are writing now."""
-    return [one for one in folder.glob(".*.????????.part") if one.is_file()]
-
-
 def remove_temporary_files(path: Path) -> None:
     """Remove what processes that were killed while they wrote `path` have left; none may be writing it now."""
-    for temporary in temporary_files(path.parent):
+    for temporary in path.parent.glob(".*.????????.part"):
         if temporary.name.startswith(f".{path.name[:40]}."):
             temporary.unlink(missing_ok=True)
 
@@ -187,16 +182,6 @@ def _problem(path: Path, *, force: bool) -> str:
 def is_foreign(path: Path) -> bool:
     """Whether a file is there that creepkit did not write as it is."""
     return path.is_file() and _recorded_origin(path) is None
-
-
-def is_listed(path: Path) -> bool:
-    """Whether creepkit wrote a file of this name in this folder, whatever it holds now."""
-    return path.name in _written(path.parent)
-
-
-def written_files(folder: Path, pattern: str = "*") -> list[Path]:
-    """Files of a folder, no links, that are as creepkit wrote them."""
-    return [one for one in folder.glob(pattern) if one.is_file() and not one.is_symlink() and not is_foreign(one)]
 
 
 def _recorded_origin(path: Path) -> str | None:

@@ -8,7 +8,6 @@ not enter.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
@@ -197,6 +196,8 @@ def _digits_text(expression: sympy.Expr, values: Mapping[sympy.Symbol, mpmath.mp
 
 
 def _hash(text: str) -> str:
+    import hashlib  # which takes longer to import than a law to be made
+
     return hashlib.sha256(text.encode()).hexdigest()
 
 

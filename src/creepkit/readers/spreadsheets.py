@@ -6,25 +6,25 @@ and none of time states conditions, one row a test; other sheets are left aside,
 
 from __future__ import annotations
 
+import io
 import warnings
-from collections import Counter
+import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from functools import partial
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
 from creepkit.files.limits import how_to_raise, raised
-from creepkit.files.reading import FileKind, check_readable, read_bytes
+from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, read_bytes
 from creepkit.readers.cell_grids import CellGrid, grid_of_rows, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.number_formats import number_text
-from creepkit.readers.spreadsheet_parts import WorkbookParts, checked_parts
-from creepkit.readers.spreadsheet_xml import MAXIMUM_UNUSED_TEXTS, SheetRows, check_formats, check_sheet, text_lengths
 from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
 from creepkit.readers.table_rows import TableRow
 from creepkit.readers.text_tables import SourceText, unknown_text
@@ -38,6 +38,10 @@ _FILLED_ROWS = 60
 """Rows from the top in which a merged cell counts for all the columns that it covers."""
 
 
+_LAST_ROW = 1_048_576
+"""That the format has."""
+
+
 _DAY_ZERO, _FIRST_DATE = datetime(1899, 12, 31), datetime(1902, 1, 1)
 """The day that a spreadsheet counts as 0, and the first on which a creep test may have been made."""
 
@@ -49,69 +53,87 @@ def read_sheets(path: Path) -> list[CellGrid]:
         from openpyxl import load_workbook
     except ImportError:
         raise HistoryError(f"{path}: to read spreadsheets, install openpyxl: pip install 'creepkit[excel]'") from None
-    parts = checked_parts(path, content)
     try:
-        with warnings.catch_warnings():
+        with zipfile.ZipFile(io.BytesIO(content)) as archive, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of what a workbook holds beside its cells
-            outline = load_workbook(parts.outline(), read_only=True, keep_links=False)
-            rows = _checked_sheets(path, outline.worksheets, parts)
-            stream = parts.with_sheets({name: sheet.content for name, sheet in rows.items()})
-            book = load_workbook(stream, read_only=True, data_only=True, keep_links=False)
-            grids = [_grid(path, sheet, rows[_part_of(sheet)]) for sheet in book.worksheets if _part_of(sheet) in rows]
-            aside = [f"hidden sheet '{one.title}' not read" for one in book.worksheets if _part_of(one) not in rows]
-            remarks = {
-                one.title: rows[_part_of(one)].remarks(one.title) for one in book.worksheets if _part_of(one) in rows
-            }
-    except HistoryError:
+            size, most = sum(part.file_size for part in archive.infolist()), raised(MAXIMUM_UNPACKED_BYTES)
+            if size > most:
+                raise HistoryError(
+                    f"{path}: unpacks to {size / 1e6:.0f} MB, more than {most / 1e6:g} MB; save it as CSV, or "
+                    f"{how_to_raise(size, most)}"
+                )
+            book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
+            visible = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
+            notes = {sheet.title: _notes_of(archive, sheet) for sheet in visible}
+            grids = [_grid(path, sheet, notes[sheet.title]) for sheet in visible]
+            aside = [f"hidden sheet '{one.title}' not read" for one in book.worksheets if one not in visible]
+    except (HistoryError, MemoryError):
         raise
-    except Exception as error:
-        if _is_own(error):
-            raise
+    except Exception:  # of openpyxl and of what it calls, which let all kinds through where a file is damaged
         raise HistoryError(
-            f"{path}: is no spreadsheet that can be read, or it is damaged; save it anew as .xlsx"
+            f"{path}: is no spreadsheet that can be read, or it is damaged; save it anew as .xlsx or CSV"
         ) from None
     found = [grid for grid in grids if grid is not None]
     if aside and not found:
         raise HistoryError(f"{path}: {aside[0]}, and no other holds anything; unhide the sheets that count")
-    return [replace(grid, remarks=(*remarks[grid.sheet], *aside)) for grid in found]
+    return [replace(grid, remarks=(*notes[grid.sheet].remarks(grid.sheet), *aside)) for grid in found]
 
 
-def _part_of(sheet: Any) -> str:
-    return str(getattr(sheet, "_worksheet_path", "")).lstrip("/")
+@dataclass(frozen=True)
+class _SheetNotes:
+    """What openpyxl does not say of a sheet that it reads row by row.
+
+    hidden : numbers of rows. hidden_columns : whether there are some. uncomputed : the first cell with a formula and no
+    value, "" for none. merged : row, first and last column of each range of merged cells.
+    """
+
+    hidden: tuple[str, ...]
+    hidden_columns: bool
+    uncomputed: str
+    merged: tuple[tuple[int, int, int], ...]
+
+    def remarks(self, sheet: str) -> tuple[str, ...]:
+        """What was hidden and read nevertheless, for the label "assumed"."""
+        shown = " ".join(self.hidden[:5]) + (" ..." if len(self.hidden) > 5 else "")
+        rows = [f"hidden rows of sheet '{sheet}' read too: {shown}"] if self.hidden else []
+        return (*rows, *([f"hidden columns of sheet '{sheet}' read too"] if self.hidden_columns else []))
 
 
-def _checked_sheets(path: Path, sheets: Sequence[Any], parts: WorkbookParts) -> dict[str, SheetRows]:
-    """{part: what it says of its rows} of the sheets that are shown; HistoryError for what no cell can hold."""
-    names = Counter(map(_part_of, sheets))
-    lengths = [length for part in parts.of_root("sst") for length in text_lengths(f"{path}: its shared texts", part)]
-    for part in parts.of_root("styleSheet"):
-        check_formats(str(path), part)
-    found = {}
-    for sheet in sheets:
-        name, place = _part_of(sheet), f"{path}, sheet '{sheet.title}'"
-        if names[name] > 1 or parts.roots.get(name) != "worksheet":
-            raise HistoryError(f"{place}: has no rows of its own in the file; save it anew as .xlsx")
-        if sheet.sheet_state == "visible":
-            found[name] = check_sheet(place, parts.contents[name], lengths)
-    unused = len(lengths) - sum(sheet.references for sheet in found.values())
-    if unused > (most := raised(MAXIMUM_UNUSED_TEXTS)):
-        raise HistoryError(
-            f"{path}: more than {most} of its shared texts are in no cell that is shown; save it anew as .xlsx, or "
-            f"{how_to_raise(unused, most)}"
-        )
-    return found
+def _notes_of(archive: zipfile.ZipFile, sheet: Any) -> _SheetNotes:
+    """The notes of a sheet; ValueError for a row that no spreadsheet has."""
+    from openpyxl.utils import range_boundaries
+
+    hidden, merged, uncomputed, hidden_columns = list[str](), list[tuple[int, int, int]](), "", False
+    with archive.open(sheet._worksheet_path.lstrip("/")) as stream:
+        for _, element in ElementTree.iterparse(stream):
+            kind, is_hidden = element.tag.rpartition("}")[2], element.get("hidden") in ("1", "true")
+            if kind == "row":
+                if int(element.get("r", 1)) > _LAST_ROW:
+                    raise ValueError
+                hidden += [element.get("r", "?")] if is_hidden else []
+                element.clear()
+            elif kind == "c" and not uncomputed:
+                entries = {child.tag.rpartition("}")[2]: child.text for child in element}
+                if "f" in entries and not (entries.get("v") or "").strip():
+                    uncomputed = element.get("r", "?")
+            elif kind == "col":
+                hidden_columns |= is_hidden
+            elif kind == "mergeCell":
+                first, row, last, _ = range_boundaries(element.get("ref", ""))
+                merged.append((row, first, last))
+    return _SheetNotes(tuple(hidden), hidden_columns, uncomputed, tuple(merged))
 
 
-def _grid(path: Path, sheet: Any, stated: SheetRows) -> CellGrid | None:
+def _grid(path: Path, sheet: Any, notes: _SheetNotes) -> CellGrid | None:
     """A sheet as a grid, None where it is empty."""
     place = f"{path}, sheet '{sheet.title}'"
     rows: list[TableRow] = []
     texts: list[str] = []
     known: dict[str, str] = {}
-    if stated.uncomputed is not None:
+    if notes.uncomputed:
         raise HistoryError(
-            f"{place}, row {stated.uncomputed[0]}, column {stated.uncomputed[1]}: a formula without a computed value; "
-            "open the file in a spreadsheet program and save it, or paste the values"
+            f"{place}, cell {notes.uncomputed}: a formula without a computed value; open the file in a spreadsheet "
+            "program and save it, or paste the values"
         )
     sheet.reset_dimensions()
     for number, row in enumerate(sheet.iter_rows(), 1):
@@ -125,7 +147,7 @@ def _grid(path: Path, sheet: Any, stated: SheetRows) -> CellGrid | None:
     if not rows:
         return None
     rows = _with_points(rows, texts, place)
-    return grid_of_rows(path, str(sheet.title), _with_merged(rows, stated.merged))
+    return grid_of_rows(path, str(sheet.title), _with_merged(rows, notes.merged))
 
 
 def _is_text(cell: Any) -> bool:
@@ -301,12 +323,3 @@ def _with_conditions(
 
 
 SPREADSHEET = SpreadsheetReader("xlsx", "a spreadsheet .xlsx: a test a sheet, or several side by side")
-
-
-def _is_own(error: BaseException) -> bool:
-    """Whether creepkit's code raised it; openpyxl lets all kinds of errors through where a file is damaged."""
-    place = error.__traceback__
-    while place is not None and place.tb_next is not None:
-        place = place.tb_next
-    module = "" if place is None else str(place.tb_frame.f_globals.get("__name__", ""))
-    return module.partition(".")[0] == "creepkit"

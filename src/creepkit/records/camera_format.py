@@ -135,8 +135,7 @@ class CameraFormat:
                 f"{self}: time is {self.time!r}; write ('head', key, unit) or ('name', '', unit) with one of the units "
                 f"{TIMES_ALLOWED}"
             )
-        rules = self.lost.items() if isinstance(self.lost, Mapping) else ()
-        lost = tuple(self._rule(*rule) for rule in rules) or tuple(self.lost)
+        lost = tuple(self._rule(*rule) for rule in self.lost.items()) if isinstance(self.lost, Mapping) else self.lost
         names = [column for column, _ in self.layout]
         for column, kind in self.layout:
             if not (column and _PACKED.fullmatch(kind)):

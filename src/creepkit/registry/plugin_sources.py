@@ -15,7 +15,6 @@ Importing a plugin runs the code of somebody else, so whatever it raises becomes
 
 from __future__ import annotations
 
-import hashlib
 import importlib.machinery
 import importlib.util
 import os
@@ -115,6 +114,8 @@ class PluginFile:
             raise PluginError(f"plugin file {self.path} is {_NO_PLUGIN_FILE}; name a Python file with hooks in it")
         if not self.path.is_file():
             raise PluginError(f"plugin file {self.path} does not exist; name a Python file with hooks in it")
+        import hashlib  # which takes longer to import than a law to be made
+
         name = f"creepkit_plugin_{self.path.stem}_{hashlib.sha256(self.place.encode()).hexdigest()[:8]}"
         loader = _UncachedSourceLoader(name, self.place)
         spec = importlib.machinery.ModuleSpec(name, loader, origin=self.place)

@@ -11,6 +11,7 @@ import pytest
 import creepkit as ck
 from creepkit.app.documents import law_data
 from creepkit.app.runtime_files import RUNTIME_FILES, runtime_files, runtime_script
+from creepkit.errors import CreepkitError
 from creepkit.exporters.javascript import script_safe_json
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.laws.norton import NORTON
@@ -114,3 +115,13 @@ def test_the_runtime_is_strict_small_and_ends_no_script_element():
     assert len(script) < 150_000
     assert "</script" not in script.lower()
     assert not re.search(r"\b(eval|Function|import|require|fetch|XMLHttpRequest|document|window)\s*\(", script)
+
+
+def test_a_page_without_the_core_in_webassembly_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setattr("creepkit.app.runtime_files.CORE_NAME", "missing.wasm")
+    runtime_script.cache_clear()
+    with pytest.raises(
+        CreepkitError, match=r"missing\.wasm, which is missing; run 'pip install ziglang' and 'make core'"
+    ):
+        ck.interactive_page("norton", tmp_path / "page.html")
+    assert not list(tmp_path.iterdir())

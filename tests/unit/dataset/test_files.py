@@ -351,7 +351,7 @@ def of_accepted(name, value):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (enormous, "its arrays have more than 500 MB unpacked"),
+        (enormous, "its arrays have more than 100 MB unpacked"),
         (replaced("reasons", np.zeros(32)), "the array 'reasons' is missing, or is none of its kind"),
         (replaced("parameters", np.zeros((32, 2), complex)), "the array 'parameters' is missing, or is none"),
         (replaced("parameters", np.full((32, 2), b"1e-12")), "the array 'parameters' is missing, or is none"),

@@ -79,7 +79,7 @@ def test_an_hdf5_file_is_bounded_as_it_unpacks(tmp_path, monkeypatch):
     path = tmp_path / "x.h5"
     with h5py.File(path, "w") as file:
         file.create_dataset("x", (10**9,), dtype="f8", chunks=(10**6,), compression="gzip")
-    with pytest.raises(FitError, match="its arrays have more than 500 MB unpacked; give a note, or if it is right"):
+    with pytest.raises(FitError, match="its arrays have more than 100 MB unpacked; give a note, or if it is right"):
         read_hdf5(path)
     with h5py.File(path, "w") as file:
         file.create_dataset("x", data=np.zeros(10_000), chunks=(10_000,), compression="gzip")

@@ -28,7 +28,7 @@
   page.plain = function (value, digits = 6) {
     if (value === 0) return "0";
     const size = Math.abs(value);
-    return size >= 1e-3 && size < 1e6 ? String(Number(value.toPrecision(digits))) : value.toPrecision(digits).replace(/\.?0+(e|$)/, "$1");
+    return size >= 1e-3 && size < 1e6 ? String(Number(value.toPrecision(digits))) : value.toExponential(digits - 1).replace(/\.?0*e/, "e");
   };
 
   // A scale from values to shares 0 to 1, and back.

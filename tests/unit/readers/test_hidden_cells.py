@@ -1,4 +1,4 @@
-"""Spreadsheets that no spreadsheet program writes, and what in them is hidden."""
+"""What is hidden in a spreadsheet is told."""
 
 from pathlib import Path
 
