@@ -161,7 +161,11 @@ def test_names_differ_by_more_than_case(texts) -> None:
 
 ONCE_EACH = (
     ["--help"],
+<<<<<<< HEAD
     ["list"],
+=======
+    ["list", "laws"],
+>>>>>>> main
     ["list", "specimens"],
     ["list", "plugins"],
     ["list", "laws", "combined"],
