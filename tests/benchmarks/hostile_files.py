@@ -195,8 +195,8 @@ def texts_of(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...
 def hostile_documents(folder: Path) -> Iterator[tuple[str, bool, str]]:
     """Every text of a law with values replaced by each text that would be code; what is read is exported."""
     import creepkit as ck
+    from creepkit.cli.shared import read_law_file
     from creepkit.errors import CreepkitError
-    from creepkit.exporters.law_files import read_law_file
 
     document = json.loads(ck.export("norton", "json", values={"A": 3e-17, "n": 4.25}))
     for place in texts_of(document):

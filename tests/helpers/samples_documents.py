@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import creepkit as ck
-from creepkit.cli.law_sources import read_law_file
+from creepkit.cli.shared import read_law_file
 from creepkit.errors import SurrogateError
 from creepkit.fem.mesh_files import read_input_deck, read_mesh
 from creepkit.files.json_documents import DocumentFormat

@@ -53,10 +53,8 @@ def load_surrogate(path: str | Path, document: DocumentFormat = SURROGATE) -> Su
         problem = check_keys(header, ("kind", "recipe", "metadata"), "its header")
         if problem:
             raise SurrogateError(f"{problem}; train it again")
-        recipe = CODEC.from_json(_recipe_class(header["kind"]), _current_recipe(header["recipe"]), "recipe")
-        # files of older versions name the class of laws as well, which is that of their recipe
-        known = {name: value for name, value in header["metadata"].items() if name != "law_class"}
-        metadata = CODEC.from_json(SurrogateMetadata, known, "metadata")
+        recipe = CODEC.from_json(_recipe_class(header["kind"]), header["recipe"], "recipe")
+        metadata = CODEC.from_json(SurrogateMetadata, header["metadata"], "metadata")
         surrogate = recipe.surrogate(weights, metadata)
         infinite = [name for name, one in weights.items() if not np.isfinite(np.asarray(one, dtype=float)).all()]
         if infinite:
@@ -66,13 +64,6 @@ def load_surrogate(path: str | Path, document: DocumentFormat = SURROGATE) -> Su
     except (KeyError, TypeError, ValueError, RuntimeError, AttributeError):
         raise SurrogateError(f"{path}: its header and its weights do not belong together; train it again") from None
     return surrogate
-
-
-def _current_recipe(document: Any) -> Any:
-    """The recipe in a header; files of older versions say "one-dof" for the base "reduced-order"."""
-    if isinstance(document, dict) and document.get("base") == "one-dof":
-        return {**document, "base": "reduced-order"}
-    return document
 
 
 def _recipe_class(kind: Any) -> type[Recipe]:

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats, Ints
+from creepkit.arrays import Floats, Ints
 from creepkit.errors import DatasetError
 from creepkit.files.json_documents import canonical_json
 from creepkit.registry.specimen_documents import specimen_to_json
-from creepkit.sampling.specimen_conditions import MODULUS, TEMPERATURE, SpecimenConditions, specimen_conditions
 from creepkit.surrogates.recipe import SampleArrays, Training
 
 if TYPE_CHECKING:
@@ -22,18 +21,6 @@ LEAST_SAMPLES = 10
 """Samples below which nothing can be learnt and nothing be said of it."""
 
 
-PLAUSIBLE_RANGES = {MODULUS: (1e3, 2e6), TEMPERATURE: (50.0, 4000.0)}
-"""Where conditions lie that are in MPa and K; a modulus in GPa does not."""
-
-
-PLAUSIBLE_LOADS = {"pressure": (1e-4, 1e4), "stress": (1e-3, 1e5), "strain": (1e-8, 1.0)}
-"""Where levels of a load of these quantities lie, MPa and strain."""
-
-
-PLAUSIBLE_LENGTHS = (1e-3, 1e4)
-"""mm."""
-
-
 def trainable_samples(data: Dataset) -> Dataset:
     """The samples to learn from: accepted ones, each with a history; DatasetError where there are too few."""
     accepted = data.accepted
@@ -42,39 +29,7 @@ def trainable_samples(data: Dataset) -> Dataset:
             f"a data set with {len(accepted)} accepted samples of {len(data)} is too small to train on; "
             f"{LEAST_SAMPLES} are the least, generate more"
         )
-    _check_units(accepted)
-    finite_frames: Bools = np.asarray(np.isfinite(accepted.values).all(axis=-1))
-    empty = ~finite_frames.any(axis=1)
-    if empty.any():
-        first = int(accepted.index[int(np.argmax(empty))])
-        raise DatasetError(
-            f"sample {first} of the data set is accepted, but no frame of its history is a number (so it is with "
-            f"{int(empty.sum())} in all); the file is damaged, generate it again"
-        )
     return accepted
-
-
-def _check_units(data: Dataset) -> None:
-    known = specimen_conditions(data.specimen)
-    for name, column in zip(data.condition_names, data.conditions.T, strict=True):
-        low, high = _plausible_range(known, name)
-        if not ((column >= low) & (column <= high)).all():
-            raise DatasetError(
-                f"condition '{name}' of the data set goes from {column.min():g} to {column.max():g}, which is not in "
-                f"{known.unit(name) or 'its unit'}; it was written in another unit or is damaged"
-            )
-    if not np.isfinite(data.parameters).all():
-        raise DatasetError("some parameter of the data set is not a number; the file is damaged, generate it again")
-
-
-def _plausible_range(known: SpecimenConditions, name: str) -> tuple[float, float]:
-    """Lowest and highest value of a condition that its unit makes likely."""
-    everything = (0.0, np.inf)
-    if name in known.levels:
-        return PLAUSIBLE_LOADS.get(known.load.quantity, everything)
-    if any(name == length.name for length in known.lengths):
-        return PLAUSIBLE_LENGTHS
-    return PLAUSIBLE_RANGES.get(name, everything)
 
 
 def training_split(count: int, training: Training, seed: int) -> tuple[Ints, Ints]:

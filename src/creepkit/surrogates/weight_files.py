@@ -29,9 +29,6 @@ SURROGATE = DocumentFormat(
 """Eight layers of 2048 units of a GRU take 0.8 GB, and one of the default size 1 MB."""
 
 
-"""The result of the same training, which is not trained again."""
-
-
 CHECKPOINT = DocumentFormat(
     "creepkit-training-checkpoint",
     1,

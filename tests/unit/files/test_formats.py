@@ -10,7 +10,7 @@ import jsonschema
 import pytest
 
 import creepkit as ck
-from creepkit.cli.law_sources import read_law_file
+from creepkit.cli.shared import read_law_file
 from creepkit.language.law_codec import law_from_json
 from creepkit.studies.lock import read_lock
 from helpers.paths import ROOT

@@ -17,7 +17,6 @@ from creepkit.surrogates.parameter_network import load_weights, sample_tensors
 from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.surrogate import Surrogate
 from creepkit.surrogates.training import train
-from creepkit.surrogates.weight_files import write_weights
 from helpers.planted_datasets import HOURS, bars, data_set, dimples, measured
 
 BRIEF = Training(epochs=2, batch=32, rate=1e-2)
@@ -251,13 +250,6 @@ def test_another_law_is_refused(learnt: Surrogate, tension: Dataset) -> None:
         ck.simulate(law, learnt, law.center(), loading=ck.constant_stress(100.0), times=[HOURS])
 
 
-def test_files_of_older_versions_that_name_the_class_of_laws_are_read(learnt: Surrogate, tmp_path) -> None:
-    header = {**learnt.file_header}
-    header["metadata"] = {**header["metadata"], "law_class": {"variables": ["stress"], "states": False}}
-    path = write_weights(tmp_path / "old.safetensors", learnt.weights, header)
-    assert load_surrogate(path).file_header == learnt.file_header
-
-
 def test_other_kinds_of_tests_are_refused(
     learnt: Surrogate, bulging: Surrogate, tension: Dataset, plates: Dataset
 ) -> None:
@@ -320,16 +312,6 @@ def test_a_network_on_a_base_is_near_before_it_has_learnt_much(corrected: Surrog
         assert found.jacobian is None
         ratios.append(found.values[0, 0, 2:, 0] / plates.values[row, 2:, 0])
     assert np.median(np.abs(np.log(ratios))) < 0.15
-
-
-def test_older_files_with_a_base_are_read(corrected: Surrogate, tmp_path) -> None:
-    """They name it "one-dof"."""
-    header = corrected.file_header
-    assert header["recipe"]["base"] == "reduced-order"
-    older = {**header, "recipe": {**header["recipe"], "base": "one-dof"}}
-    found = load_surrogate(write_weights(tmp_path / "older.safetensors", corrected.weights, older))
-    assert found.recipe == corrected.recipe
-    assert found.file_header == header
 
 
 def test_identify_with_a_network_finds_what_was_planted(learnt: Surrogate, tension: Dataset) -> None:

@@ -150,9 +150,6 @@ def test_frames_that_are_not_numbers_teach_nothing(data: Dataset) -> None:
     short = replace(data, values=values)
     model = train(short, SMALL)
     assert math.isfinite(model.metadata.metrics["loss"])
-    values[1, :] = np.nan
-    with pytest.raises(DatasetError, match=r"sample 1 of the data set is accepted, but no frame .* \(so it is with 1"):
-        train(replace(data, values=values), SMALL)
 
 
 def test_samples_that_were_rejected_teach_nothing(data: Dataset) -> None:
@@ -173,12 +170,6 @@ def test_a_constant_column_is_told_and_harmless(data: Dataset) -> None:
     model = train(replace(data, parameters=parameters), SMALL)
     assert model.metadata.notes == ("constant in training, so that nothing is known beyond: n",)
     assert math.isfinite(model.metadata.metrics["loss"])
-
-
-def test_conditions_in_another_unit_are_noticed(data: Dataset) -> None:
-    pascals = replace(data, conditions=data.conditions * [1e6, 1e6, 1.0])
-    with pytest.raises(DatasetError, match=r"condition 'stress_1' .* which is not in MPa"):
-        train(pascals, SMALL)
 
 
 def test_a_data_set_of_another_kind_cannot_judge(data: Dataset) -> None:
@@ -205,8 +196,8 @@ def test_fingerprints_see_what_can_be_learnt(data: Dataset) -> None:
     [
         ({"epochs": 0}, "epochs is 0"),
         ({"batch": 2.5}, "batch is 2.5"),
-        ({"schedule": "step"}, "schedule is 'step'; allowed are plateau, cosine and constant"),
-        ({"rate": 0.0}, "must be above zero"),
+        ({"schedule": "step"}, "schedule 'step' is not known; allowed are plateau, cosine, constant"),
+        ({"rate": 0.0}, "rate is 0.0; allowed are numbers above 0"),
         ({"validation": 1.0}, "validation is 1.0"),
     ],
 )
