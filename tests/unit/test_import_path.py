@@ -29,11 +29,7 @@ def environment(**variables: str) -> dict[str, str]:
 
 
 def test_the_command_as_a_module_imports_nothing_from_the_working_folder(folder: Path) -> None:
-<<<<<<< HEAD
-    words = [sys.executable, "-m", "creepkit", "list"]
-=======
     words = [sys.executable, "-m", "creepkit", "list", "laws"]
->>>>>>> main
     done = subprocess.run(words, cwd=folder, env=environment(), capture_output=True, text=True, check=False)
 
     assert done.returncode == 0, done.stderr

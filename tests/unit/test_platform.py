@@ -119,9 +119,9 @@ def test_it_works_without_the_modules_that_windows_lacks(absent, tmp_path) -> No
         "from pathlib import Path\n"
         "from typer.testing import CliRunner\n"
         "from creepkit.cli.app import app\n"
-        "steps = [['list'], ['surrogate', 'generate', 'norton', '--specimen', 'uniaxial', '--draws', '4', \n"
-        "         '--interval', '2400', '--seed', '1', '--workers', '1', '--to', 'set.h5'], ['read', 'set.h5'],\n"
-        "         ['report', 'norton', '--app', '--to', 'page.html']]\n"
+        "steps = [['laws'], ['generate', 'norton', '--specimen', 'uniaxial', '--draws', '4', '--interval', '2400',\n"
+        "         '--seed', '1', '--workers', '1', '--to', 'set.h5'], ['data', 'set.h5'],\n"
+        "         ['app', 'norton', '--to', 'page.html']]\n"
         "for words in steps:\n"
         "    result = CliRunner().invoke(app, words)\n"
         "    assert result.exit_code == 0, (words, result.output, result.exception)\n"
@@ -161,11 +161,7 @@ def test_names_differ_by_more_than_case(texts) -> None:
 
 ONCE_EACH = (
     ["--help"],
-<<<<<<< HEAD
-    ["list"],
-=======
     ["list", "laws"],
->>>>>>> main
     ["list", "specimens"],
     ["list", "plugins"],
     ["list", "laws", "combined"],
