@@ -19,10 +19,8 @@ from .api.objects import surrogate as surrogate
 from .api.pages import interactive_page as interactive_page
 from .api.report import report as report
 from .api.simulation import check_data_quality as check_data_quality
-from .api.simulation import exclude_suspect_frames as exclude_suspect_frames
-from .api.simulation import generate as generate
 from .api.simulation import simulate as simulate
-from .api.simulation import train as train
+from .dataset.generation import generate as generate
 from .dataset.storage import read_dataset as read_dataset
 from .dataset.storage import write_dataset as write_dataset
 from .discovery.discover import discover as discover
@@ -78,6 +76,7 @@ from .language.temperature_forms import arrhenius as arrhenius
 from .language.temperature_forms import exponential as exponential
 from .language.temperature_forms import inverse_temperature as inverse_temperature
 from .language.temperature_forms import linear as linear
+from .quality import exclude_suspect_frames as exclude_suspect_frames
 from .readers.history_csv import write_history as write_history
 from .records.camera_format import CameraFormat as CameraFormat
 from .records.camera_frames import Frames as Frames
@@ -127,6 +126,7 @@ from .studies.result import StudyResult as StudyResult
 from .studies.study import Study as Study
 from .surrogates.parameter_gru import ParameterGru as ParameterGru
 from .surrogates.recipe import Training as Training
+from .surrogates.training import train as train
 from .testing import check_camera_format as check_camera_format
 from .testing import check_exporter as check_exporter
 from .testing import check_instrument_format as check_instrument_format

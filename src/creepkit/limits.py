@@ -84,8 +84,7 @@ WORKERS, THREADS = Limits(1, 1024), Limits(1, 1024)
 EPOCHS, BATCH = Limits(1, 1_000_000), Limits(1, 1_000_000)
 HIDDEN, LAYERS = Limits(1, 4096), Limits(1, 32)
 LEARNING_RATE, LARGEST_GRADIENT = numbers(0, 1, above=True), numbers(0, 1e12, above=True)
-SEARCH_STEPS, SEARCH_POPULATION = Limits(1, 1_000_000), Limits(2, 1_000_000)
-TESTS_IN_A_RUN = Limits(1, 10_000)
+SEARCH_STEPS = Limits(1, 1_000_000)
 
 
 HOURS = numbers(1e-9, 1e9)
@@ -105,7 +104,6 @@ KELVIN = numbers(0, HOTTEST, above=True)
 
 MEGAPASCAL_OF_STATE = numbers(0, 1e5, above=True)
 CELSIUS = numbers(-273.15, HOTTEST - 273.15, above=True)
-KELVIN_DIFFERENCE = numbers(0, 1e5)
 GIGAPASCAL = numbers(0, 1e6, above=True)
 MEGAPASCAL = numbers(0, 1e6)
 MILLIMETRE = numbers(0, 1e6)

@@ -27,14 +27,14 @@ def is_plainly(value: Any, kind: Any) -> bool:
     if isinstance(kind, type) and origin is None:
         return kind is not Path and is_instance(value, kind)
     if origin in (typing.Union, types.UnionType):
-        return Path not in args and any(is_plainly(value, one) for one in args)
+        return (value is None or Path not in args) and any(is_plainly(value, one) for one in args)
     if origin is typing.Literal:
         return type(value) is str and value in args
     if origin in (Sequence, list, tuple) and type(value) in (list, tuple):
         if origin is tuple and args[1:] != (...,):
             return len(value) == len(args) and all(map(is_plainly, value, args))
         return all(is_plainly(one, args[0]) for one in value)
-    if origin is Mapping and type(value) is dict:
+    if origin is Mapping and type(value) in (dict, types.MappingProxyType):
         return all(is_plainly(key, args[0]) and is_plainly(one, args[1]) for key, one in value.items())
     return False
 

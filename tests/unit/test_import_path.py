@@ -29,7 +29,7 @@ def environment(**variables: str) -> dict[str, str]:
 
 
 def test_the_command_as_a_module_imports_nothing_from_the_working_folder(folder: Path) -> None:
-    words = [sys.executable, "-m", "creepkit", "laws"]
+    words = [sys.executable, "-m", "creepkit", "list", "laws"]
     done = subprocess.run(words, cwd=folder, env=environment(), capture_output=True, text=True, check=False)
 
     assert done.returncode == 0, done.stderr
@@ -121,9 +121,9 @@ def _starts_processes(module: str) -> bool:
 
 
 def test_processes_are_started_in_one_place() -> None:
-    """`worker_pools` waits for workers and ends them; `app_page` asks the desktop for its browser."""
+    """`worker_pools` waits for workers and ends them; `cli.report` asks the desktop for its browser."""
     starting = {module for module in source_tree.modules() if _starts_processes(module)}
-    assert starting <= {"creepkit.jobs.worker_process", "creepkit.jobs.worker_pools", "creepkit.cli.app_page"}
+    assert starting <= {"creepkit.jobs.worker_process", "creepkit.jobs.worker_pools", "creepkit.cli.report"}
     pools = source_tree.tree("creepkit.jobs.worker_pools")
     called = {
         node.func.attr

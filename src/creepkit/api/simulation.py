@@ -1,32 +1,24 @@
-"""Simulation of single tests and of data sets, training of surrogates, and the quality of measured data."""
+"""Simulation of single tests, and the quality of measured data."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import ArrayLike
 from creepkit.checked_arguments import checked, checked_with_own_words
-from creepkit.errors import DatasetError, SolveError, SurrogateError
-from creepkit.jobs.shard_progress import ProgressCallback
+from creepkit.errors import SolveError
 from creepkit.language import symbols
-from creepkit.records import History, Loading, Predictor, Program, Specimen, Status, call_of_plugin, predict_with
+from creepkit.records import History, Loading, Predictor, Program, Status, call_of_plugin, predict_with
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import check_histories, resolve_predictor
-from creepkit.sampling.domains import SamplingDesign
 from creepkit.specimens.run import Run, Runnable, run_from_outputs, unusual_values, with_explanation
-from creepkit.surrogates.surrogate import Recipe
 
 if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
-    from creepkit.jobs.worker_pools import ParallelExecution
     from creepkit.language import CreepLaw, Elastic
     from creepkit.quality import DataQuality
-    from creepkit.surrogates.recipe import Training
-    from creepkit.surrogates.surrogate import Surrogate
 
 
 ROOM_TEMPERATURE = 293.15
@@ -110,95 +102,3 @@ def check_data_quality(
     predictor = None if specimen is None else resolve_predictor(specimen)
     energy = ACTIVATION_ENERGY if activation_energy is None else activation_energy
     return run(check_histories(histories), predictor, activation_energy=energy)
-
-
-@checked
-def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] | None = None) -> list[History]:
-    """Return the histories with suspect frames unused and a label that says which; whole tests stay.
-
-    kinds : of "unloading", "falling" and "outlier"; all of them by default.
-    """
-    from creepkit.quality import FRAME_FLAG_KINDS
-    from creepkit.quality import exclude_suspect_frames as run
-
-    return run(check_histories(histories), FRAME_FLAG_KINDS if kinds is None else kinds)
-
-
-@checked
-def generate(
-    source: SamplingDesign | CreepLaw | str,
-    using: Specimen | str,
-    samples: int | None = None,
-    *,
-    seed: int,
-    to: str | Path,
-    draws: int | None = None,
-    execution: ParallelExecution | None = None,
-    progress: ProgressCallback | None = None,
-    **design: Any,
-) -> Dataset:
-    """Simulate samples until so many are accepted, write them to an HDF5 file, and return them.
-
-    source : a law or its name, or a design. Samples of a law are drawn from a sampling domain,
-        domain="conditioned" (the default, where most creep visibly) or "paper"; `design` says this and what else is
-        to differ from it: ranges of conditions in MPa, s, mm and K, as in P1=(5, 20), and the s between frames, as in
-        every=900.
-    samples : accepted ones wanted; whole shards are made, of 256 draws or as many as are wanted where these are fewer,
-        so that there may be some more. Or draws : how many are simulated or rejected, whatever becomes of them.
-    to : the file; its shards lie in a folder beside it. A call that was interrupted is made again to go on.
-    execution : processes or a cluster, and the part of the shards to do; by default one process for each core.
-    progress : called as progress(task, done, total, note).
-    """
-    from creepkit.dataset.generation import generate as run
-
-    specimen: Any = resolve_predictor(using)
-    chosen = resolve_design(source, specimen, **design)
-    return run(chosen, specimen, samples=samples, draws=draws, seed=seed, to=to, execution=execution, progress=progress)
-
-
-def resolve_design(source: SamplingDesign | CreepLaw | str, specimen: Specimen, **changes: Any) -> SamplingDesign:
-    """The design itself, or the one for a law in a sampling domain.
-
-    changes : `domain`, `every`, `grid` and ranges of conditions, as sampling.domains.sampling_design takes them.
-    """
-    from creepkit.sampling.domains import SamplingDesign, sampling_design
-
-    if not isinstance(source, SamplingDesign):
-        return sampling_design(resolve_law(source), specimen, **changes)
-    if changes:
-        argument = next(iter(changes))
-        raise DatasetError(f"{argument}= belongs to a law; a design such as {source.name} has its own, change it there")
-    return source
-
-
-@checked_with_own_words("recipe", "data")
-def train(
-    data: Dataset | str | Path,
-    recipe: Recipe,
-    *,
-    to: str | Path | None = None,
-    seed: int = 0,
-    training: Training | None = None,
-    device: str = "auto",
-    progress: ProgressCallback | None = None,
-) -> Surrogate:
-    """Train a network on a data set, or its file, and return it as a predictor: identify(..., using=it).
-
-    recipe : ParameterGru(), the recurrent network of the law of the data, with its settings.
-    to : file to write. Interrupted, the same call goes on where it was; done, it returns what the file holds.
-    seed : of the split into training and validation rows, the first weights and the order of rows.
-    training : epochs, rate and so on in the place of the recipe's. device : "auto" (a GPU where there is one), "cpu".
-    progress : called with (task, epochs done, epochs in all, note); the note says Eq. (4) of the validation rows.
-    """
-    from creepkit.surrogates.training import train as run
-
-    if isinstance(data, (str, Path)):
-        from creepkit.dataset.storage import read_dataset
-
-        data = read_dataset(data)
-    if not hasattr(data, "accepted"):
-        raise DatasetError(f"train() takes a data set or its file, found {type(data).__name__}; generate() makes one")
-    if isinstance(recipe, type) or not hasattr(recipe, "sample_arrays"):
-        found_type = recipe.__name__ if isinstance(recipe, type) else type(recipe).__name__
-        raise SurrogateError(f"train() takes a recipe such as ParameterGru(hidden=128, layers=3), found {found_type}")
-    return run(data, recipe, to=to, seed=seed, training=training, device=device, progress=progress)

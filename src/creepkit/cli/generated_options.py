@@ -104,6 +104,9 @@ def text_form(hint: Any) -> TextForm:
     origin, parts = get_origin(hint), get_args(hint)
     if hint in SPECIAL:
         return SPECIAL[hint]
+    of_records = any(getattr(one, "__module__", "").startswith("creepkit.records") for one in (hint, *parts))
+    if of_records and hint in _forms_of_records():
+        return _forms_of_records()[hint]
     if origin is Union or type(hint).__name__ == "UnionType":
         others = tuple(one for one in parts if one is not type(None))
         words = next((get_args(one) for one in others if get_origin(one) is Literal), None)
@@ -183,23 +186,26 @@ def _surrogate(name: str) -> Any:
     return ck.surrogate(name)
 
 
-def _special() -> dict[Any, TextForm]:
-    """Text forms of types that are not made of others."""
+SPECIAL: dict[Any, TextForm] = {
+    tuple[int, int]: TextForm("K/N", _part),
+    tuple[tuple[float, float], ...]: TextForm("[S:]NUMBER", steps, several=True),
+    Path: TextForm("PATH", Path),
+    int: TextForm("INTEGER", parsed_integer),
+    float: TextForm("NUMBER", parsed_number),
+    str: TextForm("TEXT", str),
+}
+"""Text forms of types that are not made of others."""
+
+
+@functools.cache
+def _forms_of_records() -> dict[Any, TextForm]:
+    """Those of records, which are imported for the commands that take them alone."""
     from creepkit.records import Nuisance, Predictor
 
     return {
-        tuple[int, int]: TextForm("K/N", _part),
-        tuple[tuple[float, float], ...]: TextForm("[S:]NUMBER", steps, several=True),
-        Path: TextForm("PATH", Path),
         Predictor: TextForm("NAME", _surrogate),
-        int: TextForm("INTEGER", parsed_integer),
-        float: TextForm("NUMBER", parsed_number),
-        str: TextForm("TEXT", str),
         tuple[Nuisance, ...]: TextForm(NUISANCE_SYNTAX, _nuisances, several=True),
     }
-
-
-SPECIAL = _special()
 
 
 def default_text(one: Option) -> str:

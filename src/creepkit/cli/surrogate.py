@@ -59,8 +59,8 @@ def generate(
     Interrupted, it goes on where it was when it is started again in the same way.
     """
     import creepkit as ck
-    from creepkit.api.simulation import resolve_design
     from creepkit.cli.shared import parsed
+    from creepkit.dataset.generation import resolve_design
     from creepkit.reports.dataset import print_dataset
     from creepkit.reports.sampling import print_acceptance
 

@@ -7,52 +7,61 @@ from __future__ import annotations
 
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
+from creepkit.checked_arguments import checked
 from creepkit.dataset import shards, storage
+from creepkit.dataset.dataset import Dataset
 from creepkit.dataset.shards import GenerationJob, is_complete, merge_shards
 from creepkit.errors import DatasetError
 from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord, ProgressReporter
 from creepkit.jobs.worker_pools import SHARD_ROWS, ParallelExecution, Workers
 from creepkit.jobs.worker_process import TaskResult
-
-if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
-    from creepkit.records import Specimen
-    from creepkit.sampling.domains import SamplingDesign
-
+from creepkit.language import CreepLaw
+from creepkit.records import Specimen
+from creepkit.registry import resolve_law
+from creepkit.registry.arguments import resolve_predictor
+from creepkit.sampling.domains import SamplingDesign, sampling_design
 
 POLL_INTERVAL = 0.5
 """s between reports of the progress, where no shard ends earlier."""
 
 
+@checked
 def generate(
-    design: SamplingDesign,
-    specimen: Specimen,
-    *,
+    source: SamplingDesign | CreepLaw | str,
+    using: Specimen | str,
     samples: int | None = None,
-    draws: int | None = None,
+    *,
     seed: int,
     to: str | Path,
+    draws: int | None = None,
     execution: ParallelExecution | None = None,
     progress: ProgressCallback | None = None,
+    **design: Any,
 ) -> Dataset:
-    """Simulate samples of a design until enough are accepted, write them to a file, and return them.
+    """Simulate samples until so many are accepted, write them to an HDF5 file, and return them.
 
-    samples : accepted ones wanted, in whole shards, so that there may be some more; or draws : samples simulated or
-        rejected, whatever becomes of them.
-    to : the HDF5 file; its shards are kept in a folder beside it, and a call that was interrupted goes on from them.
-    execution : processes or a cluster, and which part of the shards; by default a process for each core does them all.
+    source : a law or its name, or a design. Samples of a law are drawn from a sampling domain,
+        domain="conditioned" (the default, where most creep visibly) or "paper"; `design` says this and what else is
+        to differ from it: ranges of conditions in MPa, s, mm and K, as in P1=(5, 20), and the s between frames, as in
+        every=900.
+    samples : accepted ones wanted; whole shards are made, of 256 draws or as many as are wanted where these are fewer,
+        so that there may be some more. Or draws : how many are simulated or rejected, whatever becomes of them.
+    to : the file; its shards lie in a folder beside it. A call that was interrupted is made again to go on.
+    execution : processes or a cluster, and the part of the shards to do; by default one process for each core.
     progress : called as progress(task, done, total, note).
     """
+    specimen: Any = resolve_predictor(using)
+    design_of_samples = resolve_design(source, specimen, **design)
     path, execution = Path(to), execution or ParallelExecution()
     if not path.name:
         raise DatasetError(f"'{to}' is no name of a file; name the HDF5 file to write, such as combined.h5")
     folder = path.with_name(f"{path.name}.parts")
     rows = execution.shard_rows or shards.rows_of_folder(folder) or _shard_rows(samples or draws)
-    job = GenerationJob(design, specimen, _whole_number("seed", seed), folder, rows)
+    job = GenerationJob(design_of_samples, specimen, _whole_number("seed", seed), folder, rows)
     record = ProgressRecord(job, samples, draws, execution.part)
     if execution.part is None and is_complete(job, record, path):
         return storage.read_dataset(path)
@@ -65,6 +74,19 @@ def generate(
             return shards.read_shards(job, sorted(record.done))
         merge_shards(job, record, path, progress)
     return storage.read_dataset(path)
+
+
+def resolve_design(source: SamplingDesign | CreepLaw | str, specimen: Specimen, **changes: Any) -> SamplingDesign:
+    """The design itself, or the one for a law in a sampling domain.
+
+    changes : `domain`, `every`, `grid` and ranges of conditions, as sampling.domains.sampling_design takes them.
+    """
+    if not isinstance(source, SamplingDesign):
+        return sampling_design(resolve_law(source), specimen, **changes)
+    if changes:
+        argument = next(iter(changes))
+        raise DatasetError(f"{argument}= belongs to a law; a design such as {source.name} has its own, change it there")
+    return source
 
 
 def _shard_rows(wanted: object) -> int:

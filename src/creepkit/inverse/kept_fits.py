@@ -14,7 +14,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -33,7 +33,6 @@ from creepkit.files.json_documents import (
 )
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError
-from creepkit.files.writing import is_foreign
 from creepkit.inverse.composite_predictor import predictors_for_law
 from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.identification import Identification
@@ -126,16 +125,11 @@ KEPT_PARTS = ("identification", "linearised", "residual_changes")
 
 @dataclass
 class FitFolder:
-    """Identifications as files of a folder, and how many of them were made and read since.
-
-    altered : how many were not as they were written, and so not read. keys : of those made or read, in their order.
-    """
+    """Identifications as files of a folder, and how many of them were made and read since."""
 
     folder: Path
     made: int = 0
     read: int = 0
-    altered: int = 0
-    keys: list[str] = field(default_factory=list)
 
     def path(self, key: str) -> Path:
         """The file of an identification."""
@@ -143,9 +137,6 @@ class FitFolder:
 
     def load(self, key: str, histories: Any, predictor: Predictor) -> Identification | None:
         """The identification of a key, as it was when it was made; None where there is none."""
-        if is_foreign(self.path(key)):
-            self.altered += 1
-            return None
         try:
             content = check_heading(read_json(self.path(key), KEPT_FIT.kind), str(self.path(key)), KEPT_FIT)
             fit = kept_from_json(content, str(self.path(key)))
@@ -189,7 +180,6 @@ def kept_where_asked(identify: Identify) -> Identify:
             return identify(law, histories, using, **how)
         predictor, through, _ = predictors_for_law(law, using, how.get("through"))
         key = _key(getattr(identify, "__name__", ""), law, histories, predictor, {**how, "through": through})
-        kept.keys.append(key)
         fit = kept.load(key, histories, predictor)
         if fit is not None:
             kept.read += 1

@@ -14,6 +14,7 @@ from typing import get_args
 
 import numpy as np
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.quality.common_changes import common_rate_changes, find_jumps
 from creepkit.quality.comparison import (
@@ -158,6 +159,7 @@ def check_rig(histories: Sequence[History], *, activation_energy: float = ACTIVA
     return [*flags, *(rate_change_flag(histories, change, activation_energy) for change in changes)]
 
 
+@checked
 def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] = FRAME_FLAG_KINDS) -> list[History]:
     """The histories with their suspect frames unused, and a label `suspect` that says which and why.
 

@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import SurrogateError, nearest, quoted
-from creepkit.inverse.reference_conditions import with_arrhenius
+from creepkit.experiments.design_options import GoalOptions
+from creepkit.experiments.rig import Rig, changed_rigs
+from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.language import temperature
 from creepkit.options import values_of_table
 from creepkit.readers.vocabulary import split_unit
 from creepkit.records import (
     SECONDS_PER_HOUR,
     ZERO_CELSIUS,
-    History,
     Nuisance,
     Predictor,
     Program,
@@ -27,11 +28,9 @@ from creepkit.records import (
 from creepkit.records.quantities import LENGTH, QuantityKind
 from creepkit.records.units import UNITS, UnitConversion
 from creepkit.studies.study_file import KeyPath, StudyFile
-from creepkit.studies.tables import IdentificationTable, NuisanceTable, Step, Table
+from creepkit.studies.tables import NuisanceTable, Step, Table
 
 if TYPE_CHECKING:
-    from creepkit.experiments.design_task import Goal
-    from creepkit.experiments.rig import Rig
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.language import CreepLaw
 
@@ -111,9 +110,9 @@ def temperature_of(file: StudyFile, key: KeyPath, steps: Sequence[Step]) -> floa
 
 
 def laws_of(file: StudyFile) -> list[CreepLaw]:
-    """The candidate laws, with parameters bounded and fixed, each where it has them.
+    """The candidate laws by their names; StudyError for one that there is not, and for parameters that none has.
 
-    Those of a factor of temperature, such as Q, are known too; `law_as_fitted` bounds and fixes them.
+    Those of a factor of temperature, such as Q, are known too; `law_changes` bounds and fixes them.
     """
     import creepkit as ck
 
@@ -123,37 +122,39 @@ def laws_of(file: StudyFile) -> list[CreepLaw]:
     for k, name in enumerate(dict.fromkeys(part.laws)):
         with file.at("identification", "laws", k):
             laws.append(ck.law(name))
-    known = {name for law in laws for name in law.names}
-    if part.temperature == "auto":
+    changes, fitted = law_changes(file), list(laws)
+    if changes.temperature == "auto":
         factor = ck.arrhenius(T_ref=ZERO_CELSIUS)
-        known |= {name for law in laws if not law.uses(temperature) for name in law.times(factor).names}
-    for table, names in (("bounds", part.bounds), ("fix", part.fix)):
-        check_parameters(file, ("identification", table), names, known)
-    return [_changed(file, part, law) for law in laws]
+        fitted += [law.times(factor) for law in laws if not law.uses(temperature)]
+    for table in ("bounds", "fix"):
+        given = getattr(changes, table)
+        check_parameters(file, ("identification", table), given, fitted)
+        with file.at("identification", table):
+            LawChanges("none", **{table: given}).applied(fitted, ())
+    return laws
 
 
-def check_parameters(file: StudyFile, table: KeyPath, names: Mapping[str, Any], known: set[str]) -> None:
+def law_changes(file: StudyFile) -> LawChanges:
+    """What is bounded and fixed of candidate laws, and their factor of temperature."""
+    part = file.model.identification
+    with file.at("identification"):
+        return LawChanges().changed(values_of_table(LawChanges, part))
+
+
+def isothermal_laws(changes: LawChanges, laws: Sequence[CreepLaw]) -> list[CreepLaw]:
+    """The laws without a factor of temperature, with those of their own parameters changed that the study names."""
+    own = {name for law in laws for name in law.names}
+    bounds = {name: limits for name, limits in changes.bounds.items() if name in own}
+    fixed = {name: value for name, value in changes.fix.items() if name in own}
+    return LawChanges("none", fixed, bounds).applied(laws, ())
+
+
+def check_parameters(file: StudyFile, table: KeyPath, names: Mapping[str, Any], laws: Sequence[CreepLaw]) -> None:
     """StudyError for keys of a table that are parameters of none of the laws."""
+    known = {name for law in laws for name in law.names}
     for name in names:
         if name not in known:
             raise file.error((*table, name), f"no law has a parameter '{name}'; {nearest(name, known)}")
-
-
-def law_as_fitted(file: StudyFile, law: CreepLaw, histories: Sequence[History]) -> CreepLaw:
-    """A candidate law as it is fitted to tests: with its factor of temperature, bounded and fixed as the study says."""
-    part = file.model.identification
-    assert part is not None
-    return law if part.temperature == "none" else _changed(file, part, with_arrhenius(law, histories))
-
-
-def _changed(file: StudyFile, part: IdentificationTable, law: CreepLaw) -> CreepLaw:
-    """The law with those of its parameters bounded and fixed that the study names."""
-    bounds: dict[str, Any] = {name: (low, high) for name, (low, high) in part.bounds.items() if name in law.names}
-    fixed = {name: value for name, value in part.fix.items() if name in law.names}
-    with file.at("identification", "bounds"):
-        law = law.with_bounds(**bounds) if bounds else law
-    with file.at("identification", "fix"):
-        return law.fix(**fixed) if fixed else law
 
 
 def predictor_of(file: StudyFile) -> Predictor | None:
@@ -267,22 +268,12 @@ def tolerances_of(file: StudyFile, number: int) -> dict[str, float]:
     return {kinds[key]: value for key, value in given.items()}
 
 
-def goal_of(file: StudyFile) -> Goal | None:
-    """The goal of a design, as ck.design takes it."""
-    import creepkit as ck
-
-    part = file.model.design
-    assert part is not None
-    place = stated(part, stress="at_stress_MPa", T="at_temperature_C")
-    if part.goal is None or part.goal == "law" or part.goal == "parameters":
-        if place:
-            name = "at_stress_MPa" if "stress" in place else "at_temperature_C"
-            raise file.error(("design", name), 'belongs to the goals "rate" and "exponent"; leave it out')
-        return part.goal
-    if "stress" not in place:
-        raise file.error(("design", "goal"), f"{part.goal} is asked for at a stress: give at_stress_MPa")
+def goal_of(file: StudyFile) -> GoalOptions:
+    """What a design is asked for."""
     with file.at("design", "goal"):
-        return {"rate": ck.rate_at, "exponent": ck.exponent_at}[part.goal](*place.values())
+        asked = GoalOptions().changed(values_of_table(GoalOptions, file.model.design))
+        _ = asked.quantity  # which a rate without a stress has not
+        return asked
 
 
 def rigs_of_study(file: StudyFile, rigs: Sequence[Rig]) -> list[Rig]:
@@ -291,19 +282,8 @@ def rigs_of_study(file: StudyFile, rigs: Sequence[Rig]) -> list[Rig]:
 
     part = file.model.design
     assert part is not None
-    names = [rig.specimen for rig in rigs]
-    chosen = part.specimen or names[0]
-    if chosen not in names:
-        raise file.error(("design", "specimen"), f"the tests are of {' and '.join(names)}")
-    specimen = specimen_by_name(chosen)
-    changes = stated(
-        part,
-        "tests_per_run",
-        longest_hours="longest_h",
-        setup_hours="setup_h",
-        frame_interval="frame_interval_s",
-        temperatures="temperatures_C",
-    )
+    changes = values_of_table(Rig, part) | {"levels": None, "dimensions": None}
+    specimen = specimen_by_name(part.specimen or rigs[0].specimen)
     kinds = {load.name: load.kind for load in loads_of(specimen)}
     for key, bounds in part.levels.items():
         changes["levels"] = tuple(values_of(file, ("design", "levels", key), kinds, bounds)[1])
@@ -311,10 +291,8 @@ def rigs_of_study(file: StudyFile, rigs: Sequence[Rig]) -> list[Rig]:
     lengths = [values_of(file, ("design", "lengths", key), kinds, values) for key, values in part.lengths.items()]
     if lengths:
         changes["dimensions"] = {name: tuple(values) for name, values in lengths}
-    if changes and len(rigs) > 1 and part.specimen is None:
-        raise file.error(("design",), f"the tests are of {' and '.join(names)}: say by specimen whose rig is described")
     with file.at("design"):
-        return [rig.replace(**changes) if rig.specimen == chosen else rig for rig in rigs]
+        return changed_rigs(rigs, {name: value for name, value in changes.items() if value is not None})
 
 
 def check_temperature(file: StudyFile) -> None:
@@ -329,9 +307,9 @@ def check_temperature(file: StudyFile) -> None:
     if part.law is not None:
         with file.at("temperature", "law"):
             laws = [ck.law(part.law)]
-    for table, given in (("forms", part.forms), ("prior_odds", part.prior_odds)):
+    for table, given in (("forms", part.forms or {}), ("prior_odds", part.prior_odds or {})):
         if laws:
-            check_parameters(file, ("temperature", table), given, {name for law in laws for name in law.names})
+            check_parameters(file, ("temperature", table), given, laws)
         for parameter, names in given.items():
             with file.at("temperature", table, parameter):
                 check_form_names(names)

@@ -63,7 +63,8 @@ def proposed_cameras(folder: Path, path: Path, others: Sequence[Path], base: str
     for one, frames in cameras.items():
         own = next((file for file, found in times.items() if found is not None and found.size == len(frames)), None)
         source = base if one == folder else f"{place}{one.name}"
-        lines += _camera_lines(one.absolute().name, source, frames, own and f"{place}{own.name}", records)
+        beside_it = None if own is None else f"{place}{own.name}"
+        lines += _camera_lines(one.absolute().name, source, frames, beside_it, records)
         summary.append(f"{one}: {len(frames)} frames of {frames.system or 'a camera'}")
         named |= set() if own is None else {own}
     summary += [f"{one}: an instrument record with {len(record.channels)} channels" for one, record in records.items()]

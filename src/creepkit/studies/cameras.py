@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
@@ -21,9 +21,12 @@ from creepkit.api.planned_tests import stepped_load
 from creepkit.cameras.sequences import in_order
 from creepkit.errors import CreepkitError, HistoryError, StudyError, nearest
 from creepkit.extraction import Extraction
+from creepkit.extraction.options import ExtractionOptions
+from creepkit.files.record_codec import record_to_json
 from creepkit.instruments.imposed import Imposed
 from creepkit.inverse.fingerprints import predictor_fingerprint
 from creepkit.language import Elastic
+from creepkit.options import values_of_table
 from creepkit.records import Frames, History, Loading, Specimen, SupportsSurfaceObservation, loads_of
 from creepkit.registry.reading import frame_files
 from creepkit.reports.contents import Exclusion
@@ -121,12 +124,13 @@ class StudyCamera:
         if part.record is None and (len(part.load) != 1 or part.temperature_C is None):
             what = "does not say what was imposed; give record, or load and temperature_C, as load = { ... = 5 }"
             raise self.file.error(self.key(), what)
-        if part.names and part.centers_mm and len(part.names) != len(part.centers_mm):
-            what = f"are {len(part.names)}, and centers_mm {len(part.centers_mm)}; give one name of each"
+        names, centers = self.said.names, self.said.centers
+        if names and centers and len(names) != len(centers):
+            what = f"are {len(names)}, and centers_mm {len(centers)}; give one name of each"
             raise self.file.error(self.key("names"), what)
-        if len(set(part.names)) < len(part.names):
+        if len(set(names)) < len(names):
             raise self.file.error(self.key("names"), "stand there twice; each test piece has its own")
-        for name in ("record_number", "operator", "rest", "camera_start", "stated_loading", "lengths", "files"):
+        for name in ("record_number", "operator", "camera_start", "stated_loading", "lengths", "files"):
             getattr(self, name)  # each says what is wrong with its keys
 
     # ---- its table as arguments ------------------------------------------------------------------------------------
@@ -170,7 +174,7 @@ class StudyCamera:
     @property
     def format(self) -> Any:
         """The camera format as ck.read_frames takes it."""
-        return self.part.columns or self.part.format
+        return dict(self.said.columns) if self.said.columns else self.said.format
 
     @cached_property
     def specimen(self) -> Specimen:
@@ -192,20 +196,16 @@ class StudyCamera:
         """What is made of the points."""
         if self.part.operator is not None:
             return self.part.operator
-        with self.file.at(*self.key("rings_mm" if self.part.rings_mm else "window_mm")):
-            return operator_of(self.specimen, self.part.window_mm, self.part.rings_mm or ())
+        with self.file.at(*self.key("rings_mm" if self.said.rings else "window_mm")):
+            return operator_of(self.specimen, self.said.window, self.said.rings)
 
     @cached_property
-    def rest(self) -> slice | None:
-        """Frames at rest, where they are not to be found."""
-        text = self.part.rest_frames
-        if text is None:
-            return None
-        first, _, last = (one.strip() for one in text.partition("-"))
-        if not (first + last).isascii() or not first.isdecimal() or not last.isdecimal() or int(first) > int(last):
-            what = f"'{text}' is not known; write the first and the last, as \"0-39\""
-            raise self.file.error(self.key("rest_frames"), what)
-        return slice(int(first[:9]), int(last[:9]) + 1)
+    def said(self) -> ExtractionOptions:
+        """What is said of the frames."""
+        with self.file.at(*self.key("rest_frames")):
+            said = ExtractionOptions().changed({**values_of_table(ExtractionOptions, self.part), "times": None})
+            _ = said.frames_at_rest  # which a text that is no range of frames has not
+            return said
 
     @cached_property
     def camera_start(self) -> float | None:
@@ -250,37 +250,33 @@ class StudyCamera:
     def _extraction(self, hashes: Mapping[Path, list[str]]) -> Stage:
         import creepkit as ck
 
-        part, (paths, times, _) = self.part, self.files
-        centers: Any = part.centers_mm or None
-        if centers is not None:
-            names = part.names or [f"D{k + 1}" for k in range(len(centers))]
-            centers = {name: (x, y) for name, (x, y) in zip(names, centers, strict=True)}
+        part, said, (paths, times, _) = self.part, self.said, self.files
+        names = said.names or tuple(f"D{k + 1}" for k in range(len(said.centers)))
+        centers = {name: (x, y) for name, (x, y) in zip(names, said.centers, strict=False)}
 
         def make(results: Results, tick: Tick) -> ExtractedTests:
             frames = ck.read_frames(list(paths), self.format, times)
-            if part.interval_s is not None:
-                frames = replace(frames, times=part.interval_s * np.arange(len(frames), dtype=float))
+            if said.interval is not None:
+                frames = replace(frames, times=said.interval * np.arange(len(frames), dtype=float))
             found = ck.extract(
                 replace(_reporting(frames, tick), name=part.name),
                 self.specimen,
                 operator=self.operator,
-                centers=centers,
-                rest=self.rest,
-                subset=part.subset_mm,
+                centers=centers or None,
+                rest=said.frames_at_rest,
+                subset=said.subset,
             )
-            if part.names and centers is None:
-                if len(part.names) != len(found):
-                    raise HistoryError(
-                        f"{len(found)} test pieces were found, and {len(part.names)} names are given; give their "
-                        "centers_mm, or as many names"
-                    )
-                found = [one.replace(name=name) for one, name in zip(found, part.names, strict=True)]
+            if names and not centers:
+                if len(names) != len(found):
+                    what = f"{len(found)} test pieces were found, and {len(names)} names are given"
+                    raise HistoryError(f"{what}; give their centers_mm, or as many names")
+                found = [one.replace(name=name) for one, name in zip(found, names, strict=True)]
             return ExtractedTests(tuple(_without_folders(one, paths[0].parent) for one in found))
 
         settings = [
             {"frames": [hashes[path] for path in paths], "times": times and hashes[times]},
-            {name: getattr(part, name) for name in ("name", "format", "columns", "interval_s", "names", "subset_mm")},
-            [self.operator, part.centers_mm, part.rest_frames, predictor_fingerprint(self.specimen)],
+            record_to_json(asdict(said)),
+            [part.name, self.operator, predictor_fingerprint(self.specimen)],
         ]
         return Stage(self.name, "extraction", "", settings, make, ExtractedTests, _numbers_of_frames)
 

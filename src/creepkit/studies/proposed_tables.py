@@ -78,6 +78,10 @@ def tests_of_cameras(laws: Sequence[str]) -> list[list[str]]:
     return [["# [data]", CITATION_LINE], identification, REPORT]
 
 
+def _laws(names: Sequence[str]) -> str:
+    return f"laws = {quoted_list(names)}  # creepkit list laws lists all"
+
+
 def data(
     files: Sequence[str],
     reader: str | None,
@@ -185,7 +189,7 @@ def _identification(summary: DataSummary, laws: Sequence[str], of_tension: Itera
             summary.durations_known and not any(history.outputs for history in summary.tests)
         ),
         "[identification]": True,
-        f"laws = {quoted_list(laws)}  # creepkit list laws lists all": True,
+        _laws(laws): True,
         "fix = { alpha = 0, m = 0 }  # tables do not say how damage depends on principal stress and time": (
             with_alpha and summary.rupture_table
         ),

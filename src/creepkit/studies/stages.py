@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import creepkit as ck
+from creepkit.discovery.discover import DiscoveryOptions
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.files.file_names import hashed_stem
 from creepkit.files.record_codec import record_to_json
@@ -16,6 +17,7 @@ from creepkit.inverse.fingerprints import predictor_fingerprint, short_hash
 from creepkit.inverse.kept_fits import history_digest
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.search_options import SearchOptions
+from creepkit.options import values_of_table
 from creepkit.quality import DataQuality
 from creepkit.records import History
 from creepkit.registry import default_registry
@@ -71,9 +73,11 @@ class StageInputs:
         return arguments.settings_of(self.file)
 
     def laws(self, group: TestGroup) -> list[tuple[CreepLaw, CreepLaw]]:
-        """Pairs of a candidate as it is named, and as it is fitted to a group."""
-        named = arguments.laws_of(self.file)
-        return [(law, arguments.law_as_fitted(self.file, law, group.histories)) for law in named]
+        """Pairs of a candidate at one temperature, and as it is fitted to a group."""
+        laws, changes = arguments.laws_of(self.file), arguments.law_changes(self.file)
+        with self.file.at("identification"):
+            fitted = changes.applied(laws, group.histories)
+            return list(zip(arguments.isothermal_laws(changes, laws), fitted, strict=True))
 
 
 def _digests(histories: Sequence[History]) -> list[str]:
@@ -123,8 +127,8 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
     part, selection = model.identification, model.selection
     assert part is not None
     laws, tests = [fitted for _, fitted in study.laws(group)], list(group.histories)
-    how = SearchOptions(part.search, part.penalty)
-    search, penalty = how.global_search, how.term_penalty
+    asked = SearchOptions().changed(values_of_table(SearchOptions, part))
+    search, penalty = asked.global_search, asked.term_penalty
     by_likelihood = part.weights in (None, "likelihood") and part.loss in (None, "linear")
     by_likelihood = by_likelihood and search is None and penalty is None
     if selection is not None and not by_likelihood:
@@ -133,14 +137,14 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
 
     def make(results: Results, tick: Tick) -> Ranking:
         if by_likelihood and (len(laws) > 1 or selection is not None):
-            how: dict[str, Any] = {} if selection is None else {"by": selection.by, "sums": selection.sums}
+            how = {} if selection is None else values_of_table(SearchOptions, selection)
             return ck.select(laws, tests, using, settings=settings, progress=tick, **how)
         return _each_by_itself(laws, tests, using, settings, tick, search=search, penalty=penalty)
 
     described = {
         "laws": [[law.name, law.fingerprint, [[n, *p.bounds, p.off] for n, p in law.table.items()]] for law in laws],
         "settings": record_to_json(asdict(settings)),
-        "how": [part.search, part.penalty, None if selection is None else selection.model_dump()],
+        "how": [asked.search, asked.penalty, None if selection is None else selection.model_dump()],
         "using": study.using_fingerprint,
         "tests": _digests(tests),
     }
@@ -180,21 +184,18 @@ def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
 
     part, using, tests, law = study.file.model.temperature, study.using, list(group.histories), None
     assert part is not None
-    within = ISOTHERMAL_RANGE if part.within_K is None else part.within_K
+    options = values_of_table(DiscoveryOptions, part)
     if part.law is not None:
         with study.file.at("temperature", "law"):
             law = ck.law(part.law)
     elif study.file.model.identification is None:
         raise study.file.error(("temperature",), "needs a law: give law, or the table [identification]")
     need = "" if law is not None else study.needed(("temperature",), "identification", group)
-    options = stated(part, "forms", "parameters", prior="prior_odds")
 
     def make(results: Results, tick: Tick) -> Any:
         chosen, fit = (law, None) if law is not None else _best_candidate(study, results[need], group)
         settings = study.settings if fit is None else fit.settings
-        found = ck.temperature_study(
-            chosen, tests, using, moduli=part.moduli, within=within, settings=settings, progress=tick, **options
-        )
+        found = ck.temperature_study(chosen, tests, using, settings=settings, progress=tick, **options)
         if found.temperature_law is None:
             raise StudyError(found.notes[-1])
         # One law has one set of values: those of its identification, with what the study bounds and fixes.
@@ -217,7 +218,7 @@ def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
         numbers=lambda found: {"forms": found.temperature_law.forms, "values": found.temperature_law.values},
         needs=(need,) if need else (),
         document=document,
-        remark=isothermal_tests(tests, within)[1],
+        remark=isothermal_tests(tests, options.get("within", ISOTHERMAL_RANGE))[1],
     )
 
 
@@ -236,22 +237,20 @@ def _best_candidate(study: StageInputs, ranking: Ranking, group: TestGroup) -> t
 
 def _rupture_stage(study: StageInputs, group: TestGroup) -> Stage:
     """The assessment of the rupture times of a group."""
-    from creepkit.rupture_assessment.assessment import RuptureAssessment
+    from creepkit.rupture_assessment.assessment import RuptureAssessment, RuptureQuestion, RuptureSettings
 
     part, tests = study.file.model.rupture, list(group.histories)
     assert part is not None
-    changes = stated(part, "distribution", "criterion", "level", "degrees", "fixed")
-    if "degrees" in changes:
-        changes["degrees"] = tuple(changes["degrees"])
     with study.file.at("rupture"):
-        settings = ck.RuptureSettings(seed=study.file.model.study.seed, **changes)
-    how = stated(part, hours="times_h", temperatures="temperatures_C")
+        settings = ck.RuptureSettings(seed=study.file.model.study.seed)
+        settings = settings.changed(values_of_table(RuptureSettings, part))
+    how = values_of_table(RuptureQuestion, part)
     strengths = [stated(one, "strength_MPa", T="temperature_C") for one in part.tensile_strengths]
     if strengths:
         how["tensile_strength"] = {one["T"]: one["strength_MPa"] for one in strengths}
 
     def make(results: Results, tick: Tick) -> RuptureAssessment:
-        return ck.rupture(tests, part.methods, settings=settings, **how)
+        return ck.rupture(tests, settings=settings, **how)
 
     described = [part.model_dump(), record_to_json(asdict(settings)), _digests(tests)]
     name = stage_name("rupture", group.name)
@@ -313,12 +312,12 @@ def _design_stage(study: StageInputs, group: TestGroup) -> Stage:
     part, seed = study.file.model.design, study.file.model.study.seed
     assert part is not None
     need = study.needed(("design",), "identification", group)
-    goal = arguments.goal_of(study.file)
+    asked = arguments.goal_of(study.file)
 
     def make(results: Results, tick: Tick) -> Design:
         best = results[need].best
         rigs = arguments.rigs_of_study(study.file, rigs_of(best.histories, best.predictor))
-        return ck.design(results[need], rig=rigs, goal=goal, budget=part.budget_h, seed=seed, progress=tick)
+        return ck.design(results[need], rig=rigs, goal=asked.quantity, budget=asked.budget, seed=seed, progress=tick)
 
     def numbers(design: Design) -> dict[str, Any]:
         return {"plan": [test.description for test in design.plan]}

@@ -5,13 +5,21 @@ A key that is missing takes the default of the function that it goes to, which s
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
+from creepkit.discovery.discover import DiscoveryOptions
+from creepkit.experiments.design_options import GoalOptions
+from creepkit.experiments.rig import Rig
+from creepkit.extraction.options import ExtractionOptions
+from creepkit.inverse.candidate_laws import LawChanges
+from creepkit.inverse.search_options import SearchOptions
 from creepkit.inverse.settings import IdentificationSettings, OutputWeights
-from creepkit.options import table_of
+from creepkit.options import Options, table_of
+from creepkit.rupture_assessment.assessment import RuptureQuestion, RuptureSettings
 
 MOST_ITEMS = 1000
 """In a list of a study file."""
@@ -96,6 +104,24 @@ ChannelPair = Annotated[list[Text], Field(min_length=2, max_length=2)]
 Bounds = Annotated[list[Annotated[float, Field(ge=-1e100, le=1e100)]], Field(min_length=2, max_length=2)]
 
 
+TYPES: dict[Any, Any] = {
+    str: Text,
+    Path: Text,
+    tuple[str, ...]: OneOrMore,
+    tuple[tuple[float, ...], ...]: Annotated[list[Bounds], Field(max_length=MOST_ITEMS)],
+    OutputWeights: Annotated[Any, BeforeValidator(_output_weights)],
+}
+"""{type of an option: that of its key}, where it is another one in TOML."""
+
+
+def _keys(*records: type[Options], without: tuple[str, ...] = ()) -> Any:
+    """A table with the options of records as keys, None where they are missing."""
+    keys: Any = Table
+    for record in records:
+        keys = table_of(record, keys, types=TYPES, without=without)
+    return keys
+
+
 class StudyTable(Table):
     """[study]: what the report is called, and the seed of all random draws."""
 
@@ -140,7 +166,7 @@ class RecordTable(Table):
     missing: Texts = []
 
 
-class CameraTable(Table):
+class CameraTable(_keys(ExtractionOptions), Table):  # type: ignore[misc]
     """[[camera]]: frames of a surface, what is made of them as in ck.extract, and what was imposed meanwhile.
 
     frames : a folder, a pattern or files in their order. names, centers_mm : of the test pieces in the field of view.
@@ -151,18 +177,8 @@ class CameraTable(Table):
 
     name: Text
     frames: OneOrMore
-    format: Text | None = None
-    columns: dict[Text, Text] = {}
-    times: Text | None = None
-    interval_s: Annotated[float, Field(gt=0.0, lt=1e9)] | None = None
     specimen: Text | None = None
     operator: Text | None = None
-    window_mm: Positive | None = None
-    rings_mm: Numbers | None = None
-    names: Texts = []
-    centers_mm: Annotated[list[Bounds], Field(max_length=MOST_ITEMS)] = []
-    rest_frames: Text | None = None
-    subset_mm: Annotated[float, Field(ge=0.0)] = 0.0
     record: Text | None = None
     channels: Annotated[dict[str, ChannelPair], BeforeValidator(_channels)] = {}
     lag_s: float | None = None
@@ -211,46 +227,36 @@ class NuisanceTable(Table):
     sd_K: Positive | None = None
 
 
-WEIGHTS = {OutputWeights: Annotated[Any, BeforeValidator(_output_weights)]}
-ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws")
-"""Settings of identifications whose keys stand in tables of their own, or in [study], [data] and [selection]."""
+ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws", "bounds", "sums", "by")
+"""Options of identifications whose keys stand in tables of their own, in [study], [data] and [selection]."""
 
 
-_IdentificationKeys = table_of(IdentificationSettings, Table, types=WEIGHTS, without=ELSEWHERE)
+_OF_IDENTIFICATION: Any = _keys(IdentificationSettings, LawChanges, SearchOptions, without=ELSEWHERE)
 
 
-class IdentificationTable(_IdentificationKeys, Table):  # type: ignore[misc]
+class IdentificationTable(_OF_IDENTIFICATION, Table):  # type: ignore[misc]
     """[identification]: candidate laws and how each is fitted, for every group of tests."""
 
-    laws: Annotated[SomeTexts, BeforeValidator(_one_or_more)]
+    laws: OneOrMore
     group_by: Text | None = None
-    temperature: Literal["auto", "none"] = "auto"
     predictor: Text | None = None
-    fix: dict[Text, float] = {}
     bounds: dict[Text, Bounds] = {}
     nuisances: Annotated[list[NuisanceTable], Field(max_length=50)] = []
     without_nuisances: Texts = []
-    search: Literal["multi-start", "swarm", "cma-es"] = "multi-start"
-    penalty: Literal["l2", "group-l2", "sqrt", "subsets"] | None = None
 
 
-class SelectionTable(Table):
+class SelectionTable(_keys(SearchOptions, without=("search", "penalty")), Table):  # type: ignore[misc]
     """[selection]: how laws are compared; without sums, sums are tried where no candidate explains the tests."""
 
-    by: Literal["bic", "aicc", "hold-out"] = "bic"
-    sums: bool | None = None
     further_laws: Annotated[int, Field(ge=0, le=100)] | None = None
 
 
-class TemperatureTable(Table):
+class TemperatureTable(_keys(DiscoveryOptions, without=("forms", "prior")), Table):  # type: ignore[misc]
     """[temperature]: forms of temperature for the parameters of a law, by default the best law of each group."""
 
     law: Text | None = None
-    forms: dict[Text, OneOrMore] = {}
-    prior_odds: dict[Text, dict[Text, Positive]] = {}
-    parameters: Texts | None = None
-    moduli: bool = False
-    within_K: Annotated[float, Field(ge=0.0)] | None = None
+    forms: dict[Text, OneOrMore] | None = None
+    prior_odds: dict[Text, dict[Text, Positive]] | None = None
 
 
 class TensileStrength(Table):
@@ -260,18 +266,10 @@ class TensileStrength(Table):
     strength_MPa: Positive
 
 
-class RuptureTable(Table):
+class RuptureTable(_keys(RuptureSettings, RuptureQuestion, without=("seed",)), Table):  # type: ignore[misc]
     """[rupture]: parametric methods for rupture tests."""
 
-    methods: Annotated[SomeTexts, BeforeValidator(_one_or_more)] | None = None
-    times_h: Numbers | None = None
-    temperatures_C: Numbers | None = None
     tensile_strengths: Annotated[list[TensileStrength], Field(max_length=MOST_ITEMS)] = []
-    fixed: dict[Text, dict[Text, float]] = {}
-    degrees: Annotated[list[int], Field(min_length=1, max_length=10)] | None = None
-    distribution: Literal["lognormal", "weibull"] | None = None
-    criterion: Literal["bic", "aicc"] | None = None
-    level: Annotated[float, Field(ge=0.5, lt=1.0)] | None = None
 
 
 class ForecastTable(Table):
@@ -299,22 +297,12 @@ class ForecastTable(Table):
     draws: Annotated[int, Field(ge=50, le=100_000)] | None = None
 
 
-class DesignTable(Table):
-    """[design]: further tests, by what they tell for each hour of machine time."""
+class DesignTable(_keys(GoalOptions, Rig, without=("levels", "dimensions")), Table):  # type: ignore[misc]
+    """[design]: further tests, by what they tell for each hour of machine time; what is not said of the rig it did."""
 
-    goal: Literal["law", "parameters", "rate", "exponent"] | None = None
-    at_stress_MPa: Positive | None = None
-    at_temperature_C: float | None = None
     group: Text | None = None
-    budget_h: Positive | None = None
-    specimen: Text | None = None
     levels: dict[Text, Bounds] = {}
-    longest_h: Positive | None = None
-    temperatures_C: Numbers | None = None
     lengths: dict[Text, Numbers] = {}
-    tests_per_run: Annotated[int, Field(ge=1)] | None = None
-    setup_h: Annotated[float, Field(ge=0.0)] | None = None
-    frame_interval_s: Positive | None = None
 
 
 class ExportTable(Table):

@@ -8,13 +8,16 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
 
 from creepkit.arrays import Ints
-from creepkit.errors import SurrogateError
+from creepkit.checked_arguments import checked_with_own_words
+from creepkit.dataset.dataset import Dataset
+from creepkit.dataset.storage import read_dataset
+from creepkit.errors import DatasetError, SurrogateError
 from creepkit.files.json_documents import as_read_back
 from creepkit.surrogates.evaluation import (
     PredictionComparison,
@@ -31,9 +34,6 @@ from creepkit.surrogates.surrogate import Recipe, Surrogate
 from creepkit.surrogates.training_loop import NetworkTraining
 from creepkit.surrogates.training_rows import dataset_fingerprint, output_deviation, trainable_samples, training_split
 from creepkit.surrogates.weight_files import CHECKPOINT, read_weights, write_weights
-
-if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
 
 
 def training_request(data: Dataset, recipe: Recipe, seed: int) -> dict[str, Any]:
@@ -88,8 +88,9 @@ def _differences(first: Any, second: Any, path: str = "") -> list[str]:
     return [] if first == second else [path]
 
 
+@checked_with_own_words("recipe", "data")
 def train(
-    data: Dataset,
+    data: Dataset | str | Path,
     recipe: Recipe,
     *,
     to: str | Path | None = None,
@@ -98,14 +99,22 @@ def train(
     device: str = "auto",
     progress: ProgressCallback | None = None,
 ) -> Surrogate:
-    """Train a network on the accepted samples of a data set and return it as a predictor.
+    """Train a network on a data set, or its file, and return it as a predictor: identify(..., using=it).
 
-    to : file to write. A checkpoint lies beside it while the training goes on: the same call continues from there, and
-        to the last bit as if nothing had happened on a CPU; where the file is there already, it is returned.
+    recipe : ParameterGru(), the recurrent network of the law of the data, with its settings.
+    to : file to write. A checkpoint lies beside it while the training goes on: the same call continues from there, on
+        a CPU to the last bit as if nothing had happened; where the file is there already, it is returned.
     seed : of the split into training and validation rows, the first weights and the order of rows.
-    training : in the place of the recipe's own. device : "auto" (a GPU where there is one), "cpu", "cuda".
+    training : epochs, rate and so on in the place of the recipe's. device : "auto" (a GPU where there is one), "cpu".
     progress : called with (task, epochs done, epochs in all, note); the note says Eq. (4) of the validation rows.
     """
+    if isinstance(data, (str, Path)):
+        data = read_dataset(data)
+    if not hasattr(data, "accepted"):
+        raise DatasetError(f"train() takes a data set or its file, found {type(data).__name__}; generate() makes one")
+    if isinstance(recipe, type) or not hasattr(recipe, "sample_arrays"):
+        found_type = recipe.__name__ if isinstance(recipe, type) else type(recipe).__name__
+        raise SurrogateError(f"train() takes a recipe such as ParameterGru(hidden=128, layers=3), found {found_type}")
     recipe = recipe if training is None else replace(recipe, training=training)  # type: ignore[type-var]
     torch_device, path, data = _device(device), None if to is None else Path(to), trainable_samples(data)
     request = training_request(data, recipe, seed)

@@ -55,7 +55,7 @@ def loaded(folder: Path, text: str) -> ck.Study:
         ("interval_s = 10", 'interval_s = 10\ntimes = "times.csv"', 9, "interval_s: contradicts times"),
         ("interval_s = 10", 'format = "vic-4d"', 9, "there is no format 'vic-4d'; did you mean 'vic-3d'?"),
         ("interval_s = 10", 'specimen = "uniaxial"', 9, "does not say how cameras see its surface"),
-        ("interval_s = 10", 'rest_frames = "9-3"', 9, "'9-3' is not known; write the first and the last"),
+        ("interval_s = 10", 'rest_frames = "9-3"', 9, "rest is 9-3: write the first and the last"),
         ("interval_s = 10", 'camera_start = "yesterday"', 9, "'yesterday' is not known"),
         ("interval_s = 10", 'camera_start = "2025-08-18T18:51:53"', 9, "is not known"),
         ("interval_s = 10", "load = { pressure_bar = 5 }", 9, "contradicts record"),

@@ -63,8 +63,8 @@ BASE = '[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["norton"]\n'
         (BASE + '[[forecast]]\nname = "a"\nload = { stress_MPa = [{ from_h = 1, level = 5 }] }\nend_h = 3\n', 7, "0"),
         (BASE + '[[forecast]]\nname = "a"\nload = { pressure_MPa = 5 }\nend_h = 1\n', 5, "modulus_GPa"),
         (BASE + '[[forecast]]\nname = "a"\ntests = ["*.csv"]\nend_h = 1\n', 8, "leave one of them out"),
-        (BASE + '[design]\ngoal = "rate"\n', 6, "at_stress_MPa"),
-        (BASE + '[design]\ngoal = "law"\nat_stress_MPa = 5\n', 7, "belongs to the goals"),
+        (BASE + '[design]\ngoal = "rate"\n', 6, "give at_stress"),
+        (BASE + '[design]\ngoal = "law"\nat_stress_MPa = 5\n', 6, "belong to the goals"),
         ('[data]\nfiles = ["*.csv"]\n[temperature]\nlaw = "nortn"\n', 4, "did you mean 'norton'"),
     ],
 )

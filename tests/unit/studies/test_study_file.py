@@ -277,6 +277,7 @@ def test_values_of_a_wrong_type_are_refused_with_their_line():
                     "parameters",
                     "targets",
                     "frames",
+                    "names",
                     "channels",
                 }
                 assert key in allowed, (key, wrong)

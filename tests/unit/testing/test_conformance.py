@@ -104,7 +104,11 @@ BROKEN: dict[str, tuple[CreepLaw, str, str]] = {
         "numpy value against 50 digits",
         ", rate at stress ",
     ),
-    "off that is no switch": (law(A * sinh(stress / B), {A: RATE, B: scale(1, 100, off=0.0)}), "off equals fix", "off"),
+    "off that is no switch": (
+        law(A * sinh(stress / B), {A: RATE, B: scale(1, 100, off=0.0)}),
+        "off equals fix",
+        "is not finite and real",
+    ),
     "constraint that never holds": (
         law(A * stress**n, PLAIN, constraints=(n >= 9,)),
         "constraints",

@@ -186,7 +186,7 @@ LAWS: dict[str, tuple[str, str]] = {
     ),
     "off that is no switch": (
         law("A*sympy.sinh(stress/B)", "A: RATE, B: Param('b', (1, 100), 'MPa', 'log', off=0.0)"),
-        "switches",
+        "off equals fix: law",
     ),
     # ---- internal variables
     "limit below the start": (
