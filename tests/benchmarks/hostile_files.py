@@ -257,6 +257,7 @@ def hostile_folders(folder: Path) -> Iterator[tuple[str, bool, str]]:
         ["predict", "net.pt", "tests"],
         ["predict", "net.safetensors", "tests"],
         [
+            "surrogate",
             "generate",
             "norton",
             "--specimen",

@@ -21,7 +21,9 @@ PACKAGES_FOR_ANY_SPECIMEN = ("dataset", "sampling", "surrogates")
 
 ALLOWED = {
     "creepkit.cli.demo": "it shows a bulge test",
-    "creepkit.cli.options": "what commands take where no specimen is named",
+    "creepkit.cli.shared": "what commands take where no specimen is named",
+    "creepkit.extraction.options": "the window of a fit to a camera's frames, of any specimen",
+    "creepkit.cli.extract": "the same window",
 }
 
 

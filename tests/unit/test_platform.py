@@ -161,10 +161,10 @@ def test_names_differ_by_more_than_case(texts) -> None:
 
 ONCE_EACH = (
     ["--help"],
-    ["laws"],
-    ["specimens"],
-    ["plugins"],
-    ["laws", "combined"],
+    ["list", "laws"],
+    ["list", "specimens"],
+    ["list", "plugins"],
+    ["list", "laws", "combined"],
     ["export", "norton", "--to", "list"],
 )
 

@@ -189,8 +189,9 @@ app = typer.Typer(
 def _print_version(requested: bool) -> None:
     if requested:
         import creepkit
+        from creepkit.reports.terminal import tell
 
-        typer.echo(f"creepkit {creepkit.__version__}")
+        tell(f"creepkit {creepkit.__version__}")
         raise typer.Exit
 
 

@@ -47,4 +47,4 @@ def command(
         if as_json:
             print_json([{"name": key, "title": title, "provenance": source} for key, title, source in rows])
         else:
-            print_table("", ("name", "", "from"), rows)
+            print_table("", ("name", "what it is", "from"), rows)

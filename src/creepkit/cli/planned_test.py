@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from creepkit.api.planned_tests import planned_history, stepped_load
 from creepkit.cli.command_options import CheckedCommand
 from creepkit.cli.generated_options import pair, steps
+from creepkit.cli.shared import DEFAULT_SPECIMEN
 from creepkit.errors import SolveError
 from creepkit.limits import GIGAPASCAL, HOURS, RAMP
 from creepkit.options import GIGAPASCAL as IN_GIGAPASCAL
@@ -172,7 +173,7 @@ def _specimen_for(others: Mapping[str, Sequence[str]]) -> str:
     """The specimen that takes the loads, where none is named: a bar if it does, else the first that does."""
     names = {COMPONENTS} if any("=" in text for texts in others.values() for text in texts) else set(others)
     taking = [name for name, one in known_specimens().items() if names & {load.name for load in loads_of(one)}]
-    return "uniaxial" if "uniaxial" in taking or not taking else taking[0]
+    return DEFAULT_SPECIMEN if DEFAULT_SPECIMEN in taking or not taking else taking[0]
 
 
 def steps_of(texts: Sequence[str], flag: str) -> list[tuple[float, float]]:

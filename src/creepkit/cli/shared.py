@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
     from creepkit.records import History, LawWithValues
 
-PAPER_SPECIMEN = "bulge"
-"""What a data set is made of, and what a camera watches, where nothing is said."""
+PAPER_SPECIMEN, DEFAULT_SPECIMEN = "bulge", "uniaxial"
+"""What a data set is made of and a camera watches, and what a test is of whose load it takes, where nothing is said."""
 
 
 Files = Annotated[list[str], typer.Argument(metavar="FILE...", help="Measured files, folders or patterns.")]

@@ -49,7 +49,7 @@ class ParameterGru(Options, title="settings of a network", error=SurrogateError,
         record does. Derivatives are then left to differences.
     """
 
-    hidden: int = option(128, "Width of a layer.", limits.HIDDEN)
+    hidden: int = option(128, "Units of a layer.", limits.HIDDEN)
     layers: int = option(3, "Layers.", limits.LAYERS)
     cell: RecurrentCell = option("gru", "Of the network.")
     inputs: tuple[str, ...] = option((), "Of load, mean_load, time and step; by default what the grid needs.")
@@ -166,6 +166,6 @@ class NetworkSizes(Options, title="sizes of networks", error=SurrogateError):
     """
 
     layers: tuple[int, ...] = option((), "Numbers of layers.", limits.LAYERS)
-    hidden: tuple[int, ...] = option((), "Widths of a layer.", limits.HIDDEN)
+    hidden: tuple[int, ...] = option((), "Units of a layer.", limits.HIDDEN)
     cells: tuple[RecurrentCell, ...] = option((), "Of the network.")
     samples: tuple[int, ...] = option((), "Numbers of samples to learn from; all by default.", limits.SAMPLES)
