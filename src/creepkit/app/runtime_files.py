@@ -16,8 +16,7 @@ from creepkit.fem import simulation
 from creepkit.integration import batch_integration
 from creepkit.integration.core_structures import SettingsStructure
 from creepkit.integration.step_control import IntegrationSettings
-from creepkit.integration.time_discretisation import SDIRK4
-from creepkit.integration.time_transformation import SMALLEST_EXPONENT
+from creepkit.integration.time_discretisation import SDIRK4, SMALLEST_EXPONENT
 from creepkit.records import Status
 from creepkit.specimens.bulge.reduced_order_model import SEARCH_GROWTH, SEARCH_MODES, SEARCH_TOLERANCE
 

@@ -13,7 +13,7 @@ from creepkit.core import CoreStructure, address, function
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.solvable_model import SensitivityDirections, SolvableModel
-from creepkit.integration.implicit_stage import MAX_STATES
+from creepkit.integration.core_structures import MAX_STATES
 from creepkit.kernels.interface import CompiledLaw, Entry
 
 (

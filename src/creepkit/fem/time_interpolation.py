@@ -12,7 +12,7 @@ from creepkit import core
 from creepkit.arrays import ArrayLike, Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem.solver import MOTION, PRESSURE, START
-from creepkit.integration.time_transformation import SMALLEST_EXPONENT
+from creepkit.integration.time_discretisation import SMALLEST_EXPONENT
 
 OFFSET = 20.0
 """s; twice the first step after a change of load. As in src/core/time_interpolation.hpp."""

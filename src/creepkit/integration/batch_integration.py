@@ -14,6 +14,8 @@ from creepkit.arrays import Floats, Ints, frozen
 from creepkit.core import function
 from creepkit.errors import SolveError
 from creepkit.integration.core_structures import (
+    UNIAXIAL,
+    Axes,
     BatchStructure,
     axes_structure,
     check_call,
@@ -30,7 +32,6 @@ from creepkit.integration.event_location import (
     STRAIN_LIMIT,
     TOO_MANY_STEPS,
 )
-from creepkit.integration.implicit_stage import UNIAXIAL, Axes
 from creepkit.integration.step_control import IntegrationSettings
 from creepkit.integration.time_discretisation import SDIRK4, Tableau, merge_programs
 from creepkit.kernels.interface import CompiledLaw

@@ -4,16 +4,33 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from creepkit.arrays import Floats, Ints
 from creepkit.core import address
 from creepkit.errors import SolveError
-from creepkit.integration.implicit_stage import MAX_STATES, Axes
 from creepkit.integration.step_control import IntegrationSettings
 from creepkit.integration.time_discretisation import Tableau
 from creepkit.kernels.interface import CompiledLaw
 
 _NUMBER, _COUNT, _POINTER = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
+
+
+MAX_STATES = 16
+"""Internal variables of a law, at most."""
+
+
+class Axes(NamedTuple):
+    """Largest principal and mean stress as straight lines in the equivalent stress: offset + slope sigma, MPa."""
+
+    principal: float
+    principal_slope: float
+    mean: float
+    mean_slope: float
+
+
+UNIAXIAL = Axes(0.0, 1.0, 0.0, 1.0 / 3.0)
+"""Uniaxial tension: the largest principal stress is the stress, the mean stress a third of it."""
 
 
 class AxesStructure(ctypes.Structure):

@@ -1,7 +1,7 @@
 """Time discretisation of creep: Runge-Kutta tableaux and the segments of a load program.
 
 The tableaux are diagonally implicit and stiffly accurate. Within each segment of the load program steps are taken in a
-transformed time in which creep strain is nearly a straight line (`time_transformation`).
+transformed time in which creep strain is nearly a straight line (`time_transformation.hpp`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.records import Program
+
+SMALLEST_EXPONENT = 0.05
+"""Exponents of time are not taken below this: t^m with m = -0.95, where the laws' bounds stop."""
 
 
 class Tableau(NamedTuple):

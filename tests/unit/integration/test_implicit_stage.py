@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from creepkit.integration.implicit_stage import (
+from creepkit.kernels import lower
+from creepkit.kernels.interface import MEAN_STRESS, PRINCIPAL_STRESS, STRAIN, STRESS, TIME, call_entry
+from creepkit.language import Param, mean_stress, parameters, principal_stress
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.norton import NORTON
+from helpers.implicit_stage import (
     BY_LOG_WEIGHT,
     BY_MEAN,
     BY_PRINCIPAL,
@@ -22,11 +27,6 @@ from creepkit.integration.implicit_stage import (
     solve_stage,
     stage_response,
 )
-from creepkit.kernels import lower
-from creepkit.kernels.interface import MEAN_STRESS, PRINCIPAL_STRESS, STRAIN, STRESS, TIME, call_entry
-from creepkit.language import Param, mean_stress, parameters, principal_stress
-from creepkit.laws.combined import COMBINED
-from creepkit.laws.norton import NORTON
 from helpers.kachanov_law import kachanov
 
 (a,) = parameters("a")

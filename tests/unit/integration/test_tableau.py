@@ -9,10 +9,10 @@ import pytest
 
 from creepkit.core import address, function
 from creepkit.integration.core_structures import tableau_structure
-from creepkit.integration.implicit_stage import SOLVED
 from creepkit.integration.time_discretisation import SDIRK2, SDIRK4, Tableau
 from creepkit.kernels import lower
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from helpers.implicit_stage import SOLVED
 
 TABLEAUX = pytest.mark.parametrize("tableau", [SDIRK2, SDIRK4], ids=["SDIRK2", "SDIRK4"])
 

@@ -13,7 +13,6 @@ from creepkit.integration.tensor_integration import (
     prescribed_strain,
     prescribed_stress,
 )
-from creepkit.integration.tensor_point import constitutive_response
 from creepkit.integration.time_discretisation import SDIRK2, SDIRK4
 from creepkit.kernels import lower
 from creepkit.language import (
@@ -29,6 +28,7 @@ from creepkit.language import (
 )
 from creepkit.laws.norton import NORTON
 from creepkit.records import Program, Status
+from helpers.tensor_response import constitutive_response
 
 STEEL = (150e3, 0.3)
 A, n, C, v = parameters("A n C v")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from creepkit.integration.time_transformation import (
-    SMALLEST_EXPONENT,
+from creepkit.integration.time_discretisation import SMALLEST_EXPONENT
+from helpers.time_transformation import (
     TimeTransformation,
     power_law_transformation,
     shifted_power_law_transformation,

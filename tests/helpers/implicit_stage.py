@@ -13,27 +13,11 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.core import address, function
+from creepkit.integration.core_structures import UNIAXIAL, Axes
 from creepkit.kernels.interface import POINT_SIZE, CompiledLaw
-
-MAX_STATES = 16
-"""Internal variables of a law, at most."""
-
 
 SOLVED, NOT_FINITE, NO_SOLUTION, TOO_MANY = range(4)
 """Flags of a stage: solved; the rate is not finite; no increment satisfies the equation; iterations used up."""
-
-
-class Axes(NamedTuple):
-    """Largest principal and mean stress as straight lines in the equivalent stress: offset + slope sigma, MPa."""
-
-    principal: float
-    principal_slope: float
-    mean: float
-    mean_slope: float
-
-
-UNIAXIAL = Axes(0.0, 1.0, 0.0, 1.0 / 3.0)
-"""Uniaxial tension: the largest principal stress is the stress, the mean stress a third of it."""
 
 
 class StageProblem(NamedTuple):

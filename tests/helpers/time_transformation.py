@@ -13,9 +13,6 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.core import address, function
 
-SMALLEST_EXPONENT = 0.05
-"""Exponents of time are not taken below this: t^m with m = -0.95, where the laws' bounds stop."""
-
 
 class TimeTransformation(NamedTuple):
     """start and length of the segment, s; beta, and tau in s (0: from a virgin state)."""
