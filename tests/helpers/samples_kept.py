@@ -11,6 +11,7 @@ from typing import Any
 import creepkit as ck
 from creepkit.errors import StudyError
 from creepkit.files.json_documents import json_text
+from creepkit.files.reading import read_bytes
 from creepkit.files.safetensors_files import HEADER_KEY
 from creepkit.files.writing import write_bytes
 from creepkit.inverse.identification_document import read_identification
@@ -28,6 +29,7 @@ from creepkit.studies.lock import STUDY_LOCK, read_lock
 from creepkit.studies.stage import Stage
 from creepkit.studies.stages import numbers_of_ranking
 from creepkit.surrogates.loading import load_surrogate
+from creepkit.surrogates.weight_files import SURROGATE
 from helpers.paths import ROOT
 from helpers.reader_samples import ReaderSample
 from helpers.samples_documents import STUDY, document, written
@@ -107,7 +109,7 @@ def read_header(path: Path) -> Any:
     with safe_open(MADE / "surrogate.safetensors", framework="numpy") as file:
         arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (a handle, not a mapping)
     target = path.with_suffix(".safetensors")
-    text = path.read_bytes().decode("utf-8", "replace")
+    text = read_bytes(path, SURROGATE.kind).decode("utf-8", "replace")
     target.write_bytes(save(arrays, metadata={HEADER_KEY: text}))
     return load_surrogate(target)
 

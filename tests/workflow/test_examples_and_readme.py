@@ -62,7 +62,8 @@ def test_readme_blocks_run_in_order(tmp_path, monkeypatch, capsys):
     space: dict[str, object] = {}
     for block in readme_blocks("python"):
         exec(compile(block, "README.md", "exec"), space)
-    assert str(space["plate"]).count("failed") == 0
+    assert space["fit"].adequacy.explains
+    assert "subroutine creep" in capsys.readouterr().out
 
 
 def test_readme_commands_run_in_order(tmp_path, monkeypatch, capsys):
@@ -76,3 +77,9 @@ def test_readme_commands_run_in_order(tmp_path, monkeypatch, capsys):
         if words[0] == "run":
             truth = json.loads(Path("curves/truth.json").read_text())
             assert f"decisive: {truth['law']}" in result.stdout
+
+
+def test_readme_has_one_road_for_files_and_one_for_python():
+    (commands,), (snippet,) = readme_blocks("sh"), readme_blocks("python")
+    assert len(commands.splitlines()) == 3
+    assert len([line for line in snippet.splitlines() if line]) <= 6

@@ -1,0 +1,94 @@
+"""The size of the code is a design decision: lines of code of each package, no more than stated here.
+
+Whoever raises a row says in the same commit what made it necessary, and what was removed for it. A line of code is
+neither blank nor comment nor docstring.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+
+from helpers.paths import ROOT
+
+BUDGET = {
+    "api": 750,
+    "app": 650,
+    "cameras": 1200,
+    "cli": 2700,
+    "core": 100,
+    "dataset": 850,
+    "discovery": 1250,
+    "experiments": 1800,
+    "exporters": 3050,
+    "extraction": 1150,
+    "fem": 1900,
+    "files": 1350,
+    "forecasts": 1450,
+    "instruments": 1400,
+    "integration": 1100,
+    "inverse": 11500,
+    "jobs": 400,
+    "kernels": 1850,
+    "language": 1600,
+    "laws": 150,
+    "modules": 850,
+    "quality": 1400,
+    "readers": 4150,
+    "records": 2050,
+    "registry": 650,
+    "reports": 8000,
+    "rupture_assessment": 1950,
+    "sampling": 1200,
+    "screening": 750,
+    "specimens": 4050,
+    "studies": 2950,
+    "surrogates": 2000,
+    "testing": 2050,
+}
+"""{package, or modules beside packages: lines}."""
+
+TESTS = 35750
+"""Lines of tests, those of plugins included, without benchmarks."""
+
+
+def code_lines(path: Path) -> int:
+    """Lines that are neither blank nor comment nor docstring."""
+    text, documentation = path.read_text(encoding="utf-8"), set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)) and node.body:
+            first = node.body[0]
+            if (
+                isinstance(first, ast.Expr)
+                and isinstance(first.value, ast.Constant)
+                and isinstance(first.value.value, str)
+            ):
+                documentation |= set(range(first.lineno, first.end_lineno + 1))
+    lines = ((number, line.strip()) for number, line in enumerate(text.splitlines(), 1))
+    return sum(bool(line) and not line.startswith("#") and number not in documentation for number, line in lines)
+
+
+def lines_of(paths: Iterable[Path]) -> int:
+    return sum(map(code_lines, paths))
+
+
+def sizes() -> Counter[str]:
+    """{package: lines of code}; modules beside the packages, and programs of the core, count together."""
+    found: Counter[str] = Counter()
+    for path in (ROOT / "src").rglob("*.py"):
+        parts = path.relative_to(ROOT / "src").parts
+        found[parts[1] if len(parts) > 2 else "modules"] += code_lines(path)
+    return found
+
+
+def test_every_package_is_within_its_budget() -> None:
+    found = sizes()
+    above = {name: (size, BUDGET.get(name, 0)) for name, size in found.items() if size > BUDGET.get(name, 0)}
+    assert above == {}, "remove as much as was added, or raise the row and say why"
+
+
+def test_tests_are_within_their_budget() -> None:
+    tests = [path for path in (ROOT / "tests").rglob("*.py") if "benchmarks" not in path.parts]
+    assert lines_of([*tests, *(ROOT / "plugins").glob("*/tests/**/*.py")]) <= TESTS
