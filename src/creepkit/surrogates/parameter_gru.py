@@ -22,7 +22,6 @@ from creepkit.surrogates.parameter_inputs import (
     constant_inputs,
     load_history_arrays,
 )
-from creepkit.surrogates.parameter_surrogate import ParameterSurrogate
 from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, SurrogateMetadata, Training, Weights
 from creepkit.surrogates.surrogate import Surrogate
 
@@ -117,7 +116,7 @@ class ParameterGru(Options, title="settings of a network", error=SurrogateError,
 
     def surrogate(self, weights: Weights, metadata: SurrogateMetadata) -> Surrogate:
         """The network as a predictor."""
-        return ParameterSurrogate(self, weights, metadata)
+        return Surrogate(self, weights, metadata)
 
     def network(self, weights: Weights, metadata: SurrogateMetadata) -> ParameterNetwork:
         """The trained network; SurrogateError where the weights are not those of this recipe."""
