@@ -52,7 +52,7 @@ def load_surrogate(path: str | Path, document: DocumentFormat = SURROGATE) -> Su
             raise SurrogateError(f"kind '{quoted(header['kind'])}' is unknown here; it must be '{ParameterGru.kind}'")
         recipe = CODEC.from_json(ParameterGru, header["recipe"], "recipe")
         metadata = CODEC.from_json(SurrogateMetadata, header["metadata"], "metadata")
-        surrogate = recipe.surrogate(weights, metadata)
+        surrogate = Surrogate(recipe, weights, metadata)
         infinite = [name for name, one in weights.items() if not np.isfinite(np.asarray(one, dtype=float)).all()]
         if infinite:
             raise SurrogateError(f"its weights '{infinite[0]}' are not finite; train it again")

@@ -129,9 +129,9 @@ def train(
     fit.run(checkpoint.save, progress)
     weights = weights_of(fit.best)
     comparison = compare_predictions(
-        recipe.surrogate(weights, metadata), samples, data, rows[1], output_deviation(samples, rows[0])
+        Surrogate(recipe, weights, metadata), samples, data, rows[1], output_deviation(samples, rows[0])
     )
-    result = recipe.surrogate(weights, _training_metadata(metadata, data, comparison, rows, fit, request))
+    result = Surrogate(recipe, weights, _training_metadata(metadata, data, comparison, rows, fit, request))
     if path is not None:
         result.save(path)
         checkpoint.remove()
