@@ -119,6 +119,7 @@ def check_form_options(
     check_form_names(chain(listed, *(prior or {}).values()))
 
 
+@checked
 @dataclass(frozen=True)
 class DiscoveryOptions(Options, title="options of a temperature study", error=FitError):
     """What temperature_study() is asked beside the settings of its identifications.
