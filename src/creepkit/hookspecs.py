@@ -10,7 +10,7 @@ import pluggy
 if TYPE_CHECKING:
     import typer
 
-    from creepkit.language import CreepLaw
+    from creepkit.language.law import CreepLaw
     from creepkit.records import CameraFormat, Exporter, InstrumentFormat, Reader, Specimen
 
 

@@ -1,4 +1,4 @@
-"""What measured tests hold, as far as it decides which laws and stages a proposed study has."""
+"""What tests hold that decides which stages of a study make sense."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from creepkit.records import History, load_unit
 from creepkit.records.units import celsius_text
 from creepkit.studies.tertiary_creep import shows_tertiary_creep
 
+FEWEST_RUPTURES = 5
+"""For methods of rupture times."""
+
+
 SAME_TEMPERATURE = 5.0
 """K."""
-
-
-FEWEST_TEMPERATURES, FEWEST_RUPTURES = 3, 5
-"""For forms of temperature, and for methods of rupture times."""
 
 
 @dataclass(frozen=True)

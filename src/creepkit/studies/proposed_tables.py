@@ -11,10 +11,14 @@ from creepkit.inverse.duration import followed_duration
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, dimensions_of, load_unit
-from creepkit.studies.data_summary import FEWEST_RUPTURES, FEWEST_TEMPERATURES, DataSummary
+from creepkit.studies.data_summary import FEWEST_RUPTURES, DataSummary
 
 MOST_REMARKS = 20
 """Files that were not read, and flags, that the comments name."""
+
+
+FEWEST_TEMPERATURES = 3
+"""For forms of temperature."""
 
 
 CITATION_LINE = '# citation = "authors (year), title, doi"  # of published data: the methods text cites it'
