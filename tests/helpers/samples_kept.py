@@ -14,12 +14,12 @@ from creepkit.files.json_documents import json_text
 from creepkit.files.reading import read_bytes
 from creepkit.files.safetensors_files import HEADER_KEY
 from creepkit.files.writing import write_bytes
-from creepkit.inverse.identification_document import read_identification
+from creepkit.inverse.identification_document import load
 from creepkit.inverse.kept_fits import KEPT_FIT, FitFolder, kept_to_json
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.reports.attachments import embed
 from creepkit.reports.contents import Attachment
-from creepkit.rupture_assessment.assessment_document import read_assessment
+from creepkit.rupture_assessment.assessment_document import load_rupture_assessment
 from creepkit.screening.files import read_result, write_result
 from creepkit.screening.results import AlloyResult, WeightedLaw
 from creepkit.studies.carried_study import study_of_report
@@ -74,7 +74,7 @@ class StageResult:
 
     def content(self) -> bytes:
         """A file of such a result."""
-        ranking = ck.rank([read_identification(FORMATS / "identification.json").with_histories(self.tests)])
+        ranking = ck.rank([load(FORMATS / "identification.json").with_histories(self.tests)])
         with tempfile.TemporaryDirectory() as name:
             folder = ResultFolder(Path(name))
             Execution(folder, histories=self.tests).run([self._making(ranking)], ["identification"])
@@ -133,12 +133,16 @@ def run_report(path: Path) -> Any:
 def samples() -> Iterator[ReaderSample]:
     """The samples of kept files."""
     yield document(
-        "rupture assessment", "x.json", (MADE / "rupture.json").read_bytes(), read_assessment, '"ranked" "tests"'
+        "rupture assessment",
+        "x.json",
+        (MADE / "rupture.json").read_bytes(),
+        load_rupture_assessment,
+        '"ranked" "tests"',
     )
     surrogate = document("surrogate", "x.safetensors", (MADE / "surrogate.safetensors").read_bytes(), load_surrogate)
     yield ReaderSample(**{**surrogate.__dict__, "repeated": ()})
     yield document("surrogate header", "x.json", header(), read_header, '"recipe" "metadata" "kind" "format"')
-    fit = read_identification(FORMATS / "identification.json")
+    fit = load(FORMATS / "identification.json")
     kept = json_text({**KEPT_FIT.heading, **kept_to_json(fit)}).encode()
     yield document("kept fit", "x.json", kept, read_kept_fit, '"linearised" "identification"')
     result = AlloyResult("A", laws=(WeightedLaw(fit, 0.0, 1.0),))

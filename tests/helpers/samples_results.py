@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from creepkit.inverse.identification_document import read_identification
-from creepkit.inverse.ranking_document import read_ranking
+from creepkit.inverse.identification_document import load
+from creepkit.inverse.ranking_document import load_ranking
 from helpers.paths import ROOT
 from helpers.reader_samples import ReaderSample
 from helpers.samples_documents import document
@@ -17,6 +17,6 @@ def samples() -> Iterator[ReaderSample]:
     """The samples of results."""
     fit, ranking = ((FORMATS / name).read_bytes() for name in ("identification.json", "ranking.json"))
     keys = '"format" "version"'
-    yield document("identification", "identification.json", fit, read_identification, keys)
+    yield document("identification", "identification.json", fit, load, keys)
     others = {"identification.json": fit}
-    yield document("ranking", "ranking.json", ranking, read_ranking, '"format" "weight"', others)
+    yield document("ranking", "ranking.json", ranking, load_ranking, '"format" "weight"', others)

@@ -14,7 +14,7 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 750,
+    "api": 200,
     "app": 650,
     "cameras": 1200,
     "cli": 2700,
@@ -26,10 +26,10 @@ BUDGET = {
     "extraction": 1150,
     "fem": 1900,
     "files": 1350,
-    "forecasts": 1450,
+    "forecasts": 1500,
     "instruments": 1400,
     "integration": 1100,
-    "inverse": 11500,
+    "inverse": 11550,
     "jobs": 400,
     "kernels": 1850,
     "language": 1600,
@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 4150,
     "records": 2050,
     "registry": 650,
-    "reports": 8000,
+    "reports": 8250,
     "rupture_assessment": 1950,
     "sampling": 1200,
     "screening": 750,

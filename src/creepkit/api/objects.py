@@ -1,4 +1,4 @@
-"""Laws, specimens, surrogates, plugins, example data and saved identifications, by name or file."""
+"""Laws, specimens, plugins and example data, by name or file."""
 
 from __future__ import annotations
 
@@ -10,12 +10,9 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, PluginError, nearest
 
 if TYPE_CHECKING:
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.language import CreepLaw
-    from creepkit.records import Predictor, Specimen
+    from creepkit.records import Specimen
     from creepkit.registry import Plugin
-    from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 
 EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
@@ -52,45 +49,6 @@ def load_plugin(path: str | Path) -> Plugin:
     The file is run as a program: load only what you trust.
     """
     return registry.default_registry().load_file(path)
-
-
-@checked
-def surrogate(name_or_path: str | Path) -> Predictor:
-    """Return a cheap model that stands for a specimen, by its name or from its file.
-
-    name_or_path : "dimple", the reduced-order model of the default bulge specimen; or the file of a trained network,
-        see train().
-    """
-    from creepkit.surrogates.loading import surrogate_by_name
-
-    return surrogate_by_name(name_or_path)
-
-
-@checked
-def load(path: str | Path) -> Identification:
-    """Return the identification saved in a JSON file.
-
-    It knows its specimen by name and predicts new histories; attach its own with `.with_histories(histories)`.
-    """
-    from creepkit.inverse.identification_document import read_identification as run
-
-    return run(path)
-
-
-@checked
-def load_ranking(path: str | Path) -> ModelAverage:
-    """Return the laws of a ranking.json with their weights, as forecasts take them; the files of laws lie beside it."""
-    from creepkit.inverse.ranking_document import read_ranking as run
-
-    return run(path)
-
-
-@checked
-def load_rupture_assessment(path: str | Path) -> RuptureAssessment:
-    """Return the rupture assessment saved in a JSON file: its fits predict, plot and state strengths as before."""
-    from creepkit.rupture_assessment.assessment_document import read_assessment as run
-
-    return run(path)
 
 
 @checked

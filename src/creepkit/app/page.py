@@ -7,17 +7,20 @@ elements that browsers do not run, and whatever of them is shown is shown as tex
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from html import escape
 from pathlib import Path
 
-from creepkit.app.contents import PageContents
+from creepkit.app.contents import PageContents, PageSource, page_contents
 from creepkit.app.documents import contents_document
 from creepkit.app.models import page_models
 from creepkit.app.runtime_files import runtime_script
+from creepkit.checked_arguments import checked
+from creepkit.errors import ExportError
 from creepkit.exporters.javascript import law_expression, script_safe_json
-from creepkit.records import LawWithValues
+from creepkit.files.writing import check_target, write_text
+from creepkit.records import History, LawWithValues
 
 SCRIPTS = (
     *("numbers", "elements", "chart", "section", "controls", "law_controls", "test_controls", "test_list"),
@@ -36,6 +39,41 @@ POLICY = (
     "form-action 'none'\">"
 )
 """A page loads nothing and sends nothing."""
+
+
+@checked
+def interactive_page(
+    source: PageSource,
+    to: str | Path = "page.html",
+    *,
+    tests: Sequence[History] = (),
+    specimen: str | None = None,
+    title: str = "",
+    force: bool = False,
+) -> Path:
+    """Write a page of HTML on which a law's parameters are moved by sliders, and return its path.
+
+    It is one file that needs no network: curves are computed in the browser.
+
+    source : a law or its name, a law with values, an identification or a ranking.
+    tests : measured ones that are laid over; by default those that an identification holds.
+    specimen : which is shown first. title : of the page.
+    force : whether a file that creepkit did not write is replaced.
+
+    Raises ExportError for a law that cannot be written as JavaScript, for a page that is too large, and for a file that
+    cannot be written. The page shows MPa, hours, mm and kelvin.
+    """
+    path = Path(to)
+    contents = page_contents(source, tests, specimen=specimen, title=title)
+    check_target(path, ExportError, force=force)
+    text = page_html(contents).encode("utf-8", "replace").decode("utf-8")  # half a character is none
+    size = len(text.encode("utf-8"))
+    if size > LARGEST_PAGE:
+        raise ExportError(
+            f"{path}: the page would have {size / 1e6:.1f} MB, allowed is {LARGEST_PAGE / 1e6:g} MB; give fewer tests "
+            "or laws"
+        )
+    return write_text(text, path, ExportError, force=force)
 
 
 def page_html(contents: PageContents) -> str:

@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from creepkit.api.planned_tests import planned_history, stepped_load
 from creepkit.cli.command_options import CheckedCommand
 from creepkit.cli.generated_options import pair, steps
 from creepkit.cli.shared import DEFAULT_SPECIMEN
 from creepkit.errors import SolveError
+from creepkit.forecasts.planned_tests import planned_history, stepped_load
 from creepkit.limits import GIGAPASCAL, HOURS, RAMP
 from creepkit.options import GIGAPASCAL as IN_GIGAPASCAL
 from creepkit.options import HOURS as IN_HOURS

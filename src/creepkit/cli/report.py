@@ -67,12 +67,12 @@ def _page_source(name: str) -> PageSource:
     """A law by its name, or what a file holds."""
     from creepkit.exporters.law_files import VALUED_LAW
     from creepkit.files.json_documents import read_json
-    from creepkit.inverse.ranking_document import RANKING, read_ranking
+    from creepkit.inverse.ranking_document import RANKING, load_ranking
 
     if is_file_name(name):
         data = read_json(Path(name), VALUED_LAW.kind)
         if isinstance(data, dict) and data.get("format") == RANKING.name:
-            return read_ranking(name)
+            return load_ranking(name)
     return law_source(name)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.discovery.combinations import rank_combinations
-from creepkit.discovery.elastic_moduli import FIRST_FRAMES, ModulusEstimates, identify_moduli
+from creepkit.discovery.elastic_moduli import FIRST_FRAMES, ModulusEstimates, moduli
 from creepkit.discovery.forms import CONSTANT, CandidateForm, candidate_forms, check_form_names
 from creepkit.discovery.refitting import refit
 from creepkit.discovery.regression import IsothermalEstimates, check_temperatures, isothermal_groups
@@ -119,6 +119,7 @@ def check_form_options(
     check_form_names(chain(listed, *(prior or {}).values()))
 
 
+@checked
 @dataclass(frozen=True)
 class DiscoveryOptions(Options, title="options of a temperature study", error=FitError):
     """What temperature_study() is asked beside the settings of its identifications.
@@ -197,7 +198,7 @@ def temperature_study(
     notes = [*left_out, *([not_isothermal] if not_isothermal else [])]
     moduli_fit = None
     if options.moduli:
-        moduli_fit = identify_moduli(with_arrhenius(law, histories), histories, predictor, frames=FIRST_FRAMES)
+        moduli_fit = moduli(with_arrhenius(law, histories), histories, predictor, frames=FIRST_FRAMES)
         if moduli_fit.elastic is not None:
             histories = [h.replace(elastic=moduli_fit.elastic) for h in histories]
     joint_fit = identify(with_arrhenius(law, histories), histories, predictor, settings=settings, progress=progress)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
@@ -17,6 +18,8 @@ from creepkit.language import CreepLaw
 from creepkit.language.elastic import Elastic, wachtman
 from creepkit.presentation import Presentable
 from creepkit.records import History, Nuisance, Predictor
+from creepkit.registry import resolve_law
+from creepkit.registry.arguments import check_histories, resolve_predictors
 
 FIRST_FRAMES = 15
 
@@ -46,15 +49,25 @@ class ModulusEstimates(Presentable, text="reports.temperature_law:modulus_estima
     fit: Identification
 
 
-def identify_moduli(
-    law: CreepLaw,
+@checked
+def moduli(
+    law: CreepLaw | str,
     histories: Sequence[History],
-    using: Predictor,
+    using: Predictor | str | None = None,
     *,
     frames: int = FIRST_FRAMES,
     settings: IdentificationSettings | None = None,
 ) -> ModulusEstimates:
-    """Identify the modulus of each test from its first used frames; every history states a modulus to begin from."""
+    """Identify Young's modulus of each bulge test from its first frames, and Wachtman's form through the moduli.
+
+    law : the creep law, with its temperature; frames : used frames of each test, the paper's 15 by default.
+    Every history states a modulus to begin from.
+    `[h.replace(elastic=estimates.elastic) for h in histories]` then fixes the moduli.
+    """
+    histories = check_histories(histories)
+    predictor = resolve_predictors(using, histories)
+    if isinstance(predictor, Mapping):
+        raise FitError("moduli are identified from tests of one specimen; give those alone, and using= that one")
     without_modulus = [h.name for h in histories if h.elastic is None]
     if without_modulus:
         raise FitError(f"history '{without_modulus[0]}' states no modulus to begin from; set elastic=Elastic(E=...)")
@@ -62,9 +75,8 @@ def identify_moduli(
         raise FitError(f"frames is {frames}; at least 3 are needed to tell a modulus from creep")
     first_frames = [h.replace(used=h.used & (np.cumsum(h.used) <= frames)) for h in histories]
     modulus = Nuisance("modulus", sd=np.inf, bounds=MODULUS_BOUNDS)
-    fit = identify(
-        law, first_frames, using, settings=replace(settings or IdentificationSettings(starts=4), nuisances=(modulus,))
-    )
+    chosen = replace(settings or IdentificationSettings(starts=4), nuisances=(modulus,))
+    fit = identify(resolve_law(law), first_frames, predictor, settings=chosen)
     estimates = {n.owner: n for n in fit.nuisances if n.kind == "modulus"}
     stated = np.array([_stated_modulus(h) for h in histories])
     values = stated * (1.0 + np.array([estimates[h.name].value for h in histories]))

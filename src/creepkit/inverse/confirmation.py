@@ -8,14 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import CompositePredictor, outside_class
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, errors_of_output
+from creepkit.inverse.history_checks import without_suspect_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
+from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.presentation import Presentable
 from creepkit.records import History, Prediction, Predictor, Status
+from creepkit.registry.arguments import check_histories, resolve_predictors
 
 AGREEMENT_LIMIT = 1.0
 """Largest rms difference to what the fit predicts, in standard deviations of the noise, that confirms it."""
@@ -140,15 +144,28 @@ class Confirmation(Presentable, text="reports.confirmation_text:confirmation_tex
         return test, output
 
 
-def confirm(fit: Identification, tests: Sequence[History], using: Predictor | Mapping[str, Predictor]) -> Confirmation:
-    """Simulate the identified law for each test, with the nuisances and offsets that the fit found for it.
+@checked
+def confirm(
+    fit: Identification,
+    tests: Sequence[History] | None = None,
+    using: Predictor | str | Mapping[str, Predictor | str] | None = None,
+) -> Confirmation:
+    """Simulate an identified law for each test by the specimen itself, and compare: finite elements for a bulge test.
 
-    tests : those of the fit, known by name, or others, which are predicted with what is known of all tests.
-    using : the specimen, such as ck.specimen("bulge"), or {specimen: predictor}.
+    tests : by default those that were fitted, with the nuisances and offsets that the fit found for them; others are
+        predicted with what is known of all tests, without suspect frames as the fit's settings say.
+    using : the specimen, or {specimen: predictor}; by default the specimen that the tests name, with the settings that
+        it was identified with.
     """
+    tests = without_suspect_frames(check_histories(list(fit.histories if tests is None else tests)), fit.settings)
     if not tests:
         raise FitError(f"law '{fit.law.name}': there are no tests to confirm it with")
-    predictor = CompositePredictor(dict(using)) if isinstance(using, Mapping) else using
+    known = registered_specimens(fit.predictor) if using is None else {}
+    if all(h.specimen in known for h in tests):
+        used = {h.specimen: known[h.specimen] for h in tests}
+        using = used if len(used) > 1 else next(iter(used.values()))
+    resolved = resolve_predictors(using, tests)
+    predictor = CompositePredictor(resolved) if isinstance(resolved, dict) else resolved
     prediction = fit.predict(tests, predictor)
     can_predict = fit.predictor is not None and not outside_class(fit.predictor, fit.law)
     fit_prediction = fit.predict(tests) if can_predict else None

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
@@ -155,8 +156,13 @@ def write_identification(fit: Identification, path: str | Path) -> Path:
     return write_json(identification_to_json(fit), Path(path), IDENTIFICATION.kind)
 
 
-def read_identification(path: str | Path) -> Identification:
-    """Read an identification; its law is rebuilt from data and its fingerprint checked, its specimen by name."""
+@checked
+def load(path: str | Path) -> Identification:
+    """Return the identification saved in a JSON file.
+
+    It knows its specimen by name and predicts new histories; attach its own with `.with_histories(histories)`. The law
+    is rebuilt from data and its fingerprint checked.
+    """
     return identification_from_json(read_json(Path(path), IDENTIFICATION.kind), str(path))
 
 

@@ -9,12 +9,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.files.file_names import LAW_SIGNS, numbered_stems
 from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, read_json, write_json
 from creepkit.files.reading import FileKind, sha256_of
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json, read_identification
+from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json, load
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 
 if TYPE_CHECKING:
@@ -83,8 +84,9 @@ def read_fit_or_ranking(path: str | Path) -> Identification | ModelAverage:
     return _ranking_from_json(data, path)
 
 
-def read_ranking(path: str | Path) -> ModelAverage:
-    """The laws of a ranking's file with their weights."""
+@checked
+def load_ranking(path: str | Path) -> ModelAverage:
+    """Return the laws of a ranking.json with their weights, as forecasts take them; the files of laws lie beside it."""
     return _ranking_from_json(read_json(Path(path), RANKING.kind), path)
 
 
@@ -121,7 +123,7 @@ def _ranking_from_json(data: Any, path: str | Path) -> ModelAverage:
 def _fit_of_law(path: Path, name: str, sha256: Any) -> Identification:
     """The identification in a file beside a ranking; sha256 : of the file, None where the ranking does not state it."""
     try:
-        fit = read_identification(path.parent / name)
+        fit = load(path.parent / name)
     except FitError as error:
         raise FitError(f"{path} names {name}: {error}") from None
     if sha256 is not None and sha256_of(path.parent / name, IDENTIFICATION.kind) != sha256:

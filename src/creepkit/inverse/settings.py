@@ -5,9 +5,10 @@ Their defaults stand here alone: Python and the command line, identify, select, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from numbers import Integral
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
@@ -102,8 +103,10 @@ class IdentificationSettings(Options, title="settings of an identification", err
         if "nuisances" in given:
             listed: Any = given["nuisances"]
             listed = [listed] if isinstance(listed, str | Nuisance) else listed
-            given["nuisances"] = tuple(_nuisance_named(n, predictor) if isinstance(n, str) else n for n in listed)
-        if "starts" in given:  # eight points a start, a power of two, and at least 64
+            if isinstance(listed, Iterable):
+                listed = tuple(_nuisance_named(n, predictor) if isinstance(n, str) else n for n in listed)
+            given["nuisances"] = listed
+        if isinstance(given.get("starts"), Integral):  # eight points a start, a power of two, and at least 64
             points = max(64, 1 << (8 * max(int(given["starts"]), 1) - 1).bit_length())
             given.setdefault("sobol_points", points)
         return super().changed(given)

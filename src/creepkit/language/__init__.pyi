@@ -3,7 +3,7 @@
 from .elastic import Elastic as Elastic
 from .elastic import wachtman as wachtman
 from .law import CreepLaw as CreepLaw
-from .law import hookimpl as hookimpl
+from .plugin import hookimpl as hookimpl
 from .symbols import GAS_CONSTANT as GAS_CONSTANT
 from .symbols import Param as Param
 from .symbols import State as State

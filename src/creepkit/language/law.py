@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from creepkit.checked_arguments import checked, checked_with_own_words
-from creepkit.hookspecs import hookimpl as hookimpl  # a part of the language: laws import nothing else
 from creepkit.language import algebra
 from creepkit.language.law_record import LawRecord
 from creepkit.language.printing import law_latex, law_text

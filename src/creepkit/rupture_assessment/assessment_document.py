@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
@@ -46,8 +47,12 @@ def write_assessment(assessment: RuptureAssessment, path: str | Path) -> Path:
     return write_json({**ASSESSMENT.heading, **CODEC.to_json(assessment)}, Path(path), ASSESSMENT.kind)
 
 
-def read_assessment(path: str | Path) -> RuptureAssessment:
-    """Read an assessment; FitError, in one sentence, says what is wrong with other files."""
+@checked
+def load_rupture_assessment(path: str | Path) -> RuptureAssessment:
+    """Return the rupture assessment saved in a JSON file: its fits predict, plot and state strengths as before.
+
+    FitError, in one sentence, says what is wrong with other files.
+    """
     data = read_json(Path(path), ASSESSMENT.kind)
     content = check_heading(data, str(path), ASSESSMENT)
     try:

@@ -28,7 +28,7 @@ from creepkit.records import (
 from creepkit.records.quantities import LENGTH, QuantityKind
 from creepkit.records.units import UNITS, UnitConversion
 from creepkit.studies.study_file import KeyPath, StudyFile
-from creepkit.studies.tables import NuisanceTable, Step, Table
+from creepkit.studies.tables import NuisanceTable, Step, TableModel
 
 if TYPE_CHECKING:
     from creepkit.inverse.settings import IdentificationSettings
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 # ---- numbers with units --------------------------------------------------------------------------------------------
 
 
-def stated(table: Table, *keys: str, **renamed: str) -> dict[str, Any]:
+def stated(table: TableModel, *keys: str, **renamed: str) -> dict[str, Any]:
     """{argument: value} of the keys of a table that are stated: in the unit of the key, but K for C, and MPa for GPa.
 
     renamed : {argument: key} of keys that are not called like the argument.

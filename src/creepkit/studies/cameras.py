@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from creepkit.api.extraction import WATCHED, history_of, imposed_on, operator_of
-from creepkit.api.planned_tests import stepped_load
 from creepkit.cameras.sequences import in_order
 from creepkit.errors import CreepkitError, HistoryError, StudyError, nearest
 from creepkit.extraction import Extraction
 from creepkit.extraction.options import ExtractionOptions
 from creepkit.files.record_codec import record_to_json
+from creepkit.forecasts.planned_tests import stepped_load
 from creepkit.instruments.imposed import Imposed
 from creepkit.inverse.fingerprints import predictor_fingerprint
 from creepkit.language import Elastic

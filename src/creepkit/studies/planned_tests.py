@@ -55,7 +55,7 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
     StudyError where a test cannot be made of what is said.
     """
     import creepkit as ck
-    from creepkit.api.planned_tests import planned_history
+    from creepkit.forecasts.planned_tests import planned_history
 
     part, place = file.model.forecast[number], ("forecast", number)
     assert part.end_h is not None
@@ -79,7 +79,7 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
 
 def _loading_of(file: StudyFile, number: int, part: ForecastTable, specimen: Specimen, end: float) -> Loading:
     """One load by steps, or stresses and strains of components, { stress_11_MPa = 60, strain_12 = 0 }, from rest."""
-    from creepkit.api.planned_tests import stepped_load
+    from creepkit.forecasts.planned_tests import stepped_load
 
     place = ("forecast", number)
     loads = {load.name: load for load in loads_of(specimen)}

@@ -6,22 +6,19 @@ import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from textwrap import dedent, wrap
-from typing import TYPE_CHECKING
 
 from creepkit.inverse.duration import followed_duration
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, dimensions_of, load_unit
-
-if TYPE_CHECKING:
-    from creepkit.studies.proposal import DataSummary
+from creepkit.studies.data_summary import FEWEST_RUPTURES, DataSummary
 
 MOST_REMARKS = 20
 """Files that were not read, and flags, that the comments name."""
 
 
-FEWEST_TEMPERATURES, FEWEST_RUPTURES = 3, 5
-"""For forms of temperature, and for methods of rupture times."""
+FEWEST_TEMPERATURES = 3
+"""For forms of temperature."""
 
 
 CITATION_LINE = '# citation = "authors (year), title, doi"  # of published data: the methods text cites it'

@@ -41,13 +41,13 @@ SomeTexts = Annotated[list[Text], Field(min_length=1, max_length=MOST_ITEMS)]
 Numbers = Annotated[list[float], Field(min_length=1, max_length=MOST_ITEMS)]
 
 
-class Table(BaseModel):
+class TableModel(BaseModel):
     """A table of a study file: no other keys, no values of other types."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class Step(Table):
+class Step(TableModel):
     """A level that begins at a time: { from_h = 4, level = 10 }, in the unit of the key that it belongs to."""
 
     from_h: Annotated[float, Field(ge=0.0)]
@@ -116,20 +116,20 @@ TYPES: dict[Any, Any] = {
 
 def _keys(*records: type[Options], without: tuple[str, ...] = ()) -> Any:
     """A table with the options of records as keys, None where they are missing."""
-    keys: Any = Table
+    keys: Any = TableModel
     for record in records:
         keys = table_of(record, keys, types=TYPES, without=without)
     return keys
 
 
-class StudyTable(Table):
+class StudyTable(TableModel):
     """[study]: what the report is called, and the seed of all random draws."""
 
     title: Text = "creep study"
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
 
 
-class DataTable(Table):
+class DataTable(TableModel):
     """[data]: files of tests, patterns or folders, relative to the study file; none where cameras give the tests.
 
     only : values of labels that tests must have. up_to_strain : frames beyond it are left out.
@@ -146,7 +146,7 @@ class DataTable(Table):
     citation: Annotated[Texts, BeforeValidator(_one_or_more)] = []
 
 
-class RecordTable(Table):
+class RecordTable(TableModel):
     """[[record]]: what an instrument recorded of loads and temperatures, and what its file does not say, as in
     ck.read_record.
     """
@@ -166,7 +166,7 @@ class RecordTable(Table):
     missing: Texts = []
 
 
-class CameraTable(_keys(ExtractionOptions), Table):  # type: ignore[misc]
+class CameraTable(_keys(ExtractionOptions), TableModel):  # type: ignore[misc]
     """[[camera]]: frames of a surface, what is made of them as in ck.extract, and what was imposed meanwhile.
 
     frames : a folder, a pattern or files in their order. names, centers_mm : of the test pieces in the field of view.
@@ -194,7 +194,7 @@ class CameraTable(_keys(ExtractionOptions), Table):  # type: ignore[misc]
     labels: dict[Text, Text] = {}
 
 
-class ExcludeTable(Table):
+class ExcludeTable(TableModel):
     """[[exclude]]: a test, or some of its frames, with the reason. Frames are counted from 0: "97-191, 193"."""
 
     test: Text
@@ -204,14 +204,14 @@ class ExcludeTable(Table):
     to_h: Positive | None = None
 
 
-class SpecimenTable(Table):
+class SpecimenTable(TableModel):
     """[specimen]: what the tests are of where files do not say, and lengths of the test piece, as thickness_mm."""
 
     name: Text
     lengths: dict[Text, Positive] = {}
 
 
-class NuisanceTable(Table):
+class NuisanceTable(TableModel):
     """[[identification.nuisances]]: what differs between tests; mean and sd in the unit of the kind."""
 
     kind: Text
@@ -234,7 +234,7 @@ ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws", "bounds", "s
 _OF_IDENTIFICATION: Any = _keys(IdentificationSettings, LawChanges, SearchOptions, without=ELSEWHERE)
 
 
-class IdentificationTable(_OF_IDENTIFICATION, Table):  # type: ignore[misc]
+class IdentificationTable(_OF_IDENTIFICATION, TableModel):  # type: ignore[misc]
     """[identification]: candidate laws and how each is fitted, for every group of tests."""
 
     laws: OneOrMore
@@ -245,13 +245,13 @@ class IdentificationTable(_OF_IDENTIFICATION, Table):  # type: ignore[misc]
     without_nuisances: Texts = []
 
 
-class SelectionTable(_keys(SearchOptions, without=("search", "penalty")), Table):  # type: ignore[misc]
+class SelectionTable(_keys(SearchOptions, without=("search", "penalty")), TableModel):  # type: ignore[misc]
     """[selection]: how laws are compared; without sums, sums are tried where no candidate explains the tests."""
 
     further_laws: Annotated[int, Field(ge=0, le=100)] | None = None
 
 
-class TemperatureTable(_keys(DiscoveryOptions, without=("forms", "prior")), Table):  # type: ignore[misc]
+class TemperatureTable(_keys(DiscoveryOptions, without=("forms", "prior")), TableModel):  # type: ignore[misc]
     """[temperature]: forms of temperature for the parameters of a law, by default the best law of each group."""
 
     law: Text | None = None
@@ -259,20 +259,20 @@ class TemperatureTable(_keys(DiscoveryOptions, without=("forms", "prior")), Tabl
     prior_odds: dict[Text, dict[Text, Positive]] | None = None
 
 
-class TensileStrength(Table):
+class TensileStrength(TableModel):
     """A tensile strength at a temperature."""
 
     temperature_C: float
     strength_MPa: Positive
 
 
-class RuptureTable(_keys(RuptureSettings, RuptureQuestion, without=("seed",)), Table):  # type: ignore[misc]
+class RuptureTable(_keys(RuptureSettings, RuptureQuestion, without=("seed",)), TableModel):  # type: ignore[misc]
     """[rupture]: parametric methods for rupture tests."""
 
     tensile_strengths: Annotated[list[TensileStrength], Field(max_length=MOST_ITEMS)] = []
 
 
-class ForecastTable(Table):
+class ForecastTable(TableModel):
     """[[forecast]]: measured tests by their files, or a planned one by its load, temperature and end.
 
     load : as { stress_MPa = 80 } or steps, of components as
@@ -297,7 +297,7 @@ class ForecastTable(Table):
     draws: Annotated[int, Field(ge=50, le=100_000)] | None = None
 
 
-class DesignTable(_keys(GoalOptions, Rig, without=("levels", "dimensions")), Table):  # type: ignore[misc]
+class DesignTable(_keys(GoalOptions, Rig, without=("levels", "dimensions")), TableModel):  # type: ignore[misc]
     """[design]: further tests, by what they tell for each hour of machine time; what is not said of the rig it did."""
 
     group: Text | None = None
@@ -305,7 +305,7 @@ class DesignTable(_keys(GoalOptions, Rig, without=("levels", "dimensions")), Tab
     lengths: dict[Text, Numbers] = {}
 
 
-class ExportTable(Table):
+class ExportTable(TableModel):
     """[[export]]: the best law of a group, or its law of temperature, as text for a target."""
 
     target: Text
@@ -320,14 +320,14 @@ class ExportTable(Table):
     poisson: Annotated[float, Field(gt=-1.0, lt=0.5)] = 0.3
 
 
-class ReportTable(Table):
+class ReportTable(TableModel):
     """[report]: the page. Data files up to attach_MB in all are put into it, of others their hashes alone."""
 
     file: Text = "report.html"
     attach_MB: Annotated[float, Field(ge=0.0, le=50.0)] = 3.0
 
 
-class StudyTables(Table):
+class StudyTables(TableModel):
     """A whole study file; every table but [data], or but [[camera]], may be missing."""
 
     study: StudyTable = StudyTable()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, SurrogateError, nearest, quoted
 from creepkit.files.json_documents import DocumentFormat, check_keys
 from creepkit.records import Predictor, SupportsReducedOrderModel, known_specimens
@@ -30,8 +31,13 @@ def reduced_order_models() -> dict[str, SupportsReducedOrderModel]:
 SUFFIX = ".safetensors"
 
 
-def surrogate_by_name(name_or_path: str | Path) -> Predictor:
-    """The reduced-order model of this name, or the trained network in this file."""
+@checked
+def surrogate(name_or_path: str | Path) -> Predictor:
+    """Return a cheap model that stands for a specimen, by its name or from its file.
+
+    name_or_path : "dimple", the reduced-order model of the default bulge specimen; or the file of a trained network,
+        see train().
+    """
     text = str(name_or_path)
     if isinstance(name_or_path, str) and not text.endswith(SUFFIX) and text in (named := reduced_order_models()):
         return named[text].reduced_order_model()

@@ -8,7 +8,7 @@ import pytest
 import creepkit as ck
 from creepkit.cli.identified_folder import identifying_alone, write_ranking
 from creepkit.errors import FitError
-from creepkit.inverse.ranking_document import read_ranking
+from creepkit.inverse.ranking_document import load_ranking
 from creepkit.inverse.selection import rank
 from helpers.rupture_tests import BAR
 
@@ -43,7 +43,7 @@ def test_a_later_run_leaves_nothing_of_the_former_one_and_what_is_not_its(rankin
     ck.export(rankings[0].best, "c", to=tmp_path / "norton.c")  # of creepkit, and of another command
     written = _run(rankings[1], tmp_path)
     assert _names(tmp_path) == sorted([*(path.name for path in written), "notes.txt", "norton.c"])
-    assert [fit.law.name for fit in read_ranking(tmp_path / "ranking.json").fits] == ["strain-hardening"]
+    assert [fit.law.name for fit in load_ranking(tmp_path / "ranking.json").fits] == ["strain-hardening"]
 
 
 def test_a_changed_file_of_the_former_run_is_neither_removed_nor_mixed_with_another_run(rankings, tmp_path):
@@ -76,7 +76,7 @@ def test_a_ranking_refuses_a_file_that_another_run_has_written_under_the_same_na
     _run(rankings[0], tmp_path)
     rankings[1].best.save(tmp_path / "norton.json")
     with pytest.raises(FitError, match=r"norton\.json is not the file that this ranking was made with"):
-        read_ranking(tmp_path / "ranking.json")
+        load_ranking(tmp_path / "ranking.json")
 
 
 def test_rankings_without_hashes_are_read_as_before(rankings, tmp_path):
@@ -85,4 +85,4 @@ def test_rankings_without_hashes_are_read_as_before(rankings, tmp_path):
     content = json.loads(path.read_text())
     content["laws"] = [{"file": one["file"], "weight": one["weight"]} for one in content["laws"]]
     path.write_text(json.dumps(content))
-    assert read_ranking(path).weights == (1.0,)
+    assert load_ranking(path).weights == (1.0,)

@@ -8,7 +8,7 @@ from scipy.stats import chi2, f
 
 import creepkit as ck
 from creepkit.inverse.confirmation import Confirmation, ConfirmedTest, _confirmed_output, confirm, outside_domain
-from creepkit.inverse.identification_document import read_identification
+from creepkit.inverse.identification_document import load
 from creepkit.records import Status
 from creepkit.records.history import EVERY_FRAME
 from helpers.planted_alloys import bars
@@ -79,7 +79,7 @@ def test_only_the_guard_of_a_surrogate_doubts(fit):
 
 
 def test_a_fit_from_a_file_is_held_against_the_misfit_it_tells(fit, tmp_path):
-    found = read_identification(replace(fit, predictor=None).save(tmp_path / "fit.json"))
+    found = load(replace(fit, predictor=None).save(tmp_path / "fit.json"))
     told = confirm(found, TESTS, BAR)
     assert np.isnan(told["X-60", "strain"].rms_difference)
     assert told.noise_ratio == pytest.approx(0.0, abs=1e-3)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.discovery.elastic_moduli import fit_wachtman, identify_moduli
+from creepkit.discovery.elastic_moduli import fit_wachtman, moduli
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
@@ -21,7 +21,7 @@ def test_moduli_that_the_histories_state_wrongly_are_found() -> None:
     plans = [Plan(c, 8.0, 8.0) for c in (720, 740, 760, 780, 800)]
     tests = planted(LAW, TRUTH, plans, seed=5, frames=96)
     stated = [replace(h, elastic=Elastic(1.15 * float(h.elastic.E))) for h in tests]
-    found = identify_moduli(LAW, stated, OneDegree(exact=True), settings=QUICK)
+    found = moduli(LAW, stated, OneDegree(exact=True), settings=QUICK)
     planted_moduli = np.array([float(h.elastic.E) for h in tests])
     assert (np.abs(found.values - planted_moduli) < 4 * found.sd).all()
     assert (np.abs(found.values / planted_moduli - 1) < 0.05).all()

@@ -181,7 +181,7 @@ def test_the_verb_takes_results_and_keeps_existing_files(tmp_path: Path) -> None
 
 
 def test_identifications_of_the_same_tests_are_ranked() -> None:
-    from creepkit.api.report import report_contents
+    from creepkit.reports.report import report_contents
 
     fits = [one.fit for one in ranking().laws]
     (group,) = report_contents(fits).groups

@@ -11,7 +11,7 @@ import creepkit as ck
 from creepkit.errors import SurrogateError
 from creepkit.files.writing import RECORD
 from creepkit.inverse.composite_predictor import refined_of
-from creepkit.surrogates.loading import load_surrogate, surrogate_by_name
+from creepkit.surrogates.loading import load_surrogate, surrogate
 from creepkit.surrogates.weight_files import SURROGATE, read_weights, write_weights
 
 HEADER = {"kind": "parameter-gru"}
@@ -142,16 +142,16 @@ def test_a_header_without_its_parts_says_so(tmp_path: Path) -> None:
 
 
 def test_the_surrogate_of_the_dimple_is_the_reduced_order_model_of_the_bulge_specimen() -> None:
-    model = surrogate_by_name("dimple")
+    model = surrogate("dimple")
     assert model == ck.specimen("bulge").reduced_order_model()
     assert refined_of(model) == ck.specimen("bulge").refined()
 
 
 def test_names_that_nobody_knows(tmp_path: Path) -> None:
     with pytest.raises(SurrogateError, match="no surrogate is called 'dimpel'"):
-        surrogate_by_name("dimpel")
+        surrogate("dimpel")
     with pytest.raises(SurrogateError, match="there is no such file"):
-        surrogate_by_name(tmp_path / "none.safetensors")
+        surrogate(tmp_path / "none.safetensors")
 
 
 def test_the_header_is_plain_json(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import (
@@ -196,6 +197,7 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
     return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}"
 
 
+@checked
 def rank(
     fits: Sequence[Identification],
     criterion: Criterion = "bic",
@@ -203,7 +205,7 @@ def rank(
     *,
     challenge: bool = True,
 ) -> Ranking:
-    """Rank identifications made from the same histories; criterion : "bic" or "aicc".
+    """Rank identifications made from the same histories, with weights and a verdict; criterion : "bic" or "aicc".
 
     challenge : whether a law that is singled out is challenged (some runs of the predictor), without which no answer
         is decisive.

@@ -1,27 +1,29 @@
-"""Identification and selection of laws, and their confirmation by simulation."""
+"""identify() and select() as users call them: names resolved, tests checked, and notes of what was left out."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
+from creepkit.inverse.composite_predictor import prediction_errors_of, reduced_order_model_of, through_for_law
+from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identify import identify as identify_law
+from creepkit.inverse.nuisance_parameters import check_nuisance_tests
 from creepkit.inverse.search.global_search import GlobalSearch
+from creepkit.inverse.selection import Ranking
+from creepkit.inverse.selection.select import select as select_law
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
+from creepkit.inverse.sparsity.term_selection import identify_sparse
+from creepkit.language import CreepLaw
 from creepkit.options import takes_options
 from creepkit.records import History, Predictor
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import check_histories, resolve_predictors
-
-if TYPE_CHECKING:
-    from creepkit.discovery.elastic_moduli import ModulusEstimates
-    from creepkit.inverse.confirmation import Confirmation
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection import Ranking
-    from creepkit.language import CreepLaw
 
 
 @takes_options(IdentificationSettings)
@@ -52,12 +54,6 @@ def identify(
         are left out. changes : single fields of it, see IdentificationSettings:
         starts=4, nuisances=["offset", Nuisance("rate", sd=0.1)], weights="likelihood".
     """
-    from creepkit.inverse.composite_predictor import through_for_law
-    from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
-    from creepkit.inverse.identify import identify as run
-    from creepkit.inverse.nuisance_parameters import check_nuisance_tests
-    from creepkit.inverse.sparsity.term_selection import identify_sparse
-
     law, predictor = resolve_law(law), resolve_predictors(using, check_histories(histories))
     settings = (settings or IdentificationSettings()).changed(changes, predictor)
     histories, left_out = sound_tests(check_histories(histories), settings)
@@ -66,7 +62,9 @@ def identify(
     if through == "auto":
         surrogate = through_for_law(surrogate, law)
     if penalty is None:
-        fit = run(law, histories, predictor, settings=settings, search=search, through=surrogate, progress=progress)
+        fit = identify_law(
+            law, histories, predictor, settings=settings, search=search, through=surrogate, progress=progress
+        )
     else:
         fit = identify_sparse(
             law,
@@ -103,10 +101,6 @@ def select(
         asked for explains the tests, has 95 % of the weight, and nothing that the tests allow stands against it.
     using, through, settings, changes : as for identify(); weights are "likelihood".
     """
-    from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
-    from creepkit.inverse.nuisance_parameters import check_nuisance_tests
-    from creepkit.inverse.selection.select import select as run
-
     predictor = resolve_predictors(using, check_histories(histories))
     settings = (settings or IdentificationSettings()).changed(changes, predictor)
     if changes.get("weights") not in (None, "likelihood"):
@@ -116,7 +110,7 @@ def select(
         )
     histories, left_out = sound_tests(check_histories(histories), settings)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
-    ranking = run(
+    ranking = select_law(
         [resolve_law(law) for law in ((laws,) if isinstance(laws, str) else laws)],
         histories,
         predictor,
@@ -131,62 +125,10 @@ def select(
     return replace(ranking, laws=tuple(noted))
 
 
-@checked
-def rank(fits: Sequence[Identification]) -> Ranking:
-    """Rank identifications of the same histories by BIC, with weights and a verdict."""
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection import rank as run
-
-    if isinstance(fits, Identification):
-        raise FitError("rank() takes a list of identifications, found a single one")
-    return run(list(fits))
-
-
-@checked
-def moduli(
-    law: CreepLaw | str, histories: Sequence[History], using: Predictor | str | None = None, *, frames: int = 15
-) -> ModulusEstimates:
-    """Identify Young's modulus of each bulge test from its first frames, and Wachtman's form through the moduli.
-
-    law : the creep law, with its temperature; frames : used frames of each test, the paper's 15 by default.
-    `[h.replace(elastic=estimates.elastic) for h in histories]` then fixes the moduli.
-    """
-    from creepkit.discovery.elastic_moduli import identify_moduli
-
-    histories = check_histories(histories)
-    predictor = resolve_predictors(using, histories)
-    if isinstance(predictor, Mapping):
-        raise FitError("moduli are identified from tests of one specimen; give those alone, and using= that one")
-    return identify_moduli(resolve_law(law), histories, predictor, frames=frames)
-
-
-@checked
-def confirm(
-    fit: Identification, tests: Sequence[History] | None = None, using: Predictor | str | None = None
-) -> Confirmation:
-    """Simulate an identified law for each test by the specimen itself, and compare: finite elements for a bulge test.
-
-    tests : by default those that were fitted; of others suspect frames are left out as the fit's settings say.
-    using : by default the specimen that they name, with the settings that it was identified with.
-    """
-    from creepkit.inverse.confirmation import confirm as run
-    from creepkit.inverse.history_checks import without_suspect_frames
-    from creepkit.inverse.predictor_documents import registered_specimens
-
-    histories = without_suspect_frames(check_histories(list(fit.histories if tests is None else tests)), fit.settings)
-    known = registered_specimens(fit.predictor) if using is None else {}
-    if not histories or not all(h.specimen in known for h in histories):
-        return run(fit, histories, resolve_predictors(using, histories))
-    used = {h.specimen: known[h.specimen] for h in histories}
-    return run(fit, histories, used if len(used) > 1 else next(iter(used.values())))
-
-
 def _resolve_through(
     through: Predictor | Literal["auto"] | None, predictor: Predictor | Mapping[str, Predictor]
 ) -> Predictor | None:
     """The predictor given; or the reduced-order model of the specimen, where it states how accurate it is."""
-    from creepkit.inverse.composite_predictor import prediction_errors_of, reduced_order_model_of
-
     if not isinstance(through, str):
         return through
     if through != "auto":

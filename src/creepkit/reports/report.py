@@ -5,34 +5,58 @@ from __future__ import annotations
 import hashlib
 import platform
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
-from creepkit.api.identification import rank
+import numpy as np
+
 from creepkit.checked_arguments import checked
+from creepkit.discovery.discover import TemperatureStudy
+from creepkit.discovery.temperature_law import TemperatureLaw
 from creepkit.errors import CreepkitError, ReportError
+from creepkit.experiments.planned_design import Design
 from creepkit.exporters.exporting import export, law_with_values
-from creepkit.reports.contents import ReportSource
-
-if TYPE_CHECKING:
-    from creepkit.discovery.discover import TemperatureStudy
-    from creepkit.discovery.temperature_law import TemperatureLaw
-    from creepkit.experiments.planned_design import Design
-    from creepkit.extraction.extraction import Extraction
-    from creepkit.forecasts.forecast import Forecast
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection.ranking import Ranking
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-    from creepkit.records import History
-    from creepkit.reports.contents import Exclusion, ExportedFile, ReportContents, ReportGroup, ReportProvenance
-    from creepkit.rupture_assessment.assessment import RuptureAssessment
-    from creepkit.screening.results import AlloyResult, ScreeningResult
+from creepkit.extraction.extraction import Extraction
+from creepkit.files.json_documents import json_text
+from creepkit.files.reading import FileKind, read_bytes
+from creepkit.files.writing import check_target, write_text
+from creepkit.forecasts.forecast import Forecast
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identification_document import identification_to_json
+from creepkit.inverse.selection import Ranking, rank
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.quality import check_data_quality
+from creepkit.records import History
+from creepkit.registry import default_registry, resolve_law
+from creepkit.reports.contents import (
+    Exclusion,
+    ExportedFile,
+    ReportContents,
+    ReportGroup,
+    ReportProvenance,
+    ReportSource,
+)
+from creepkit.reports.html import report_html
+from creepkit.reports.html.findings import findings_of
+from creepkit.reports.identified_files import identified_files
+from creepkit.rupture_assessment.assessment import RuptureAssessment
+from creepkit.screening.results import AlloyResult, ScreeningResult
 
 Reported: TypeAlias = (
-    "Identification | Ranking | ModelAverage | AlloyResult | ScreeningResult | TemperatureStudy | TemperatureLaw "
-    "| Forecast | Design | RuptureAssessment | Extraction"
+    Identification
+    | Ranking
+    | ModelAverage
+    | AlloyResult
+    | ScreeningResult
+    | TemperatureStudy
+    | TemperatureLaw
+    | Forecast
+    | Design
+    | RuptureAssessment
+    | Extraction
 )
 
 EXPORT_TARGETS = ("json", "python", "latex", "abaqus")
@@ -67,9 +91,6 @@ def report(
     The page loads nothing, and is complete without scripts. It holds figures, tables, laws to download, methods text
     and provenance, in MPa, hours, kelvin and the units of the parameters.
     """
-    from creepkit.files.writing import check_target, write_text
-    from creepkit.reports.html import report_html
-
     path = Path(to)
     check_target(path, ReportError, force=force)
     return write_text(report_html(report_contents(source, title=title)), path, ReportError, force=force)
@@ -79,10 +100,6 @@ def report_contents(
     source: Reported | ReportSource | ReportContents | Iterable[Reported], *, title: str = ""
 ) -> ReportContents:
     """What report() shows of results: groups by material, data quality, exclusions, exports and provenance."""
-    from dataclasses import replace
-
-    from creepkit.reports.contents import ReportContents
-
     if hasattr(source, "report_contents"):
         source = source.report_contents()
     if isinstance(source, ReportContents):
@@ -130,18 +147,6 @@ class _Results:
 
     def add(self, one: Any) -> None:
         """Sort one result in; ReportError for anything else."""
-        from creepkit.discovery.discover import TemperatureStudy
-        from creepkit.discovery.temperature_law import TemperatureLaw
-        from creepkit.experiments.planned_design import Design
-        from creepkit.extraction.extraction import Extraction
-        from creepkit.forecasts.forecast import Forecast
-        from creepkit.inverse.identification import Identification
-        from creepkit.inverse.selection.ranking import Ranking
-        from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-        from creepkit.reports.contents import ReportGroup
-        from creepkit.rupture_assessment.assessment import RuptureAssessment
-        from creepkit.screening.results import AlloyResult, ScreeningResult
-
         if isinstance(one, Identification):
             self.fits.append(one)
         elif isinstance(one, ModelAverage):
@@ -170,8 +175,6 @@ class _Results:
 
     def groups(self) -> tuple[ReportGroup, ...]:
         """Rankings and alloys, then identifications: those of the same tests as one ranking."""
-        from creepkit.reports.contents import ReportGroup
-
         same_tests: dict[object, list[Identification]] = {}
         for fit in self.fits:
             same_tests.setdefault(fit.provenance.get("data", id(fit)), []).append(fit)
@@ -205,7 +208,6 @@ def _title(groups: Sequence[ReportGroup]) -> str:
 
 
 def _quality(histories: Sequence[History]) -> Any:
-    from creepkit.api.simulation import check_data_quality
 
     try:
         return check_data_quality(histories) if histories else None
@@ -215,10 +217,6 @@ def _quality(histories: Sequence[History]) -> Any:
 
 def _exclusions(histories: Sequence[History]) -> Iterator[Exclusion]:
     """Frames that are marked as not used, with what is known of the reason."""
-    import numpy as np
-
-    from creepkit.reports.contents import Exclusion
-
     for history in histories:
         frames = tuple(int(k) for k in np.flatnonzero(~np.asarray(history.used)))
         if frames:
@@ -228,13 +226,6 @@ def _exclusions(histories: Sequence[History]) -> Iterator[Exclusion]:
 
 def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], tuple[str, ...]]:
     """The best law of each material for some targets, identifications and rankings; and what cannot be written."""
-    from creepkit.files.json_documents import json_text
-    from creepkit.inverse.identification_document import identification_to_json
-    from creepkit.registry import default_registry
-    from creepkit.reports.contents import ExportedFile
-    from creepkit.reports.html.findings import findings_of
-    from creepkit.reports.identified_files import identified_files
-
     found = [one for one in map(findings_of, groups) if one is not None]
     if not 0 < len(found) <= MOST_EXPORTED_GROUPS:
         return (), ()
@@ -261,8 +252,6 @@ def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], t
 
 
 def _provenance(groups: Sequence[ReportGroup], histories: Sequence[History]) -> ReportProvenance:
-    from creepkit.reports.contents import ReportProvenance
-    from creepkit.reports.html.findings import findings_of
 
     found = [one for one in map(findings_of, groups) if one is not None]
     if not found:
@@ -288,11 +277,6 @@ MOST_NAMED_FILES = 12
 
 def _commands(group: ReportGroup, histories: Sequence[History]) -> Iterator[str]:
     """Lines of Python that repeat an identification, where names and settings alone determine it."""
-    from creepkit.inverse.selection.ranking import Ranking
-    from creepkit.inverse.settings import IdentificationSettings
-    from creepkit.registry import resolve_law
-    from creepkit.reports.html.findings import findings_of
-
     found = findings_of(group)
     files = list(dict.fromkeys(Path(h.source).name for h in histories if h.source and Path(h.source).is_file()))
     if found is None or not files or found.fit.sparsity is not None:
@@ -329,8 +313,6 @@ def _versions() -> dict[str, str]:
 
 def _inputs(histories: Sequence[History]) -> Iterator[tuple[str, str]]:
     """(file, sha256) of the files of histories that are still there."""
-    from creepkit.files.reading import FileKind, read_bytes
-
     kind = FileKind("a test", ReportError, "write the test to several files", maximum_bytes=500_000_000)
     for source in dict.fromkeys(h.source for h in histories if h.source):
         path = Path(source)
