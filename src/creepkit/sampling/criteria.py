@@ -98,14 +98,20 @@ class SimulationOutcome:
 
 
 @dataclass(frozen=True)
-class RateLimit:
+class NamedCriterion:
+    """What criteria have in common: a name, and in words what is asked for."""
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
+class RateLimit(NamedCriterion):
     """The law's rate at one point lies within limits, None where there is none: criteria 1 and 2.
 
     stress : MPa. lower, upper : log10 of the rate in 1/s: as logarithms rates do not underflow. time : s.
     """
 
-    name: str
-    text: str
     stress: float
     lower: float | None = None
     upper: float | None = None
@@ -122,11 +128,9 @@ class RateLimit:
 
 
 @dataclass(frozen=True)
-class WithinBounds:
+class WithinBounds(NamedCriterion):
     """Every parameter lies within the law's bounds, or is off."""
 
-    name: str
-    text: str
     stage: ClassVar[Literal["before"]] = "before"
 
     def passes(self, law: CreepLaw, draws: Draws) -> Bools:
@@ -140,11 +144,9 @@ class WithinBounds:
 
 
 @dataclass(frozen=True)
-class ConstraintsHold:
+class ConstraintsHold(NamedCriterion):
     """The constraints that the law declares hold throughout the test; end : s, of tests whose end is not drawn."""
 
-    name: str
-    text: str
     end: float
     stage: ClassVar[Literal["before"]] = "before"
 
@@ -154,15 +156,13 @@ class ConstraintsHold:
 
 
 @dataclass(frozen=True)
-class SurvivesTime:
+class SurvivesTime(NamedCriterion):
     """The simulation converged and went on for `seconds`, or to the end of a shorter test: criterion 3.
 
     None stands for the whole test. A burst is no failure of the simulation: with a number of seconds, one after them
     is admitted.
     """
 
-    name: str
-    text: str
     seconds: float | None = None
     stage: ClassVar[Literal["after"]] = "after"
 
@@ -179,14 +179,12 @@ class SurvivesTime:
 
 
 @dataclass(frozen=True)
-class CreepInEachHold:
+class CreepInEachHold(NamedCriterion):
     """Creep above `threshold` in either hold, elastic jumps left out: criterion 4.
 
     A hold that a burst cut short counts up to its last frame; a second hold that was never reached is no growth.
     """
 
-    name: str
-    text: str
     threshold: float
     stage: ClassVar[Literal["after"]] = "after"
 
@@ -207,11 +205,9 @@ class CreepInEachHold:
 
 
 @dataclass(frozen=True)
-class TotalCreepAbove:
+class TotalCreepAbove(NamedCriterion):
     """Creep of `threshold` or more in both holds together, elastic jumps left out."""
 
-    name: str
-    text: str
     threshold: float
     stage: ClassVar[Literal["after"]] = "after"
 
@@ -221,14 +217,12 @@ class TotalCreepAbove:
 
 
 @dataclass(frozen=True)
-class FinalOutputAbove:
+class FinalOutputAbove(NamedCriterion):
     """The output that shows creep is above `threshold` at the end: criterion 5.
 
     After a burst, in the last frame before it.
     """
 
-    name: str
-    text: str
     threshold: float
     stage: ClassVar[Literal["after"]] = "after"
 
