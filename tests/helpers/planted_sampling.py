@@ -10,6 +10,7 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.sampling.conditions import TimeGrid, planned_test
+from creepkit.sampling.domains import SamplingDomain
 from creepkit.sampling.draws import Draws, additive_recurrence_step
 
 NORTON = ck.law("norton")
@@ -81,14 +82,16 @@ class Raising:
 
 
 @dataclass(frozen=True)
-class Planted:
+class Planted(SamplingDomain):
     """A of 1e-12 to 1e-10 1/s, n of 1 to 3, stresses of 50 to 150 MPa and a jump at 2000 s."""
 
     criteria: tuple = (Strong(), Visible())
     name: str = field(default="planted", init=False)
     specimen: str = field(default="uniaxial", init=False)
     law: object = field(default=NORTON, init=False)
-    grid: TimeGrid = GRID
+    conditions: object = field(default=None, init=False)
+    reference_stress: object = field(default=None, init=False)
+    grid: TimeGrid = field(default=GRID, kw_only=True)
     low: float = 50.0
 
     condition_names = ("stress_1", "stress_2", "Tj")

@@ -14,7 +14,6 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import DatasetError, quoted
 from creepkit.presentation import Presentable
 from creepkit.records import Status, outputs_of
-from creepkit.registry.specimen_documents import specimen_to_json
 from creepkit.sampling.conditions import planned_test
 from creepkit.sampling.specimen_conditions import specimen_conditions
 
@@ -156,24 +155,6 @@ class Dataset(Presentable, text="reports.dataset:dataset_text"):
             raise DatasetError(f"a data set of {self.specimen.name} has no output '{name}'; it has {self.outputs}")
         return self.values[..., self.outputs.index(name)]
 
-    def joined(self, other: Dataset) -> Dataset:
-        """Both data sets as one; DatasetError when they are not of one kind, or share samples."""
-        return join(self, other)
-
-
-def join(one: Dataset, other: Dataset) -> Dataset:
-    """The samples of both, one after the other; designs and seeds may differ, what was simulated may not."""
-    _check_compatible(one, other)
-    _check_no_shared_rows(one, other)
-    same = one.design_document == other.design_document
-    design = (
-        one.design_document
-        if same
-        else {"joined": [*_joined_documents(one.design_document), *_joined_documents(other.design_document)]}
-    )
-    provenance = {"joined": [*_joined_documents(one.provenance), *_joined_documents(other.provenance)]}
-    return replace(concatenate([one, other]), design_document=design, provenance=provenance)
-
 
 def concatenate(parts: Sequence[Dataset]) -> Dataset:
     """The samples of data sets of one kind, one after the other; everything else is that of the first."""
@@ -183,44 +164,6 @@ def concatenate(parts: Sequence[Dataset]) -> Dataset:
         offset + row: text for offset, part in zip(offsets, parts, strict=False) for row, text in part.failures.items()
     }
     return replace(parts[0], **columns, failures=failures)
-
-
-def _joined_documents(document: Any) -> list[Any]:
-    joined = document.get("joined")
-    return list(joined) if isinstance(joined, list) else [dict(document)]
-
-
-def _check_compatible(one: Dataset, other: Dataset) -> None:
-    """DatasetError that names the first thing in which two data sets differ."""
-    if one.law.fingerprint != other.law.fingerprint:
-        raise DatasetError(
-            f"data sets of the laws '{one.law.name}' and '{other.law.name}' cannot be joined: their equations differ"
-        )
-    specimens = specimen_to_json(one.specimen), specimen_to_json(other.specimen)
-    if specimens[0] != specimens[1]:
-        raise DatasetError(
-            f"data sets of different specimens cannot be joined: {first_difference(*specimens, 'specimen')}"
-        )
-    for name in ("parameter_names", "condition_names", "outputs", "reason_names"):
-        if getattr(one, name) != getattr(other, name):
-            raise DatasetError(
-                f"data sets with different {name.replace('_', ' ')} cannot be joined: "
-                f"{', '.join(getattr(one, name))} and {', '.join(getattr(other, name))}"
-            )
-    if one.grid != other.grid:
-        raise DatasetError("data sets with different time grids cannot be joined; generate them with the same grid")
-
-
-def _check_no_shared_rows(one: Dataset, other: Dataset) -> None:
-    """The same row of the same sequence must not count twice."""
-    if one.design_document != other.design_document or one.provenance.get("seed") != other.provenance.get("seed"):
-        return
-    shared = np.intersect1d(one.index, other.index)
-    if shared.size:
-        raise DatasetError(
-            f"both data sets hold {shared.size} samples of the same design and seed (Sobol row {shared[0]} is one), "
-            "which would count twice; generate one of them with another seed"
-        )
 
 
 def first_difference(one: Any, other: Any, name: str) -> str:
@@ -249,7 +192,7 @@ def summary(data: Dataset) -> dict[str, Any]:
         "law": data.law.name,
         "law_fingerprint": data.law.fingerprint,
         "specimen": data.specimen.name,
-        "design": design_name(data),
+        "design": str(data.provenance.get("design", "unknown")),
         "samples": len(data),
         "accepted": int(accepted.sum()),
         "failed": int((data.reasons < 0).sum()),
@@ -267,12 +210,6 @@ def summary(data: Dataset) -> dict[str, Any]:
         "units": column_units(data),
         "provenance": dict(data.provenance),
     }
-
-
-def design_name(data: Dataset) -> str:
-    """The design that drew the samples; of a joined set, all of them."""
-    sources = data.provenance.get("joined", [data.provenance])
-    return ", ".join(dict.fromkeys(str(source.get("design", "unknown")) for source in sources))
 
 
 def rejection_counts(data: Dataset) -> list[dict[str, Any]]:

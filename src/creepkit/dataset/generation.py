@@ -23,7 +23,7 @@ from creepkit.language import CreepLaw
 from creepkit.records import Specimen
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictor
-from creepkit.sampling.domains import SamplingDesign, sampling_design
+from creepkit.sampling.domains import SamplingDomain, sampling_design
 
 POLL_INTERVAL = 0.5
 """s between reports of the progress, where no shard ends earlier."""
@@ -31,7 +31,7 @@ POLL_INTERVAL = 0.5
 
 @checked
 def generate(
-    source: SamplingDesign | CreepLaw | str,
+    source: SamplingDomain | CreepLaw | str,
     using: Specimen | str,
     samples: int | None = None,
     *,
@@ -76,12 +76,12 @@ def generate(
     return storage.read_dataset(path)
 
 
-def resolve_design(source: SamplingDesign | CreepLaw | str, specimen: Specimen, **changes: Any) -> SamplingDesign:
+def resolve_design(source: SamplingDomain | CreepLaw | str, specimen: Specimen, **changes: Any) -> SamplingDomain:
     """The design itself, or the one for a law in a sampling domain.
 
     changes : `domain`, `every`, `grid` and ranges of conditions, as sampling.domains.sampling_design takes them.
     """
-    if not isinstance(source, SamplingDesign):
+    if not isinstance(source, SamplingDomain):
         return sampling_design(resolve_law(source), specimen, **changes)
     if changes:
         argument = next(iter(changes))

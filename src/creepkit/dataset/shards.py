@@ -38,7 +38,7 @@ from creepkit.registry.specimen_documents import specimen_to_json
 if TYPE_CHECKING:
     from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord
     from creepkit.records import Specimen
-    from creepkit.sampling.domains import SamplingDesign
+    from creepkit.sampling.domains import SamplingDomain
 
 
 GENERATION_NAME = "generation.json"
@@ -59,7 +59,7 @@ class GenerationJob:
     rows : of a shard. Worker processes are sent this record.
     """
 
-    design: SamplingDesign
+    design: SamplingDomain
     specimen: Specimen
     seed: int
     folder: Path

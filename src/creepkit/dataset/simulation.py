@@ -23,11 +23,11 @@ from creepkit.sampling.specimen_conditions import creep_output
 
 if TYPE_CHECKING:
     from creepkit.records import Specimen
-    from creepkit.sampling.domains import SamplingDesign
+    from creepkit.sampling.domains import SamplingDomain
     from creepkit.sampling.draws import Draws
 
 
-def rejected_by_screening(design: SamplingDesign, samples: Dataset) -> Ints:
+def rejected_by_screening(design: SamplingDomain, samples: Dataset) -> Ints:
     """(rows,) the number of the criterion that a sample cannot meet, 0 where it must be simulated to know."""
     reasons = np.zeros(len(samples), dtype=np.int64)
     if not getattr(design, "screened", False) or not isinstance(samples.specimen, SupportsReducedOrderModel):
@@ -44,7 +44,7 @@ def rejected_by_screening(design: SamplingDesign, samples: Dataset) -> Ints:
 
 
 def _screening_outcome(
-    design: SamplingDesign, samples: Dataset, row: int, reduced_model: Predictor
+    design: SamplingDomain, samples: Dataset, row: int, reduced_model: Predictor
 ) -> SimulationOutcome:
     """The outcome of one sample by the reduced-order model, at the times when the holds begin and end."""
     conditions = samples.conditions_of(row)
@@ -58,7 +58,7 @@ def _screening_outcome(
     return SimulationOutcome(times, outputs, marks, status, end_time, conditions, shown.column, shown.falls)
 
 
-def _first_rejection(design: SamplingDesign, screening_outcome: SimulationOutcome) -> int:
+def _first_rejection(design: SamplingDomain, screening_outcome: SimulationOutcome) -> int:
     for number, criterion in enumerate(design.criteria, start=1):
         if isinstance(criterion, SurvivesTime | CreepInEachHold) and criterion.rejects_early(screening_outcome):
             return number
@@ -73,7 +73,7 @@ REJECTED_DIGITS = 12
 """Binary digits of the histories of rejected samples, 1 part in 4000: these serve inspection, not training."""
 
 
-def empty_dataset(design: SamplingDesign, specimen: Specimen, provenance: dict[str, object]) -> Dataset:
+def empty_dataset(design: SamplingDomain, specimen: Specimen, provenance: dict[str, object]) -> Dataset:
     """The data set of a design with no samples in it yet."""
     sizes = {
         "parameter_names": len(design.law.names),
@@ -97,7 +97,7 @@ def empty_dataset(design: SamplingDesign, specimen: Specimen, provenance: dict[s
     )
 
 
-def simulate_rows(design: SamplingDesign, header: Dataset, seed: int, first: int, count: int) -> Dataset:
+def simulate_rows(design: SamplingDomain, header: Dataset, seed: int, first: int, count: int) -> Dataset:
     """Rows first to first + count of a design, simulated."""
     draws = design.draw(first, count, seed)
     samples = _unsimulated(header, draws, _reasons_before(design, draws), first)
@@ -126,7 +126,7 @@ def rounded_outputs(values: NDArray[np.float32]) -> NDArray[np.float32]:
     )
 
 
-def _reasons_before(design: SamplingDesign, draws: Draws) -> Ints:
+def _reasons_before(design: SamplingDomain, draws: Draws) -> Ints:
     """The first criterion that a draw does not meet, 0 where it meets all that need no simulation."""
     reasons = np.zeros(len(draws), dtype=np.int64)
     for number, criterion in enumerate(design.criteria, start=1):
@@ -156,7 +156,7 @@ def _unsimulated(header: Dataset, draws: Draws, reasons: Ints, first: int) -> Da
     )
 
 
-def _simulate_sample(design: SamplingDesign, samples: Dataset, row: int) -> int:
+def _simulate_sample(design: SamplingDomain, samples: Dataset, row: int) -> int:
     """Simulate one sample, write its history into its row and return its reason."""
     conditions = samples.conditions_of(row)
     test = planned_test(samples.specimen, conditions, design.grid)
@@ -180,7 +180,7 @@ def _simulate_sample(design: SamplingDesign, samples: Dataset, row: int) -> int:
     return _reason_after(design, outcome)
 
 
-def _reason_after(design: SamplingDesign, outcome: SimulationOutcome) -> int:
+def _reason_after(design: SamplingDomain, outcome: SimulationOutcome) -> int:
     for number, criterion in enumerate(design.criteria, start=1):
         if criterion.stage == "after" and not criterion.passes(outcome):
             return number

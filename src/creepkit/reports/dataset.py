@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.dataset.dataset import column_units, design_name, summary, summary_columns
+from creepkit.dataset.dataset import column_units, summary, summary_columns
 from creepkit.errors import DatasetError
 from creepkit.reports.figures import empty_figure, make_folder, save_figure, set_range
 from creepkit.reports.terminal import print_json, tell, tell_written
@@ -139,7 +139,7 @@ def _load_colours(loads: Floats) -> Any:
 
 
 def _dataset_title(data: Dataset) -> str:
-    return f"{data.law.name} on {data.specimen.name}, design {design_name(data)}"
+    return f"{data.law.name} on {data.specimen.name}, design {data.provenance.get('design', 'unknown')}"
 
 
 def _unit_label(unit: str) -> str:
@@ -195,10 +195,9 @@ def _range_table(summary_data: dict[str, Any]) -> Iterator[str]:
 
 
 def _origin_lines(summary_data: dict[str, Any]) -> Iterator[str]:
-    for number, source in enumerate(summary_data["provenance"].get("joined", [summary_data["provenance"]]), start=1):
-        items = {key: source[key] for key in ("design", "seed", "creepkit", "when", "fingerprint") if key in source}
-        name = "from" if "joined" not in summary_data["provenance"] else f"from {number}."
-        yield f"{name} {', '.join(f'{key} {value}' for key, value in items.items())}"
+    source = summary_data["provenance"]
+    items = {key: source[key] for key in ("design", "seed", "creepkit", "when", "fingerprint") if key in source}
+    yield f"from {', '.join(f'{key} {value}' for key, value in items.items())}"
 
 
 def print_dataset(data: Dataset, to: Path, part: str | None, as_json: bool) -> None:

@@ -13,7 +13,7 @@ from creepkit.reports.figures import empty_figure, place_legend_below, save_figu
 from creepkit.reports.terminal import print_json, tell
 from creepkit.sampling.conditions import ROOM_TEMPERATURE
 from creepkit.sampling.criteria import RateLimit
-from creepkit.sampling.domains import Acceptance, SamplingDesign, SamplingDomain
+from creepkit.sampling.domains import Acceptance, SamplingDomain
 from creepkit.sampling.domains import acceptance as evaluate_acceptance
 from creepkit.sampling.rates import RateArguments, ln_rate
 
@@ -170,7 +170,7 @@ def _summary_line(acceptance: Acceptance) -> str:
     return f"{simulated} of the draws would be simulated{exception}; {useful} of all have {description}"
 
 
-def print_acceptance(design: SamplingDesign, seed: int, to: Path | None, as_json: bool) -> None:
+def print_acceptance(design: SamplingDomain, seed: int, to: Path | None, as_json: bool) -> None:
     """Print what the design would draw, and draw the rates of its samples."""
     assert isinstance(design, SamplingDomain)  # the command line makes no others
     result = evaluate_acceptance(design, seed=seed)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -56,10 +56,6 @@ from creepkit.sampling.specimen_conditions import END, specimen_conditions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-if TYPE_CHECKING:
-    from creepkit.sampling.criteria import Criterion
 
 
 @dataclass(frozen=True)
@@ -306,50 +302,7 @@ def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0
     )
 
 
-@runtime_checkable
-class SamplingDesign(Protocol):
-    """Which samples are drawn; a frozen record that worker processes can be sent."""
-
-    @property
-    def law(self) -> CreepLaw:
-        """The law whose parameters are drawn."""
-        ...
-
-    @property
-    def name(self) -> str:
-        """paper or conditioned."""
-        ...
-
-    @property
-    def specimen(self) -> str:
-        """The kind of test: the name of the specimen."""
-        ...
-
-    @property
-    def condition_names(self) -> tuple[str, ...]:
-        """Names of the conditions that are drawn, in the order of the columns."""
-        ...
-
-    @property
-    def grid(self) -> TimeGrid:
-        """The times of its samples."""
-        ...
-
-    @property
-    def criteria(self) -> tuple[Criterion, ...]:
-        """Criteria that a sample must meet to be kept, those before simulation first."""
-        ...
-
-    def draw(self, first: int, count: int, seed: int) -> Draws:
-        """Return rows `first` to `first + count` of one scrambled Sobol sequence, whatever the block."""
-        ...
-
-    def document(self) -> dict[str, Any]:
-        """Everything that decides the draws, as JSON-able data."""
-        ...
-
-
-def sampling_design(law: CreepLaw, specimen: Specimen, domain: str = "conditioned", **changes: Any) -> SamplingDesign:
+def sampling_design(law: CreepLaw, specimen: Specimen, domain: str = "conditioned", **changes: Any) -> SamplingDomain:
     """Return a design for a law and a specimen; see paper_domain() and conditioned_domain().
 
     domain : "conditioned", whose samples creep visibly, or "paper", uniform in the law's bounds.
@@ -357,7 +310,7 @@ def sampling_design(law: CreepLaw, specimen: Specimen, domain: str = "conditione
         ones: force_1=(5, 20), span=(40, 60), end_time=3600, or force=(5, 20) of both levels of the load; `every`, s
         between frames, or `grid`, a TimeGrid.
     """
-    domains: dict[str, Callable[..., SamplingDesign]] = {"conditioned": conditioned_domain, "paper": paper_domain}
+    domains: dict[str, Callable[..., SamplingDomain]] = {"conditioned": conditioned_domain, "paper": paper_domain}
     if domain not in domains:
         raise DatasetError(f"there is no sampling domain '{domain}': {nearest(domain, domains)}")
     return domains[domain](law, specimen, **changes)

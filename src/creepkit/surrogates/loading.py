@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,8 +10,9 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, SurrogateError, nearest, quoted
 from creepkit.files.json_documents import DocumentFormat, check_keys
 from creepkit.records import Predictor, SupportsReducedOrderModel, known_specimens
+from creepkit.surrogates.parameter_gru import ParameterGru
 from creepkit.surrogates.recipe import SurrogateMetadata
-from creepkit.surrogates.surrogate import Recipe, Surrogate
+from creepkit.surrogates.surrogate import Surrogate
 from creepkit.surrogates.weight_files import CODEC, SURROGATE, read_weights
 
 
@@ -48,10 +47,6 @@ def surrogate(name_or_path: str | Path) -> Predictor:
     return load_surrogate(text)
 
 
-RECIPE_CLASSES = {"parameter-gru": "creepkit.surrogates.parameter_gru:ParameterGru"}
-"""{kind: where its recipe is}; the recipe makes the network that the weights of a file belong to."""
-
-
 def load_surrogate(path: str | Path, document: DocumentFormat = SURROGATE) -> Surrogate:
     """Return the surrogate in a file; SurrogateError says what is wrong with any other file."""
     weights, header = read_weights(path, document)
@@ -59,9 +54,11 @@ def load_surrogate(path: str | Path, document: DocumentFormat = SURROGATE) -> Su
         problem = check_keys(header, ("kind", "recipe", "metadata"), "its header")
         if problem:
             raise SurrogateError(f"{problem}; train it again")
-        recipe = CODEC.from_json(_recipe_class(header["kind"]), header["recipe"], "recipe")
+        if header["kind"] != ParameterGru.kind:
+            raise SurrogateError(f"kind '{quoted(header['kind'])}' is unknown here; it must be '{ParameterGru.kind}'")
+        recipe = CODEC.from_json(ParameterGru, header["recipe"], "recipe")
         metadata = CODEC.from_json(SurrogateMetadata, header["metadata"], "metadata")
-        surrogate = recipe.surrogate(weights, metadata)
+        surrogate = Surrogate(recipe, weights, metadata)
         infinite = [name for name, one in weights.items() if not np.isfinite(np.asarray(one, dtype=float)).all()]
         if infinite:
             raise SurrogateError(f"its weights '{infinite[0]}' are not finite; train it again")
@@ -70,12 +67,3 @@ def load_surrogate(path: str | Path, document: DocumentFormat = SURROGATE) -> Su
     except (KeyError, TypeError, ValueError, RuntimeError, AttributeError):
         raise SurrogateError(f"{path}: its header and its weights do not belong together; train it again") from None
     return surrogate
-
-
-def _recipe_class(kind: Any) -> type[Recipe]:
-    """The class of the recipes of a kind."""
-    if not isinstance(kind, str) or kind not in RECIPE_CLASSES:
-        raise SurrogateError(f"kind '{quoted(kind)}' is unknown here; {nearest(str(kind), RECIPE_CLASSES)}")
-    module, _, name = RECIPE_CLASSES[kind].partition(":")
-    recipe_class: type[Recipe] = getattr(import_module(module), name)
-    return recipe_class

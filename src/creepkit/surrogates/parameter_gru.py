@@ -22,9 +22,7 @@ from creepkit.surrogates.parameter_inputs import (
     constant_inputs,
     load_history_arrays,
 )
-from creepkit.surrogates.parameter_surrogate import ParameterSurrogate
 from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, SurrogateMetadata, Training, Weights
-from creepkit.surrogates.surrogate import Surrogate
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -114,10 +112,6 @@ class ParameterGru(Options, title="settings of a network", error=SurrogateError,
         )
         domain = ApplicabilityDomain.from_rows(domain_names, samples["domain"][train].numpy())
         return SurrogateMetadata.from_dataset(data, scaling=scaling, domain=domain, notes=notes)
-
-    def surrogate(self, weights: Weights, metadata: SurrogateMetadata) -> Surrogate:
-        """The network as a predictor."""
-        return ParameterSurrogate(self, weights, metadata)
 
     def network(self, weights: Weights, metadata: SurrogateMetadata) -> ParameterNetwork:
         """The trained network; SurrogateError where the weights are not those of this recipe."""

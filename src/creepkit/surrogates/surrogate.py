@@ -1,21 +1,23 @@
-"""Surrogates: trained networks as predictors, and the check that a history is one they apply to."""
+"""Surrogates: trained networks as predictors."""
 
 from __future__ import annotations
 
 import warnings
 import weakref
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Floats, Ints
 from creepkit.errors import SurrogateError, SurrogateWarning
 from creepkit.presentation import Presentable
 from creepkit.records import (
     History,
+    HistoryPrediction,
     NuisanceValues,
     Prediction,
     Predictor,
@@ -23,35 +25,56 @@ from creepkit.records import (
     Status,
     SupportsReducedOrderModel,
     SupportsRefinement,
+    assemble_prediction,
     broadcast_candidates,
     check_nuisances,
-    dimension_named,
-    outputs_of,
     unpredicted,
 )
-from creepkit.sampling.conditions import TimeGrid
-from creepkit.sampling.specimen_conditions import specimen_conditions
-from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, SurrogateMetadata, Training, Weights
+from creepkit.surrogates.parameter_inputs import (
+    LawInputs,
+    LoadHistoryInputs,
+    base_model,
+    complete_parameters,
+    hold_last_value,
+    zero_coefficients,
+)
+from creepkit.surrogates.recipe import SampleArrays, SurrogateMetadata, Weights
+from creepkit.surrogates.tested_histories import (
+    check_history,
+    interpolation_weights,
+    observation_derivative,
+    observed_outputs,
+    prediction_frames,
+)
 from creepkit.surrogates.weight_files import CODEC, write_weights
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
-    from creepkit.dataset.dataset import Dataset
     from creepkit.language import CreepLaw
-    from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors
+    from creepkit.surrogates.parameter_gru import ParameterGru
 
 
-RELATIVE_TOLERANCE = 1e-6
+@dataclass(frozen=True, eq=False)
+class NetworkQuery:
+    """Inputs of the network for candidates x tests.
 
+    theta : (candidates, parameters) internal values. law_rows : (candidates, columns) of the law, as network inputs.
+    constants : (candidates, tests, constants). series : (tests, frames, series). base : (candidates, tests, frames).
+    derivatives : {nuisance: (candidates, tests, constants)} of the constants.
+    """
 
-def check_applicable(
-    metadata: SurrogateMetadata, histories: Sequence[History], nuisances: Iterable[str], known_nuisances: Sequence[str]
-) -> None:
-    """SurrogateError where a history, or an explicit nuisance, is none that the surrogate knows."""
-    for history in histories:
-        check_history(metadata, history)
-    check_nuisances(nuisances, known_nuisances, "this surrogate", SurrogateError)
+    theta: Floats
+    law_rows: Floats
+    constants: Floats
+    series: Floats
+    base: Floats | None
+    derivatives: Mapping[str, Floats]
+
+    def network_arguments(self) -> tuple[Floats, Floats, Floats | None]:
+        """Constants (rows, columns), series (tests, frames, series), base (rows, frames); rows: candidates x tests."""
+        count, tests = self.constants.shape[:2]
+        rows = np.repeat(self.law_rows, tests, axis=0)
+        constants = np.concatenate([rows, self.constants.reshape(count * tests, -1)], axis=1)
+        return constants, self.series, None if self.base is None else self.base.reshape(count * tests, -1)
 
 
 def warn_of_unknown_domain(surrogate: Surrogate) -> None:
@@ -69,96 +92,16 @@ def warn_of_unknown_domain(surrogate: Surrogate) -> None:
 _WARNED: weakref.WeakSet[Surrogate] = weakref.WeakSet()
 
 
-def check_history(metadata: SurrogateMetadata, history: History) -> None:
-    """SurrogateError where a history is of another kind of test than those of the training."""
-    where, specimen = history.origin, metadata.specimen
-    quantity = specimen_conditions(specimen).load.name
-    if history.loading.quantity != quantity:
-        raise SurrogateError(f"{where}: its {history.loading.quantity} is prescribed; the surrogate knows {quantity}")
-    control = getattr(history.loading, "control", None)
-    if control not in (None, "load") and quantity == "stress" and metadata.provenance.get("control", "load") != control:
-        raise SurrogateError(f"{where}: true stress is held, and the surrogate was trained under held loads")
-    last = float(history.times[-1])
-    if not metadata.grid.relative and last > metadata.grid.end * (1 + RELATIVE_TOLERANCE):
-        raise SurrogateError(
-            f"{where}: it lasts {last:g} s, and the surrogate was trained up to {metadata.grid.end:g} s; leave later "
-            "frames out or train on longer tests"
-        )
-    observation = getattr(specimen, "observation", None)
-    if observation is not None and history.operator and history.operator != str(observation):
-        raise SurrogateError(f"{where}: observed by '{history.operator}'; the surrogate was trained on '{observation}'")
-    _check_lengths(where, metadata, history)
-
-
-def _check_lengths(where: str, metadata: SurrogateMetadata, history: History) -> None:
-    """Lengths must be those of the specimen, but for those that the applicability domain checks.
-
-    These are the lengths that were varied, and those that differ from test piece to test piece.
-    """
-    for name, value in history.geometry.items():
-        length = dimension_named(metadata.specimen, name)
-        if length is None or length.tolerance > 0.0 or length.name in metadata.conditions:
-            continue
-        if abs(length.default - value) > RELATIVE_TOLERANCE * length.default:
-            raise SurrogateError(f"{where}: {name} is {value:g} mm; the surrogate was trained on {length.default:g} mm")
-
-
-def prediction_frames(grid: TimeGrid, histories: Sequence[History]) -> list[Floats]:
-    """The times (frames,) s of the network for each history: as many for all, as far as the longest needs."""
-    if grid.relative:
-        return [grid.times(float(h.times[-1])) for h in histories]
-    last = max(float(h.times[-1]) for h in histories)
-    count = min(int(np.searchsorted(grid.values, last * (1 - RELATIVE_TOLERANCE))) + 1, grid.values.size)
-    return [grid.values[:count]] * len(histories)
-
-
-def interpolation_weights(frames: Floats, times: Floats) -> Floats:
-    """(times, frames) weights: linear in time between frames, constant before the first and beyond the last.
-
-    frames : (frames,) s. times : (times,) s.
-    """
-    position = np.interp(times, frames, np.arange(frames.size, dtype=float))
-    below = np.minimum(position.astype(int), frames.size - 1)
-    fraction, rows = position - below, np.arange(times.size)
-    weights = np.zeros((times.size, frames.size))
-    weights[rows, below] = 1.0 - fraction
-    weights[rows, np.minimum(below + 1, frames.size - 1)] += fraction
-    return weights
-
-
-def observed_outputs(specimen: Specimen, history: History, values: Floats) -> Floats:
-    """What a history's instrument shows, (candidates, times, outputs): of a creep strain, its own measure of strain.
-
-    values : (candidates, times, outputs) of the network.
-    """
-    observe = _strain_method(specimen, "observed_output")
-    return values if observe is None else np.asarray(observe(history, values[..., 0]))[..., None]
-
-
-def observation_derivative(specimen: Specimen, history: History, values: Floats) -> Floats:
-    """Derivative of what is shown to what the network gives, values (candidates, times, outputs); of that shape."""
-    derivative = _strain_method(specimen, "output_derivative")
-    return np.ones_like(values) if derivative is None else np.asarray(derivative(history, values[..., 0]))[..., None]
-
-
-def _strain_method(specimen: Specimen, name: str) -> Any:
-    """A method of creep strain of a specimen whose only output is a strain; None of others, which show one thing."""
-    outputs = outputs_of(specimen)
-    only_strain = len(outputs) == 1 and outputs[0].quantity == "strain"
-    return getattr(specimen, name, None) if only_strain else None
-
-
-class Surrogate(Presentable, ABC, text="reports.surrogate:surrogate_text"):
+class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
     """A trained network in the place of a specimen; a records.Predictor.
 
-    recipe, weights, metadata : what it was trained as, the arrays of its network, and what is known of its training.
+    It predicts at the frames of its training, and between them linearly in time. recipe, weights, metadata : what it
+    was trained as, the arrays of its network, and what is known of its training.
     """
 
-    nuisances: tuple[str, ...] = ()
-    """Kinds of explicit nuisances that predict() understands."""
-
-    def __init__(self, recipe: Recipe, weights: Weights, metadata: SurrogateMetadata) -> None:
+    def __init__(self, recipe: ParameterGru, weights: Weights, metadata: SurrogateMetadata) -> None:
         self.recipe, self.weights, self.metadata = recipe, weights, metadata
+        self.network = recipe.network(weights, metadata)
 
     @property
     def name(self) -> str:
@@ -180,9 +123,18 @@ class Surrogate(Presentable, ABC, text="reports.surrogate:surrogate_text"):
         """Names of what is predicted."""
         return self.metadata.outputs
 
-    @abstractmethod
+    @property
+    def nuisances(self) -> tuple[str, ...]:
+        """The nuisances whose inputs were varied."""
+        return self._history_inputs.nuisances
+
     def outside_class(self, law: CreepLaw) -> str:
         """Why it does not predict a law, in a sentence; "" where it does."""
+        try:
+            zero_coefficients(self.metadata.law, law)
+        except SurrogateError as error:
+            return str(error)
+        return ""
 
     def predict(
         self,
@@ -198,7 +150,9 @@ class Surrogate(Presentable, ABC, text="reports.surrogate:surrogate_text"):
         A row outside the domain of the training has its values all the same, and Status.OUTSIDE_DOMAIN. A law outside
         the class of the training has Status.OUTSIDE_CLASS, a `reason`, and NaN: nothing bounds the error there.
         """
-        check_applicable(self.metadata, histories, nuisances or (), self.nuisances)
+        for history in histories:
+            check_history(self.metadata, history)
+        check_nuisances(nuisances or (), self.nuisances, "this surrogate", SurrogateError)
         reason = self.outside_class(law)
         if reason:
             candidates = len(broadcast_candidates(theta, nuisances, len(histories))[0])
@@ -206,7 +160,6 @@ class Surrogate(Presentable, ABC, text="reports.surrogate:surrogate_text"):
             return unpredicted(histories, self.outputs, candidates, Status.OUTSIDE_CLASS, f"{reason}; {remedy}")
         return self._predict(law, theta, histories, nuisances, sensitivities)
 
-    @abstractmethod
     def _predict(
         self,
         law: CreepLaw,
@@ -215,16 +168,34 @@ class Surrogate(Presentable, ABC, text="reports.surrogate:surrogate_text"):
         nuisances: NuisanceValues | None,
         sensitivities: bool,
     ) -> Prediction:
-        """As predict(), of a law and of histories that were checked."""
+        """Predict each history's outputs at its times; theta : (candidates, parameters)."""
+        complete_theta = complete_parameters(self.metadata.law, law, theta)
+        complete_theta, nuisances = broadcast_candidates(complete_theta, nuisances, len(histories))
+        frames = prediction_frames(self.metadata.grid, histories)
+        query = self._query(complete_theta, histories, frames, nuisances)
+        positions = [self.metadata.law.names.index(name) for name in law.names]
+        directions = self._directions(query, positions) if sensitivities and self.recipe.base == "none" else None
+        rows, row_derivatives = self.network.outputs_with_derivatives(*query.network_arguments(), directions)
+        shape = query.constants.shape[:2]
+        outputs = rows.reshape(*shape, *rows.shape[1:])
+        derivatives = None if directions is None else row_derivatives.reshape(*shape, *row_derivatives.shape[1:])
+        status = self._status(query, histories, frames)
+        parts = []
+        for k, history in enumerate(histories):
+            test_derivatives = None if derivatives is None else derivatives[:, k]
+            part = self._history_prediction(history, frames[k], outputs[:, k], test_derivatives, tuple(nuisances))
+            parts.append(replace(part, status=status[:, k]))
+        return assemble_prediction(parts, histories, self.outputs, len(complete_theta))
 
-    @abstractmethod
     def predict_samples(self, samples: SampleArrays) -> Floats:
         """(rows, frames, outputs) of the network for samples of its recipe, in physical units."""
+        arrays = {name: np.asarray(samples[name], float) for name in ("constants", "series", "base") if name in samples}
+        return self.network.outputs(arrays["constants"], arrays["series"], arrays.get("base"))
 
     @property
-    @abstractmethod
     def weight_count(self) -> int:
         """Numbers that its training fitted."""
+        return self.network.weight_count
 
     @property
     def error(self) -> dict[str, float]:
@@ -271,30 +242,92 @@ class Surrogate(Presentable, ABC, text="reports.surrogate:surrogate_text"):
     def __repr__(self) -> str:
         return f"<Surrogate: {self.title}>"
 
+    # ---- inputs of the network ----------------------------------------------------------------------------------
 
-class Recipe(Protocol):
-    """A frozen record of what is trained: its fields are plain numbers and words, and make the recipe again."""
+    @cached_property
+    def _history_inputs(self) -> LoadHistoryInputs:
+        return self.recipe.history_inputs(self.specimen, self.metadata.conditions, self.metadata.grid.relative)
 
-    kind: ClassVar[str]
-    """The word for it in files; RECIPE_CLASSES of surrogates.loading says where the class is."""
+    @cached_property
+    def _law_inputs(self) -> LawInputs:
+        return LawInputs(self.metadata.law)
 
-    @property
-    def training(self) -> Training:
-        """How it is trained, unless train() is given other settings; a field."""
-        ...
+    def _query(
+        self, theta: Floats, histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues
+    ) -> NetworkQuery:
+        perturbed = [
+            self._history_inputs.with_nuisances(h, {kind: v[:, k] for kind, v in nuisances.items()}, len(theta))
+            for k, h in enumerate(histories)
+        ]
+        return NetworkQuery(
+            theta=theta,
+            law_rows=self._law_inputs.input_rows(theta),
+            constants=np.stack([numbers for numbers, _ in perturbed], axis=1),
+            series=np.stack([self._history_inputs.series_values(h, t) for h, t in zip(histories, frames, strict=True)]),
+            base=self._base(theta, histories, frames, nuisances) if self.recipe.base != "none" else None,
+            derivatives={kind: np.stack([slopes[kind] for _, slopes in perturbed], axis=1) for kind in nuisances},
+        )
 
-    def sample_arrays(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleArrays:
-        """The arrays of a data set; DatasetError where it cannot be learnt from."""
-        ...
+    def _base(
+        self, theta: Floats, histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues
+    ) -> Floats:
+        """(candidates, tests, frames) what the model that is corrected predicts of the first output."""
+        tests = [h.replace(times=t, outputs={}, standard_deviation={}) for h, t in zip(histories, frames, strict=True)]
+        prediction = base_model(self.specimen, self.recipe.base).predict(
+            self.metadata.law, theta, tests, nuisances=nuisances
+        )
+        return hold_last_value(prediction.values[..., prediction.outputs.index(self.outputs[0])])
 
-    def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> ParameterModule:
-        """A fresh network for these data; its scales are those of the training rows, train (rows,), alone."""
-        ...
+    # ---- outputs ---------------------------------------------------------------------------------------------------
 
-    def metadata(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateMetadata:
-        """What the data say of a surrogate before its training: scaling, domain and notes among it; train : (rows,)."""
-        ...
+    def _directions(self, query: NetworkQuery, positions: Sequence[int]) -> Floats:
+        """(rows, directions, constants): how inputs move with parameters at `positions`, then with the nuisances."""
+        (count, tests, constants), columns = query.constants.shape, query.law_rows.shape[1]
+        directions = np.zeros((count * tests, len(positions) + len(query.derivatives), columns + constants))
+        law_derivatives = self._law_inputs.derivatives(query.theta)[:, :, list(positions)]
+        directions[:, : len(positions), :columns] = np.repeat(np.swapaxes(law_derivatives, 1, 2), tests, axis=0)
+        for k, constant_derivatives in enumerate(query.derivatives.values()):
+            directions[:, len(positions) + k, columns:] = constant_derivatives.reshape(count * tests, -1)
+        return directions
 
-    def surrogate(self, weights: Weights, metadata: SurrogateMetadata) -> Surrogate:
-        """The trained network as a predictor; SurrogateError where the weights are not those of such a network."""
-        ...
+    def _history_prediction(
+        self, history: History, frames: Floats, outputs: Floats, derivatives: Floats | None, nuisances: tuple[str, ...]
+    ) -> HistoryPrediction:
+        """One history at its times, as its instrument shows it.
+
+        frames : (frames,) s. outputs : (candidates, frames, outputs). derivatives : (candidates, frames, outputs,
+        parameters and then nuisances), or None.
+        """
+        weights = interpolation_weights(frames, history.times)
+        interpolated = np.einsum("tf,cfo->cto", weights, outputs)
+        jacobian, nuisance_jacobian = None, {}
+        if derivatives is not None:
+            slope = observation_derivative(self.specimen, history, interpolated)[..., None]
+            shown = np.einsum("tf,cfod->ctod", weights, derivatives) * slope
+            count = shown.shape[-1] - len(nuisances)
+            jacobian = shown[..., :count]
+            nuisance_jacobian = {kind: shown[..., count + k] for k, kind in enumerate(nuisances)}
+        return HistoryPrediction(
+            values=observed_outputs(self.specimen, history, interpolated),
+            status=np.zeros(len(outputs), dtype=np.int64),
+            end_times=np.full(len(outputs), history.times[-1]),
+            jacobian=jacobian,
+            nuisance_jacobian=nuisance_jacobian,
+        )
+
+    def _status(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Ints:
+        """(candidates, tests): complete, or outside the domain."""
+        outside = np.zeros(query.constants.shape[:2], bool)
+        if self.metadata.domain is None:
+            warn_of_unknown_domain(self)
+        else:
+            outside = self.metadata.domain.outside(self._domain_inputs(query, histories, frames))
+        return np.where(outside, int(Status.OUTSIDE_DOMAIN), int(Status.COMPLETE)).astype(np.int64)
+
+    def _domain_inputs(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Floats:
+        """(candidates, tests, inputs) of the applicability domain."""
+        count, tests, constants = query.constants.shape
+        test_rows = np.stack([self._history_inputs.domain_inputs(h, t) for h, t in zip(histories, frames, strict=True)])
+        test_summary = np.broadcast_to(test_rows[None, :, constants:], (count, tests, test_rows.shape[1] - constants))
+        rows = np.broadcast_to(query.law_rows[:, None], (count, tests, query.law_rows.shape[1]))
+        return np.concatenate([rows, query.constants, test_summary], axis=2)

@@ -14,10 +14,10 @@ import numpy as np
 import torch
 
 from creepkit.arrays import Ints
-from creepkit.checked_arguments import checked_with_own_words
+from creepkit.checked_arguments import checked
 from creepkit.dataset.dataset import Dataset
 from creepkit.dataset.storage import read_dataset
-from creepkit.errors import DatasetError, SurrogateError
+from creepkit.errors import SurrogateError
 from creepkit.files.json_documents import as_read_back
 from creepkit.surrogates.evaluation import (
     PredictionComparison,
@@ -30,15 +30,15 @@ from creepkit.surrogates.network_evaluation import RecurrentCell
 from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru
 from creepkit.surrogates.parameter_network import sample_tensors, weights_of
 from creepkit.surrogates.recipe import ProgressCallback, SurrogateMetadata, Training
-from creepkit.surrogates.surrogate import Recipe, Surrogate
+from creepkit.surrogates.surrogate import Surrogate
 from creepkit.surrogates.training_loop import NetworkTraining
 from creepkit.surrogates.training_rows import dataset_fingerprint, output_deviation, trainable_samples, training_split
 from creepkit.surrogates.weight_files import CHECKPOINT, read_weights, write_weights
 
 
-def training_request(data: Dataset, recipe: Recipe, seed: int) -> dict[str, Any]:
+def training_request(data: Dataset, recipe: ParameterGru, seed: int) -> dict[str, Any]:
     """What was asked for, as JSON-able data: the same call goes on where it was interrupted."""
-    config: Any = asdict(recipe)  # type: ignore[call-overload]
+    config: Any = asdict(recipe)
     request: dict[str, Any] = as_read_back(
         {"data": dataset_fingerprint(data), "kind": recipe.kind, "recipe": config, "seed": seed}
     )
@@ -88,10 +88,10 @@ def _differences(first: Any, second: Any, path: str = "") -> list[str]:
     return [] if first == second else [path]
 
 
-@checked_with_own_words("recipe", "data")
+@checked
 def train(
     data: Dataset | str | Path,
-    recipe: Recipe,
+    recipe: ParameterGru,
     *,
     to: str | Path | None = None,
     seed: int = 0,
@@ -110,12 +110,7 @@ def train(
     """
     if isinstance(data, (str, Path)):
         data = read_dataset(data)
-    if not hasattr(data, "accepted"):
-        raise DatasetError(f"train() takes a data set or its file, found {type(data).__name__}; generate() makes one")
-    if isinstance(recipe, type) or not hasattr(recipe, "sample_arrays"):
-        found_type = recipe.__name__ if isinstance(recipe, type) else type(recipe).__name__
-        raise SurrogateError(f"train() takes a recipe such as ParameterGru(hidden=128, layers=3), found {found_type}")
-    recipe = recipe if training is None else replace(recipe, training=training)  # type: ignore[type-var]
+    recipe = recipe if training is None else replace(recipe, training=training)
     torch_device, path, data = _device(device), None if to is None else Path(to), trainable_samples(data)
     request = training_request(data, recipe, seed)
     if path is not None and path.exists():
@@ -134,9 +129,9 @@ def train(
     fit.run(checkpoint.save, progress)
     weights = weights_of(fit.best)
     comparison = compare_predictions(
-        recipe.surrogate(weights, metadata), samples, data, rows[1], output_deviation(samples, rows[0])
+        Surrogate(recipe, weights, metadata), samples, data, rows[1], output_deviation(samples, rows[0])
     )
-    result = recipe.surrogate(weights, _training_metadata(metadata, data, comparison, rows, fit, request))
+    result = Surrogate(recipe, weights, _training_metadata(metadata, data, comparison, rows, fit, request))
     if path is not None:
         result.save(path)
         checkpoint.remove()

@@ -12,8 +12,8 @@ from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from creepkit import limits
-from creepkit.checked_arguments import checked, checked_with_own_words
-from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError
+from creepkit.checked_arguments import checked
+from creepkit.errors import CreepkitError, LawError, PluginError
 from creepkit.kernels.lowering import lower
 from creepkit.language.law import CreepLaw
 from creepkit.records import (
@@ -68,7 +68,7 @@ def check_law(law: CreepLaw, samples: int = 64, seed: int = 0) -> ConformanceRep
     return ConformanceReport(law, tuple(found))
 
 
-@checked_with_own_words("specimen")
+@checked
 def check_specimen(
     specimen: Specimen,
     histories: Sequence[History] | None = None,
@@ -81,8 +81,6 @@ def check_specimen(
     histories : tests to check it with, of different lengths; by default planned from its loads and conditions.
     law, values : by default Norton's law with an activation energy, at a creep strain of half a per cent.
     """
-    if isinstance(specimen, type) or not hasattr(specimen, "predict"):
-        raise SolveError(f"check_specimen() takes a specimen, found {specimen!r}; ck.specimen(name) returns one")
     remember_specimen(specimen)
     return _predictor_report(specimen, histories, law, values, "specimen")
 
@@ -99,8 +97,6 @@ def check_predictor(
 
     histories : tests that it can predict; by default those of its specimen. law, values : that it knows.
     """
-    if isinstance(predictor, type) or not hasattr(predictor, "predict"):
-        raise SolveError(f"check_predictor() takes a predictor, found {predictor!r}; it needs a method predict()")
     return _predictor_report(predictor, histories, law, values, "predictor")
 
 
@@ -154,14 +150,12 @@ def _same_class(first: type, second: type) -> bool:
     return first is second or (first.__qualname__ == second.__qualname__ and same_file)
 
 
-@checked_with_own_words("reader")
+@checked
 def check_reader(reader: Reader, path: str | Path | None = None) -> ConformanceReport:
     """Run every check on a reader.
 
     path : an example file or folder, whose histories must survive creepkit's own CSV files.
     """
-    if isinstance(reader, type) or not hasattr(reader, "accepts"):
-        raise HistoryError(f"check_reader() takes a reader, found {reader!r}; it needs accepts() and read()")
     return _report(reader, "reader", reader_checks, None if path is None else Path(path))
 
 
@@ -174,11 +168,9 @@ def check_camera_format(format: CameraFormat, path: str | Path | None = None) ->
     return _report(format, "camera format", camera_checks, None if path is None else Path(path))
 
 
-@checked_with_own_words("exporter")
+@checked
 def check_exporter(exporter: Exporter) -> ConformanceReport:
     """Run every check on an exporter, with every registered law."""
-    if isinstance(exporter, type) or not hasattr(exporter, "text"):
-        raise ExportError(f"check_exporter() takes an exporter, found {exporter!r}; it needs a method text()")
     return _report(exporter, "exporter", exporter_checks)
 
 

@@ -148,38 +148,6 @@ def test_rows_keep_what_belongs_to_them(data):
     np.testing.assert_array_equal(part.times(0), GRID.values)
 
 
-# ---- joining -------------------------------------------------------------------------------------------------------
-
-
-def test_joined_sets_hold_the_samples_of_both(tmp_path, data):
-    other = replace(simulated(tmp_path, seed=1), design_document=data.design_document, reason_names=data.reason_names)
-    both = data.joined(other)
-    assert_same(both.rows(slice(0, 32)), data)
-    assert_same(both.rows(slice(32, 64)), other)
-    assert [source["seed"] for source in both.provenance["joined"]] == [0, 1]
-    assert len(both.joined(replace(other, provenance={"seed": 2})).provenance["joined"]) == 3
-
-
-def test_the_same_samples_do_not_count_twice(data):
-    with pytest.raises(DatasetError, match="both data sets hold 32 samples of the same design and seed .* twice"):
-        data.joined(data)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"law": ck.law("strain-hardening")}, "laws 'norton' and 'strain-hardening' cannot be joined"),
-        ({"specimen": BAR.replace(tolerance=1e-4)}, "specimen.fields.tolerance is 1e-05 and 0.0001"),
-        ({"outputs": ("elongation",)}, "different outputs cannot be joined: strain and elongation"),
-        ({"reason_names": ("accepted",)}, "different reason names"),
-        ({"grid": type(GRID)(2 * GRID.values)}, "different time grids"),
-    ],
-)
-def test_strangers_are_not_joined(data, change, message):
-    with pytest.raises(DatasetError, match=message):
-        data.joined(replace(data, **change))
-
-
 # ---- files that are something else ---------------------------------------------------------------------------------
 
 

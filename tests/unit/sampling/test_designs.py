@@ -14,7 +14,7 @@ import creepkit as ck
 from creepkit.errors import DatasetError
 from creepkit.records import PressureJump
 from creepkit.sampling.conditions import TimeGrid, hold_times, planned_test
-from creepkit.sampling.domains import SamplingDesign, sampling_design
+from creepkit.sampling.domains import SamplingDomain, sampling_design
 from creepkit.sampling.draws import Draws, sobol_rows
 
 DIMPLE, BAR = ck.specimen("bulge"), ck.specimen("uniaxial")
@@ -171,7 +171,7 @@ def test_a_bar_has_two_stresses_and_no_modulus():
 @pytest.mark.parametrize("domain", ["paper", "conditioned"])
 def test_a_design_travels_and_says_what_decides_it(domain):
     design = sampling_design(ck.law("combined"), DIMPLE, domain)
-    assert isinstance(design, SamplingDesign)
+    assert isinstance(design, SamplingDomain)
     again = pickle.loads(pickle.dumps(design))
     assert again == design
     text = json.dumps(design.document(), allow_nan=False)

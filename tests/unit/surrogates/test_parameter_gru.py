@@ -273,10 +273,10 @@ def test_other_kinds_of_tests_are_refused(
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"cell": "rnn"}, "cell is 'rnn'; allowed are gru, lstm"),
+        ({"cell": "rnn"}, "cell 'rnn' is not known; allowed are gru, lstm"),
         ({"hidden": 0}, "hidden is 0"),
         ({"inputs": ("laod",)}, "there is no input 'laod': did you mean 'load'"),
-        ({"base": "one-dof"}, "base is 'one-dof'; allowed are none, reduced-order, reference-stress"),
+        ({"base": "one-dof"}, "base 'one-dof' is not known; allowed are none, reduced-order, reference-stress"),
     ],
 )
 def test_recipes_that_make_no_sense(changes: dict, told: str) -> None:
