@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from creepkit.registry.arguments import resolve_predictor
 
 if TYPE_CHECKING:
     from creepkit.extraction import Extraction
+    from creepkit.extraction.options import ExtractionOptions
     from creepkit.instruments.imposed import Imposed
     from creepkit.records import Frames, History, InstrumentRecord
 
@@ -57,6 +59,47 @@ def extract(
     # A program counts from the first frame, a constant load from the last frame at rest.
     zero = None if program is None else 0.0
     return [one.replace(history=one.history_under(loading, temperature, time_zero=zero)) for one in found]
+
+
+def extract_as_described(
+    frames: Frames,
+    specimen: Specimen | str,
+    described: ExtractionOptions,
+    operator: str,
+    progress: Callable[[str, int, int], None],
+) -> list[Extraction]:
+    """Extract what a command or a study describes: its frames' interval, centres, names and frames at rest.
+
+    progress : called as progress("frames", done, total) for each frame that is read. HistoryError for another number of
+    names than of test pieces.
+    """
+    if described.interval is not None:
+        frames = replace(frames, times=described.interval * np.arange(len(frames), dtype=float))
+    names = described.names or tuple(f"D{k + 1}" for k in range(len(described.centers)))
+    done: set[int] = set()
+
+    def read(index: int) -> Any:
+        done.add(index)
+        progress("frames", len(done), len(frames))
+        return frames.read_frame(index)
+
+    centers = {name: (x, y) for name, (x, y) in zip(names, described.centers, strict=False)}
+    found = extract(
+        replace(frames, read_frame=read),
+        specimen,
+        operator=operator,
+        centers=centers or None,
+        rest=described.frames_at_rest,
+        subset=described.subset,
+    )
+    if not names or centers:
+        return found
+    if len(names) != len(found):
+        raise HistoryError(
+            f"{len(found)} test pieces were found, and {len(names)} names are given: {', '.join(names)}; give as many "
+            "names, or the centres of those that have them"
+        )
+    return [one.replace(name=name) for one, name in zip(found, names, strict=True)]
 
 
 def operator_of(specimen: Specimen | str, window: float | None = None, radii: Sequence[float] = ()) -> str:

@@ -7,6 +7,7 @@ imported when it is asked for; `creepkit --help` imports none.
 from __future__ import annotations
 
 import importlib
+import inspect
 import os
 import sys
 from collections.abc import Iterator
@@ -78,7 +79,7 @@ def built(name: str) -> Any:
     app = typer.Typer(rich_markup_mode=None)
     functions = getattr(module, "COMMANDS", None)
     if functions is None:
-        help = f"{COMMANDS[name]}\n\n{module.command.__doc__}"
+        help = f"{COMMANDS[name]}\n\n{inspect.cleandoc(module.command.__doc__)}"
         app.command(name, cls=getattr(module, "Command", CheckedCommand), help=help)(checked(module.command))
     else:
         group = typer.Typer(rich_markup_mode=None, no_args_is_help=True, help=COMMANDS[name])

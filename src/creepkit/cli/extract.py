@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,7 +16,7 @@ from creepkit.reports.terminal import ProgressBar, tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.extraction import Extraction
-    from creepkit.records import Frames, History, InstrumentRecord
+    from creepkit.records import History, InstrumentRecord
 
 
 def command(
@@ -31,7 +30,7 @@ def command(
 ) -> None:
     """What was imposed is in an instrument's record, or constant; without it, histories cannot be written."""
     import creepkit as ck
-    from creepkit.api.extraction import operator_of
+    from creepkit.api.extraction import extract_as_described, operator_of
     from creepkit.files.writing import check_folder_target, check_target, made_from
 
     said, under = ExtractionOptions().changed(options), ImposedOptions().changed(conditions)
@@ -50,25 +49,18 @@ def command(
     operator = operator_of(specimen, said.window, said.rings)
     if said.names and (len(set(said.names)) != len(said.names) or any("/" in n or n[:1] == "." for n in said.names)):
         raise HistoryError(f"--names {','.join(said.names)}: give different names, without a folder in them")
-    names = said.names or tuple(f"D{k + 1}" for k in range(len(said.centers)))
-    if said.centers and len(names) != len(said.centers):
-        raise HistoryError(f"--names {','.join(names)}: give {len(said.centers)} names, one for each --center")
+    if said.names and said.centers and len(said.names) != len(said.centers):
+        raise HistoryError(f"--names {','.join(said.names)}: give {len(said.centers)} names, one for each --center")
     if any(len(center) != 2 for center in said.centers):
         raise HistoryError(f"--center {','.join(map(str, said.centers[0]))}: write X,Y in mm, as in --center 12.5,-3")
-    rest, centers = said.frames_at_rest, {name: (x, y) for name, (x, y) in zip(names, said.centers, strict=False)}
+    _ = said.frames_at_rest  # which says what is wrong with its text, before frames are read
+    if said.columns is not None and said.format is not None:
+        raise HistoryError("--columns and --format were given: named columns are of no known format; leave one out")
+    if said.interval is not None and said.times is not None:
+        raise HistoryError("--interval-s and --times were given; leave one of them out")
+    read = ck.read_frames(frames, said.format if said.columns is None else dict(said.columns), said.times)
     with ProgressBar() as progress:
-        found = ck.extract(
-            _reporting(_frames(frames, said), progress.tick),
-            specimen,
-            operator=operator,
-            centers=centers or None,
-            rest=rest,
-            subset=said.subset,
-        )
-    if said.names and not said.centers:
-        if len(names) != len(found):
-            raise HistoryError(f"--names {','.join(names)}: give {len(found)} names, one for each that is found")
-        found = [one.replace(name=name) for one, name in zip(found, names, strict=True)]
+        found = extract_as_described(read, specimen, said, operator, progress.tick)
     for one in found:
         tell(one)
     sheets = [plot if len(found) == 1 else plot.with_stem(f"{plot.stem}_{one.name}") for one in found] if plot else []
@@ -106,30 +98,3 @@ def _history(one: Extraction, recorded: InstrumentRecord | None, under: ImposedO
             tell(f"  {note}")
         history = history_of(one, imposed)
     return history if under.modulus is None else history.replace(elastic=ck.Elastic(E=under.modulus))
-
-
-def _frames(path: str, said: ExtractionOptions) -> Frames:
-    import numpy as np
-
-    import creepkit as ck
-
-    if said.columns is not None and said.format is not None:
-        raise HistoryError("--columns and --format were given: named columns are of no known format; leave one out")
-    if said.interval is not None and said.times is not None:
-        raise HistoryError("--interval-s and --times were given; leave one of them out")
-    frames = ck.read_frames(path, said.format if said.columns is None else dict(said.columns), said.times)
-    if said.interval is not None:
-        return replace(frames, times=said.interval * np.arange(len(frames), dtype=float))
-    return frames
-
-
-def _reporting(frames: Frames, tick: Any) -> Frames:
-    """The same frames; each that is read is told to a progress bar."""
-    done: set[int] = set()
-
-    def read(index: int) -> Any:
-        done.add(index)
-        tick("read", len(done), len(frames), "")
-        return frames.read_frame(index)
-
-    return replace(frames, read_frame=read)

@@ -212,7 +212,7 @@ def default_text(one: Option) -> str:
     """The limits and the default, where a line can say it."""
     limits = f"{one.limits.low:g} to {one.limits.high:g}" if one.limits and one.limits.high < 1e6 else ""
     default = one.default
-    if default in (MISSING, None, inspect.Parameter.empty) or isinstance(default, bool):
+    if default in (MISSING, None, inspect.Parameter.empty, {}, ()) or isinstance(default, bool):
         text = ""
     elif isinstance(default, int | float):
         text = f"{(default - one.offset) / one.scale:g}"

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, nearest
+from creepkit.errors import PluginError, nearest
 from creepkit.files.writing import write_text
 from creepkit.options import Option
 from creepkit.reports.terminal import tell
@@ -27,23 +27,14 @@ class PackageKind:
 
     In the texts $name, $title, $constant, $class_name, $module and $package stand for names made of the plugin's own.
 
-    noun : what is offered: "law". error : raised where there is one of that name already.
-    module, test : text of the module, and of its test. edit : what its author edits first.
-    use : commands that use it. check : the command that checks $file, the path of the module.
+    module : its text. edit : what its author edits first. use : a command that uses it. test : of the module, where its
+    promises alone do not show what it does.
     """
 
-    noun: str
-    error: type[CreepkitError]
     module: str
-    test: str
     edit: str
     use: str
-    check: str
-
-    @property
-    def listed(self) -> str:
-        """What `creepkit list` calls all of the kind."""
-        return "targets" if self.noun == "exporter" else f"{self.noun}s"
+    test: str = ""
 
 
 PROJECT = """\
@@ -67,6 +58,16 @@ include = ["$module.py"]
 """
 
 
+TEST = """\
+from creepkit.testing import check_named
+
+
+def test_it_keeps_what_every_${noun}_promises() -> None:
+    for report in check_named("$name"):
+        assert report.passed, str(report)
+"""
+
+
 README = """\
 # $package
 
@@ -74,16 +75,13 @@ $title: say here what it is, and where it was published.
 
     pip install -e .
     pytest
-$use
+    creepkit check $name
 """
 
 
 LAW = PackageKind(
-    "law",
-    LawError,
     edit="its terms and params",
-    check="creepkit check $file",
-    use="creepkit list laws $name\ncreepkit check $name",
+    use="    creepkit list laws $name\n",
     module='''\
 """$title: say here in one line what the law describes."""
 
@@ -107,22 +105,11 @@ $constant = CreepLaw(
 def creepkit_laws():
     return [$constant]
 ''',
-    test="""\
-import creepkit as ck
-
-
-def test_it_keeps_what_every_law_promises() -> None:
-    report = ck.check_law(ck.law("$name"))
-    assert report.passed, str(report)
-""",
 )
 
 SPECIMEN = PackageKind(
-    "specimen",
-    SolveError,
     edit="its lengths, outputs and one()",
-    check="creepkit check $file",
-    use="creepkit list specimens\ncreepkit check $name",
+    use="    creepkit list specimens\n",
     module='''\
 """$title: say here in one line what is loaded, and what is observed."""
 
@@ -168,47 +155,11 @@ class ${class_name}Specimen(ck.PerTest):
 def creepkit_specimens():
     return [${class_name}Specimen()]
 ''',
-    test='''\
-import numpy as np
-import pytest
-
-import creepkit as ck
-
-VALUES = {"A": 1e-16, "n": 4.0}
-TIMES = np.linspace(3600.0, 3.6e6, 20)
-
-
-def simulated(force: float) -> ck.History:
-    return ck.simulate("norton", "$name", VALUES, loading=ck.constant_load("force", force), times=TIMES)
-
-
-def test_it_keeps_what_every_specimen_promises() -> None:
-    report = ck.check_specimen(ck.specimen("$name"))
-    assert report.passed, str(report)
-
-
-def test_it_is_the_closed_form_of_norton_creep_under_dead_weight() -> None:
-    """d(ln l)/dt = A (s l/L)^n has the solution l = L (1 - n A s^n t)^(-1/n)."""
-    specimen = ck.specimen("$name")
-    stress = specimen.reference_stress(simulated(4000.0))
-    stretch = (1 - VALUES["n"] * VALUES["A"] * stress ** VALUES["n"] * TIMES) ** (-1 / VALUES["n"])
-    elongation = specimen.gauge_length * (stretch - 1)
-    np.testing.assert_allclose(simulated(4000.0).outputs["elongation"], elongation, rtol=1e-5)
-
-
-def test_the_values_that_made_a_test_are_found_from_it() -> None:
-    tests = [simulated(force).replace(name=f"{force:g} N") for force in (3000.0, 4000.0, 5000.0)]
-    fit = ck.identify("norton", tests, "$name", starts=1, nuisances=[])
-    assert fit.values["n"] == pytest.approx(VALUES["n"], rel=1e-3)
-''',
 )
 
 READER = PackageKind(
-    "reader",
-    HistoryError,
     edit="the names of files and columns",
-    check="creepkit check $file",
-    use="creepkit check $name\ncreepkit identify FOLDER --law norton",
+    use="    creepkit identify FOLDER --law norton\n",
     module='''\
 """$title: say here whose files these are, and what they hold."""
 
@@ -256,18 +207,13 @@ def test_numbers_arrive_in_creepkits_units(tmp_path: Path) -> None:
 
     np.testing.assert_allclose(bar.times, [3600.0, 7200.0])
     np.testing.assert_allclose(bar.outputs["strain"], [2e-4, 3e-4])
-    assert bar.loading.program().values.tolist() == [120.0]
-    assert bar.temperature == 1023.15
-    assert bar.unruptured
+    assert (bar.temperature, bar.unruptured) == (1023.15, True)
 """,
 )
 
 EXPORTER = PackageKind(
-    "exporter",
-    ExportError,
     edit="text()",
-    check="creepkit check $file",
-    use="creepkit check $name\ncreepkit export norton --to $name --set A=1e-16 --set n=5",
+    use="    creepkit export norton --to $name --set A=1e-16 --set n=5\n",
     module='''\
 """$title: say here which program reads the text."""
 
@@ -301,30 +247,10 @@ class ${class_name}Exporter:
 def creepkit_exporters():
     return [${class_name}Exporter()]
 ''',
-    test="""\
-import pytest
-
-import creepkit as ck
-
-VALUES = {"A": 1e-16, "n": 5.0}
-
-
-def test_it_keeps_what_every_exporter_promises() -> None:
-    report = ck.check_exporter(ck.available("exporters")["$name"])
-    assert report.passed, str(report)
-
-
-def test_the_text_says_the_same_as_the_law() -> None:
-    text = ck.export("norton", "$name", VALUES)
-    space = {"stress": 100.0}
-    for line in text.splitlines()[::-1]:  # values before the rate
-        exec(line, space)
-    assert space["rate"] == pytest.approx(1e-16 * 100.0**5, rel=1e-12)
-""",
 )
 
 
-KINDS = {kind.noun: kind for kind in (LAW, SPECIMEN, READER, EXPORTER)}
+KINDS = {"law": LAW, "specimen": SPECIMEN, "reader": READER, "exporter": EXPORTER}
 
 
 def command(
@@ -344,45 +270,36 @@ def command(
             f"'{name}' is not a {kind}'s name: use lower-case words joined by '-', such as my-{kind}"
         )
     if name in getattr(default_registry(), f"{kind}s")():
-        raise chosen.error(f"there is a {kind} '{name}' already; choose another, see creepkit list {chosen.listed}")
-    tell(_write_file(chosen, name) if file else _write_package(chosen, name))
-
-
-def _write_file(kind: PackageKind, name: str) -> str:
-    """Write the module alone; say what to do next."""
-    path = Path(f"{name.replace('-', '_')}.py")
-    _check_absent(path)
-    write_text(_filled(kind.module, name), path, PluginError, internal=True)  # that it is absent was checked
-    check = _filled(kind.check, name, file=str(path))
-    return (
-        f"wrote {path}; next: edit {kind.edit}, then run '{check}', "
-        f"and 'creepkit --plugin {path}' before any other command"
-    )
-
-
-def _write_package(kind: PackageKind, name: str) -> str:
-    """Write a folder with module, project file, README and test; say what to do next."""
-    folder, module = Path(name), _names(name)["module"]
-    _check_absent(folder)
-    if find_spec(module) is not None:
-        raise PluginError(f"a module '{module}' is installed already; choose another name than '{name}'")
-    use = "".join(f"    {line}\n" for line in _filled(kind.use, name).splitlines())
-    texts = {
-        f"{module}.py": _filled(kind.module, name),
-        "pyproject.toml": _filled(PROJECT, name, noun=kind.noun),
-        "README.md": _filled(README, name, use=use.rstrip("\n")),
-        f"tests/test_{name.replace('-', '_')}.py": _filled(kind.test, name),
-    }
-    (folder / "tests").mkdir(parents=True)
-    for path, text in texts.items():
-        write_text(text, folder / path, PluginError, internal=True)  # in a new folder
-    file = folder / f"{module}.py"
-    check = _filled(kind.check, name, file=str(file))
-    return (
-        f"wrote {folder}/ ({', '.join(texts)})\n"
-        f"next: edit {kind.edit} in {file}, run '{check}', then 'pip install -e ./{folder}' and 'pytest {folder}': "
-        f"from then on every command knows the {kind.noun} '{name}'"
-    )
+        every = "targets" if kind == "exporter" else f"{kind}s"
+        raise PluginError(f"there is a {kind} '{name}' already; choose another, see creepkit list {every}")
+    texts = _names(name)
+    path, package, module = Path(f"{name.replace('-', '_')}.py"), Path(name), texts["module"]
+    if os.path.lexists(path if file else package):  # it is left as it is
+        place = path if file else package
+        raise PluginError(f"{place} exists already; it was left as it is, choose another name or move it")
+    if file:
+        written = {path: chosen.module}
+        said = f"wrote {path}; next: edit {chosen.edit}, then run 'creepkit check {path}', "
+        said += f"and 'creepkit --plugin {path}' before any other command"
+    else:
+        if find_spec(module) is not None:
+            raise PluginError(f"a module '{module}' is installed already; choose another name than '{name}'")
+        written = {
+            package / f"{module}.py": chosen.module,
+            package / "pyproject.toml": PROJECT,
+            package / "README.md": README + chosen.use,
+            package / "tests" / f"test_{path.name}": chosen.test or TEST,
+        }
+        path = package / f"{module}.py"
+        said = f"wrote {package}/ ({', '.join(str(one.relative_to(package)) for one in written)})\n"
+        said += (
+            f"next: edit {chosen.edit} in {path}, run 'creepkit check {path}', then 'pip install -e ./{package}' and "
+        )
+        said += f"'pytest {package}': from then on every command knows the {kind} '{name}'"
+        (package / "tests").mkdir(parents=True)
+    for one, text in written.items():
+        write_text(Template(text).substitute(texts, noun=kind), one, PluginError, internal=True)  # it was absent
+    tell(said)
 
 
 def _names(name: str) -> dict[str, str]:
@@ -396,13 +313,3 @@ def _names(name: str) -> dict[str, str]:
         "module": f"creepkit_{'_'.join(words)}",
         "package": f"creepkit-{name}",
     }
-
-
-def _filled(text: str, name: str, **more: str) -> str:
-    return Template(text).substitute(_names(name), **more)
-
-
-def _check_absent(path: Path) -> None:
-    """What exists is left as it is."""
-    if os.path.lexists(path):
-        raise PluginError(f"{path} exists already; it was left as it is, choose another name or move it")

@@ -104,9 +104,9 @@ class ProgressBar:
             if task not in self._tasks:
                 self._tasks[task] = self._bar.add_task(task, total=total, note=note)
             self._bar.update(self._tasks[task], completed=done, total=total, note=note)
-        elif task != self._stage:
-            self._stage, self._due = task, time.monotonic() + self.LONG_STAGE
-            tell(f"{task} ...", err=True)
+        elif f"{task} {member}" != self._stage:
+            self._stage, self._due = f"{task} {member}", time.monotonic() + self.LONG_STAGE
+            tell(f"{task}{member and f' {member}'} ...", err=True)
         elif time.monotonic() > self._due:
             self._due += 2 * (time.monotonic() - self._due + self.LONG_STAGE)
             tell(f"{task}: {done} of {total}{note and f' ({note})'}", err=True)

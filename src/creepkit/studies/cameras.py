@@ -14,9 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from creepkit.api.extraction import WATCHED, history_of, imposed_on, operator_of
+from creepkit.api.extraction import WATCHED, extract_as_described, history_of, imposed_on, operator_of
 from creepkit.cameras.sequences import in_order
 from creepkit.errors import CreepkitError, HistoryError, StudyError, nearest
 from creepkit.extraction import Extraction
@@ -27,7 +25,7 @@ from creepkit.instruments.imposed import Imposed
 from creepkit.inverse.fingerprints import predictor_fingerprint
 from creepkit.language import Elastic
 from creepkit.options import values_of_table
-from creepkit.records import Frames, History, Loading, Specimen, SupportsSurfaceObservation, loads_of
+from creepkit.records import History, Loading, Specimen, SupportsSurfaceObservation, loads_of
 from creepkit.registry.reading import frame_files
 from creepkit.reports.contents import Exclusion
 from creepkit.studies import arguments
@@ -251,26 +249,10 @@ class StudyCamera:
         import creepkit as ck
 
         part, said, (paths, times, _) = self.part, self.said, self.files
-        names = said.names or tuple(f"D{k + 1}" for k in range(len(said.centers)))
-        centers = {name: (x, y) for name, (x, y) in zip(names, said.centers, strict=False)}
 
         def make(results: Results, tick: Tick) -> ExtractedTests:
-            frames = ck.read_frames(list(paths), self.format, times)
-            if said.interval is not None:
-                frames = replace(frames, times=said.interval * np.arange(len(frames), dtype=float))
-            found = ck.extract(
-                replace(_reporting(frames, tick), name=part.name),
-                self.specimen,
-                operator=self.operator,
-                centers=centers or None,
-                rest=said.frames_at_rest,
-                subset=said.subset,
-            )
-            if names and not centers:
-                if len(names) != len(found):
-                    what = f"{len(found)} test pieces were found, and {len(names)} names are given"
-                    raise HistoryError(f"{what}; give their centers_mm, or as many names")
-                found = [one.replace(name=name) for one, name in zip(found, names, strict=True)]
+            frames = replace(ck.read_frames(list(paths), self.format, times), name=part.name)
+            found = extract_as_described(frames, self.specimen, said, self.operator, tick)
             return ExtractedTests(tuple(_without_folders(one, paths[0].parent) for one in found))
 
         settings = [
@@ -374,18 +356,6 @@ def _record_options(record: RecordTable) -> Any:
     options = record.model_dump(exclude={"name", "file", "format", "pressure_reference", "ambient_pressure_MPa"})
     reference, ambient = record.pressure_reference or "", record.ambient_pressure_MPa
     return {**options, "pressure_reference": reference, "ambient_pressure": ambient}
-
-
-def _reporting(frames: Frames, tick: Tick) -> Frames:
-    """The same frames; each that is read counts as progress."""
-    done: set[int] = set()
-
-    def read(index: int) -> Any:
-        done.add(index)
-        tick("frames", len(done), len(frames))
-        return frames.read_frame(index)
-
-    return replace(frames, read_frame=read)
 
 
 def _without_folders(extraction: Extraction, folder: Path) -> Extraction:
