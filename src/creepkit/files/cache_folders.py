@@ -39,9 +39,9 @@ def cache_folder(name: str) -> Path | None:
 
 
 def is_ours_alone(path: Path) -> bool:
-    """Whether a file or folder, no link, is this user's or root's, and nobody else can write to it; OSError if none."""
+    """Whether a regular file or folder is this user's or root's, and nobody else can write to it; OSError if none."""
     status = os.lstat(path)
-    if stat.S_ISLNK(status.st_mode):
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
         return False
     if not hasattr(os, "geteuid"):
         return True
