@@ -189,7 +189,7 @@ figure.savefig("brittle-steel-elsewhere.png", dpi=120)
 
 command = Path(sys.executable).with_name("creepkit")
 if not Path("new-steel").exists():
-    print(subprocess.run([command, "new-law", "new-steel"], check=True, capture_output=True, text=True).stdout)
+    print(subprocess.run([command, "new", "law", "new-steel"], check=True, capture_output=True, text=True).stdout)
 
 # %%
 # Text for other programs

@@ -121,7 +121,7 @@ def planted_plate(alloys: int = 47, seed: int = 7, *, thickness_known: bool = Tr
 
     thickness_known : whether each test states the apex thickness of its dimple, to a micrometre.
     """
-    limits.check_number("alloys", alloys, limits.TESTS_IN_A_RUN, FitError)
+    limits.check_number("alloys", alloys, limits.Limits(1, 10_000), FitError)
     limits.check_number("seed", seed, limits.SEED, FitError)
     histories, atomic, truth = [], {}, {}
     for number in range(1, alloys + 1):

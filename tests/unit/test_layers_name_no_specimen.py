@@ -24,6 +24,7 @@ ALLOWED = {
     "creepkit.cli.shared": "what commands take where no specimen is named",
     "creepkit.extraction.options": "the window of a fit to a camera's frames, of any specimen",
     "creepkit.cli.extract": "the same window",
+    "creepkit.studies.cameras": "the same window",
 }
 
 

@@ -119,7 +119,7 @@ def test_it_works_without_the_modules_that_windows_lacks(absent, tmp_path) -> No
         "from pathlib import Path\n"
         "from typer.testing import CliRunner\n"
         "from creepkit.cli.app import app\n"
-        "steps = [['laws'], ['generate', 'norton', '--specimen', 'uniaxial', '--draws', '4', '--interval', '2400',\n"
+        "steps = [['list', 'laws'], ['surrogate', 'generate', 'norton', '--specimen', 'uniaxial', '--draws', '4', '--interval', '2400',\n"
         "         '--seed', '1', '--workers', '1', '--to', 'set.h5'], ['data', 'set.h5'],\n"
         "         ['app', 'norton', '--to', 'page.html']]\n"
         "for words in steps:\n"

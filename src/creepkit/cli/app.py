@@ -125,8 +125,11 @@ class CommandGroup(TyperGroup):
             raise typer.Exit(exit_code_of_signal()) from None
         except Exception as error:
             if debug or _is_of_the_command_line(error) or isinstance(error, BrokenPipeError):
-                if isinstance(getattr(error, "message", None), str):  # it names options and arguments as they came
-                    error.message = printable(error.message)  # type: ignore[attr-defined]
+                message = getattr(error, "message", None)  # it names options and arguments as they came
+                if isinstance(message, str) and type(error).__name__ != "NoArgsIsHelpError":
+                    before = "; write it before the command: creepkit --plugin FILE COMMAND"
+                    hint = before if message.startswith("No such option: --plugin") else ""
+                    error.message = f"{printable(message)}{hint}"  # type: ignore[attr-defined]
                 raise
             say(sentence_of(error))
             raise typer.Exit(1) from None

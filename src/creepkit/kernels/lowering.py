@@ -145,9 +145,7 @@ class ArrayKernel:
     def _internal_values(self, values: Mapping[str, Any]) -> list[Any]:
         for name in values:
             self.law.symbol(name)
-        missing = [name for name in self.law.names if name not in values]
-        if missing:
-            raise LawError(f"law '{self.law.name}' needs a value for {', '.join(missing)}")
+        self.law.check_complete(values)
         log = self._target.FUNCTIONS["log_or_off"]
         numbers = {n: self._target.as_array(values[n]) for n in self.law.names}
         return [log(numbers[n]) if p.scale == "log" else numbers[n] for n, p in self.law.table.items()]

@@ -299,13 +299,18 @@ class LawRecord:
         """The middle of the bounds, each on its own scale: {name: value}."""
         return {name: param.center for name, param in self.table.items()}
 
+    def check_complete(self, given: Mapping[str, Any]) -> None:
+        """LawError, with the parameters that lack a value, unless every one has one."""
+        missing = [name for name in self.names if name not in given]
+        if missing:
+            how = f"give all of them, such as {{{missing[0]!r}: 1.5}}, in a command --set {missing[0]}=1.5"
+            raise LawError(f"law '{self.name}' needs a value for {', '.join(missing)}; {how}")
+
     def values(self, given: Mapping[str, float]) -> dict[str, float]:
         """Return `given` completed and in the law's order; every parameter must be there, finite, once."""
         for name in given:
             self.symbol(name)
-        missing = [name for name in self.names if name not in given]
-        if missing:
-            raise LawError(f"law '{self.name}' needs a value for {', '.join(missing)}")
+        self.check_complete(given)
         values = {name: self.number(given[name], f"parameter '{name}'") for name in self.names}
         for name, value in values.items():
             if not abs(value) < float("inf"):
@@ -335,9 +340,7 @@ class LawRecord:
         import numpy as np
 
         if isinstance(values, Mapping):
-            missing = [name for name in self.names if name not in values]
-            if missing:
-                raise LawError(f"law '{self.name}' needs a value for {', '.join(missing)}")
+            self.check_complete(values)
             columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[name], float)) for name in self.names))
             theta = np.stack(columns, axis=-1) if columns else np.zeros((1, 0))
         else:

@@ -1,4 +1,4 @@
-"""`new-law`, `new-specimen`, `new-reader`, `new-exporter`: packages whose own tests pass, or one file."""
+"""`new law`, `new specimen`, `new reader`, `new exporter`: packages whose own tests pass, or one file."""
 
 import json
 import os
