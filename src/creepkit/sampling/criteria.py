@@ -7,9 +7,10 @@ to 0.2 mm, so criterion 4 is applied here to the growth of the output by creep w
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal, TypeAlias
+from functools import lru_cache
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 import sympy
@@ -31,6 +32,13 @@ CONSTRAINT_STRESS, CONSTRAINT_STRAIN = 100.0, 0.01
 """MPa and strain at which constraints are evaluated that depend on these."""
 
 
+@lru_cache(maxsize=64)
+def constraint_functions(law: CreepLaw) -> tuple[Callable[..., Any], ...]:
+    """Each constraint of a law as a function of the point, the internal variables and the author's parameters."""
+    arguments = (*POINT_VARIABLES, *law.states, *law.params)
+    return tuple(sympy.lambdify(arguments, relation, "numpy", dummify=True) for relation in law.constraints)
+
+
 def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:
     """Which draws meet every constraint at every time of their tests, (rows,); what is not a number does not.
 
@@ -42,8 +50,7 @@ def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:
     arguments = (stress, strain, TIME_FRACTIONS * end_times[:, None], temperature, stress, stress / 3.0)
     states = [state.initial for state in law.states.values()]
     holds = np.ones(len(draws), bool)
-    for relation in law.constraints:
-        function = sympy.lambdify((*POINT_VARIABLES, *law.states, *law.params), relation, "numpy", dummify=True)
+    for function in constraint_functions(law):
         with np.errstate(all="ignore"):
             satisfied = np.broadcast_to(function(*arguments, *states, *parameters), stress.shape)
         holds &= satisfied.all(axis=1)

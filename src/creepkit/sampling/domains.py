@@ -107,7 +107,7 @@ def uniform_in_bounds(law: CreepLaw, unit_coordinates: Floats) -> Floats:
 
     unit_coordinates : (rows, parameters) from 0 to 1.
     """
-    low, high = np.array([[p.to_internal(b) for b in p.bounds] for p in law.params.values()]).reshape(-1, 2).T
+    low, high = law.internal_bounds
     return np.asarray(low + unit_coordinates * (high - low))
 
 
