@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 def rejected_by_screening(design: SamplingDomain, samples: Dataset) -> Ints:
     """(rows,) the number of the criterion that a sample cannot meet, 0 where it must be simulated to know."""
     reasons = np.zeros(len(samples), dtype=np.int64)
-    if not getattr(design, "screened", False) or not isinstance(samples.specimen, SupportsReducedOrderModel):
+    if not design.screened or not isinstance(samples.specimen, SupportsReducedOrderModel):
         return reasons
     reduced_model = samples.specimen.reduced_order_model()
     for row in np.flatnonzero(samples.reasons == 0).tolist():

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import sympy
@@ -165,14 +164,13 @@ def _called_names(texts: Iterable[str]) -> set[str]:
 _LINE_LENGTH = 120
 
 
-@dataclass(frozen=True)
 class CExporter:
     """A C file: NAME_rate, NAME_log_rate with slopes and, for laws with internal variables, NAME_state_rates."""
 
     serves = ("c++", "cpp")
-    name: str = "c"
-    title: str = "C99 file with the rate and its derivatives"
-    suffix: str = ".c"
+    name = "c"
+    title = "C99 file with the rate and its derivatives"
+    suffix = ".c"
 
     def text(self, source: LawWithValues) -> str:
         """Return the file's text; stress and time are converted on entry, rates on exit."""

@@ -7,7 +7,6 @@ an activation energy, LEMAITRE_FO takes UN_SUR_K as a formula of TEMP.
 from __future__ import annotations
 
 import keyword
-from dataclasses import dataclass
 
 import sympy
 
@@ -39,14 +38,13 @@ _ENCODING = "# -*- coding: utf-8 -*-"
 _RESERVED = (*keyword.kwlist, "_F", "DEFI_CONSTANTE", "DEFI_MATERIAU", "FORMULE")
 
 
-@dataclass(frozen=True)
 class CodeAsterMaterial:
     """A material for COMPORTEMENT=_F(RELATION='LEMAITRE')."""
 
     serves = ("aster",)
-    name: str = "code_aster"
-    title: str = "code_aster DEFI_MATERIAU with LEMAITRE (and Norton's law as its limit)"
-    suffix: str = ".comm"
+    name = "code_aster"
+    title = "code_aster DEFI_MATERIAU with LEMAITRE (and Norton's law as its limit)"
+    suffix = ".comm"
 
     def text(self, source: LawWithValues) -> str:
         """Return DEFI_MATERIAU, with ELAS where moduli are given, and the formulas that it needs."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -86,14 +85,13 @@ _ENTRIES = {"rates": "rate", "terms": "terms", "update": "update"}
 _LINE_LENGTH = 120
 
 
-@dataclass(frozen=True)
 class JavaScriptExporter:
     """An ES module with `rate`, `terms` and `stateRates` by name, the values as defaults, and `kernel`."""
 
     serves = ("js",)
-    name: str = "javascript"
-    title: str = "JavaScript module with the rate, its terms and its derivatives"
-    suffix: str = ".mjs"
+    name = "javascript"
+    title = "JavaScript module with the rate, its terms and its derivatives"
+    suffix = ".mjs"
 
     def text(self, source: LawWithValues) -> str:
         """Return the module's text; stress and time are converted on entry, rates on exit."""

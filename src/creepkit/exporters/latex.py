@@ -34,14 +34,13 @@ _LATEX_ESCAPES = {
 }
 
 
-@dataclass(frozen=True)
 class LatexExporter:
     """Equation and table of values for a paper."""
 
     serves = ("tex",)
-    name: str = "latex"
-    title: str = "LaTeX equation and table of values"
-    suffix: str = ".tex"
+    name = "latex"
+    title = "LaTeX equation and table of values"
+    suffix = ".tex"
 
     def text(self, source: LawWithValues) -> str:
         """Return an align environment and a tabular; notes and references become comments."""
@@ -179,14 +178,13 @@ def _infinity_symbol(name: str) -> str:
     return rf"{name[:-1]},\infty}}" if re.search(r"_\{[^{}]*\}$", name) else rf"{name}_{{\infty}}"
 
 
-@dataclass(frozen=True)
 class MarkdownExporter:
     """A section of a report."""
 
     serves = ("md",)
-    name: str = "markdown"
-    title: str = "Markdown with the equation, a table of values, notes and references"
-    suffix: str = ".md"
+    name = "markdown"
+    title = "Markdown with the equation, a table of values, notes and references"
+    suffix = ".md"
 
     def text(self, source: LawWithValues) -> str:
         """Return the section, under a heading of the first level."""

@@ -41,13 +41,12 @@ class _Values:
     ranges: dict[str, tuple[float, float]]
 
 
-@dataclass(frozen=True)
 class JsonExporter:
     """The law, its values and notes as JSON; `read_valued_law` reads it."""
 
-    name: str = "json"
-    title: str = "JSON that creepkit reads back"
-    suffix: str = ".json"
+    name = "json"
+    title = "JSON that creepkit reads back"
+    suffix = ".json"
 
     def text(self, source: LawWithValues) -> str:
         """Return the document as text, indented."""

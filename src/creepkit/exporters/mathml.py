@@ -9,7 +9,6 @@ import html
 import html.entities
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import sympy
@@ -44,13 +43,12 @@ _XML_ENTITIES = ("amp", "lt", "gt", "quot", "apos")
 _STYLE = "table { border-collapse: collapse } td, th { border: 1px solid #999; padding: 0.2em 0.6em; text-align: left }"
 
 
-@dataclass(frozen=True)
 class MathmlExporter:
     """A page with the law's equations as presentation MathML."""
 
-    name: str = "mathml"
-    title: str = "MathML in a page of XHTML, with a table of values, notes and references"
-    suffix: str = ".xhtml"
+    name = "mathml"
+    title = "MathML in a page of XHTML, with a table of values, notes and references"
+    suffix = ".xhtml"
 
     def text(self, source: LawWithValues) -> str:
         """Return the page."""

@@ -13,7 +13,6 @@ theta (lambda I + 2 mu n_1) with n_1 the dyad of its direction, d(mean stress) =
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import sympy
@@ -255,14 +254,13 @@ _FORMULA_NODES = (sympy.Add, sympy.Mul, sympy.Pow, sympy.exp, sympy.log, sympy.S
 """What the formulas of @ElasticMaterialProperties may hold."""
 
 
-@dataclass(frozen=True)
 class MfrontExporter:
     """An .mfront file; stress and time are in the units asked for, which are those of the solver."""
 
     serves = ("umat", "vumat", "usermat", "usercreep")
-    name: str = "mfront"
-    title: str = "MFront behaviour (Implicit DSL) with its exact Jacobian"
-    suffix: str = ".mfront"
+    name = "mfront"
+    title = "MFront behaviour (Implicit DSL) with its exact Jacobian"
+    suffix = ".mfront"
 
     def text(self, source: LawWithValues) -> str:
         """Return the file's text."""

@@ -12,7 +12,6 @@ hyperbolic sine.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from creepkit.errors import ExportError
 from creepkit.exporters.creep_forms import (
@@ -61,13 +60,12 @@ _MOOSE_FORMULA = (
 _MOOSE_RESERVED = ("stress", "elasticity")
 
 
-@dataclass(frozen=True)
 class MooseBlock:
     """[Materials] with power-law creep, elasticity where moduli are given, and the stress that joins them."""
 
-    name: str = "moose"
-    title: str = "MOOSE [Materials] block of power-law creep (PowerLawCreepStressUpdate)"
-    suffix: str = ".i"
+    name = "moose"
+    title = "MOOSE [Materials] block of power-law creep (PowerLawCreepStressUpdate)"
+    suffix = ".i"
 
     def text(self, source: LawWithValues) -> str:
         """Return the block; a variable called `temperature` must exist where the law depends on temperature."""
@@ -151,13 +149,12 @@ _NEML2_RESERVED = (
 )
 
 
-@dataclass(frozen=True)
 class Neml2Model:
     """An input file with [Models], [EquationSystems] and [Solvers]; needs the moduli."""
 
-    name: str = "neml2"
-    title: str = "NEML2 3.1 material model with Norton's law (PerzynaPlasticFlowRate)"
-    suffix: str = ".i"
+    name = "neml2"
+    title = "NEML2 3.1 material model with Norton's law (PerzynaPlasticFlowRate)"
+    suffix = ".i"
 
     def text(self, source: LawWithValues) -> str:
         """Return the input file."""

@@ -244,14 +244,13 @@ def _free_names_of_statement(node: ast.stmt) -> set[str]:
     return {n.id for n in nodes if isinstance(n, ast.Name)} - bound_names
 
 
-@dataclass(frozen=True)
 class PythonExporter:
     """A Python module with `rate` (and `state_rates`), the values as defaults."""
 
     serves = ("py",)
-    name: str = "python"
-    title: str = "Python module that needs nothing but the standard library"
-    suffix: str = ".py"
+    name = "python"
+    title = "Python module that needs nothing but the standard library"
+    suffix = ".py"
 
     def text(self, source: LawWithValues) -> str:
         """Return the module's text; stress and time are converted on entry, rates on exit."""
@@ -295,13 +294,12 @@ def _scalar_dialect() -> PythonDialect:
     )
 
 
-@dataclass(frozen=True)
 class NumpyExporter:
     """A Python module of arrays with `rate` (and `state_rates`), the values as defaults."""
 
-    name: str = "numpy"
-    title: str = "Python module for arrays that needs nothing but NumPy"
-    suffix: str = ".py"
+    name = "numpy"
+    title = "Python module for arrays that needs nothing but NumPy"
+    suffix = ".py"
 
     def text(self, source: LawWithValues) -> str:
         """Return the module's text; stress and time are converted on entry, rates on exit."""

@@ -17,7 +17,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 from creepkit import limits
 from creepkit.arrays import usable_cores
@@ -50,19 +50,6 @@ TERMINATION_TIMEOUT = 5
 
 
 _log = logging.getLogger("creepkit.jobs")
-
-
-class Workers(Protocol):
-    """Processes or threads that run the tasks of a job."""
-
-    @property
-    def size(self) -> int:
-        """How many tasks are submitted at once."""
-        ...
-
-    def submit(self, number: int) -> Future[TaskResult]:
-        """Have a task done."""
-        ...
 
 
 @checked
@@ -211,3 +198,6 @@ def cluster_workers(job: ShardedJob, address: str, threads: int | None = None) -
     with closing(client):
         executor = client.get_executor(pure=False)  # type: ignore[no-untyped-call]
         yield ClusterWorkers(job.on_one_thread(), client, executor, threads)
+
+
+Workers: TypeAlias = ProcessWorkers | ClusterWorkers

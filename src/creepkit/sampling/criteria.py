@@ -7,9 +7,10 @@ to 0.2 mm, so criterion 4 is applied here to the growth of the output by creep w
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal, TypeAlias
+from functools import lru_cache
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 import sympy
@@ -31,6 +32,13 @@ CONSTRAINT_STRESS, CONSTRAINT_STRAIN = 100.0, 0.01
 """MPa and strain at which constraints are evaluated that depend on these."""
 
 
+@lru_cache(maxsize=64)
+def constraint_functions(law: CreepLaw) -> tuple[Callable[..., Any], ...]:
+    """Each constraint of a law as a function of the point, the internal variables and the author's parameters."""
+    arguments = (*POINT_VARIABLES, *law.states, *law.params)
+    return tuple(sympy.lambdify(arguments, relation, "numpy", dummify=True) for relation in law.constraints)
+
+
 def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:
     """Which draws meet every constraint at every time of their tests, (rows,); what is not a number does not.
 
@@ -42,8 +50,7 @@ def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:
     arguments = (stress, strain, TIME_FRACTIONS * end_times[:, None], temperature, stress, stress / 3.0)
     states = [state.initial for state in law.states.values()]
     holds = np.ones(len(draws), bool)
-    for relation in law.constraints:
-        function = sympy.lambdify((*POINT_VARIABLES, *law.states, *law.params), relation, "numpy", dummify=True)
+    for function in constraint_functions(law):
         with np.errstate(all="ignore"):
             satisfied = np.broadcast_to(function(*arguments, *states, *parameters), stress.shape)
         holds &= satisfied.all(axis=1)
@@ -98,14 +105,20 @@ class SimulationOutcome:
 
 
 @dataclass(frozen=True)
-class RateLimit:
+class NamedCriterion:
+    """What criteria have in common: a name, and in words what is asked for."""
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
+class RateLimit(NamedCriterion):
     """The law's rate at one point lies within limits, None where there is none: criteria 1 and 2.
 
     stress : MPa. lower, upper : log10 of the rate in 1/s: as logarithms rates do not underflow. time : s.
     """
 
-    name: str
-    text: str
     stress: float
     lower: float | None = None
     upper: float | None = None
@@ -122,11 +135,9 @@ class RateLimit:
 
 
 @dataclass(frozen=True)
-class WithinBounds:
+class WithinBounds(NamedCriterion):
     """Every parameter lies within the law's bounds, or is off."""
 
-    name: str
-    text: str
     stage: ClassVar[Literal["before"]] = "before"
 
     def passes(self, law: CreepLaw, draws: Draws) -> Bools:
@@ -140,11 +151,9 @@ class WithinBounds:
 
 
 @dataclass(frozen=True)
-class ConstraintsHold:
+class ConstraintsHold(NamedCriterion):
     """The constraints that the law declares hold throughout the test; end : s, of tests whose end is not drawn."""
 
-    name: str
-    text: str
     end: float
     stage: ClassVar[Literal["before"]] = "before"
 
@@ -154,15 +163,13 @@ class ConstraintsHold:
 
 
 @dataclass(frozen=True)
-class SurvivesTime:
+class SurvivesTime(NamedCriterion):
     """The simulation converged and went on for `seconds`, or to the end of a shorter test: criterion 3.
 
     None stands for the whole test. A burst is no failure of the simulation: with a number of seconds, one after them
     is admitted.
     """
 
-    name: str
-    text: str
     seconds: float | None = None
     stage: ClassVar[Literal["after"]] = "after"
 
@@ -179,14 +186,12 @@ class SurvivesTime:
 
 
 @dataclass(frozen=True)
-class CreepInEachHold:
+class CreepInEachHold(NamedCriterion):
     """Creep above `threshold` in either hold, elastic jumps left out: criterion 4.
 
     A hold that a burst cut short counts up to its last frame; a second hold that was never reached is no growth.
     """
 
-    name: str
-    text: str
     threshold: float
     stage: ClassVar[Literal["after"]] = "after"
 
@@ -207,11 +212,9 @@ class CreepInEachHold:
 
 
 @dataclass(frozen=True)
-class TotalCreepAbove:
+class TotalCreepAbove(NamedCriterion):
     """Creep of `threshold` or more in both holds together, elastic jumps left out."""
 
-    name: str
-    text: str
     threshold: float
     stage: ClassVar[Literal["after"]] = "after"
 
@@ -221,14 +224,12 @@ class TotalCreepAbove:
 
 
 @dataclass(frozen=True)
-class FinalOutputAbove:
+class FinalOutputAbove(NamedCriterion):
     """The output that shows creep is above `threshold` at the end: criterion 5.
 
     After a burst, in the last frame before it.
     """
 
-    name: str
-    text: str
     threshold: float
     stage: ClassVar[Literal["after"]] = "after"
 

@@ -7,8 +7,8 @@ survive the test.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -63,6 +63,7 @@ class SamplingDomain:
     """A design that draws a law's parameters and the conditions of its tests from ranges.
 
     reference_stress : the stress that represents a test, and which rates are useful there.
+    screened : leave out simulations that the specimen's reduced-order model rejects; see dataset.simulation.
     """
 
     law: CreepLaw
@@ -70,6 +71,7 @@ class SamplingDomain:
     grid: TimeGrid
     criteria: tuple[Criterion, ...]
     reference_stress: ReferenceStress
+    screened: bool = field(default=False, kw_only=True)
 
     name: ClassVar[str]
     """The word for it; part of its document."""
@@ -105,7 +107,7 @@ def uniform_in_bounds(law: CreepLaw, unit_coordinates: Floats) -> Floats:
 
     unit_coordinates : (rows, parameters) from 0 to 1.
     """
-    low, high = np.array([[p.to_internal(b) for b in p.bounds] for p in law.params.values()]).reshape(-1, 2).T
+    low, high = law.internal_bounds
     return np.asarray(low + unit_coordinates * (high - low))
 
 
@@ -117,14 +119,12 @@ def default_grid(interval: float, specimen: Specimen, ranges: Mapping[str, Any])
 
 @dataclass(frozen=True)
 class PaperDomain(SamplingDomain):
-    """Uniform in the bounds of a law and the ranges of conditions.
-
-    screened : leave out simulations that the specimen's reduced-order model rejects; see dataset.simulation.
+    """Uniform in the bounds of a law and the ranges of conditions: the paper's, with a second load level not below the
+    first, and a jump at 2 to 10 h of 12 h.
     """
 
-    screened: bool = True
-
     name: ClassVar[str] = "paper"
+    screened: bool = field(default=True, kw_only=True)
 
     def draw(self, first: int, count: int, seed: int) -> Draws:
         """Return rows of the sequence: parameters first, then conditions."""
@@ -136,26 +136,6 @@ class PaperDomain(SamplingDomain):
     def document(self) -> dict[str, Any]:
         """Everything that decides the draws, as JSON-able data."""
         return {**super().document(), "screened": self.screened}
-
-
-def paper_domain(
-    law: CreepLaw,
-    specimen: Specimen,
-    *,
-    every: float = PAPER_INTERVAL,
-    grid: TimeGrid | None = None,
-    screened: bool = True,
-    **ranges: Any,
-) -> PaperDomain:
-    """Return the paper's sampling domain of any law: its bounds, the specimen's ranges of load and modulus, a second
-    load level not below the first, a jump at 2 to 10 h of 12 h.
-
-    every : s between frames. grid : in its place, other times. screened : see PaperDomain. ranges : other ranges of
-        conditions, as sampling_design() takes them.
-    """
-    grid = grid or default_grid(every, specimen, ranges)
-    condition_space = condition_ranges(specimen, grid, ranges, needs_temperature=law.uses(temperature))
-    return PaperDomain(law, condition_space, grid, paper_criteria(specimen), reference_stress_of(specimen), screened)
 
 
 MOST_TRIALS = 32
@@ -230,21 +210,6 @@ class ConditionedDomain(SamplingDomain):
         }
 
 
-def conditioned_domain(
-    law: CreepLaw, specimen: Specimen, *, every: float = PAPER_INTERVAL, grid: TimeGrid | None = None, **ranges: Any
-) -> ConditionedDomain:
-    """Return the conditioned sampling domain for any law whose terms have rate coefficients (else DatasetError).
-
-    every : s between frames. grid : in its place, other times. ranges : other ranges of conditions, as
-        sampling_design() takes them.
-    """
-    term_groups(law)
-    grid = grid or default_grid(every, specimen, ranges)
-    condition_space = condition_ranges(specimen, grid, ranges, needs_temperature=law.uses(temperature))
-    criteria = conditioned_criteria(law, specimen, condition_space.end)
-    return ConditionedDomain(law, condition_space, grid, criteria, reference_stress_of(specimen))
-
-
 DEFAULT_DRAWS = 4096
 """Rows drawn."""
 
@@ -302,15 +267,30 @@ def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0
     )
 
 
-def sampling_design(law: CreepLaw, specimen: Specimen, domain: str = "conditioned", **changes: Any) -> SamplingDomain:
-    """Return a design for a law and a specimen; see paper_domain() and conditioned_domain().
+def sampling_design(
+    law: CreepLaw,
+    specimen: Specimen,
+    domain: str = "conditioned",
+    *,
+    every: float = PAPER_INTERVAL,
+    grid: TimeGrid | None = None,
+    **ranges: Any,
+) -> SamplingDomain:
+    """Return a design for a law and a specimen; see PaperDomain and ConditionedDomain.
 
-    domain : "conditioned", whose samples creep visibly, or "paper", uniform in the law's bounds.
-    changes : ranges of conditions, (low, high) or a number, by the names of the specimen's data sets or the general
-        ones: force_1=(5, 20), span=(40, 60), end_time=3600, or force=(5, 20) of both levels of the load; `every`, s
-        between frames, or `grid`, a TimeGrid.
+    domain : "conditioned", whose samples creep visibly, for laws whose terms have rate coefficients (else
+        DatasetError), or "paper", uniform in the law's bounds.
+    every : s between frames. grid : in its place, other times.
+    ranges : of conditions, (low, high) or a number, by the names of the specimen's data sets or the general ones:
+        force_1=(5, 20), span=(40, 60), end_time=3600, or force=(5, 20) of both levels of the load.
     """
-    domains: dict[str, Callable[..., SamplingDomain]] = {"conditioned": conditioned_domain, "paper": paper_domain}
-    if domain not in domains:
-        raise DatasetError(f"there is no sampling domain '{domain}': {nearest(domain, domains)}")
-    return domains[domain](law, specimen, **changes)
+    if domain not in ("conditioned", "paper"):
+        raise DatasetError(f"there is no sampling domain '{domain}': {nearest(domain, ('conditioned', 'paper'))}")
+    if domain == "conditioned":
+        term_groups(law)
+    grid = grid or default_grid(every, specimen, ranges)
+    conditions = condition_ranges(specimen, grid, ranges, needs_temperature=law.uses(temperature))
+    reference = reference_stress_of(specimen)
+    if domain == "paper":
+        return PaperDomain(law, conditions, grid, paper_criteria(specimen), reference)
+    return ConditionedDomain(law, conditions, grid, conditioned_criteria(law, specimen, conditions.end), reference)

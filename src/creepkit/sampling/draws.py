@@ -88,21 +88,19 @@ CONCENTRATION = 0.7
 
 
 TERM_COUNT_PROBABILITIES = (0.6, 0.3, 0.1)
-"""Fractions of samples with one, two and three groups of terms, unless a design says otherwise."""
+"""Fractions of samples with one, two and three groups of terms."""
 
 
 SELECTION_DIMENSIONS = 2
 """Coordinates that the choice of groups takes; their fractions take one for each group."""
 
 
-def active_terms(
-    unit_coordinates: Floats, group_count: int, count_probabilities: tuple[float, ...] = TERM_COUNT_PROBABILITIES
-) -> Bools:
+def active_terms(unit_coordinates: Floats, group_count: int) -> Bools:
     """Which groups of terms are active, (rows, groups): how many, then which of the ways to choose them.
 
     unit_coordinates : (rows, 2) from 0 to 1.
     """
-    weights = np.array(count_probabilities[:group_count]) / sum(count_probabilities[:group_count])
+    weights = np.array(TERM_COUNT_PROBABILITIES[:group_count]) / sum(TERM_COUNT_PROBABILITIES[:group_count])
     subsets = (members for k in range(1, len(weights) + 1) for members in combinations(range(group_count), k))
     masks = [np.eye(group_count, dtype=bool)[list(chosen)].any(axis=0) for chosen in subsets]
     sizes = np.array([mask.sum() for mask in masks])

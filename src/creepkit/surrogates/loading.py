@@ -8,12 +8,13 @@ import numpy as np
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, SurrogateError, nearest, quoted
-from creepkit.files.json_documents import DocumentFormat, check_keys
+from creepkit.files.json_documents import check_keys
+from creepkit.files.safetensors_files import read_safetensors
 from creepkit.records import Predictor, SupportsReducedOrderModel, known_specimens
 from creepkit.surrogates.parameter_gru import ParameterGru
 from creepkit.surrogates.recipe import SurrogateMetadata
 from creepkit.surrogates.surrogate import Surrogate
-from creepkit.surrogates.weight_files import CODEC, SURROGATE, read_weights
+from creepkit.surrogates.weight_files import CODEC, SURROGATE
 
 
 def reduced_order_models() -> dict[str, SupportsReducedOrderModel]:
@@ -47,9 +48,9 @@ def surrogate(name_or_path: str | Path) -> Predictor:
     return load_surrogate(text)
 
 
-def load_surrogate(path: str | Path, document: DocumentFormat = SURROGATE) -> Surrogate:
+def load_surrogate(path: str | Path) -> Surrogate:
     """Return the surrogate in a file; SurrogateError says what is wrong with any other file."""
-    weights, header = read_weights(path, document)
+    weights, header = read_safetensors(path, SURROGATE)
     try:
         problem = check_keys(header, ("kind", "recipe", "metadata"), "its header")
         if problem:

@@ -22,12 +22,6 @@ def sample_tensors(samples: SampleArrays) -> SampleTensors:
     return {name: torch.from_numpy(array) for name, array in samples.items()}
 
 
-def load_weights(module: ParameterModule, weights: Weights) -> ParameterModule:
-    """The module with the weights and scales of a file."""
-    module.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in weights.items()})
-    return module
-
-
 def weights_of(tensors: dict[str, Tensor]) -> Weights:
     """{name: (...,)} arrays of the state of a module; tensors : {name: (...,)}."""
     return {name: tensor.detach().cpu().numpy() for name, tensor in tensors.items()}

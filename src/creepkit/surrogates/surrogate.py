@@ -14,6 +14,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SurrogateError, SurrogateWarning
+from creepkit.files.safetensors_files import write_safetensors
 from creepkit.presentation import Presentable
 from creepkit.records import (
     History,
@@ -46,7 +47,7 @@ from creepkit.surrogates.tested_histories import (
     observed_outputs,
     prediction_frames,
 )
-from creepkit.surrogates.weight_files import CODEC, write_weights
+from creepkit.surrogates.weight_files import CODEC, SURROGATE
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
@@ -237,7 +238,7 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
 
     def save(self, path: str | Path) -> Path:
         """Write the weights with their header."""
-        return write_weights(path, self.weights, self.file_header)
+        return write_safetensors(path, self.weights, self.file_header, SURROGATE)
 
     def __repr__(self) -> str:
         return f"<Surrogate: {self.title}>"

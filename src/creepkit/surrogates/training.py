@@ -15,10 +15,11 @@ import torch
 
 from creepkit.arrays import Ints
 from creepkit.checked_arguments import checked
-from creepkit.dataset.dataset import Dataset
+from creepkit.dataset.dataset import Dataset, first_difference
 from creepkit.dataset.storage import read_dataset
 from creepkit.errors import SurrogateError
 from creepkit.files.json_documents import as_read_back
+from creepkit.files.safetensors_files import read_safetensors, write_safetensors
 from creepkit.surrogates.evaluation import (
     PredictionComparison,
     compare_predictions,
@@ -33,7 +34,7 @@ from creepkit.surrogates.recipe import ProgressCallback, SurrogateMetadata, Trai
 from creepkit.surrogates.surrogate import Surrogate
 from creepkit.surrogates.training_loop import NetworkTraining
 from creepkit.surrogates.training_rows import dataset_fingerprint, output_deviation, trainable_samples, training_split
-from creepkit.surrogates.weight_files import CHECKPOINT, read_weights, write_weights
+from creepkit.surrogates.weight_files import CHECKPOINT
 
 
 def training_request(data: Dataset, recipe: ParameterGru, seed: int) -> dict[str, Any]:
@@ -56,17 +57,17 @@ class Checkpoint:
         """Leave a fit as it is, in the place of what was left before."""
         if self.path is not None:
             header = {"call": self.request, "curves": state_of_training.curves}
-            write_weights(self.path, state_of_training.state(), header, CHECKPOINT)
+            write_safetensors(self.path, state_of_training.state(), header, CHECKPOINT, internal=True)
 
     def restore(self, state_of_training: NetworkTraining) -> None:
         """Bring a fresh fit to where the same call was interrupted, if it was."""
         if self.path is None or not self.path.exists():
             return
-        tensors, header = read_weights(self.path, CHECKPOINT)
+        tensors, header = read_safetensors(self.path, CHECKPOINT)
         if header.get("call") != self.request:
-            differences = ", ".join(_differences(self.request, header.get("call") or {}))
+            difference = first_difference(header.get("call"), self.request, "")
             raise SurrogateError(
-                f"{self.path}: left by another training (it differs in {differences}); finish that one, remove the "
+                f"{self.path}: left by another training (there and here {difference}); finish that one, remove the "
                 "file, or choose another name"
             )
         try:
@@ -78,14 +79,6 @@ class Checkpoint:
         """The training is done and its file written."""
         if self.path is not None:
             self.path.unlink(missing_ok=True)
-
-
-def _differences(first: Any, second: Any, path: str = "") -> list[str]:
-    """The names of what two calls do not share."""
-    if isinstance(first, Mapping) and isinstance(second, Mapping):
-        names = dict.fromkeys([*first, *second])
-        return [difference for name in names for difference in _differences(first.get(name), second.get(name), name)]
-    return [] if first == second else [path]
 
 
 @checked

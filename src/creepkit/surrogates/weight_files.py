@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from creepkit.errors import SurrogateError
 from creepkit.files.json_documents import DocumentFormat
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, ValueCodec
-from creepkit.files.safetensors_files import read_safetensors, write_safetensors
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.records import Specimen
@@ -18,7 +15,6 @@ from creepkit.registry.arguments import specimen_by_name
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
-from creepkit.surrogates.recipe import Weights
 
 SURROGATE = DocumentFormat(
     "creepkit-surrogate",
@@ -56,15 +52,3 @@ CODEC = RecordCodec(
     default_range=ANY_NUMBER,
 )
 """Of recipes, and of what a surrogate knows beside its weights."""
-
-
-def write_weights(
-    path: str | Path, weights: Weights, header: Mapping[str, Any], document: DocumentFormat = SURROGATE
-) -> Path:
-    """Write weights (...,) by name with a JSON-able header; the file is whole or absent."""
-    return write_safetensors(path, weights, header, document, internal=document is CHECKPOINT)
-
-
-def read_weights(path: str | Path, document: DocumentFormat = SURROGATE) -> tuple[Weights, dict[str, Any]]:
-    """The weights, {name: (...,)}, and the header of a file; SurrogateError says what is wrong with any other."""
-    return read_safetensors(path, document)

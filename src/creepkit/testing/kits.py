@@ -192,53 +192,47 @@ def check_temperature_form(name: str, form: Callable[..., Any]) -> ConformanceRe
     return ConformanceReport(SimpleNamespace(name=name), tuple(found), "temperature form")
 
 
-_KITS: dict[str, Callable[[Any], ConformanceReport]] = {
-    "law": check_law,
-    "specimen": check_specimen,
-    "reader": check_reader,
-    "camera format": check_camera_format,
-    "exporter": check_exporter,
-    "instrument format": check_instrument_format,
+_KITS: dict[str, Callable[[str, Any], ConformanceReport]] = {
+    "law": lambda _, law: check_law(law),
+    "specimen": lambda _, specimen: check_specimen(specimen),
+    "reader": lambda _, reader: check_reader(reader),
+    "camera format": lambda _, format: check_camera_format(format),
+    "exporter": lambda _, exporter: check_exporter(exporter),
+    "instrument format": lambda _, format: check_instrument_format(format),
+    "temperature form": check_temperature_form,
 }
+
+
+_KINDS = " or ".join([", ".join([*_KITS][:-1]), [*_KITS][-1]])
 
 
 def check_plugin(plugin: Plugin) -> list[ConformanceReport]:
     """Run the kit of each thing that a plugin offers; PluginError where it offers nothing that can be checked."""
-    reports = [
-        _KITS[kind](value)
-        for kind, offered in plugin.contributions.items()
-        for value in offered.values()
-        if kind in _KITS
+    offered = [
+        (kind, name, one) for kind, kit in _KITS.items() for name, one in plugin.contributions.get(kind, {}).items()
     ]
-    forms = plugin.contributions.get("temperature form", {})
-    reports += [check_temperature_form(*named) for named in forms.items()]
-    if not reports:
+    if not offered:
         raise PluginError(
-            f"{plugin.provenance} offers no law, specimen, reader, camera format, instrument format, exporter or "
-            "temperature form; return one from a hook such as creepkit_laws"
+            f"{plugin.provenance} offers no {', '.join(_KITS)}; return one from a hook such as creepkit_laws"
         )
-    return reports
+    return [_KITS[kind](name, one) for kind, name, one in offered]
 
 
 def check_named(name: str) -> list[ConformanceReport]:
     """Run the kits of whatever is registered under a name; PluginError with the nearest name where nothing is."""
-    registry, forms = default_registry(), default_registry().temperature_forms()
-    offered: dict[str, Mapping[str, Any]] = {
-        "law": registry.laws(),
-        "specimen": registry.specimens(),
-        "reader": registry.readers(),
-        "camera format": registry.cameras(),
-        "exporter": registry.exporters(),
-        "instrument format": registry.instruments(),
-    }
-    reports = [_KITS[kind](known[name].value) for kind, known in offered.items() if name in known]
-    if name in forms:
-        reports.append(check_temperature_form(name, forms[name].value))
+    registry = default_registry()
+    registered = (
+        *(registry.laws(), registry.specimens(), registry.readers(), registry.cameras(), registry.exporters()),
+        *(registry.instruments(), registry.temperature_forms()),
+    )
+    offered: dict[str, Mapping[str, Any]] = dict(zip(_KITS, registered, strict=True))
+    reports = [_KITS[kind](name, known[name].value) for kind, known in offered.items() if name in known]
     if not reports:
         clashes = [sentence for sentence in registry.conflicts() if f"'{name}' is offered twice" in sentence]
-        known = sorted({one for names in (*offered.values(), forms) for one in names})
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.55)
-        kinds = f"{', '.join(offered)} or temperature form"
+        near = difflib.get_close_matches(
+            name, sorted({one for known in offered.values() for one in known}), n=1, cutoff=0.55
+        )
         advice = f"did you mean '{near[0]}'?" if near else "'creepkit list' says what there is"
-        raise PluginError(clashes[0] if clashes else f"no {kinds} is called '{name}'; {advice}{registry.broken_hint()}")
+        sentence = f"no {_KINDS} is called '{name}'; {advice}{registry.broken_hint()}"
+        raise PluginError(clashes[0] if clashes else sentence)
     return reports

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
-import sympy
 from scipy.stats import qmc
 
 from creepkit.arrays import Bools, Floats
@@ -16,6 +12,8 @@ from creepkit.kernels.interface import POINT_SIZE
 from creepkit.kernels.lowering import ArrayKernel
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, State
+from creepkit.sampling.criteria import constraint_functions
+from creepkit.sampling.domains import uniform_in_bounds
 
 STRESS_RANGE, STRAIN_RANGE, TIME_RANGE, TEMPERATURE_RANGE = (1e-3, 2000.0), (1e-12, 1.0), (1e-3, 1e6), (600.0, 1600.0)
 """Ranges in MPa, 1, s and K."""
@@ -79,7 +77,10 @@ def draw_samples(law: CreepLaw, samples: int, seed: int = 0) -> LawSamples:
     points, theta = np.empty((0, POINT_SIZE + len(law.states))), np.empty((0, len(law.params)))
     for _ in range(_MOST_BATCHES):
         unit = sequence.random(samples)
-        new_points, new_theta = _to_points(law, unit[:, : points.shape[1]]), _to_theta(law, unit[:, points.shape[1] :])
+        new_points, new_theta = (
+            _to_points(law, unit[:, : points.shape[1]]),
+            uniform_in_bounds(law, unit[:, points.shape[1] :]),
+        )
         satisfied = constraints_hold(law, new_points, new_theta)
         points, theta = np.vstack([points, new_points[satisfied]]), np.vstack([theta, new_theta[satisfied]])
         if len(points) >= samples:
@@ -91,15 +92,9 @@ def constraints_hold(law: CreepLaw, points: Floats, theta: Floats) -> Bools:
     """Where every constraint of the law holds, (samples,); points (samples, 6 + S), theta (samples, parameters)."""
     values = [np.exp(t) if p.scale == "log" else t for p, t in zip(law.params.values(), theta.T, strict=True)]
     holds = np.ones(len(points), bool)
-    for test in _constraint_functions(law):
+    for test in constraint_functions(law):
         holds &= np.asarray(test(*points.T, *values), bool)
     return holds
-
-
-@lru_cache(maxsize=64)
-def _constraint_functions(law: CreepLaw) -> tuple[Callable[..., Any], ...]:
-    arguments = (*POINT_VARIABLES, *law.states, *law.params)
-    return tuple(sympy.lambdify(arguments, relation, "numpy", dummify=True) for relation in law.constraints)
 
 
 def _to_points(law: CreepLaw, unit: Floats) -> Floats:
@@ -116,12 +111,6 @@ def _to_points(law: CreepLaw, unit: Floats) -> Floats:
     point = [stress, strain, time, temperature, principal, mean]
     state_values = [_state_between(u, state) for u, state in zip(unit.T[POINT_SIZE:], law.states.values(), strict=True)]
     return np.stack([*point, *state_values], axis=1)
-
-
-def _to_theta(law: CreepLaw, unit: Floats) -> Floats:
-    bounds = [[p.to_internal(b) for b in p.bounds] for p in law.params.values()]
-    low, high = np.array(bounds).reshape(-1, 2).T
-    return np.asarray(low + unit * (high - low))
 
 
 def _state_between(u: Floats, state: State) -> Floats:

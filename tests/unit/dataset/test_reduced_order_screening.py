@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ def test_without_a_number_of_seconds_a_burst_rules_nothing_out():
 
 def few(screened, rows=24):
     """Few rows of the paper's sampling domain of Norton's law, at three times, its stresses high."""
-    design = sampling_design(NORTON, DIMPLE, "paper", every=21600.0, screened=screened)
+    design = replace(sampling_design(NORTON, DIMPLE, "paper", every=21600.0), screened=screened)
     return simulate_rows(design, empty_dataset(design, DIMPLE, {}), 1, 0, rows)
 
 
@@ -96,7 +96,7 @@ def test_the_description_says_how_many_were_not_simulated(some_simulated):
 
 
 def test_whether_samples_are_screened_decides_what_a_generation_is(tmp_path):
-    both = [sampling_design(NORTON, DIMPLE, "paper", screened=screened) for screened in (True, False)]
+    both = [replace(sampling_design(NORTON, DIMPLE, "paper"), screened=screened) for screened in (True, False)]
     assert [design.document()["screened"] for design in both] == [True, False]
     prints = {GenerationJob(design, DIMPLE, 1, tmp_path).fingerprint for design in both}
     assert len(prints) == 2

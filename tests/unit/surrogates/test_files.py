@@ -9,18 +9,19 @@ from safetensors.numpy import load_file, save_file
 
 import creepkit as ck
 from creepkit.errors import SurrogateError
+from creepkit.files.safetensors_files import read_safetensors, write_safetensors
 from creepkit.files.writing import RECORD
 from creepkit.inverse.composite_predictor import refined_of
 from creepkit.surrogates.loading import load_surrogate, surrogate
-from creepkit.surrogates.weight_files import SURROGATE, read_weights, write_weights
+from creepkit.surrogates.weight_files import SURROGATE
 
 HEADER = {"kind": "parameter-gru"}
 WEIGHTS = {"a": np.arange(6.0, dtype=np.float32).reshape(2, 3), "b": np.array(3)}
 
 
 def test_weights_and_header_come_back(tmp_path: Path) -> None:
-    path = write_weights(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "curves": {"loss": [1.0, 0.5]}})
-    tensors, header = read_weights(path)
+    path = write_safetensors(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "curves": {"loss": [1.0, 0.5]}}, SURROGATE)
+    tensors, header = read_safetensors(path, SURROGATE)
     assert all(
         np.array_equal(tensors[name], WEIGHTS[name]) and tensors[name].dtype == WEIGHTS[name].dtype for name in WEIGHTS
     )
@@ -29,13 +30,13 @@ def test_weights_and_header_come_back(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
-    path = write_weights(tmp_path / "m.safetensors", WEIGHTS, HEADER)
+    path = write_safetensors(tmp_path / "m.safetensors", WEIGHTS, HEADER, SURROGATE)
     before = path.read_bytes()
     with pytest.raises(ValueError, match="JSON"):
-        write_weights(path, WEIGHTS, {**HEADER, "loss": float("nan")})
+        write_safetensors(path, WEIGHTS, {**HEADER, "loss": float("nan")}, SURROGATE)
     assert path.read_bytes() == before
     with pytest.raises(SurrogateError, match="cannot be written"):
-        write_weights(tmp_path / "nowhere" / "m.safetensors", WEIGHTS, HEADER)
+        write_safetensors(tmp_path / "nowhere" / "m.safetensors", WEIGHTS, HEADER, SURROGATE)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +52,7 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> Non
     ],
 )  # fmt: skip
 def test_a_file_that_is_not_a_surrogate_says_why(tmp_path: Path, spoil, told: str) -> None:
-    path = write_weights(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "recipe": {}, "metadata": {}})
+    path = write_safetensors(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "recipe": {}, "metadata": {}}, SURROGATE)
     path.write_bytes(spoil(path.read_bytes()))
     with pytest.raises(SurrogateError, match=told) as caught:
         load_surrogate(path)
@@ -96,17 +97,17 @@ def entry(dtype: object = "F32", shape: object = (2, 3), offsets: object = (0, 2
 def test_a_header_that_does_not_describe_its_file_is_refused(tmp_path: Path, entries: object, size: int) -> None:
     path = tmp_path / "m.safetensors"
     path.write_bytes(file_of({"a": entry()}, 24))
-    assert read_weights(path)[0]["a"].shape == (2, 3)
+    assert read_safetensors(path, SURROGATE)[0]["a"].shape == (2, 3)
     path.write_bytes(file_of(entries, size))
     with pytest.raises(SurrogateError, match="damaged, or not a safetensors file"):
-        read_weights(path)
+        read_safetensors(path, SURROGATE)
 
 
 @pytest.mark.parametrize("metadata", [[], {"creepkit": 1}, "creepkit"])
 def test_metadata_that_are_no_texts_are_refused(tmp_path: Path, metadata: object) -> None:
     (tmp_path / "m.safetensors").write_bytes(file_of({}, 0, metadata))
     with pytest.raises(SurrogateError, match="damaged, or not a safetensors file"):
-        read_weights(tmp_path / "m.safetensors")
+        read_safetensors(tmp_path / "m.safetensors", SURROGATE)
 
 
 def test_arrays_are_those_of_the_reference_reader(tmp_path: Path) -> None:
@@ -115,8 +116,8 @@ def test_arrays_are_those_of_the_reference_reader(tmp_path: Path) -> None:
     types = ("?", "u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f2", "f4", "f8")
     arrays = {f"of {name}": rng.integers(0, 2, (3, k)).astype(name) for k, name in enumerate(types)}
     arrays |= {"number": np.array(7.5), "text of ä": rng.normal(size=(2, 1, 4)).astype("f4")}
-    path = write_weights(tmp_path / "m.safetensors", arrays, HEADER)
-    found, expected = read_weights(path)[0], load_file(path)
+    path = write_safetensors(tmp_path / "m.safetensors", arrays, HEADER, SURROGATE)
+    found, expected = read_safetensors(path, SURROGATE)[0], load_file(path)
     assert found.keys() == expected.keys() == arrays.keys()
     for name, array in expected.items():
         assert (
@@ -136,7 +137,9 @@ def test_weights_of_another_program_are_told_apart(tmp_path: Path) -> None:
 
 
 def test_a_header_without_its_parts_says_so(tmp_path: Path) -> None:
-    path = write_weights(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "recipe": {"training": {}}, "metadata": {}})
+    path = write_safetensors(
+        tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "recipe": {"training": {}}, "metadata": {}}, SURROGATE
+    )
     with pytest.raises(SurrogateError, match="metadata: 'law' is missing"):
         load_surrogate(path)
 
@@ -155,7 +158,7 @@ def test_names_that_nobody_knows(tmp_path: Path) -> None:
 
 
 def test_the_header_is_plain_json(tmp_path: Path) -> None:
-    raw = write_weights(tmp_path / "m.safetensors", WEIGHTS, HEADER).read_bytes()
+    raw = write_safetensors(tmp_path / "m.safetensors", WEIGHTS, HEADER, SURROGATE).read_bytes()
     size = int.from_bytes(raw[:8], "little")
     told = json.loads(raw[8 : 8 + size])["__metadata__"]["creepkit"]
     assert json.loads(told) == {"format": "creepkit-surrogate", "version": 2, "kind": "parameter-gru"}

@@ -13,7 +13,7 @@ from creepkit.records import Program, RecordedLoading, Status
 from creepkit.sampling.conditions import TimeGrid
 from creepkit.surrogates.loading import load_surrogate
 from creepkit.surrogates.parameter_gru import ParameterGru
-from creepkit.surrogates.parameter_network import load_weights, sample_tensors
+from creepkit.surrogates.parameter_network import sample_tensors
 from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.surrogate import Surrogate
 from creepkit.surrogates.training import train
@@ -121,7 +121,8 @@ def test_candidates_and_tests_are_predicted_as_one_by_one(learnt: Surrogate, ten
 
 def test_frames_of_the_training_are_predicted_as_in_training(learnt: Surrogate, tension: Dataset) -> None:
     samples = sample_tensors(learnt.recipe.sample_arrays(tension))
-    module = load_weights(learnt.recipe.module(tension, samples, torch.arange(100)), learnt.weights)
+    module = learnt.recipe.module(tension, samples, torch.arange(100))
+    module.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in learnt.weights.items()})
     with torch.no_grad():
         known = module({name: v[:4] for name, v in samples.items()}).numpy()
     for row in range(4):
