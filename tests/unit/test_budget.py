@@ -14,10 +14,10 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 200,
+    "api": 225,
     "app": 650,
     "cameras": 1200,
-    "cli": 2700,
+    "cli": 2550,
     "core": 100,
     "dataset": 800,
     "discovery": 1250,
@@ -26,7 +26,7 @@ BUDGET = {
     "extraction": 1150,
     "fem": 1900,
     "files": 1350,
-    "forecasts": 1500,
+    "forecasts": 1510,
     "instruments": 1400,
     "integration": 1100,
     "inverse": 11550,
@@ -44,7 +44,7 @@ BUDGET = {
     "sampling": 1150,
     "screening": 750,
     "specimens": 4050,
-    "studies": 2950,
+    "studies": 2900,
     "surrogates": 1900,
     "testing": 2000,
 }

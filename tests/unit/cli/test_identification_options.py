@@ -40,7 +40,7 @@ def test_parameters_are_fixed_and_bounded_where_a_law_has_them() -> None:
         (None, ["m_1=0:1"], "bounds: no parameter of norton, strain-hardening is called 'm_1'; "),
         (["n"], None, "--fix n is not known; write NAME=NUMBER, such as n=5"),
         (["n=inf"], None, "--fix n=inf is not known; write NAME=NUMBER, such as n=5"),
-        (["n=5", "n=6"], None, "--fix n=5 n=6: n=6: n is given twice; keep one of them"),
+        (["n=5", "n=6"], None, "--fix n=5 n=6: n is given twice; keep one of them"),
         (None, ["n=5"], "--bound n=5 is not known; write NAME=LOW:HIGH, such as n=1:8"),
     ],
 )
