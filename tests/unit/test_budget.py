@@ -19,10 +19,10 @@ BUDGET = {
     "cameras": 1200,
     "cli": 2550,
     "core": 100,
-    "dataset": 850,
+    "dataset": 800,
     "discovery": 1250,
     "experiments": 1800,
-    "exporters": 3050,
+    "exporters": 3000,
     "extraction": 1150,
     "fem": 1900,
     "files": 1350,
@@ -41,12 +41,12 @@ BUDGET = {
     "registry": 650,
     "reports": 8250,
     "rupture_assessment": 1950,
-    "sampling": 1200,
+    "sampling": 1150,
     "screening": 750,
     "specimens": 4050,
     "studies": 2900,
-    "surrogates": 2000,
-    "testing": 2050,
+    "surrogates": 1900,
+    "testing": 2000,
 }
 """{package, or modules beside packages: lines}."""
 
