@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from creepkit.jobs.worker_process import setup_message
 from helpers import source_tree
 
 PLANTED = "import sys; open({ran!r}, 'a').write(__name__ + chr(10))\n"
@@ -140,3 +141,10 @@ def test_nothing_of_the_working_folder_is_imported_before_it_is_left_out(tmp_pat
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / "executed").exists()
+
+
+def test_torch_with_its_made_up_attributes_leaves_workers_what_they_need():
+    """torch.classes answers for any attribute, __path__ among them, with what is no list of folders."""
+    import torch  # noqa: F401
+
+    assert setup_message()

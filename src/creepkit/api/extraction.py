@@ -102,11 +102,11 @@ def extract_as_described(
     return [one.replace(name=name) for one, name in zip(found, names, strict=True)]
 
 
-def operator_of(specimen: Specimen | str, window: float | None = None, radii: Sequence[float] = ()) -> str:
-    """The text of the operator of a specimen within a window, mm, or at radii, mm; by default its own."""
-    if window is not None and len(radii):
+def operator_of(specimen: Specimen | str, described: ExtractionOptions) -> str:
+    """The text of the operator of a specimen within the window or on the rings described; by default its own."""
+    if described.window is not None and described.rings:
         raise HistoryError("a window and rings were given: means on rings have no window; leave one of them out")
-    return _watched(specimen).surface_operator(window, radii)
+    return _watched(specimen).surface_operator(described.window, described.rings)
 
 
 def imposed_on(

@@ -35,6 +35,16 @@ PLANTED_BULGE = EXAMPLE_DATA / "planted_bulge_test"
 """A simulated bulge test of one dimple, and the truth behind it."""
 
 
+HEADINGS = {
+    MEASURED: "MEASURED: nine creep curves of CMSX-6 at 980 °C, thinned; six tests ruptured, three were stopped\n"
+    "(Federal Institute for Materials Research and Testing, doi 10.5281/zenodo.13937986, CC BY 4.0)",
+    PLANTED: "SIMULATED: nine creep curves with noise, 750 to 850 °C",
+    PLANTED_BULGE: "\nSIMULATED: a bulge test of one dimple with camera noise, at two pressures in turn;\n"
+    "every law is simulated by finite elements",
+}
+"""What is said before the study of each."""
+
+
 FOLDERS = {"curves": PLANTED, "bulge": PLANTED_BULGE, "ruptures": MEASURED}
 """{folder that --data writes: where its files come from}."""
 
@@ -55,10 +65,8 @@ def command(
         _write_data(to)
         return
     started = time.perf_counter()
-    if uniaxial:
-        results = [_planted_creep_curves(to)]
-    else:
-        results = [_measured_creep_curves(to / "creep_curves"), _planted_bulge_test(to / "bulge_test")]
+    studies = {to / "creep_curves": MEASURED, to / "bulge_test": PLANTED_BULGE}
+    results = [_run(source, folder) for folder, source in ({to: PLANTED} if uniaxial else studies).items()]
     tell(f"\ntime: {time.perf_counter() - started:.0f} s")
     tell(f"results, the best law of each as LaTeX and Python, and the study files' locks: {to}")
     tell(f"reports: {' '.join(str(result.report) for result in results)}")
@@ -79,54 +87,31 @@ def _write_data(to: Path) -> None:
         tell_written(folder, f": {len(files)} files")
 
 
-def _measured_creep_curves(folder: Path) -> StudyResult:
-    """Laws of the CMSX-6 curves, and rupture as the best one has it."""
-    tell(
-        "MEASURED: nine creep curves of CMSX-6 at 980 °C, thinned; six tests ruptured, three were stopped\n"
-        "(Federal Institute for Materials Research and Testing, doi 10.5281/zenodo.13937986, CC BY 4.0)"
-    )
-    result = _run(MEASURED, folder)
-    ranking = result.rankings[""]
-    _print_ranking(ranking)
-    _print_values(ranking.best)
-    _print_rupture_times(ranking.best)
-    return result
-
-
-def _planted_creep_curves(folder: Path) -> StudyResult:
-    tell("SIMULATED: nine creep curves with noise, 750 to 850 °C")
-    result = _run(PLANTED, folder)
-    _print_ranking(result.rankings[""])
-    _print_truth(PLANTED, result.rankings[""].best)
-    return result
-
-
-def _planted_bulge_test(folder: Path) -> StudyResult:
-    import creepkit as ck
-
-    (test,) = ck.read_histories(PLANTED_BULGE)
-    pressures = " then ".join(dict.fromkeys(f"{value:g}" for value in test.loading.program().values if value > 0))
-    hours, height = test.times[-1] / 3600, test.outputs["amplitude"][-1]
-    tell(
-        f"\nSIMULATED: a bulge test with camera noise, {pressures} MPa, {test.times.size} frames to {hours:.0f} h,\n"
-        f"top raised by {height:.2f} mm; every law is simulated by finite elements"
-    )
-    result = _run(PLANTED_BULGE, folder)
-    _print_ranking(result.rankings[""])
-    _print_truth(PLANTED_BULGE, result.rankings[""].best)
-    return result
-
-
 def _run(data: Path, folder: Path) -> StudyResult:
-    """Carry out the study of example data, with those of its laws that are installed; FitError where a stage fails."""
+    """Carry out the study of example data, with those of its laws that are installed, and print what it found.
+
+    FitError where a stage fails.
+    """
     import creepkit as ck
     from creepkit.errors import FitError
+    from creepkit.reports.interval_basis import interval_basis
 
+    tell(HEADINGS[data])
     study = ck.Study(_with_installed_laws(data / "study.toml"))
     with ProgressBar() as progress:
         result = study.run(to=folder, progress=progress.tick)
     for failure in result.failures:
         raise FitError(f"{failure.stage}: {failure.sentence}")
+    ranking = result.rankings[""]
+    _print_ranking(ranking)
+    if data == MEASURED:
+        _print_values(ranking.best)
+    else:
+        _print_truth(data, ranking.best)
+    for line in interval_basis(ranking.best):
+        tell(f"  {line}")
+    if data == MEASURED:
+        _print_rupture_times(ranking.best)
     return result
 
 
@@ -156,16 +141,20 @@ def _with_installed_laws(path: Path) -> StudyFile:
 
 
 def _print_ranking(ranking: Ranking) -> None:
-    """Each law with its misfit and weight, then the best one with its values."""
-    output = next(iter(ranking.best.errors))
-    misfit = "rms ln strain" if output == "strain" else "loss of amplitude"
-    rows = []
-    for entry in ranking.laws:
-        fit = entry.fit
-        value = fit.rms if output == "strain" else fit.errors[output].relative_squared_error
-        numbers = f"{value:.3g}", f"{entry.excess:.1f}", f"{entry.weight:.3f}"
-        rows.append((fit.law.name, str(len(fit.law.params)), *numbers))
-    _print_rows(("law", "parameters", misfit, "BIC - best", "weight"), rows)
+    """Each law with its misfit and weight, and the verdict."""
+    from creepkit.reports.ranking import misfit_cells, misfit_columns
+
+    rows = [
+        (
+            one.fit.law.name,
+            str(len(one.fit.law.params)),
+            misfit_cells(one.fit)[0],
+            f"{one.excess:.1f}",
+            f"{one.weight:.3f}",
+        )
+        for one in ranking.laws
+    ]
+    _print_rows(("law", "parameters", misfit_columns(ranking.best)[0], "BIC - best", "weight"), rows)
     tell(ranking.verdict)
 
 
@@ -180,7 +169,6 @@ def _print_values(fit: Identification) -> None:
     ]
     for start in range(0, len(texts), 3):
         tell("  " + ", ".join(texts[start : start + 3]))
-    _print_interval_basis(fit)
 
 
 def _print_rupture_times(fit: Identification) -> None:
@@ -213,14 +201,6 @@ def _print_truth(folder: Path, fit: Identification) -> None:
         rows.append(("rate between tests", *sds, "", ""))
     tell(f"the truth: {truth['law']}")
     _print_rows(("parameter", "true", "identified", "95 % interval", "inside"), rows)
-    _print_interval_basis(fit)
-
-
-def _print_interval_basis(fit: Identification) -> None:
-    from creepkit.reports.interval_basis import interval_basis
-
-    for line in interval_basis(fit):
-        tell(f"  {line}")
 
 
 def _print_rows(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

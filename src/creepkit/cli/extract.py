@@ -46,7 +46,7 @@ def command(
             date_order=under.date_order,
             pressure_reference=under.pressure_reference or "",
         )
-    operator = operator_of(specimen, said.window, said.rings)
+    operator = operator_of(specimen, said)
     if said.names and (len(set(said.names)) != len(said.names) or any("/" in n or n[:1] == "." for n in said.names)):
         raise HistoryError(f"--names {','.join(said.names)}: give different names, without a folder in them")
     if said.names and said.centers and len(said.names) != len(said.centers):

@@ -15,7 +15,13 @@ from creepkit.cli.command_options import CheckedCommand
 from creepkit.cli.generated_options import pair, steps
 from creepkit.cli.shared import DEFAULT_SPECIMEN
 from creepkit.errors import SolveError
-from creepkit.forecasts.planned_tests import planned_history, stepped_load
+from creepkit.forecasts.planned_tests import (
+    COMPONENTS,
+    load_of_components,
+    needs_modulus,
+    planned_history,
+    stepped_load,
+)
 from creepkit.limits import GIGAPASCAL, HOURS, RAMP
 from creepkit.options import GIGAPASCAL as IN_GIGAPASCAL
 from creepkit.options import HOURS as IN_HOURS
@@ -23,7 +29,6 @@ from creepkit.options import Options, option
 from creepkit.records import (
     ZERO_CELSIUS,
     History,
-    PointLoading,
     Program,
     check_geometry,
     dimension_named,
@@ -34,10 +39,6 @@ from creepkit.records import (
 
 if TYPE_CHECKING:
     from creepkit.records import Load, Loading, Specimen
-
-COMPONENTS = "components"
-"""The load of a material point, which --stress and --strain state with the names of components."""
-
 
 LOAD_TEXT = re.compile(r"([0-9.]+:)?[+-]?[0-9.]+([eE][+-]?[0-9]+)?")
 """The value of a load: a number, or SECONDS:NUMBER."""
@@ -157,8 +158,7 @@ def described_test(given: Mapping[str, Any], others: Mapping[str, Sequence[str]]
     check_geometry(specimen, lengths, "a length")
     end = float(options.end or 0.0)
     loading = _components(specimen, loads) if COMPONENTS in own else _loading(specimen, own, loads, options, end)
-    needed = "modulus" in getattr(specimen, "conditions", {}) or (COMPONENTS in own and "strain" in loads)
-    if options.modulus is None and needed:
+    if options.modulus is None and needs_modulus(specimen, loading):
         raise SolveError(f"specimen '{specimen.name}' needs a modulus: give --modulus-gpa, such as 150")
     temperature: float | Program | None = None
     if options.temperature:
@@ -229,8 +229,6 @@ def _components(specimen: Specimen, loads: Mapping[str, Sequence[str]]) -> Loadi
                 raise SolveError(f"--{kind} {text}: name the component, such as 11={text}") from None
             components[kind].setdefault(name, []).extend(steps_of([value], f"--{kind}"))
         for name, pairs in components[kind].items():
-            if pairs[0][0] != 0.0:
-                pairs.insert(0, (0.0, 0.0))
             if sorted(pairs) != pairs:
                 raise SolveError(f"--{kind}: the steps of component {name} must follow one another in time")
-    return PointLoading(**components)
+    return load_of_components(components)

@@ -107,24 +107,16 @@ def _readable_tests(
 ) -> tuple[list[History], list[CreepkitError]]:
     """All tests; where some file cannot be read those of the others, and the errors of these."""
     import creepkit as ck
+    from creepkit.registry.reading import read_those_that_can_be
 
     try:
         return ck.read_histories(files, reader=reader, ignore=ignored), []
     except ck.errors.CreepkitError:
         single = [one for path in files for one in (_files_in(path, reader) if path.is_dir() else [path])]
-        if len(single) < 2:
+        _, tests, unread = read_those_that_can_be(single, reader, ignored)
+        if not tests or not unread:
             raise
-        read: list[Path] = []
-        unread: list[CreepkitError] = []
-        for path in single:
-            try:
-                ck.read_histories([path], reader=reader, ignore=ignored)
-                read.append(path)
-            except ck.errors.CreepkitError as error:
-                unread.append(error)
-        if not read or not unread:
-            raise
-    return ck.read_histories(read, reader=reader, ignore=ignored), unread
+        return tests, unread
 
 
 def _files_in(folder: Path, reader: str | None) -> list[Path]:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.generated_options import TextForm, text_form
-from creepkit.errors import CreepkitError, FitError, LawError
+from creepkit.errors import LawError
 from creepkit.limits import Limits
 from creepkit.options import Option
 
@@ -85,16 +84,6 @@ def merged_values(source: Any, given: Mapping[str, float] | None) -> dict[str, f
     if own is None:
         return dict(given or {})
     return {**own, **given} if given else None
-
-
-def parsed(kind: Any, text: str, option: str, example: str) -> Any:
-    """A text as a value of a type; CreepkitError that names the option for one that is not understood."""
-    form: TextForm = text_form(kind)
-    try:
-        return form.parse([text] if form.several else text)
-    except (ValueError, CreepkitError) as error:
-        said = f": {error}" if isinstance(error, CreepkitError) else f" is not known; write {example}"
-        raise FitError(f"{option} {text}{said}") from None
 
 
 def selected(histories: Sequence[History], only: Mapping[str, Sequence[str]] | None) -> list[History]:

@@ -42,10 +42,8 @@ def generate(
     seed: Seed = 0,
     interval: Annotated[float | None, Option(help="s from frame to frame; 150 by default.", limits=SECONDS)] = None,
     conditions: Annotated[
-        dict[str, str] | None,
-        Option(
-            help="Range of a condition, in MPa, s, mm, K, N.", flag="range", metavar="NAME=LOW:HIGH", example="P1=5:20"
-        ),
+        dict[str, tuple[float, float]] | None,
+        Option(help="Range of a condition, in MPa, s, mm, K, N.", flag="range", example="P1=5:20"),
     ] = None,
     screened: Annotated[
         bool, Option(help="Of the paper's domain: leave out what bursts far too early by the reduced-order model.")
@@ -59,16 +57,12 @@ def generate(
     Interrupted, it goes on where it was when it is started again in the same way.
     """
     import creepkit as ck
-    from creepkit.cli.shared import parsed
     from creepkit.dataset.generation import resolve_design
     from creepkit.reports.dataset import print_dataset
     from creepkit.reports.sampling import print_acceptance
 
     chosen = ParallelExecution(**execution)
-    changes: dict[str, Any] = {"domain": domain}
-    for name, text in (conditions or {}).items():
-        whole = text if ":" in text else f"{text}:{text}"
-        changes[name] = parsed(tuple[float, float], whole, f"--range {name}", "NAME=LOW:HIGH, such as P1=5:20")
+    changes: dict[str, Any] = {"domain": domain, **(conditions or {})}
     if interval is not None:
         changes["every"] = interval
     if not screened:

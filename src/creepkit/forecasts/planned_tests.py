@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from creepkit.errors import SolveError
-from creepkit.records import History, Loading, Program, Specimen, StressSteps, TwoLevels, loading_of
+from creepkit.records import (
+    History,
+    Loading,
+    PointLoading,
+    Program,
+    Specimen,
+    StrainSteps,
+    StressSteps,
+    TwoLevels,
+    loading_of,
+)
 
 if TYPE_CHECKING:
     from creepkit.language import Elastic
@@ -17,6 +27,25 @@ if TYPE_CHECKING:
 
 PLANNED_FRAMES = 100
 """Of a planned test, half spread over time and half over its logarithm."""
+
+
+COMPONENTS = "components"
+"""The load of specimens under stresses and strains of several components."""
+
+
+def needs_modulus(specimen: Specimen, loading: Loading) -> bool:
+    """Whether a planned test has no curve without Young's modulus: by its specimen, or because strain is prescribed."""
+    prescribed = isinstance(loading, StrainSteps) or (isinstance(loading, PointLoading) and bool(loading.strain))
+    return prescribed or "modulus" in getattr(specimen, "conditions", {})
+
+
+def load_of_components(components: Mapping[str, Mapping[str, Sequence[tuple[float, float]]]]) -> PointLoading:
+    """The load of a material point, {"stress" or "strain": {component: steps}}; a component is at rest until then."""
+    from_rest = {
+        kind: {name: tuple(steps) if steps[0][0] == 0.0 else ((0.0, 0.0), *steps) for name, steps in given.items()}
+        for kind, given in components.items()
+    }
+    return PointLoading(**from_rest)
 
 
 def stepped_load(

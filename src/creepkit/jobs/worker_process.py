@@ -148,9 +148,11 @@ def _imported_modules(modules: Mapping[str, ModuleType]) -> dict[str, tuple[str 
     installation = tuple({f"{os.path.realpath(prefix)}{os.sep}" for prefix in (sys.prefix, sys.base_prefix)})
     found = {}
     for name, module in list(modules.items()):
+        if "." in name or name == "__main__":  # some of torch's make up a __path__ that is none
+            continue
         file, folders = getattr(module, "__file__", None), list(getattr(module, "__path__", ()))
         places = [os.path.realpath(place) for place in (file, *folders) if place]
-        if "." not in name and name != "__main__" and places and not places[0].startswith(installation):
+        if places and not places[0].startswith(installation):
             found[name] = (file and os.path.abspath(file), folders or None)
     return found
 

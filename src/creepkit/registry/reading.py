@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Unpack
 
 from creepkit.arrays import ArrayLike
 from creepkit.cameras import reading as camera_reading
 from creepkit.checked_arguments import checked_with_own_words
+from creepkit.errors import CreepkitError
 from creepkit.instruments import reading as instrument_files
 from creepkit.instruments.reading_options import RecordOptions
 from creepkit.readers import reading
@@ -25,6 +26,24 @@ def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: 
     """
     readers = [entry.value for entry in default_registry().readers().values()]
     return reading.read_histories(paths, readers, reader, ignore)
+
+
+def read_those_that_can_be(
+    files: Iterable[Path], reader: str | None = None, ignore: Collection[str] = ()
+) -> tuple[list[Path], list[History], list[CreepkitError]]:
+    """The files that hold tests, these tests, and the error of each other file; each file is read by itself."""
+    read: list[Path] = []
+    tests: list[History] = []
+    errors: list[CreepkitError] = []
+    for file in files:
+        try:
+            tests += read_histories([file], reader, ignore)
+            read.append(file)
+        except CreepkitError as error:
+            errors.append(error)
+    if len({history.name for history in tests}) < len(tests):
+        tests = read_histories(read, reader, ignore)  # which says so, or tells them apart
+    return read, tests, errors
 
 
 @checked_with_own_words("path", "times")

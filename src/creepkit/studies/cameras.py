@@ -195,7 +195,7 @@ class StudyCamera:
         if self.part.operator is not None:
             return self.part.operator
         with self.file.at(*self.key("rings_mm" if self.said.rings else "window_mm")):
-            return operator_of(self.specimen, self.said.window, self.said.rings)
+            return operator_of(self.specimen, self.said)
 
     @cached_property
     def said(self) -> ExtractionOptions:

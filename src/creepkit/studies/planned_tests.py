@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from creepkit.forecasts.planned_tests import (
+    COMPONENTS,
+    load_of_components,
+    needs_modulus,
+    planned_history,
+    stepped_load,
+)
 from creepkit.readers.vocabulary import split_unit
 from creepkit.records import (
     SECONDS_PER_HOUR,
@@ -11,20 +18,14 @@ from creepkit.records import (
     ZERO_CELSIUS,
     History,
     Loading,
-    PointLoading,
     Program,
     Specimen,
-    StrainSteps,
     loads_of,
 )
 from creepkit.records.quantities import QUANTITIES, QuantityKind
 from creepkit.studies.arguments import lengths_of, levels_of, quantity, stated, temperature_of
 from creepkit.studies.study_file import StudyFile
 from creepkit.studies.tables import ForecastTable
-
-COMPONENTS = "components"
-"""The load of specimens under stresses and strains of several components; keys of a study name these."""
-
 
 COMPONENT_KINDS: Mapping[str, QuantityKind] = {
     f"{name}_{component}": QUANTITIES[quantity_name]
@@ -55,7 +56,6 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
     StudyError where a test cannot be made of what is said.
     """
     import creepkit as ck
-    from creepkit.forecasts.planned_tests import planned_history
 
     part, place = file.model.forecast[number], ("forecast", number)
     assert part.end_h is not None
@@ -66,8 +66,7 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
     if temperature is None:
         raise file.error(place, "the fitted tests were made at several temperatures; give temperature_C")
     modulus = stated(part, E="modulus_GPa")
-    prescribed = isinstance(loading, StrainSteps) or (isinstance(loading, PointLoading) and bool(loading.strain))
-    if not modulus and (prescribed or "modulus" in getattr(specimen, "conditions", {})):
+    if not modulus and needs_modulus(specimen, loading):
         raise file.error(place, f"specimen '{specimen.name}' needs modulus_GPa, such as 150")
     lengths = lengths_of(file, (*place, "lengths"), part.lengths, specimen)
     with file.at(*place):
@@ -79,8 +78,6 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
 
 def _loading_of(file: StudyFile, number: int, part: ForecastTable, specimen: Specimen, end: float) -> Loading:
     """One load by steps, or stresses and strains of components, { stress_11_MPa = 60, strain_12 = 0 }, from rest."""
-    from creepkit.forecasts.planned_tests import stepped_load
-
     place = ("forecast", number)
     loads = {load.name: load for load in loads_of(specimen)}
     if COMPONENTS not in loads:
@@ -99,9 +96,9 @@ def _loading_of(file: StudyFile, number: int, part: ForecastTable, specimen: Spe
         kind, _, component = name.partition("_")
         if component in given[kind]:
             raise file.error((*place, "load", key), f"{name} is given twice; keep one of them")
-        given[kind][component] = levels if levels[0][0] == 0.0 else [(0.0, 0.0), *levels]
+        given[kind][component] = levels
     with file.at(*place, "load"):
-        return PointLoading(**given)
+        return load_of_components(given)
 
 
 def _specimen_of(file: StudyFile, number: int, part: ForecastTable) -> Specimen:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os.path
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.duration import needs_durations, rests_on_durations
 from creepkit.records import History
+from creepkit.registry.reading import read_those_that_can_be
 from creepkit.studies import proposed_tables as tables
 from creepkit.studies.camera_proposal import proposed_cameras
 from creepkit.studies.data_summary import DataSummary
@@ -92,13 +92,8 @@ def _readable(
         suffix = endings.pop() if len(endings) == 1 else ""
         complete = suffix and all(file.name in sources for file in files if file.suffix == suffix)
         return [f"*{suffix}" if complete else "."], whole, [], None
-    read, tests, problems = [], [], []
-    for file in files:
-        try:
-            tests += ck.read_histories([file], reader)
-            read.append(file)
-        except CreepkitError as error:
-            problems.append(" ".join(str(error).split()))
+    read, tests, errors = read_those_that_can_be(files, reader)
+    problems = [" ".join(str(error).split()) for error in errors]
     if not tests:
         below = _folders_with_tests(folder, reader)
         what = f"holds a test that can be read: {reason}"
@@ -109,8 +104,6 @@ def _readable(
                 f"--to {path}' to keep the study file here"
             )
         return [], [], problems, StudyError(f"{folder}: none of its files {what}")
-    if max(Counter(history.name for history in tests).values()) > 1:
-        tests = ck.read_histories(read, reader)  # which says so, or tells them apart
     return [file.name for file in read], tests, problems, None
 
 
