@@ -92,10 +92,11 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
         given: dict[str, dict[str, Any]] = {name: {} for name in records}
         for name, (group, one, error) in generated.items():
             value = given_value(one, options.pop(name), error)
+            stated = None if value is NOTHING else value
             if not group:
-                options[name] = one.default if value is None else value
+                options[name] = one.default if value is None else stated
             elif value is not None:
-                given[group][name] = None if value is NOTHING else value
+                given[group][name] = stated
         with overwriting() if force else nullcontext():
             for name, output in outputs.items():
                 if options.get(name) is not None:

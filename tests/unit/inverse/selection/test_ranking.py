@@ -106,12 +106,15 @@ def test_only_a_law_that_is_singled_out_and_can_be_predicted_is_challenged(monke
 
 
 def test_what_cannot_be_ranked_is_refused():
+    tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(55.0, 1000.0), (65.0, 1000.0)], seed=0, noise=2e-4)
+    settings = IdentificationSettings(starts=1, sobol_points=8, frames=20, nuisances=())
+    one = identify(NORTON, tests, Steady(), settings=settings)
     with pytest.raises(FitError, match="there are no identifications to rank"):
         rank([])
     with pytest.raises(FitError, match=r"rank\(by='hold-out'\) is not known"):
-        rank([fit("norton")], "hold-out")
+        rank([one], "hold-out")
     with pytest.raises(FitError, match="were made from different histories"):
-        rank([fit("norton", provenance={"data": "a"}), fit("sinh", provenance={"data": "b"})])
+        rank([one, replace(one, provenance={**one.provenance, "data": "others"})])
 
 
 def test_an_export_of_a_ranking_carries_its_verdict():

@@ -64,7 +64,11 @@ def program(*pressures: float) -> RecordedLoading:
             f"{WHERE}: the last time is 0 s, where the load only begins; ask for a time after it",
         ),
         (HistoryError, {"temperature": -300.0}, f"{WHERE}: a temperature of -300 K is not above 0 and below 4500 K"),
-        (LawError, {"values": {"A": 5e-13}}, "law 'norton' needs a value for n"),
+        (
+            LawError,
+            {"values": {"A": 5e-13}},
+            "law 'norton' needs a value for n; give all of them, such as {'n': 1.5}, in a command --set n=1.5",
+        ),
         (
             LawError,
             {"values": {"A": -1.0, "n": 3.0}},
