@@ -13,13 +13,14 @@ from helpers.study_runs import study_in
 @pytest.fixture
 def plain_pages(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages with their attachments and failures alone: what else they show takes seconds."""
-    from creepkit.reports import html
+    from creepkit.reports import html, report
     from creepkit.reports.attachments import embed
 
     def page(contents: Any) -> str:
         return f"<p>{[one.stage for one in contents.failures]}</p>{embed(contents.attachments)}"
 
-    monkeypatch.setattr(html, "report_html", page)
+    for module in (html, report):
+        monkeypatch.setattr(module, "report_html", page)
 
 
 @pytest.fixture
