@@ -77,6 +77,7 @@ class Registry:
         self._plugins: dict[str, Plugin] = {}
         self._being_loaded: set[str] = set()
         self._loading = threading.RLock()
+        self._found: dict[tuple[str, str | None], Any] = {}  # what was asked for, until another plugin is registered
 
     # ---- what there is ---------------------------------------------------------------------------------------------
 
@@ -179,11 +180,19 @@ class Registry:
         return f"; {broken} plugin(s) could not be loaded, see 'creepkit list plugins'" if broken else ""
 
     def _all(self, kind: ContributionKind) -> dict[str, Registered[Any]]:
-        self._load(source for source in self._sources if source.offers(kind.group))
-        return _merged(kind, self._loaded())[0]
+        if (kind.label, None) not in self._found:
+            self._load(source for source in self._sources if source.offers(kind.group))
+            self._found[kind.label, None] = _merged(kind, self._loaded())[0]
+        return dict(self._found[kind.label, None])
 
     def _one(self, kind: ContributionKind, name: str) -> Any:
-        """What is registered under a name, whatever its capitals and hyphens, or under an alias of it."""
+        """What is registered under a name, whatever its capitals and hyphens, or under an alias of it; kept."""
+        if (kind.label, name) not in self._found:
+            self._found[kind.label, name] = self._looked_up(kind, name)
+        return self._found[kind.label, name]
+
+    def _looked_up(self, kind: ContributionKind, name: str) -> Any:
+        """As _one(), loading the plugins that may have it."""
         named = self._named(kind, {name})
         for sources in (named, [source for source in self._sources if source.offers(kind.group)]):
             self._load(sources)
@@ -280,6 +289,7 @@ class Registry:
 
     def _registered(self, source: Source) -> Plugin:
         """Import a plugin and enter it whole or not at all: its hooks must exist and return what they promise."""
+        self._found.clear()
         module, provenance = source.load(), source.provenance
         contributions.check_hooks(provenance, module)
         try:
