@@ -1,5 +1,5 @@
-# make test   set up .venv, then check style, types, layers and run the tests, those of plugins/ included: six minutes
-# make nightly   the rest, an hour: slow tests, release, sanitizer, pictures, CalculiX, hostile input (.ci/nightly)
+# make test   set up .venv, then check style, types, layers and run the tests, those of plugins/ included
+# make nightly   what takes longer: slow tests, release, sanitizer, pictures, CalculiX, hostile input (.ci/nightly)
 # make verify-export   exported laws in a CalculiX built from Debian's source, beside our solver: a table
 # make docs   build the documentation into build/docs; needs no network once .venv is set up
 # make core   compile the core (src/core) again where its sources changed; 'make test' does it first
@@ -7,7 +7,8 @@
 # make demo   set up .venv, then identify laws from measured creep curves and a simulated bulge test; plots in demo/
 #
 # Both need make, Python and a network for pip; tests that need a compiler are skipped without it. The core is compiled by
-# the machine's C++ compiler, else by that in the package ziglang (400 MB in .venv). PYTEST_OPTIONS goes to pytest.
+# the machine's C++ compiler, else by that in the package ziglang (400 MB in .venv), which compiles it for pages of
+# sliders in any case. PYTEST_OPTIONS goes to pytest.
 # TORCH chooses another build of torch: make test TORCH='torch==2.13.0' on a machine with a GPU.
 
 SHELL := /bin/bash
@@ -28,7 +29,7 @@ CPU_WHEELS := https://download.pytorch.org/whl/cpu
 # Two threads of torch on one busy core are far slower than one; pytest runs two workers instead.
 export OMP_NUM_THREADS := 1
 
-# Seconds after which a test fails, and shows where it waits; the slowest took 34 (--durations=1, two cores).
+# Seconds after which a test fails, and shows where it waits.
 export PYTEST_TIMEOUT := 300
 
 # What 'make sanitize' runs: the tests of packages that call the core, and of finite elements against closed forms.
