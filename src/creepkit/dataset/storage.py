@@ -131,7 +131,8 @@ def check_values(columns: dict[str, Any], header: Dataset, source: str) -> None:
             raise _damaged(source, f"sample {np.flatnonzero(~sound)[0]}: its {what}")
 
 
-COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
+"""With a checksum of each chunk, which is compared when it is read."""
 
 
 # ---- writing -------------------------------------------------------------------------------------------------------

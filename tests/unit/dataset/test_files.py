@@ -254,14 +254,6 @@ def test_long_attributes_are_no_trouble(data, tmp_path):
     assert storage.read_dataset(storage.write_dataset(long, tmp_path / "a.h5")).design_document == long.design_document
 
 
-def test_shards_are_not_written_through_a_link(tmp_path):
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "a.h5.parts").symlink_to("elsewhere")
-    with pytest.raises(DatasetError, match=r"a\.h5\.parts: is a link, .* remove the link"):
-        ck.generate("norton", "uniaxial", 4, seed=1, to=tmp_path / "a.h5", every=3600.0)
-    assert names_in(tmp_path / "elsewhere") == []
-
-
 def test_a_specimen_that_a_file_cannot_hold_is_refused(data, tmp_path):
     odd = ck.specimen("bulge")
     mesh = odd.geometry.mesh(0.5)
