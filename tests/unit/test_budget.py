@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35750
+TESTS = 34500
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
