@@ -17,7 +17,7 @@ BUDGET = {
     "api": 225,
     "app": 650,
     "cameras": 1200,
-    "cli": 2550,
+    "cli": 2390,
     "core": 100,
     "dataset": 800,
     "discovery": 1250,
@@ -44,7 +44,7 @@ BUDGET = {
     "sampling": 1150,
     "screening": 750,
     "specimens": 4050,
-    "studies": 2900,
+    "studies": 2750,
     "surrogates": 1900,
     "testing": 2000,
 }
