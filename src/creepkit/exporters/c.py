@@ -11,7 +11,7 @@ from typing import Any
 
 import sympy
 
-from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, factor_text
+from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, called_names, factor_text
 from creepkit.exporters.law_description import comment_lines, comment_safe, heading, printable_text
 from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
@@ -133,10 +133,10 @@ def c_assignments(definitions: Iterable[tuple[sympy.Symbol, sympy.Expr]], type_n
 
 def stable_functions_in(texts: Sequence[str]) -> list[str]:
     """The names of the helpers that texts call, and of those that they call in turn, in order."""
-    required = _called_names(texts)
+    required = called_names(texts)
     for name in reversed([*STABLE_FUNCTIONS]):
         if name in required:
-            required |= _called_names([STABLE_FUNCTIONS[name][1]])
+            required |= called_names([STABLE_FUNCTIONS[name][1]])
     return [name for name in STABLE_FUNCTIONS if name in required]
 
 
@@ -155,10 +155,6 @@ def cpp_lambda_definition(name: str) -> str:
 def c_block_comment(lines: Iterable[str]) -> list[str]:
     """Lines, each made ` * ...`, between comment marks; whatever could end a comment is taken apart."""
     return ["/*", *(comment_safe(line) for line in lines), " */"]
-
-
-def _called_names(texts: Iterable[str]) -> set[str]:
-    return {name for text in texts for name in re.findall(r"(\w+)\(", text)}
 
 
 _LINE_LENGTH = 120

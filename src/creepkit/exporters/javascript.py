@@ -15,8 +15,8 @@ from typing import Any
 
 import sympy
 
-from creepkit.exporters.c import STABLE_FUNCTIONS, CPrinter, stable_functions_in
-from creepkit.exporters.law_code import Assignments, CodeFunction, Identifiers, LawCode
+from creepkit.exporters.c import STABLE_FUNCTIONS, c_assignments, c_expression, stable_functions_in
+from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
 from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS
@@ -206,7 +206,7 @@ class _JavaScriptLaw:
         exponents = []
         for (time, strain), coefficients in self.code.leading_exponents():
             active = " && ".join(f"{symbol} !== 0.0" for symbol in coefficients) or "true"
-            pair = f"{_expression(time)}, {_expression(strain)}"
+            pair = f"{c_expression(time)}, {c_expression(strain)}"
             exponents.append(f"    [{active}, {pair}],")
         return [
             "  const exponents = [",
@@ -214,21 +214,6 @@ class _JavaScriptLaw:
             "  ].filter((e) => e[0]).map((e) => (1.0 + e[1]) / (1.0 - Math.min(e[2], 1.0 - 1e-12)));",
             "  const leadingExponent = exponents.length > 0 ? Math.min(...exponents) : 1.0;",
         ]
-
-
-class JavaScriptPrinter(CPrinter):
-    """Print lowered expressions as JavaScript: the operators are those of C."""
-
-
-_PRINTER = JavaScriptPrinter({"standard": "python3"})
-
-
-def _expression(expression: sympy.Basic) -> str:
-    return str(_PRINTER.doprint(expression))
-
-
-def _definitions(assignments: Assignments, indent: str) -> list[str]:
-    return [f"{indent}const {symbol} = {_expression(expression)};" for symbol, expression in assignments]
 
 
 def _closure(name: str, function: CodeFunction, places: dict[sympy.Symbol, str]) -> list[str]:
@@ -244,11 +229,11 @@ def _closure(name: str, function: CodeFunction, places: dict[sympy.Symbol, str])
     return [
         f"  let {name};",
         "  {",
-        *_definitions(tuple(constants), "    "),
+        *(f"    {line}" for line in c_assignments(constants, "const")),
         f"    {name} = (point, out) => {{",
         *(f"      const {symbol} = {places[symbol]};" for symbol in function.inputs),
-        *_definitions(tuple(steps), "      "),
-        *(f"      out[{k}] = {_expression(output)};" for k, output in enumerate(function.outputs)),
+        *(f"      {line}" for line in c_assignments(steps, "const")),
+        *(f"      out[{k}] = {c_expression(output)};" for k, output in enumerate(function.outputs)),
         "    };",
         "  }",
     ]

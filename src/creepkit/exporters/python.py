@@ -19,15 +19,12 @@ import sympy
 from creepkit.errors import ExportError, LawError
 from creepkit.exporters.law_code import Identifiers, factor_text
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.exporters.unit_conversion import STRESSES
 from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
 from creepkit.kernels.log_form import FLOOR, TIME_FLOOR, log_form
-from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
+from creepkit.language.symbols import POINT_VARIABLES, time
 from creepkit.records import Exporter, LawWithValues, Units
-
-STRESS_SYMBOLS = (stress, principal_stress, mean_stress)
-"""The variables of a point that are in the units of stress."""
-
 
 _MODULE_NAMES = ("INITIAL", "LIMIT", "errstate", "inf", "max", "min", "np", "rate", "state_rates")
 
@@ -135,7 +132,7 @@ class _ModuleFunctions:
     def _unit_conversions(self, used: set[sympy.Basic]) -> list[str]:
         """Stress and time on entry, in the law's own units."""
         units = self.source.units
-        pairs = [*((s, units.megapascals) for s in STRESS_SYMBOLS), (time, units.seconds)]
+        pairs = [*((s, units.megapascals) for s in STRESSES), (time, units.seconds)]
         return [f"{s} = {factor!r} * {s}" for s, factor in pairs if factor != 1 and s in used]
 
     def _signature_lines(self) -> list[str]:
