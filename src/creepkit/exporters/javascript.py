@@ -117,7 +117,8 @@ class _JavaScriptLaw:
     def text(self) -> str:
         """The text up to what sets a module apart from an expression."""
         kernel = self._kernel()
-        functions = [_function_definition(name) for name in stable_functions_in(kernel)]
+        called = {name: STABLE_FUNCTIONS[name] for name in stable_functions_in(kernel)}
+        functions = [f"const {name} = ({', '.join(inputs)}) => {result};" for name, (inputs, result) in called.items()]
         if any("erf(" in line for line in kernel):
             functions.append(_ERROR_FUNCTION)
         code = "\n".join([*functions, *kernel])
@@ -127,7 +128,7 @@ class _JavaScriptLaw:
         blocks = [
             "\n".join(self._header(kernel)),
             *(["\n".join(imports)] if imports else []),
-            f"const law = {_json_text(self._description())};",
+            f"const law = Object.freeze({script_safe_json(self._description(), indent=2)});",
             *functions,
             "\n".join(kernel),
             _template(),
@@ -171,24 +172,26 @@ class _JavaScriptLaw:
 
     def _kernel(self) -> list[str]:
         """The function that makes the law's functions for given values of the parameters."""
-        code, width = self.code, len(POINT_VARIABLES) + len(self.law.states)
-        functions = {name: code.function(entry) for name, entry in _ENTRIES.items()}
+        code = self.code
+        places = {symbol: f"point[{k}]" for k, symbol in enumerate((*code.point, *code.states))}
+        closures = {name: _closure(name, code.function(entry), places) for name, entry in _ENTRIES.items()}
         labels = [f"// {_comment_safe(printable_text(label))}" for label in self.law.terms]
-        lines = [
-            f"/** Functions of the law at values of its parameters, in their order; points have {width} numbers. */",
+        return [
+            "/** Functions of the law at values of its parameters, in their order; "
+            f"points have {len(places)} numbers. */",
             "function kernel(values) {",
             *([f"  const [{', '.join(map(str, code.parameters))}] = values;"] if code.parameters else []),
             *(f"  const {ln} = log({symbol});" for ln, symbol in code.logarithms.items()),
             "",
             "  // rate, then rates of internal variables",
-            *_closure("rates", functions["rates"], self._inputs()),
+            *closures["rates"],
             "",
             "  // the rate of each term:",
             *(f"  {label}" for label in labels),
-            *_closure("terms", functions["terms"], self._inputs()),
+            *closures["terms"],
             "",
             "  // ln of the rate, rates of internal variables, then the derivatives of each to the point, row by row",
-            *_closure("update", functions["update"], self._inputs()),
+            *closures["update"],
             "",
             "  // exponent of time in strain ~ t^b as t -> 0+ from a virgin state at constant stress",
             *self._leading_exponent(),
@@ -196,11 +199,6 @@ class _JavaScriptLaw:
             "  return { rates, terms, update, leadingExponent };",
             "}",
         ]
-        return lines
-
-    def _inputs(self) -> dict[sympy.Symbol, str]:
-        """{symbol: where it stands in a point}."""
-        return {symbol: f"point[{k}]" for k, symbol in enumerate((*self.code.point, *self.code.states))}
 
     def _leading_exponent(self) -> list[str]:
         exponents = []
@@ -219,13 +217,12 @@ class _JavaScriptLaw:
 def _closure(name: str, function: CodeFunction, places: dict[sympy.Symbol, str]) -> list[str]:
     """A function of `point` that writes into `out`; what depends on the parameters alone is worked out once."""
     varying: set[sympy.Basic] = {*function.inputs}
-    constants, steps = [], []
+    constants: list[tuple[sympy.Symbol, sympy.Expr]] = []
+    steps: list[tuple[sympy.Symbol, sympy.Expr]] = []
     for symbol, expression in function.assignments:
-        if expression.free_symbols & varying:
-            varying.add(symbol)
-            steps.append((symbol, expression))
-        else:
-            constants.append((symbol, expression))
+        varies = not varying.isdisjoint(expression.free_symbols)
+        varying |= {symbol} if varies else set()
+        (steps if varies else constants).append((symbol, expression))
     return [
         f"  let {name};",
         "  {",
@@ -239,11 +236,6 @@ def _closure(name: str, function: CodeFunction, places: dict[sympy.Symbol, str])
     ]
 
 
-def _function_definition(name: str) -> str:
-    arguments, result = STABLE_FUNCTIONS[name]
-    return f"const {name} = ({', '.join(arguments)}) => {result};"
-
-
 def _comment_safe(text: str) -> str:
     """Text in which no comment and no script element ends."""
     return text.replace("*/", "* /").replace("</", "< /").replace("<!--", "< !--")
@@ -253,10 +245,6 @@ def script_safe_json(value: Any, indent: int | None = None) -> str:
     """A value as JSON that ends no script element of a page, and holds no other than ASCII characters."""
     text = json.dumps(value, allow_nan=False, indent=indent)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def _json_text(value: Any) -> str:
-    return f"Object.freeze({script_safe_json(value, indent=2)})"
 
 
 @cache

@@ -68,9 +68,10 @@ def _coefficient_factors(law: CreepLaw, values: Mapping[str, float], units: Unit
     rates |= {f"rate of '{symbol}'": state.rate for symbol, state in law.states.items()}
     factors: dict[str, float] = {}
     for label, rate in rates.items():
-        powers = [_degree_in_numbers(rate, degrees, numbers) for degrees in (of_stress, of_time)]
-        factor = None if None in powers else mpmath.mpf(units.megapascals) ** powers[0]
-        factor = None if factor is None else factor * mpmath.mpf(units.seconds) ** (1 + powers[1])
+        p, q = (_degree_in_numbers(rate, degrees, numbers) for degrees in (of_stress, of_time))
+        factor = None
+        if p is not None and q is not None:
+            factor = mpmath.mpf(units.megapascals) ** p * mpmath.mpf(units.seconds) ** (1 + q)
         if rate.xreplace(numbers) == 0 or (factor is not None and abs(factor - 1) < _FACTOR_TOLERANCE):
             continue
         found = ((s.name, _degree_in_numbers(rate, {s: 1}, numbers)) for s in candidates)
