@@ -17,7 +17,7 @@ BUDGET = {
     "api": 225,
     "app": 650,
     "cameras": 1200,
-    "cli": 2550,
+    "cli": 2390,
     "core": 100,
     "dataset": 800,
     "discovery": 1250,
@@ -44,13 +44,13 @@ BUDGET = {
     "sampling": 1150,
     "screening": 750,
     "specimens": 4050,
-    "studies": 2900,
+    "studies": 2750,
     "surrogates": 1900,
     "testing": 2000,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35750
+TESTS = 34500
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
