@@ -340,20 +340,6 @@ def test_an_answer_outside_the_domain_says_so(learnt: Surrogate, tension: Datase
     assert [note for note in fit.notes if "outside the domain that the surrogate was trained in, in test 'odd'" in note]
 
 
-def test_identify_of_real_bars_with_a_network_is_off_by_its_error(learnt: Surrogate, tension: Dataset) -> None:
-    truth = tension.values_of(7)
-    tests = []
-    for k, row in enumerate((7, 8, 9, 10)):
-        shown = tension.specimen.predict(
-            tension.law, tension.law.to_internal(truth), [tension.planned_test(row)]
-        ).values[0, 0]
-        tests.append(measured(tension.planned_test(row), shown, ("strain",), f"t{k}"))
-    fit = ck.identify(tension.law, tests, using=learnt, starts=3)
-    by_name = {e.name: e.value for e in fit.estimates}
-    assert by_name["n"] == pytest.approx(truth["n"], abs=0.5)
-    assert by_name["A"] * 100 ** by_name["n"] == pytest.approx(truth["A"] * 100 ** truth["n"], rel=0.3)
-
-
 def test_simulate_with_a_network_is_a_history_of_its_specimen(learnt: Surrogate, tension: Dataset) -> None:
     run = ck.simulate(
         tension.law, learnt, tension.values_of(0), loading=ck.constant_stress(100.0), times=[HOURS, 2 * HOURS]
