@@ -18,6 +18,7 @@ from creepkit.dataset.dataset import COLUMNS
 from creepkit.dataset.shards import GenerationJob
 from creepkit.dataset.simulation import rounded_outputs, simulate_rows
 from creepkit.errors import DatasetError
+from helpers.dataset_runs import assert_same
 from helpers.planted_sampling import BAR, GRID, Planted, Raising, strain, stress_of
 from helpers.written_files import names_in
 
@@ -31,12 +32,6 @@ def simulated(tmp_path, design=None, first=0, rows=32, seed=0, specimen=BAR):
 def data(tmp_path):
     raising = Raising(stress_of(next(r for r in range(32) if stress_of(r) <= 120.0)))
     return simulated(tmp_path, Planted((*Planted().criteria, raising)))
-
-
-def assert_same(one, other):
-    for name in COLUMNS:
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
-    assert dict(one.failures) == dict(other.failures)
 
 
 def test_histories_are_those_of_nortons_law_under_constant_load(data):

@@ -271,25 +271,6 @@ def test_other_kinds_of_tests_are_refused(
         bulging.predict(plates.law, plates.theta_of(0), [plate], nuisances={"window": np.ones((1, 1))})
 
 
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({"cell": "rnn"}, "cell 'rnn' is not known; allowed are gru, lstm"),
-        ({"hidden": 0}, "hidden is 0"),
-        ({"inputs": ("laod",)}, "there is no input 'laod': did you mean 'load'"),
-        ({"base": "one-dof"}, "base 'one-dof' is not known; allowed are none, reduced-order, reference-stress"),
-    ],
-)
-def test_recipes_that_make_no_sense(changes: dict, told: str) -> None:
-    with pytest.raises(SurrogateError, match=told):
-        ParameterGru(**changes)
-
-
-def test_a_bar_has_no_reduced_order_model(tension: Dataset) -> None:
-    with pytest.raises(SurrogateError, match="specimen 'uniaxial' has no reduced-order model"):
-        train(tension, ParameterGru(4, 1, base="reduced-order", training=BRIEF))
-
-
 # ---- studies ---------------------------------------------------------------------------------------------------------
 
 
