@@ -183,8 +183,6 @@ MISTAKES = [
     (lambda: design(every=-5), "frames every -5 s"),
     (lambda: design(domain="paper").draw(0, 0, seed=1), "0 samples"),
     (lambda: sampling_design(ck.law("norton").times(ck.arrhenius(T_ref=1073)), DIMPLE), "depends on temperature"),
-    (lambda: Draws(np.zeros((3, 2)), np.zeros((2, 1)), ("P1",)), "a row of parameters and of conditions each"),
-    (lambda: Draws(np.zeros((2, 2)), np.zeros((2, 1)), ("P1", "P2")), "1 conditions and 2 names"),
     (lambda: Draws(np.zeros((2, 2)), np.zeros((2, 1)), ("P1",)).condition("P2"), "no condition 'P2'"),
 ]
 
