@@ -19,7 +19,7 @@ from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets, check_penalty
-from creepkit.jobs.shard_progress import ProgressCallback, duration_text
+from creepkit.jobs.progress import ProgressCallback, duration_text
 from creepkit.jobs.worker_pools import ProcessWorkers, process_count
 from creepkit.jobs.worker_process import TaskResult, run_task
 from creepkit.language import CreepLaw
