@@ -316,7 +316,8 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
     def _domain_inputs(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Floats:
         """(candidates, tests, inputs) of the applicability domain."""
         count, tests, constants = query.constants.shape
-        test_rows = np.stack([self._history_inputs.domain_inputs(h, t) for h, t in zip(histories, frames, strict=True)])
+        pairs = zip(histories, frames, strict=True)
+        test_rows = np.array([[*self._history_inputs.domain_inputs(*pair).values()] for pair in pairs])
         test_summary = np.broadcast_to(test_rows[None, :, constants:], (count, tests, test_rows.shape[1] - constants))
         rows = np.broadcast_to(query.law_rows[:, None], (count, tests, query.law_rows.shape[1]))
         return np.concatenate([rows, query.constants, test_summary], axis=2)
