@@ -14,10 +14,10 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 225,
+    "api": 270,
     "app": 650,
     "cameras": 1200,
-    "cli": 2390,
+    "cli": 2300,
     "core": 100,
     "dataset": 860,
     "discovery": 1250,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34500
+TESTS = 33950
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

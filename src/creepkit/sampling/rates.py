@@ -187,11 +187,6 @@ class ReferenceStress:
         end_times = draws.condition(END, end)
         return np.log10(least_strain / end_times), np.log10(LARGEST_REFERENCE_STRAIN / end_times)
 
-    def document(self) -> dict[str, Any]:
-        """What decides the rates, as JSON-able data."""
-        found = {"kind": self.known.kind, "visible_creep": self.visible_creep}
-        return found if self.scaling is None else {**found, **self.scaling.document()}
-
     # ---- of all rows at once -----------------------------------------------------------------------------------------
 
     def _lengths(self, draws: Draws, scaling: LoadScaling) -> Floats:
