@@ -221,8 +221,8 @@ HOOKS: dict[str, tuple[str, str, bool]] = {
     "without its decorator": (WITHOUT_HOOK, "without @hookimpl", True),
     "with a parameter": (
         GOOD.replace("creepkit_laws()", "creepkit_laws(registry)"),
-        "has the parameter 'registry'",
-        True,
+        "Argument(s) {'registry'} are declared in the hookimpl",
+        False,
     ),
     "forgot to return": (GOOD.replace("return [LAW]", "[LAW]"), "found NoneType None; add a return statement", True),
     "a generator": (GOOD.replace("return [LAW]", "yield LAW"), "is a generator; return a list", True),
