@@ -22,10 +22,6 @@ MAXIMUM_UNPACKED_BYTES = 100_000_000
 """Of all that a compressed file holds together."""
 
 
-PIECE_BYTES = 1_000_000
-"""Bytes that are read at once."""
-
-
 @dataclass(frozen=True)
 class FileKind:
     """A kind of file that creepkit reads or writes.
@@ -66,7 +62,7 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
     descriptor = _open_regular(path, kind, any_size=first is not None)
     try:
         with os.fdopen(descriptor, "rb") as stream:
-            content = _read_pieces(stream, kind.most_bytes + 1 if first is None else first)
+            content = stream.read() if first is None else stream.read(first)
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
     except MemoryError:
@@ -102,15 +98,6 @@ def sha256_of(path: Path, kind: FileKind) -> str:
     """SHA-256 of the content of a regular file."""
     with open_binary(path, kind) as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def _read_pieces(stream: BufferedReader, limit: int) -> bytes:
-    """At most `limit` bytes; piece by piece, for to ask for all at once would reserve memory for the limit."""
-    pieces: list[bytes] = []
-    while limit > 0 and (piece := stream.read(min(limit, PIECE_BYTES))):
-        pieces.append(piece)
-        limit -= len(piece)
-    return b"".join(pieces)
 
 
 def read_text(path: Path, kind: FileKind) -> str:

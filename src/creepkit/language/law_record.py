@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -31,7 +32,9 @@ def validate_law(law: LawRecord) -> None:
     """Raise LawError when the law is not well formed."""
     _check_names_and_titles(law)
     origin = f"law '{law.name}'"
-    _check_tables(law, origin)
+    for symbol in (*law.params, *law.states):
+        if isinstance(symbol, SymbolTuple):
+            symbol.refuse()
     _check_names(law, origin)
     _check_expressions(law, origin)
     _check_symbols(law, origin)
@@ -66,21 +69,6 @@ def _check_names_and_titles(law: LawRecord) -> None:
     for text in (law.title, *law.references):
         if not isinstance(text, str) or not text.isprintable():
             raise LawError(f"law '{law.name}': the title or reference {text!r} must be one line of text")
-
-
-def _check_tables(law: LawRecord, origin: str) -> None:
-    for symbol, param in law.params.items():
-        if isinstance(symbol, SymbolTuple):
-            symbol.refuse()
-        if not isinstance(symbol, sympy.Symbol):
-            raise LawError(f"{origin}: the parameter table must be keyed by symbols, found {symbol!r}")
-        if not isinstance(param, Param):
-            raise LawError(f"{origin}, parameter '{symbol}': found {type(param).__name__}, write Param(...)")
-    for symbol, state in law.states.items():
-        if isinstance(symbol, SymbolTuple):
-            symbol.refuse()
-        if not isinstance(symbol, sympy.Symbol) or not isinstance(state, State):
-            raise LawError(f"{origin}: states must be written as {{symbol: State(...)}}, found {symbol!r}: {state!r}")
 
 
 def _check_names(law: LawRecord, origin: str) -> None:
@@ -399,10 +387,6 @@ class LawRecord:
 
     def __reduce__(self) -> tuple[Any, ...]:
         state = {f.name: getattr(self, f.name) for f in fields(self)}
-        plain = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
+        plain: dict[str, Any] = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
         plain["examples"] = tuple(dict(example) for example in self.examples)
-        return _rebuild, (type(self), plain)
-
-
-def _rebuild(kind: type[LawRecord], state: dict[str, Any]) -> LawRecord:
-    return kind(**state)
+        return partial(type(self), **plain), ()

@@ -187,9 +187,6 @@ class Nuisance:
             )
         if self.kind not in STEP_NUISANCES and self.start != 0.0:
             raise SolveError(f"nuisance '{self.kind}' has no start; only {', '.join(STEP_NUISANCES)} begin later")
-        names: object = self.tests
-        if isinstance(names, str):
-            raise SolveError(f"nuisance '{self.kind}': tests is '{self.tests}'; give names, such as ('{self.tests}',)")
         object.__setattr__(self, "start", float(self.start))
         object.__setattr__(self, "tests", tuple(self.tests))
 

@@ -23,11 +23,8 @@ from creepkit.surrogates.surrogate import Surrogate
 from creepkit.surrogates.training_rows import dataset_fingerprint, output_deviation, trainable_samples, training_split
 
 if TYPE_CHECKING:
-    from creepkit.sampling.conditions import TimeGrid
-
-
-if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
+    from creepkit.sampling.conditions import TimeGrid
 
 
 PAPER_EVALUATION_TIMES = (7_500.0, 22_500.0, 37_500.0)
@@ -199,9 +196,7 @@ def evaluate(surrogate: Surrogate, data: Dataset) -> Evaluation:
     if provenance.get("data") == dataset_fingerprint(data):
         train, rows = training_split(len(data), surrogate.recipe.training, int(provenance["seed"]))
         scale = output_deviation(samples, train)
-    comparison = compare_predictions(surrogate, samples, data, rows, scale)
-    times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
-    return Evaluation(comparison, comparison_metrics(comparison, times), times)
+    return evaluate_rows(surrogate, samples, data, rows, scale)
 
 
 def check_same_kind(metadata: SurrogateMetadata, data: Dataset) -> None:
@@ -215,13 +210,11 @@ def check_same_kind(metadata: SurrogateMetadata, data: Dataset) -> None:
         raise DatasetError(f"the data set has the outputs {', '.join(data.outputs)}, not {', '.join(metadata.outputs)}")
 
 
-def compare_predictions(
-    surrogate: Surrogate, samples: SampleArrays, data: Dataset, rows: Ints, scale: Floats
-) -> PredictionComparison:
+def evaluate_rows(surrogate: Surrogate, samples: SampleArrays, data: Dataset, rows: Ints, scale: Floats) -> Evaluation:
     """What a network predicts for rows (n,) of a data set, beside what is true; scale : (outputs,)."""
     parts = [rows[first : first + EVALUATION_BATCH] for first in range(0, len(rows), EVALUATION_BATCH)]
     predicted = [surrogate.predict_samples({name: v[part] for name, v in samples.items()}) for part in parts]
-    return PredictionComparison(
+    comparison = PredictionComparison(
         times=np.stack([data.times(int(k)) for k in rows]),
         true=np.asarray(samples["targets"][rows], float),
         predicted=np.concatenate(predicted),
@@ -230,3 +223,5 @@ def compare_predictions(
         scale=scale,
         index=data.index[rows],
     )
+    times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
+    return Evaluation(comparison, comparison_metrics(comparison, times), times)

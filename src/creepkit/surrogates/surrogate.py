@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from creepkit.records import (
     check_nuisances,
     unpredicted,
 )
+from creepkit.surrogates.parameter_gru import ParameterGru
 from creepkit.surrogates.parameter_inputs import (
     LawInputs,
     LoadHistoryInputs,
@@ -51,7 +52,15 @@ from creepkit.surrogates.weight_files import CODEC, SURROGATE
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
-    from creepkit.surrogates.parameter_gru import ParameterGru
+
+
+@dataclass(frozen=True, eq=False)
+class SurrogateHeader:
+    """What the file of a surrogate says beside the weights."""
+
+    kind: Literal["parameter-gru"]
+    recipe: ParameterGru
+    metadata: SurrogateMetadata
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,8 +242,8 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
     @property
     def file_header(self) -> dict[str, Any]:
         """Everything that a file says beside the weights."""
-        recipe, metadata = CODEC.to_json(self.recipe), CODEC.to_json(self.metadata)
-        return {"kind": self.recipe.kind, "recipe": recipe, "metadata": metadata}
+        header: dict[str, Any] = CODEC.to_json(SurrogateHeader(self.recipe.kind, self.recipe, self.metadata))
+        return header
 
     def save(self, path: str | Path) -> Path:
         """Write the weights with their header."""

@@ -179,15 +179,3 @@ def test_no_file_is_executed_but_one_whose_name_ends_in_py(name: str, monkeypatc
         assert (result.exit_code, result.stdout, result.stderr.count("\n")) == (1, "", 1)
         assert "only files whose names end in .py are" in result.stderr
     assert not Path("executed").exists()
-
-
-def test_check_takes_a_registered_name_before_a_file() -> None:
-    Path("latex").write_text(EXECUTED)
-    Path("unknown").write_text(EXECUTED)
-
-    assert "deterministic: twice the same text" in creepkit("check", "latex").stdout
-    unknown = creepkit("check", "unknown")
-
-    assert unknown.exit_code == 1
-    assert "the file unknown is not executed" in unknown.stderr
-    assert not Path("executed").exists()

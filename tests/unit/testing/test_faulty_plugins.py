@@ -179,7 +179,7 @@ LAWS: dict[str, tuple[str, str]] = {
         law("A*stress**n", "A: Param('a', (1, 2), '1/s', 'logarithmic'), n: POWER"),
         "allowed are 'linear' and 'log'",
     ),
-    "number for a Param": (law("A*stress**n", "A: RATE, n: 5.0"), "write Param(...)"),
+    "number for a Param": (law("A*stress**n", "A: RATE, n: 5.0"), "allowed is a Param"),
     "constraints that never hold": (
         law("A*stress**n", PLAIN, more="constraints=(n > 9,)"),
         "the constraints hold at 0",
@@ -203,7 +203,7 @@ LAWS: dict[str, tuple[str, str]] = {
         ),
         "rate of 'w' comes out in s^-1, and must in mm per s",
     ),
-    "text for a state's rate": (damage("State(0.0, 'B*stress', 'damage')"), "is not a sympy expression"),
+    "text for a state's rate": (damage("State(0.0, 'B*stress', 'damage')"), "allowed is an Expr"),
     # ---- examples
     "example with another rate": (
         law("A*stress**n", PLAIN, more="examples=({'A': 1e-16, 'n': 4, 'stress': 100, 'rate': 2e-8},)"),
