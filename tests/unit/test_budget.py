@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 33950
+TESTS = 33740
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
