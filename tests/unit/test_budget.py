@@ -22,7 +22,7 @@ BUDGET = {
     "dataset": 860,
     "discovery": 1250,
     "experiments": 1800,
-    "exporters": 3000,
+    "exporters": 2690,
     "extraction": 1150,
     "fem": 1900,
     "files": 1350,
@@ -46,11 +46,11 @@ BUDGET = {
     "specimens": 4050,
     "studies": 2750,
     "surrogates": 1850,
-    "testing": 2000,
+    "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 33950
+TESTS = 33740
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
