@@ -14,15 +14,15 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 225,
+    "api": 270,
     "app": 650,
     "cameras": 1200,
-    "cli": 2390,
+    "cli": 2300,
     "core": 100,
     "dataset": 860,
     "discovery": 1250,
     "experiments": 1800,
-    "exporters": 3000,
+    "exporters": 2690,
     "extraction": 1150,
     "fem": 1900,
     "files": 1350,
@@ -46,11 +46,11 @@ BUDGET = {
     "specimens": 4050,
     "studies": 2750,
     "surrogates": 1850,
-    "testing": 2000,
+    "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34500
+TESTS = 33740
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
