@@ -121,10 +121,11 @@ def select(
 def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLaw]:
     """What is tried where no candidate explains the tests: sums of the best one with the others, then other laws.
 
-    Nothing where a candidate would explain them with an effect that is not modelled: that is the simpler explanation.
+    Nothing where a candidate would explain them with an effect that is not modelled, or but for one test or for two
+    groups of tests: that is the simpler explanation.
     """
     adequacies = [ranked.fit.adequacy for ranked in ranking.laws]
-    if any(a is None or a.verdict != "leaves a discrepancy" or a.remedies for a in adequacies):
+    if any(a is None or a.verdict != "leaves a discrepancy" or a.remedies or a.lies_in_tests for a in adequacies):
         return []
     laws = [ranked.fit.law for ranked in ranking.laws]
     tried = {law.fingerprint for law in laws}
