@@ -1,139 +1,167 @@
-"""What pydantic makes of an annotation, and the words for what it allows."""
+"""Annotations as types: where a value is not what one allows, and the words for what is.
+
+A class that a module imports for type checking alone is known by its name: where no instance exists yet, its module
+need not be imported to say that a value is none.
+"""
 
 from __future__ import annotations
 
+import builtins
 import functools
+import inspect
 import math
 import numbers
 import os
+import sys
 import types
 import typing
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union
+from typing import Any, Literal, Union
 
-import numpy as np
-from pydantic import BeforeValidator, PlainValidator, TypeAdapter, ValidationError
-from pydantic_core import PydanticCustomError
-
-from creepkit.errors import ArgumentError, quoted_value
-from creepkit.resolved_annotations import Array, is_instance, protocol_members
-
-UNIONS = (Union, types.UnionType)
 SERIES = (Sequence, Collection, Iterable, list, set, frozenset, tuple)
 
 
-def judged_value(value: Any, kind: Any, argument: str, function: str, *, finite: bool) -> Any:
-    """The value itself, or a list of what a generator gives; ArgumentError where its annotation does not allow it.
+class Array:
+    """Stands for numpy's ArrayLike, a union that Python would take apart."""
 
-    kind : the resolved annotation. finite : whether numbers must be.
+
+def annotations_of(sources: Sequence[Any]) -> dict[str, Any]:
+    """{argument: resolved annotation} of a function, or of a record and those that it derives from."""
+    kinds: dict[str, Any] = {}
+    for source in sources:
+        names = _Names(vars(sys.modules[source.__module__]))
+        for argument, annotation in inspect.get_annotations(source).items():
+            if argument == "return":
+                continue
+            text = getattr(annotation, "__forward_arg__", annotation)
+            kind = kinds[argument] = eval(text, {}, names) if isinstance(text, str) else text
+            if typing.get_origin(kind) is typing.Unpack:  # the keys of a TypedDict
+                kinds |= annotations_of(typing.get_args(kind))
+    return kinds
+
+
+class _Names(dict[str, Any]):
+    """Names of a module as its annotations mean them; an alias may be a text."""
+
+    def __getitem__(self, name: str) -> Any:
+        if name == "ArrayLike":
+            return Array
+        if name.startswith("__"):  # asked of every namespace by debuggers
+            raise KeyError(name)
+        kind = self.get(name, getattr(builtins, name, None))
+        if kind is None:
+            return KnownByName(name, (), {})
+        return eval(kind, {}, self) if isinstance(kind, str) else kind
+
+
+class KnownByName(type):
+    """Stands for a class that a module imports for type checking alone."""
+
+    def __instancecheck__(cls, value: object) -> bool:
+        return cls.__name__ in {one.__name__ for one in type(value).__mro__}
+
+
+class Mismatch(typing.NamedTuple):
+    """Where in an argument, as '[3]', what stands there, and what is allowed in words."""
+
+    place: str
+    value: Any
+    allowed: str
+
+
+class Kind(typing.NamedTuple):
+    """What an annotation allows.
+
+    words : such as "a list, each item a text". test : of the value as a whole. parts : (index or key, part, its kind)
+    of a value that passed. members : of a union, one of which is enough.
     """
-    if isinstance(value, Iterator) and _takes_several(kind):
-        value = list(value)
-    try:
-        _validator(kind, finite).validate_python(value)
-    except ValidationError as error:
-        place, wrong, allowed = _first_wrong(error)
-        text = f"{argument}{place} of {function} is {quoted_value(wrong)}; allowed is {allowed}"
-        raise ArgumentError(text, argument) from None
-    return value
+
+    words: str
+    test: Callable[[Any], bool] = lambda value: True
+    parts: Callable[[Any], Iterable[tuple[Any, Any, Kind]]] | None = None
+    members: tuple[Kind, ...] = ()
+
+    def mismatch(self, value: Any) -> Mismatch | None:
+        """Where a value is not what is allowed, deepest in it; None of a value that is right."""
+        if self.members:
+            wrong = []
+            for member in self.members:
+                if not (one := member.mismatch(value)):
+                    return None
+                wrong.append(one)
+            deepest = max(wrong, key=lambda one: one.place.count("["))
+            return deepest._replace(allowed=_listed(one.allowed for one in wrong if one.place == deepest.place))
+        if not self.test(value):
+            return Mismatch("", value, self.words)
+        for key, part, kind in self.parts(value) if self.parts else ():
+            if within := kind.mismatch(part):
+                return within._replace(place=f"[{key!r}]{within.place}")
+        return None
 
 
 @functools.cache
-def _validator(kind: Any, finite: bool) -> TypeAdapter[Any]:
-    return TypeAdapter(_adapted(kind, finite)[0])
-
-
-def _takes_several(kind: Any) -> bool:
-    origin, args = typing.get_origin(kind), typing.get_args(kind)
-    return any(map(_takes_several, args)) if origin in UNIONS else origin in SERIES or _is_array_type(kind)
-
-
-def _first_wrong(error: ValidationError) -> tuple[str, Any, str]:
-    """Where a value is wrong, as '[3]', deepest in it, what stands there, and all that is allowed there."""
-    allowed: dict[str, list[str]] = {}
-    wrong: dict[str, Any] = {}
-    for one in error.errors(include_url=False):
-        # the members of a union stand in a location beside indices and keys, under the names of our functions
-        parts = [part for part in one["loc"] if not str(part).startswith("function-") and part != "[key]"]
-        place = "".join(f"[{part!r}]" for part in parts)
-        allowed.setdefault(place, []).append(one["msg"])
-        wrong.setdefault(place, one["input"])
-    deepest = max(allowed, key=lambda place: place.count("["))
-    return deepest, wrong[deepest], _listed(allowed[deepest])
-
-
-def _listed(words: list[str]) -> str:
-    unique = sorted(dict.fromkeys(words), key=lambda one: one == "None")
-    return unique[0] if len(unique) == 1 else f"{', '.join(unique[:-1])} or {unique[-1]}"
-
-
-Adapted = tuple[Any, str]
-"""(type for pydantic, what it allows in words)."""
-
-
-def _adapted(kind: Any, finite: bool) -> Adapted:
-    """An annotation as pydantic is to judge it: numbers of numpy are numbers, and True is none."""
-    origin, args = typing.get_origin(kind), typing.get_args(kind)
-    if kind in TESTS:
-        return _tested(*TESTS[kind])
-    if kind is float:
-        return _tested(_is_finite, "a finite number") if finite else _tested(_is_number, "a number")
-    if _is_array_type(kind):
-        return _tested(_is_array, "an array of numbers")
-    if origin in UNIONS:
-        members = [_adapted(one, finite) for one in args if one is not str or Path not in args]  # a text is a path too
-        return Union[tuple(member for member, _ in members)], _listed([words for _, words in members])  # noqa: UP007
-    if origin is Literal:
-        kinds = tuple({type(value) for value in args})  # which of them, the function itself says
-        return _tested(lambda value: isinstance(value, kinds), _listed([repr(value) for value in args]))
+def kind_of(annotation: Any, finite: bool) -> Kind:
+    """What a resolved annotation allows; finite : whether numbers must be, those of pairs such as bounds apart."""
+    origin, args = typing.get_origin(annotation), typing.get_args(annotation)
+    if annotation in SCALARS:
+        return SCALARS[annotation]
+    if annotation is float:
+        return Kind("a finite number", _is_finite) if finite else Kind("a number", _is_number)
+    if annotation is Array or getattr(origin or annotation, "__name__", "") == "ndarray":
+        return Kind("an array of numbers", _is_array)
+    if origin in (Union, types.UnionType):
+        members = tuple(kind_of(one, finite) for one in args if one is not str or Path not in args)  # a text is a path
+        return Kind(_listed(one.words for one in members), members=members)
+    if origin is Literal:  # which of them, the function itself says
+        kinds = tuple({type(value) for value in args})
+        return Kind(_listed(map(repr, args)), lambda value: isinstance(value, kinds))
     if origin is tuple and args[1:] != (...,):
-        items = [_adapted(one, finite=False) for one in args if one != ()]
-        words = f"({', '.join(words for _, words in items)})"
-        return _container(tuple[tuple(item for item, _ in items)], tuple, words, len(items))  # type: ignore[misc]
+        items = [kind_of(one, False) for one in args if one != ()]
+        return Kind(
+            f"({', '.join(one.words for one in items)})",
+            lambda value: _is_series(value) and len(value) == len(items),
+            lambda value: zip(range(len(items)), value, items, strict=True),
+        )
     if origin in SERIES:
-        item, words = _adapted(args[0], finite)
-        return _container(list[item], list, "a list" if item is Any else f"a list, each item {words}")  # type: ignore[valid-type]
+        item = kind_of(args[0], finite)
+        if args[0] is Any:
+            return Kind("a list", _is_series)
+        words = f"a list, each item {item.words}"
+        return Kind(words, _is_series, lambda value: ((k, one, item) for k, one in enumerate(value)))
     if isinstance(origin, type) and issubclass(origin, Mapping):
-        (key, name), (item, words) = _adapted(args[0], finite), _adapted(args[1], finite)
-        return _container(dict[key, item], dict, f"a mapping of {name} to {words}")  # type: ignore[valid-type]
-    if Callable in (origin, kind):
-        return _tested(callable, "a function")
-    return _instance(kind if origin is None else origin)
+        pair = [kind_of(one, finite) for one in args]
+        return Kind(
+            f"a mapping of {pair[0].words} to {pair[1].words}",
+            lambda value: isinstance(value, Mapping),
+            lambda value: ((key, *one) for key in value for one in zip((key, value[key]), pair, strict=True)),
+        )
+    if Callable in (origin, annotation):
+        return Kind("a function", callable)
+    return _kind_of_class(origin or annotation)
 
 
-def _instance(kind: Any) -> Adapted:
+def _kind_of_class(kind: Any) -> Kind:
     if not isinstance(kind, type) or kind in (Any, object):
-        return Any, "anything"
-    words = f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
-    if getattr(kind, "_is_protocol", False) and not getattr(kind, "_is_runtime_protocol", False):
-        members = protocol_members(kind)
-        words = "a function" if "__call__" in members else f"an object with {' and '.join(members)}"
-    return _tested(lambda value: is_instance(value, kind), words)
+        return Kind("anything")
+    if not getattr(kind, "_is_protocol", False):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        return Kind(f"{article} {kind.__name__}", lambda value: isinstance(value, kind))
+    names = {name for one in kind.__mro__ if getattr(one, "_is_protocol", False) for name in vars(one)}
+    members = sorted(name for name in names if name == "__call__" or not name.startswith("_"))
+    words = "a function" if "__call__" in members else f"an object with {' and '.join(members)}"
+    return Kind(words, lambda value: not isinstance(value, type) and all(hasattr(value, one) for one in members))
 
 
-def _tested(test: Callable[[Any], bool], words: str) -> Adapted:
-    """What passes a test."""
-    return Annotated[Any, PlainValidator(_refusing(test, words))], words
+def takes_several(annotation: Any) -> bool:
+    """Whether several objects are wanted, so that a generator has to be read first."""
+    kind = kind_of(annotation, True)
+    return any(one.parts or one.test in (_is_series, _is_array) for one in (kind, *kind.members))
 
 
-def _container(kind: Any, make: type, words: str, length: int | None = None) -> Adapted:
-    """A list, tuple or dict of what pydantic judges item by item, made of what is one in numpy's sense too."""
-
-    def convertible(value: Any) -> bool:
-        right = isinstance(value, Mapping) if make is dict else _is_series(value)
-        return right and length in (None, len(value))
-
-    return Annotated[kind, BeforeValidator(_refusing(convertible, words, make))], words
-
-
-def _refusing(test: Callable[[Any], bool], words: str, make: Any = lambda value: value) -> Callable[[Any], Any]:
-    def made_or_refused(value: Any) -> Any:
-        if not test(value):
-            raise PydanticCustomError("not_allowed", "{words}", {"words": words})
-        return make(value)
-
-    return made_or_refused
+def _listed(allowed: Iterable[str]) -> str:
+    unique = sorted(dict.fromkeys(allowed), key=lambda one: one == "None")
+    return unique[0] if len(unique) == 1 else f"{', '.join(unique[:-1])} or {unique[-1]}"
 
 
 def _is_number(value: Any) -> bool:
@@ -147,7 +175,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _is_finite(value: Any) -> bool:
-    return _is_number(value) and math.isfinite(value)
+    return (type(value) is float or _is_number(value)) and math.isfinite(value)
 
 
 def _is_integer(value: Any) -> bool:
@@ -170,25 +198,23 @@ def _is_series(value: Any) -> bool:
     return hasattr(value, "__len__") and shape != () and 0 not in shape[1:] and shape[:1] != (0,)
 
 
-def _is_array_type(kind: Any) -> bool:
-    return kind is Array or np.ndarray in (kind, typing.get_origin(kind))
-
-
 def _is_array(value: Any) -> bool:
     """Real numbers in an array, or what numpy makes one of."""
     if isinstance(value, str | bytes | Mapping) or not (hasattr(value, "__len__") or _is_number(value)):
         return False
+    import numpy as np  # which the definition of a law does without
+
     try:
         return np.asarray(value).dtype.kind in "fiub"
     except (TypeError, ValueError, RuntimeError, OverflowError):
         return False
 
 
-TESTS: dict[Any, tuple[Callable[[Any], bool], str]] = {
-    None: (lambda value: value is None, "None"),
-    type(None): (lambda value: value is None, "None"),
-    str: (lambda value: isinstance(value, str), "a text"),
-    int: (_is_integer, "a whole number below 2**63"),
-    bool: (lambda value: isinstance(value, bool | np.bool_), "True or False"),
-    Path: (_is_path, "a path"),
+SCALARS: dict[Any, Kind] = {
+    None: Kind("None", lambda value: value is None),
+    type(None): Kind("None", lambda value: value is None),
+    str: Kind("a text", lambda value: isinstance(value, str)),
+    int: Kind("a whole number below 2**63", _is_integer),
+    bool: Kind("True or False", lambda value: isinstance(value, bool) or type(value).__name__ in ("bool_", "bool")),
+    Path: Kind("a path", _is_path),
 }

@@ -4,10 +4,8 @@
 def rate(stress: float, tests: Sequence[History]) -> float: ...
 
 raises an ArgumentError, in one sentence, for a text in the place of the stress. What is right is passed on as it is,
-except that a generator becomes a list where several objects are wanted, as it can be read only once.
-
-A value that is plainly right passes here; any other is judged by pydantic, in argument_types, which is imported then:
-defining a law takes no other module.
+except that a generator becomes a list where several objects are wanted, as it can be read only once. The words are
+those of argument_types.
 """
 
 from __future__ import annotations
@@ -16,12 +14,12 @@ import contextlib
 import functools
 import inspect
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from typing import Any, TypeVar
 
-from creepkit.errors import ArgumentError, nearest
-from creepkit.resolved_annotations import annotations_of, is_plainly
+from creepkit.argument_types import annotations_of, kind_of, takes_several
+from creepkit.errors import ArgumentError, nearest, quoted_value
 
 Anything = TypeVar("Anything", bound=Callable[..., Any])
 
@@ -107,10 +105,11 @@ class _Arguments:
     def _judged(self, value: Any, argument: str | None) -> Any:
         parameter = self.parameters.get(argument or "")
         kind = self.kinds.get((argument if parameter else self.options) or "", Any)
-        if is_plainly(value, kind):
-            return value
-        from creepkit.argument_types import judged_value
-
         default = parameter.default if parameter else None
         infinite = isinstance(default, float) and not math.isfinite(default)
-        return judged_value(value, kind, argument or "", self.name, finite=not infinite)
+        if isinstance(value, Iterator) and takes_several(kind):
+            value = list(value)
+        if wrong := kind_of(kind, not infinite).mismatch(value):
+            where = f"{argument or ''}{wrong.place} of {self.name}"
+            raise ArgumentError(f"{where} is {quoted_value(wrong.value)}; allowed is {wrong.allowed}", argument or "")
+        return value

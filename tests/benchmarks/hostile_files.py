@@ -2,7 +2,7 @@
 
     python tests/benchmarks/hostile_files.py [--short] [--each 400] [--first 0] [--only SAMPLE SEED] [--write]
 
-Samples of every format that creepkit reads (tests/helpers/samples_*.py) are changed in `--each` ways by seed: cut,
+Samples of every format that creepkit reads (tests/benchmarks/file_samples) are changed in `--each` ways by seed: cut,
 garbled, repeated, in other encodings, with columns, units or keys that say something else; replaced by a file of
 another kind; and enlarged to 1.5 GB that are stored nowhere. Counted are "read", "refused" (one sentence that names the
 file), and faults: "traceback", any exception but an error of creepkit, or an error of several lines; "hang", more than
@@ -33,10 +33,9 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from file_samples.mutations import mutation
+from file_samples.samples import ReaderSample, all_samples
 from measured import Page, arguments, progress
-
-from helpers.file_mutations import mutation
-from helpers.reader_samples import ReaderSample, all_samples
 
 CPU_SECONDS, WALL_SECONDS, MEMORY_BYTES, ENORMOUS = 30.0, 120, 3_000_000_000, 1_500_000_000
 EACH_IN_SHORT = 5

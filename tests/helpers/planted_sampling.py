@@ -10,6 +10,7 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.sampling.conditions import TimeGrid, planned_test
+from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion
 from creepkit.sampling.domains import SamplingDomain
 from creepkit.sampling.draws import Draws, additive_recurrence_step
 
@@ -19,26 +20,24 @@ GRID = TimeGrid(np.array([0.0, 100.0, 1000.0, 3600.0]))
 
 
 @dataclass(frozen=True)
-class Strong:
+class Strong(DrawCriterion):
     """Bars of at most 120 MPa."""
 
     name: str = "strong"
     text: str = "first stress of 120 MPa or less"
-    stage: str = "before"
 
     def passes(self, law, draws):
         return draws.condition("stress_1") <= 120.0
 
 
 @dataclass(frozen=True)
-class Visible:
+class Visible(OutcomeCriterion):
     """Some creep; `log` gets a byte for each sample that was looked at."""
 
     name: str = "visible"
     text: str = "strain above 1e-5"
     log: str = ""
     seconds: float = 0.0
-    stage: str = "after"
 
     def passes(self, outcome):
         if self.log:
@@ -49,14 +48,13 @@ class Visible:
 
 
 @dataclass(frozen=True)
-class Deadly:
+class Deadly(OutcomeCriterion):
     """Kills its process for bars of one stress; `once` names a file that says that it has done so."""
 
+    name: str = field(default="deadly", init=False)
+    text: str = field(default="survives", init=False)
     stress: float
     once: str = ""
-    name: str = "deadly"
-    text: str = "survives"
-    stage: str = "after"
 
     def passes(self, outcome):
         if outcome.conditions["stress_1"] == self.stress and not (self.once and Path(self.once).exists()):
@@ -67,13 +65,12 @@ class Deadly:
 
 
 @dataclass(frozen=True)
-class Raising:
+class Raising(OutcomeCriterion):
     """A criterion of a plugin that was not thought through; of one stress, or of all of them."""
 
+    name: str = field(default="raising", init=False)
+    text: str = field(default="is defined", init=False)
     stress: float | None = None
-    name: str = "raising"
-    text: str = "is defined"
-    stage: str = "after"
 
     def passes(self, outcome):
         if self.stress in (None, outcome.conditions["stress_1"]):

@@ -9,20 +9,25 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.dataset import shards, storage
-from creepkit.dataset.dataset import Dataset
-from creepkit.dataset.shards import GenerationJob, is_complete, merge_shards
+from creepkit.dataset.dataset import Dataset, concatenate, first_difference
+from creepkit.dataset.progress import ProgressRecord, ProgressReporter
+from creepkit.dataset.shards import GenerationJob
 from creepkit.errors import DatasetError
-from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord, ProgressReporter
+from creepkit.files.hdf5_files import open_hdf5, write_hdf5
+from creepkit.files.json_documents import as_read_back
+from creepkit.files.writing import remove_temporary_files
+from creepkit.jobs.progress import ProgressCallback
 from creepkit.jobs.worker_pools import SHARD_ROWS, ParallelExecution, Workers
 from creepkit.jobs.worker_process import TaskResult
 from creepkit.language import CreepLaw
+from creepkit.language.law_codec import law_to_json
 from creepkit.records import Specimen
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictor
+from creepkit.registry.specimen_documents import specimen_to_json
 from creepkit.sampling.domains import SamplingDomain, sampling_design
 
 POLL_INTERVAL = 0.5
@@ -61,7 +66,8 @@ def generate(
         raise DatasetError(f"'{to}' is no name of a file; name the HDF5 file to write, such as combined.h5")
     folder = path.with_name(f"{path.name}.parts")
     rows = execution.shard_rows or shards.rows_of_folder(folder) or _shard_rows(samples or draws)
-    job = GenerationJob(design_of_samples, specimen, _whole_number("seed", seed), folder, rows)
+    limits.check_number("seed", seed, limits.SEED, DatasetError)
+    job = GenerationJob(design_of_samples, specimen, int(seed), folder, rows)
     record = ProgressRecord(job, samples, draws, execution.part)
     if execution.part is None and is_complete(job, record, path):
         return storage.read_dataset(path)
@@ -71,7 +77,7 @@ def generate(
         with execution.start(job) as workers:
             run_until_enough(record, workers, progress)
         if execution.part is not None:
-            return shards.read_shards(job, sorted(record.done))
+            return concatenate([job.header, *map(job.read, sorted(record.done))])
         merge_shards(job, record, path, progress)
     return storage.read_dataset(path)
 
@@ -94,20 +100,12 @@ def _shard_rows(wanted: object) -> int:
     return min(SHARD_ROWS, wanted) if isinstance(wanted, int) and wanted > 0 else SHARD_ROWS
 
 
-def _whole_number(name: str, value: object) -> int:
-    """A number from zero on, which must be whole: 1.5 does not become 1."""
-    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 0:
-        raise DatasetError(f"{name} is {value!r}; allowed are whole numbers from zero on")
-    return int(value)
-
-
 def run_until_enough(record: ProgressRecord, workers: Workers, progress: ProgressCallback | None) -> None:
     """Have shards simulated until there are enough; DatasetError when one cannot be."""
     reporter = ProgressReporter(record, progress)
     running: dict[Future[TaskResult], int] = {}
     while record.leading_run() is None:
-        while len(running) < workers.size and (shard := record.next_shard()) is not None:
-            record.running.add(shard)
+        while len(running) < workers.size and (shard := record.next_shard(running.values())) is not None:
             running[workers.submit(shard)] = shard
         for future in wait(running, POLL_INTERVAL, FIRST_COMPLETED).done:
             number = running.pop(future)
@@ -129,3 +127,48 @@ def run_until_enough(record: ProgressRecord, workers: Workers, progress: Progres
                 )
             record.mark_done(number, result.accepted)
         reporter.report()
+
+
+def is_complete(job: GenerationJob, record: ProgressRecord, path: Path) -> bool:
+    """Whether the file is there already and holds what is wanted; DatasetError when it is something else."""
+    if not path.exists():
+        return False
+    if path.is_dir():
+        raise DatasetError(f"{path}: is a folder; name a file for the data set")
+    with open_hdf5(path, storage.DATASET_FILE) as file:
+        header = storage.read_header(file, str(path))
+        if header.provenance.get("fingerprint") != job.fingerprint:
+            difference = first_difference(_identity(header), _identity(job.header), "")
+            description = f"there and here {difference}" if difference else "of shards of another size"
+            raise DatasetError(f"{path}: holds another data set ({description}); choose another name")
+        reasons = file["reasons"][:]
+    if record.samples is None:
+        return len(reasons) >= (record.draws or 0)
+    return int((reasons == 0).sum()) >= record.samples
+
+
+def merge_shards(job: GenerationJob, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
+    """Write the shortest leading run of shards that is enough."""
+    numbers, remaining = record.leading_run() or [], record.draws
+    remove_temporary_files(path)
+    # a file that is there holds the first samples of the same data set, see is_complete()
+    with write_hdf5(path, DatasetError, storage.WRITE_ADVICE, force=True) as file:
+        storage.write_header(file, job.header)
+        for done, number in enumerate(numbers, start=1):
+            samples = job.read(number)
+            storage.append_samples(file, samples if remaining is None else samples.rows(slice(0, remaining)))
+            remaining = None if remaining is None else remaining - len(samples)
+            if progress is not None:
+                progress("shards merged", done, len(numbers), "")
+
+
+def _identity(data: Dataset) -> dict[str, Any]:
+    """Everything in the file of a data set that decides its samples."""
+    document = {
+        "law": law_to_json(data.law),
+        "specimen": specimen_to_json(data.specimen),
+        "design": data.design_document,
+        "seed": data.provenance.get("seed"),
+        "creepkit": data.provenance.get("creepkit"),
+    }
+    return dict(as_read_back(document))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -21,7 +21,7 @@ import numpy as np
 
 from creepkit import registry
 from creepkit.dataset import storage
-from creepkit.dataset.dataset import COLUMNS, Dataset, concatenate, first_difference
+from creepkit.dataset.dataset import Dataset, first_difference
 from creepkit.dataset.simulation import empty_dataset, simulate_rows
 from creepkit.dataset.storage import LAYOUT_VERSION
 from creepkit.errors import DatasetError
@@ -36,7 +36,6 @@ from creepkit.language.law_codec import law_to_json
 from creepkit.registry.specimen_documents import specimen_to_json
 
 if TYPE_CHECKING:
-    from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord
     from creepkit.records import Specimen
     from creepkit.sampling.domains import SamplingDomain
 
@@ -73,8 +72,18 @@ class GenerationJob:
         return replace(self, specimen=self.specimen.replace(threads=1))  # type: ignore[attr-defined]
 
     def run(self, number: int) -> TaskResult:
-        """Simulate a shard; see run_shard() below."""
-        return run_shard(self, number)
+        """Simulate a shard and write its file, unless it is done."""
+        accepted = self.accepted_count(number, quiet=True)
+        if accepted is None:
+            path = self.path(number)
+            remove_temporary_files(path)
+            samples = simulate_rows(self.design, self.header, self.seed, number * self.rows, self.rows)
+            with write_hdf5(path, DatasetError, storage.WRITE_ADVICE, internal=True) as file:
+                storage.write_header(file, samples)
+                storage.append_samples(file, samples)
+                file.attrs.update({"generation": self.fingerprint, "shard": number})
+            accepted = int((samples.reasons == 0).sum())
+        return TaskResult(number, "done", accepted)
 
     @cached_property
     def document(self) -> dict[str, Any]:
@@ -117,17 +126,28 @@ class GenerationJob:
         """The file of a shard."""
         return self.folder / f"{number:05d}.h5"
 
-    def accepted_count(self, number: int) -> int | None:
+    def read(self, number: int) -> Dataset:
+        """The samples of a shard; DatasetError when it is not whole, or of another data set."""
+        path = self.path(number)
+        with open_hdf5(path, storage.DATASET_FILE) as file:
+            if file.attrs.get("generation") != self.fingerprint or file.attrs.get("shard") != number:
+                raise DatasetError(f"{path}: a shard of another data set")
+            return storage.read_samples(file, self.header)
+
+    def accepted_count(self, number: int, *, quiet: bool = False) -> int | None:
         """How many samples of a shard were accepted; None when it has to be simulated, or again, which is logged."""
-        return accepted_count(self, number)
+        if not self.path(number).exists():
+            return None
+        try:
+            return int((self.read(number).reasons == 0).sum())
+        except DatasetError as error:
+            if not quiet:
+                _log.warning("%s; it is simulated again", error)
+            return None
 
     def open_folder(self) -> None:
         """Make the folder, or check that the one that is there belongs to this job."""
         path = self.folder / GENERATION_NAME
-        if self.folder.is_symlink():
-            raise DatasetError(
-                f"{self.folder}: is a link, and shards are kept in a folder of their own; remove the link"
-            )
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             if not path.exists():
@@ -161,106 +181,3 @@ def generating_alone(folder: Path, part: tuple[int, int] | None) -> Iterator[Non
                 f"{folder}: another process is making these shards; wait for it or end it, or divide the work (part)"
             )
         yield
-
-
-def run_shard(job: GenerationJob, number: int) -> TaskResult:
-    """Simulate a shard and write its file, unless it is done."""
-    accepted = accepted_count(job, number, quiet=True)
-    if accepted is None:
-        remove_temporary_files(job.path(number))
-        samples = simulate_rows(job.design, job.header, job.seed, number * job.rows, job.rows)
-        write_shard(job, number, samples)
-        accepted = int((samples.reasons == 0).sum())
-    return TaskResult(number, "done", accepted)
-
-
-def write_shard(job: GenerationJob, number: int, samples: Dataset) -> None:
-    """Write the file of a shard."""
-    with write_hdf5(job.path(number), DatasetError, storage.WRITE_ADVICE, internal=True) as file:
-        storage.write_header(file, samples)
-        storage.append_samples(file, samples)
-        file.attrs.update({"generation": job.fingerprint, "shard": number, "checksum": sample_checksum(samples)})
-
-
-def sample_checksum(samples: Dataset) -> str:
-    """SHA-256 of all that a data set holds of its samples."""
-    digest = hashlib.sha256(repr(sorted(samples.failures.items())).encode())
-    for name, column in COLUMNS.items():
-        digest.update(np.ascontiguousarray(getattr(samples, name), dtype=column.file_type).tobytes())
-    return digest.hexdigest()
-
-
-def read_shard(job: GenerationJob, number: int) -> Dataset:
-    """The samples of a shard; DatasetError when it is not whole, or of another data set."""
-    path = job.path(number)
-    with open_hdf5(path, storage.DATASET_FILE) as file:
-        if file.attrs.get("generation") != job.fingerprint or file.attrs.get("shard") != number:
-            raise DatasetError(f"{path}: a shard of another data set")
-        samples = storage.read_samples(file, job.header)
-        expected = file.attrs["checksum"]
-    if sample_checksum(samples) != expected:
-        raise DatasetError(f"{path}: damaged, its checksum is not that of what it holds")
-    return samples
-
-
-def accepted_count(job: GenerationJob, number: int, *, quiet: bool = False) -> int | None:
-    """How many samples of a shard were accepted; None when it has to be simulated, or again, which is logged."""
-    path = job.path(number)
-    if not path.exists():
-        return None
-    try:
-        return int((read_shard(job, number).reasons == 0).sum())
-    except DatasetError as error:
-        if not quiet:
-            _log.warning("%s; it is simulated again", error)
-        return None
-
-
-def read_shards(job: GenerationJob, numbers: Sequence[int]) -> Dataset:
-    """The samples of several shards."""
-    return concatenate([job.header, *(read_shard(job, number) for number in numbers)])
-
-
-def is_complete(job: GenerationJob, record: ProgressRecord, path: Path) -> bool:
-    """Whether the file is there already and holds what is wanted; DatasetError when it is something else."""
-    if not path.exists():
-        return False
-    if path.is_dir():
-        raise DatasetError(f"{path}: is a folder; name a file for the data set")
-    with open_hdf5(path, storage.DATASET_FILE) as file:
-        header = storage.read_header(file, str(path))
-        if header.provenance.get("fingerprint") != job.fingerprint:
-            difference = first_difference(_identity(header), _identity(job.header), "")
-            description = f"there and here {difference}" if difference else "of shards of another size"
-            raise DatasetError(f"{path}: holds another data set ({description}); choose another name")
-        reasons = file["reasons"][:]
-    if record.samples is None:
-        return len(reasons) >= (record.draws or 0)
-    return int((reasons == 0).sum()) >= record.samples
-
-
-def merge_shards(job: GenerationJob, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
-    """Write the shortest leading run of shards that is enough."""
-    numbers, remaining = record.leading_run() or [], record.draws
-    remove_temporary_files(path)
-    # a file that is there holds the first samples of the same data set, see is_complete()
-    with write_hdf5(path, DatasetError, storage.WRITE_ADVICE, force=True) as file:
-        storage.write_header(file, job.header)
-        for done, number in enumerate(numbers, start=1):
-            samples = read_shard(job, number)
-            storage.append_samples(file, samples if remaining is None else samples.rows(slice(0, remaining)))
-            remaining = None if remaining is None else remaining - len(samples)
-            if progress is not None:
-                progress("shards merged", done, len(numbers), "")
-
-
-def _identity(data: Dataset) -> dict[str, Any]:
-    """Everything in the file of a data set that decides its samples."""
-    document = {
-        "law": law_to_json(data.law),
-        "specimen": specimen_to_json(data.specimen),
-        "design": data.design_document,
-        "seed": data.provenance.get("seed"),
-        "creepkit": data.provenance.get("creepkit"),
-    }
-    return dict(as_read_back(document))

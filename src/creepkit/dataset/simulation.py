@@ -17,8 +17,8 @@ from creepkit.dataset.dataset import FAILED, HOLD_TIMES, NOT_SIMULATED, Dataset,
 from creepkit.errors import DatasetError
 from creepkit.jobs.worker_process import error_text
 from creepkit.records import Predictor, Status, SupportsReducedOrderModel, predict_with
-from creepkit.sampling.conditions import hold_times, planned_test
-from creepkit.sampling.criteria import CreepInEachHold, SimulationOutcome, SurvivesTime
+from creepkit.sampling.conditions import hold_times
+from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion, SimulationOutcome
 from creepkit.sampling.specimen_conditions import creep_output
 
 if TYPE_CHECKING:
@@ -32,10 +32,11 @@ def rejected_by_screening(design: SamplingDomain, samples: Dataset) -> Ints:
     reasons = np.zeros(len(samples), dtype=np.int64)
     if not design.screened or not isinstance(samples.specimen, SupportsReducedOrderModel):
         return reasons
-    reduced_model = samples.specimen.reduced_order_model()
+    reduced_model, criteria = samples.specimen.reduced_order_model(), _outcome_criteria(design)
     for row in np.flatnonzero(samples.reasons == 0).tolist():
         try:
-            reasons[row] = _first_rejection(design, _screening_outcome(design, samples, row, reduced_model))
+            outcome = _outcome(samples, row, reduced_model, frames=False)
+            reasons[row] = next((k for k, one in criteria if one.rejects_early(outcome)), 0)
         except (MemoryError, OSError):
             raise
         except Exception:
@@ -43,26 +44,27 @@ def rejected_by_screening(design: SamplingDomain, samples: Dataset) -> Ints:
     return reasons
 
 
-def _screening_outcome(
-    design: SamplingDomain, samples: Dataset, row: int, reduced_model: Predictor
-) -> SimulationOutcome:
-    """The outcome of one sample by the reduced-order model, at the times when the holds begin and end."""
-    conditions = samples.conditions_of(row)
-    test = planned_test(samples.specimen, conditions, design.grid)
+def _outcome_criteria(design: SamplingDomain) -> list[tuple[int, OutcomeCriterion]]:
+    """The criteria of simulated samples, each with its number among all."""
+    return [(k, one) for k, one in enumerate(design.criteria, start=1) if isinstance(one, OutcomeCriterion)]
+
+
+def _outcome(samples: Dataset, row: int, model: Predictor, *, frames: bool) -> SimulationOutcome:
+    """The outcome of one sample by a model, at the frames of its test, or only when its holds begin and end."""
+    test = samples.planned_test(row)
     hold_instants = hold_times(test)
-    times = np.unique(hold_instants)
-    prediction = predict_with(reduced_model, samples.law, samples.theta_of(row), [test.replace(times=times)])
-    outputs = prediction.of(0)
+    shown_times = test.times if frames else np.unique(hold_instants)
+    times = np.union1d(shown_times, hold_instants)
+    prediction = predict_with(model, samples.law, samples.theta_of(row), [test.replace(times=times)])
+    observed, shown = prediction.of(0), creep_output(samples.specimen)
+    outputs, hold_outputs = (observed[np.searchsorted(times, t)] for t in (shown_times, hold_instants))
     status, end_time = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
-    marks, shown = outputs[np.searchsorted(times, hold_instants)], creep_output(samples.specimen)
-    return SimulationOutcome(times, outputs, marks, status, end_time, conditions, shown.column, shown.falls)
-
-
-def _first_rejection(design: SamplingDomain, screening_outcome: SimulationOutcome) -> int:
-    for number, criterion in enumerate(design.criteria, start=1):
-        if isinstance(criterion, SurvivesTime | CreepInEachHold) and criterion.rejects_early(screening_outcome):
-            return number
-    return 0
+    if status == Status.NOT_CONVERGED and not np.isfinite(observed[times > 0, shown.column]).any():
+        raise DatasetError(f"not converged from {end_time:g} s on, with nothing to show before")
+    conditions = samples.conditions_of(row)
+    return SimulationOutcome(
+        shown_times, outputs, hold_outputs, status, end_time, conditions, shown.column, shown.falls
+    )
 
 
 TOO_MANY_FAILURES = 8
@@ -103,9 +105,13 @@ def simulate_rows(design: SamplingDomain, header: Dataset, seed: int, first: int
     samples = _unsimulated(header, draws, _reasons_before(design, draws), first)
     samples.reasons[:] += rejected_by_screening(design, samples)
     failures: dict[int, str] = {}
+    criteria = _outcome_criteria(design)
     for attempt, row in enumerate(np.flatnonzero(samples.reasons == 0).tolist(), start=1):
         try:
-            samples.reasons[row] = _simulate_sample(design, samples, row)
+            outcome = _outcome(samples, row, samples.specimen, frames=True)
+            samples.values[row, : outcome.times.size], samples.hold_outputs[row] = outcome.outputs, outcome.hold_outputs
+            samples.status[row], samples.end_times[row] = outcome.status, outcome.end_time
+            samples.reasons[row] = next((k for k, one in criteria if not one.passes(outcome)), 0)
         except (MemoryError, OSError):
             raise
         except Exception as error:  # a failed sample is data, whatever a law or a specimen of a plugin raises
@@ -130,9 +136,8 @@ def _reasons_before(design: SamplingDomain, draws: Draws) -> Ints:
     """The first criterion that a draw does not meet, 0 where it meets all that need no simulation."""
     reasons = np.zeros(len(draws), dtype=np.int64)
     for number, criterion in enumerate(design.criteria, start=1):
-        if criterion.stage == "before":
-            met = criterion.passes(design.law, draws)
-            reasons[(reasons == 0) & ~met] = number
+        if isinstance(criterion, DrawCriterion):
+            reasons[(reasons == 0) & ~criterion.passes(design.law, draws)] = number
     return reasons
 
 
@@ -154,34 +159,3 @@ def _unsimulated(header: Dataset, draws: Draws, reasons: Ints, first: int) -> Da
         reasons=reasons,
         index=np.arange(first, first + rows, dtype=np.int64),
     )
-
-
-def _simulate_sample(design: SamplingDomain, samples: Dataset, row: int) -> int:
-    """Simulate one sample, write its history into its row and return its reason."""
-    conditions = samples.conditions_of(row)
-    test = planned_test(samples.specimen, conditions, design.grid)
-    hold_instants = hold_times(test)
-    times = np.union1d(test.times, hold_instants)
-    prediction = predict_with(samples.specimen, samples.law, samples.theta_of(row), [test.replace(times=times)])
-    observed = prediction.of(0)
-    outputs = np.full(samples.values.shape[1:], np.nan)
-    outputs[: test.times.size] = observed[np.searchsorted(times, test.times)]
-    hold_outputs = observed[np.searchsorted(times, hold_instants)]
-    status, end_time = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
-    samples.values[row], samples.hold_outputs[row] = outputs, hold_outputs
-    samples.status[row], samples.end_times[row] = status, end_time
-    shown = creep_output(samples.specimen)
-    if status == Status.NOT_CONVERGED and not np.isfinite(observed[times > 0, shown.column]).any():
-        raise DatasetError(f"not converged from {end_time:g} s on, with nothing to show before")
-    reached = outputs[: test.times.size]
-    outcome = SimulationOutcome(
-        test.times, reached, hold_outputs, status, end_time, conditions, shown.column, shown.falls
-    )
-    return _reason_after(design, outcome)
-
-
-def _reason_after(design: SamplingDomain, outcome: SimulationOutcome) -> int:
-    for number, criterion in enumerate(design.criteria, start=1):
-        if criterion.stage == "after" and not criterion.passes(outcome):
-            return number
-    return 0

@@ -43,12 +43,11 @@ from creepkit.errors import DatasetError, LawError, printable, quoted, quoted_va
 from creepkit.files.hdf5_files import open_hdf5, write_hdf5, write_names
 from creepkit.files.json_documents import compact_json, parse_json
 from creepkit.files.reading import FileKind
-from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.records import Status
 from creepkit.registry.arguments import specimen_by_name
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
-from creepkit.sampling.conditions import MOST_FRAMES, TimeGrid
+from creepkit.sampling.conditions import TimeGrid
 
 DATASET_FILE = FileKind("a data set", DatasetError, "give a data set that creepkit generated", maximum_bytes=2**50)
 
@@ -89,28 +88,12 @@ def check_format(file: h5py.File, source: str) -> None:
         raise DatasetError(f"{source}: its units are {quoted_value(units)}; allowed are '{FILE_UNITS}'")
 
 
-def stored_array(file: h5py.File, name: str, kinds: str, source: str) -> h5py.Dataset:
-    """An array of one axis or more; DatasetError when there is none, or its numbers are of another kind of NumPy."""
-    array = file.get(name)
-    if not isinstance(array, h5py.Dataset) or not array.shape or array.dtype.kind not in kinds:
-        raise _damaged(source, f"the array '{name}' is missing, or is none of its kind")
-    return array
-
-
-def stored_names(file: h5py.File, name: str, source: str) -> tuple[str, ...]:
-    """An attribute that is a list of texts; DatasetError when it is something else."""
-    value = file.attrs.get(name)
-    if not (isinstance(value, np.ndarray) and value.ndim == 1 and all(isinstance(word, str) for word in value)):
-        raise _damaged(source, f"the attribute '{name}' is missing, or no list of texts")
-    return tuple(str(word) for word in value)
-
-
-def check_shapes(file: h5py.File, expected: dict[str, Any], source: str) -> None:
-    """DatasetError when an array is missing, or does not fit the words of the file."""
-    samples = stored_array(file, "index", "i", source).shape[0]
-    for name, empty in expected.items():
-        array = stored_array(file, name, np.dtype(COLUMNS[name].file_type).kind, source)
-        if array.shape != (samples, *empty.shape[1:]):
+def check_columns(file: h5py.File, header: Dataset, source: str) -> None:
+    """DatasetError when an array has not as many samples as the others, or does not fit the words of the file."""
+    samples = len(file["index"])
+    for name, column in COLUMNS.items():
+        array, shape = file[name], (samples, *getattr(header, name).shape[1:])
+        if array.shape != shape or array.dtype.kind != np.dtype(column.file_type).kind:
             raise _damaged(source, f"the array '{name}' is {array.dtype} {array.shape}, which does not fit the others")
 
 
@@ -131,7 +114,8 @@ def check_values(columns: dict[str, Any], header: Dataset, source: str) -> None:
             raise _damaged(source, f"sample {np.flatnonzero(~sound)[0]}: its {what}")
 
 
-COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
+"""With a checksum of each chunk, which is compared when it is read."""
 
 
 # ---- writing -------------------------------------------------------------------------------------------------------
@@ -205,49 +189,34 @@ def read_dataset(path: str | Path, *, accepted_only: bool = False) -> Dataset:
 def read_header(file: h5py.File, source: str) -> Dataset:
     """The data set of a file with no samples in it yet."""
     check_format(file, source)
-    name_lists: dict[str, Any] = {name: stored_names(file, name, source) for name in NAME_LISTS}
+    name_lists: dict[str, Any] = {name: tuple(map(str, file.attrs[name])) for name in NAME_LISTS}
     documents: dict[str, Any] = {}
     for name in ("law", "specimen", "design", "provenance"):
-        text = file.attrs.get(name)
-        documents[name] = parse_json(text, f"{source}: its {name}", DATASET_FILE) if isinstance(text, str) else None
+        documents[name] = parse_json(file.attrs[name], f"{source}: its {name}", DATASET_FILE)
         if not isinstance(documents[name], dict):
-            raise _damaged(source, f"the attribute '{name}' is missing, or no record")
+            raise _damaged(source, f"the attribute '{name}' is no record")
     if not name_lists["outputs"] or len(name_lists["reason_names"]) != len(name_lists["reason_texts"]):
         raise _damaged(source, "names no output, or not a text for each reason")
-    times = stored_array(file, "time_grid", "f", source)
+    times = file["time_grid"]
     lengths = {name: len(values) for name, values in name_lists.items()}
     columns = empty_columns({**lengths, "holds": HOLD_TIMES, "frames": len(times)})
-    check_shapes(file, columns, source)
-    return Dataset(
-        law=_read_law(documents["law"], name_lists["parameter_names"], source),
+    try:
+        law, grid = law_from_json(documents["law"], source), TimeGrid(times[:], bool(times.attrs["relative"]))
+    except (LawError, DatasetError) as error:
+        raise DatasetError(str(error) if source in str(error) else f"{source}: {error}") from None
+    if tuple(law.names) != (names := name_lists["parameter_names"]):
+        raise _damaged(source, f"its parameters are {', '.join(names)}, those of its law {', '.join(law.names)}")
+    header = Dataset(
+        law=law,
         specimen=specimen_from_json(documents["specimen"], source, specimen_by_name),
         design_document=documents["design"],
-        grid=_read_grid(times, source),
+        grid=grid,
         provenance=documents["provenance"],
         **name_lists,
         **columns,
     )
-
-
-def _read_law(document: Any, names: tuple[str, ...], source: str) -> CreepLaw:
-    try:
-        law = law_from_json(document, source)
-    except LawError as error:
-        raise DatasetError(str(error)) from None
-    if tuple(law.names) != names:
-        raise _damaged(source, f"its parameters are {', '.join(names)}, those of its law {', '.join(law.names)}")
-    return law
-
-
-def _read_grid(array: h5py.Dataset, source: str) -> TimeGrid:
-    relative = array.attrs.get("relative")
-    if array.size > MOST_FRAMES or array.ndim != 1 or not isinstance(relative, bool | np.bool_):
-        found = f"{array.dtype} {array.shape}, relative {quoted_value(relative)}"
-        raise _damaged(source, f"its time grid is {found}")
-    try:
-        return TimeGrid(array[:], bool(relative))
-    except DatasetError as error:
-        raise DatasetError(f"{source}: {error}") from None
+    check_columns(file, header, source)
+    return header
 
 
 def read_samples(file: h5py.File, header: Dataset, accepted_only: bool = False) -> Dataset:
@@ -255,12 +224,11 @@ def read_samples(file: h5py.File, header: Dataset, accepted_only: bool = False) 
     reasons = file["reasons"][:]
     selected = reasons == 0 if accepted_only else np.ones(len(reasons), dtype=bool)
     columns: dict[str, Any] = {name: _read_rows(file[name], selected, COLUMNS[name].memory_type) for name in COLUMNS}
-    rows = stored_array(file, "failures/rows", "i", file.filename)
-    texts = stored_array(file, "failures/texts", "O", file.filename)
-    if rows.shape != texts.shape or rows.ndim != 1 or not np.isin(rows[:], np.arange(len(reasons))).all():
-        raise _damaged(file.filename, "its failures are not of samples, each with one text")
     new_row = {int(row): k for k, row in enumerate(np.flatnonzero(selected))}
-    pairs = zip(rows[:].tolist(), texts.asstr()[:].tolist(), strict=True)
+    rows, texts = file["failures/rows"][:], file["failures/texts"].asstr()[:]
+    if rows.shape != texts.shape or not np.isin(rows, np.arange(len(reasons))).all():
+        raise _damaged(file.filename, "its failures are not of samples, each with one text")
+    pairs = zip(rows.tolist(), texts.tolist(), strict=True)
     failures = {new_row[row]: printable(text) for row, text in pairs if row in new_row}
     check_values(columns, header, file.filename)
     return replace(header, **columns, failures=failures)

@@ -21,6 +21,7 @@ from creepkit.arrays import Floats
 from creepkit.discovery.forms import ARRHENIUS, CandidateForm
 from creepkit.discovery.regression import IsothermalEstimates, Regression, regress
 from creepkit.errors import FitError
+from creepkit.inverse.information_criteria import criterion_weights
 from creepkit.inverse.search.local_refinement import IterationCallback
 
 MAX_EXHAUSTIVE = 150
@@ -108,11 +109,9 @@ def rank_combinations(
         raise FitError(f"no form of {', '.join(names)} within its bounds has fewer numbers than these points allow")
     overdispersion = max(1.0, min(one.chi_square / (one.rows - one.parameter_count) for one in admissible))
     scores = np.array([_quasi_aicc(one, overdispersion) for one in admissible])
-    weights = akaike_weights(scores)
+    excess, weights = criterion_weights(scores)
     order = np.argsort(scores, kind="stable")
-    combinations = [
-        WeightedCombination(admissible[k], float(scores[k] - scores.min()), float(weights[k])) for k in order
-    ]
+    combinations = [WeightedCombination(admissible[k], float(excess[k]), float(weights[k])) for k in order]
     plausible_forms = {name: _plausible_forms(name, combinations, points, overdispersion) for name in names}
     return RankedCombinations(tuple(combinations), overdispersion, plausible_forms)
 
@@ -168,12 +167,6 @@ def squared_mahalanobis(
     """
     whitened: Floats = np.einsum("kij,kj->ki", points.whitening, first.fitted_theta - second.fitted_theta)
     return float((whitened**2).sum() / overdispersion)
-
-
-def akaike_weights(scores: Floats) -> Floats:
-    """(laws,) weights that sum to 1; scores : (laws,) a criterion such as BIC or AICc."""
-    weights = np.exp(-0.5 * (scores - scores.min()))
-    return np.asarray(weights / weights.sum())
 
 
 def weight_of_better_forms(weights: Mapping[str, float]) -> dict[str, float]:

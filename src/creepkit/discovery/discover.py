@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from creepkit.checked_arguments import checked, checked_with_own_words
+from creepkit.checked_arguments import checked
 from creepkit.discovery.combinations import rank_combinations
 from creepkit.discovery.elastic_moduli import FIRST_FRAMES, ModulusEstimates, moduli
 from creepkit.discovery.forms import CONSTANT, CandidateForm, candidate_forms, check_form_names
@@ -32,7 +32,7 @@ from creepkit.presentation import Presentable
 from creepkit.records import History, Predictor
 from creepkit.records.units import celsius_text
 from creepkit.registry import resolve_law
-from creepkit.registry.arguments import check_histories, resolve_predictor, resolve_predictors
+from creepkit.registry.arguments import resolve_predictor, resolve_predictors
 
 Forms = Sequence[str] | Mapping[str, Sequence[str]]
 """Names of temperature forms, or {parameter: names}."""
@@ -42,7 +42,7 @@ PriorOdds = Mapping[str, Mapping[str, float]]
 """{parameter: {form: odds}}."""
 
 
-@checked_with_own_words("fits")
+@checked
 def discover(
     fits: Sequence[Identification],
     *,
@@ -78,7 +78,7 @@ def discover(
     if predictor is None:
         raise FitError("the identifications were loaded from files: give using=, the specimen they were made with")
     settings = settings or fits[0].settings
-    tests, _ = sound_tests(check_histories(histories), settings)
+    tests, _ = sound_tests(list(histories), settings)
     return refit(temperature_law, tests, predictor, settings=settings, progress=progress)
 
 
@@ -183,7 +183,7 @@ def temperature_study(
     form_options: dict[str, Any] = {
         "forms": options.forms, "prior": options.prior, "parameters": options.parameters
     }  # fmt: skip
-    law, resolved = resolve_law(law), resolve_predictors(using, check_histories(tests))
+    law, resolved = resolve_law(law), resolve_predictors(using, tests)
     predictor = CompositePredictor(resolved) if isinstance(resolved, dict) else resolved
     if law.uses(temperature):
         raise FitError(f"law '{law.name}' depends on temperature already; give it without: forms are what is sought")

@@ -19,7 +19,7 @@ from creepkit.language.elastic import Elastic, wachtman
 from creepkit.presentation import Presentable
 from creepkit.records import History, Nuisance, Predictor
 from creepkit.registry import resolve_law
-from creepkit.registry.arguments import check_histories, resolve_predictors
+from creepkit.registry.arguments import resolve_predictors
 
 FIRST_FRAMES = 15
 
@@ -64,7 +64,7 @@ def moduli(
     Every history states a modulus to begin from.
     `[h.replace(elastic=estimates.elastic) for h in histories]` then fixes the moduli.
     """
-    histories = check_histories(histories)
+    histories = list(histories)
     predictor = resolve_predictors(using, histories)
     if isinstance(predictor, Mapping):
         raise FitError("moduli are identified from tests of one specimen; give those alone, and using= that one")

@@ -16,13 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.discovery.combinations import (
-    CREDIBLE_MASS,
-    FormWeight,
-    akaike_weights,
-    squared_mahalanobis,
-    weight_of_better_forms,
-)
+from creepkit.discovery.combinations import CREDIBLE_MASS, FormWeight, squared_mahalanobis, weight_of_better_forms
 from creepkit.discovery.forms import ARRHENIUS, CandidateForm, law_with_forms
 from creepkit.discovery.regression import IsothermalEstimates, Regression, check_temperatures, regress
 from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw, averaged_estimates
@@ -30,6 +24,7 @@ from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
+from creepkit.inverse.information_criteria import criterion_weights
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
@@ -65,9 +60,9 @@ def weigh_refits(
     bic_differences = {id(entry.fit): entry.excess for entry in ranking.laws}
     odds = np.array([one.regression.prior_odds for one in refits])
     scores = np.array([bic_differences[id(one.fit)] for one in refits]) - 2.0 * np.log(odds)
-    weights = akaike_weights(scores)
+    excess, weights = criterion_weights(scores)
     order = np.argsort(scores, kind="stable")
-    candidates = tuple(_candidate_law(refits[k], float(scores[k] - scores.min()), float(weights[k])) for k in order)
+    candidates = tuple(_candidate_law(refits[k], float(excess[k]), float(weights[k])) for k in order)
     best = candidates[0]
     assert best.fit is not None
     return replace(

@@ -96,7 +96,7 @@ class IsothermalEstimates:
 
 def check_identifications(fits: Sequence[Identification]) -> None:
     """Identifications of one law without temperature, at three temperatures or more."""
-    if isinstance(fits, Identification) or not fits:
+    if not fits:
         raise FitError("discover() takes a list of identifications, one for each temperature")
     law = fits[0].law
     if law.uses(temperature):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
@@ -10,24 +10,10 @@ from typing import Literal
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import FitError, quoted
+from creepkit.errors import FitError
 from creepkit.experiments.rig import HIGHER_LEVEL, LOWER_LEVEL, Rig
-from creepkit.records import (
-    History,
-    Loading,
-    PressureJump,
-    StrainSteps,
-    StressSteps,
-    constant_strain,
-    constant_stress,
-    load_steps,
-    load_unit,
-)
-from creepkit.records.loading import Quantity
+from creepkit.records import History, Loading, TwoLevels, load_unit, loading_of
 from creepkit.records.units import celsius_text, time_text
-
-ControlledQuantity = Literal["load", "stress"]
-
 
 FEWEST_FRAMES, MOST_FRAMES = 8, 60
 """Frames of a planned test: one each interval of the rig's frames; no test is shorter than the first of these, and what
@@ -89,7 +75,7 @@ def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperatu
     pieces = [*_test_pieces(rig, base)]
     candidates = []
     for duration, T in product(_durations(rig, longest), temperatures):
-        for loading, text in _LOADINGS.get(quantity, _loads)(rig, base, duration):
+        for loading, text in _loadings(rig, base, duration):
             at_temperature = f" at {celsius_text(T)}" if len(temperatures) > 1 else ""
             whole = f"{text} {time_text(duration)}{at_temperature}"
             times = frame_times(duration, rig.frame_interval)
@@ -155,58 +141,33 @@ def _pairs(rig: Rig) -> Iterator[tuple[float, float]]:
             yield first, second
 
 
-def _change_text(first: str, change: float, second: str) -> str:
-    """A load that changes after a time, s, up to the end, which the description of the test goes on with."""
-    return f"{first} to {time_text(change)}, then {second} to"
+def _loadings(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
+    """Levels held, and changes of level after a time; with the ramp and the control of `base`.
 
+    Each in words, which the description of the test goes on with.
+    """
+    quantity, change = base.loading.quantity, CHANGE_AT * duration
+    unit = "" if quantity == "strain" else f" {load_unit(base)}".rstrip()
+    ramp = None if quantity == "stress" else min(_ramp_of(base), 0.1 * duration)
+    control: Literal["load", "stress"] = getattr(base.loading, "control", "stress")
 
-def _pressures(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
-    ramp = min(float(getattr(base.loading, "ramp", 5.0)), 0.1 * duration)
+    def made(value: float | TwoLevels, end: float) -> Loading:
+        return loading_of(quantity, value, control=control, ramp=ramp, end=end)
+
+    prefix = "a strain of " if quantity == "strain" else ""
     for level in _levels(rig):
-        yield PressureJump(level, level, 0.5 * duration, ramp), f"{level:.3g} MPa for"
+        yield made(level, 0.5 * duration), f"{prefix}{level:.3g}{unit} for"
     for first, second in _pairs(rig):
-        change = CHANGE_AT * duration
-        yield (PressureJump(first, second, change, ramp), _change_text(f"{first:.3g} MPa", change, f"{second:.3g} MPa"))
+        text = f"{prefix}{first:.3g}{unit} to {time_text(change)}, then {second:.3g}{unit} to"
+        yield made(TwoLevels(first, second, change), duration), text
 
 
-def _stresses(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
-    control: ControlledQuantity = getattr(base.loading, "control", "stress")
-    for level in _levels(rig):
-        yield constant_stress(level, control), f"{level:.3g} MPa for"
-    for first, second in _pairs(rig):
-        change = CHANGE_AT * duration
-        steps = StressSteps(((0.0, first), (change, second)), control)
-        yield steps, _change_text(f"{first:.3g} MPa", change, f"{second:.3g} MPa")
-
-
-def _strains(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
-    ramp = min(float(getattr(base.loading, "ramp", 0.0)), 0.1 * duration)
-    for level in _levels(rig):
-        yield constant_strain(level, ramp), f"a strain of {level:.3g} for"
-    for first, second in _pairs(rig):
-        change = CHANGE_AT * duration
-        steps = StrainSteps(((0.0, first), (change, second)), ramp)
-        yield steps, _change_text(f"a strain of {first:.3g}", change, f"{second:.3g}")
-
-
-def _loads(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loading, str]]:
-    """Any other load, in its unit, after a ramp as long as that of `base`."""
-    quantity, unit, program = base.loading.quantity, load_unit(base), base.loading.program()
-    ramp = float(program.times[1]) if program.values[0] == 0.0 and program.times.size > 1 else 0.0
-    ramp = min(ramp, 0.1 * duration)
-    for level in _levels(rig):
-        yield load_steps(quantity, [(0.0, level)], ramp), f"{level:.3g} {unit}".rstrip() + " for"
-    for first, second in _pairs(rig):
-        change = CHANGE_AT * duration
-        steps = load_steps(quantity, [(0.0, first), (change, second)], ramp)
-        yield steps, _change_text(f"{first:.3g} {unit}".rstrip(), change, f"{second:.3g} {unit}".rstrip())
-
-
-_LOADINGS: dict[Quantity, Callable[[Rig, History, float], Iterator[tuple[Loading, str]]]] = {
-    "pressure": _pressures,
-    "stress": _stresses,
-    "strain": _strains,
-}
+def _ramp_of(base: History) -> float:
+    """s, in which the load of a test was reached."""
+    if base.loading.quantity in ("pressure", "strain"):
+        return float(getattr(base.loading, "ramp", 5.0 if base.loading.quantity == "pressure" else 0.0))
+    program = base.loading.program()
+    return float(program.times[1]) if program.values[0] == 0.0 and program.times.size > 1 else 0.0
 
 
 NOT_PLANNED = "components"
@@ -241,15 +202,14 @@ def _variations(rig: Rig, base: History, made_levels: Floats, exponent: float) -
     end, longest = float(base.times[-1]), rig.longest_hours * 3600.0
     base_level = float(base.loading.program().values.max())
     at_levels = rig.replace(load_changes=False)
-    loadings = _LOADINGS.get(base.loading.quantity, _loads)
     for level in dict.fromkeys((rig.levels[0], LOWER_LEVEL * high, rig.levels[1])):
         is_bar = base.loading.quantity == "stress"
         duration = min(end * (level / base_level) ** -exponent, longest) if is_bar else end
-        yield from _made(at_levels.replace(levels=(level, level)), base, duration, loadings)
+        yield from _made(at_levels.replace(levels=(level, level)), base, duration)
     middle = float(np.sqrt(low * high))
     for first, second in ((low, HIGHER_LEVEL * high), (middle, LOWER_LEVEL * middle), (middle, HIGHER_LEVEL * middle)):
         pair = rig.replace(levels=(min(first, second), max(first, second)))
-        for candidate in _made(pair, base, end, loadings):
+        for candidate in _made(pair, base, end):
             program = candidate.histories[0].loading.program().values
             begin, end_level = candidate.first_level, float(program[-1])
             if abs(begin - first) < 0.01 * first and abs(end_level - second) < 0.01 * second:
@@ -264,10 +224,8 @@ def _variations(rig: Rig, base: History, made_levels: Floats, exponent: float) -
                 yield _like(changed, f"{text} under the same loading for", end, rig)
 
 
-def _made(
-    rig: Rig, base: History, duration: float, loadings: Callable[[Rig, History, float], Iterator[tuple[Loading, str]]]
-) -> Iterator[CandidateTest]:
-    for loading, text in loadings(rig, base, duration):
+def _made(rig: Rig, base: History, duration: float) -> Iterator[CandidateTest]:
+    for loading, text in _loadings(rig, base, duration):
         yield _like(replace(base, loading=loading), text, duration, rig)
 
 
@@ -283,11 +241,9 @@ def candidates_given(histories: Sequence[History | CandidateTest], rigs: Sequenc
     """Planned tests that a user gives, with names of their own; FitError for one that no rig can make."""
     candidates = []
     for given in histories:
-        if not isinstance(given, CandidateTest | History):
-            raise FitError(f"a planned test is a history without outputs, found {quoted(repr(given), 60)}")
-        if isinstance(given, CandidateTest) and not (given.histories and 0 < given.hours < np.inf):
-            raise FitError(f"the planned test '{given.description}' needs a history and a machine time above zero")
         if isinstance(given, CandidateTest):
+            if not (given.histories and 0 < given.hours < np.inf):
+                raise FitError(f"the planned test '{given.description}' needs a history and a machine time above zero")
             for history in given.histories:
                 _rig_for(history, rigs)
             candidates.append(given)

@@ -12,11 +12,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from creepkit import limits
 from creepkit.arrays import single_threaded_blas
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError, quoted
+from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig, variations_of_tests
-from creepkit.experiments.design_checks import check_arguments, edges_of, notes_of, rigs_for
+from creepkit.experiments.design_checks import edges_of, notes_of, rigs_for
 from creepkit.experiments.design_task import DesignTask, Goal, task_of
 from creepkit.experiments.expectations import Criterion, Expectation, PrecisionCriterion
 from creepkit.experiments.known_laws import KnownLaw
@@ -78,11 +79,13 @@ def design(
     candidates : planned histories (without outputs) in the place of what the rig can make.
     Stopped by Ctrl-C it gives the best so far.
     """
-    check_arguments(goal, budget, seed)
+    if budget is not None and budget <= 0:
+        raise FitError(f"the budget is {budget:g} h; it must be above zero")
+    limits.check_number("seed", seed, limits.SEED, FitError)
     remaining = RemainingLaws.of(source)
     rigs = rigs_for(remaining.fits[0], rig)
-    if candidates is not None and not (isinstance(candidates, Sequence) and len(candidates) > 0):
-        raise FitError(f"candidates= takes a list of planned histories, found {quoted(repr(candidates), 60)}")
+    if candidates is not None and not len(candidates):
+        raise FitError("candidates= takes a list of planned histories, found none")
     search = _Search(task_of(remaining, goal, budget), rigs, seed, progress)
     if search.nothing_to_do is not None:
         return search.nothing_to_do

@@ -1,33 +1,18 @@
-"""What a design is asked for, checked, and what its expectations take for granted."""
+"""The rigs of a design, and what its expectations take for granted."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from creepkit.errors import FitError, quoted
+from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import CandidateTest
 from creepkit.experiments.rig import Rig, rigs_of
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import MINIMUM_TESTS
-from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
 from creepkit.records import dimensions_of
 from creepkit.records.units import time_text
-
-
-def check_arguments(goal: object, budget: object, seed: object) -> None:
-    """FitError for a goal, a budget or a seed that is none."""
-    if goal is not None and not isinstance(goal, str | DerivedQuantity):
-        raise FitError(
-            f"the goal is 'law', 'parameters', or a quantity such as ck.rate_at(60.0); found {quoted(repr(goal), 60)}"
-        )
-    if budget is not None and not (isinstance(budget, int | float | np.number) and 0 < budget < np.inf):
-        raise FitError(f"the budget is {quoted(repr(budget))} h; it must be above zero")
-    if not (isinstance(seed, int) and seed >= 0):
-        raise FitError(f"the seed is {quoted(repr(seed))}; it must be a whole number from 0 on")
 
 
 def rigs_for(fit: Identification, rig: Rig | Sequence[Rig] | None) -> tuple[Rig, ...]:
@@ -35,9 +20,9 @@ def rigs_for(fit: Identification, rig: Rig | Sequence[Rig] | None) -> tuple[Rig,
     assert fit.predictor is not None
     if rig is None:
         return rigs_of(fit.histories, fit.predictor)
-    rigs = (rig,) if isinstance(rig, Rig) else tuple(rig) if isinstance(rig, Sequence) else ()
-    if not rigs or not all(isinstance(one, Rig) for one in rigs):
-        raise FitError(f"rig= takes a ck.Rig, or several in a list; found {quoted(repr(rig), 60)}")
+    rigs = (rig,) if isinstance(rig, Rig) else tuple(rig)
+    if not rigs:
+        raise FitError("rig= takes a ck.Rig, or several in a list; found none")
     known = dict.fromkeys(h.specimen for h in fit.histories)
     for one in rigs:
         if one.specimen not in known:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import FitError, quoted
+from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.challenges import NOT_EXCLUDED, AlteredLaw, altered_laws
 from creepkit.inverse.selection.ranking import Ranking, rank, ranking_from_scores
@@ -36,17 +36,14 @@ class RemainingLaws:
     @classmethod
     def of(cls, source: Ranking | ModelAverage | Identification | Sequence[Identification]) -> RemainingLaws:
         """Those of an identification, of several or of a ranking; FitError for what no design can be made from."""
-        is_list = (
-            isinstance(source, Sequence) and all(isinstance(fit, Identification) for fit in source) and len(source) > 0
-        )
-        if not (isinstance(source, Identification | Ranking | ModelAverage) or is_list):
-            raise FitError(f"a design is made from identifications or a ranking, found {quoted(repr(source), 60)}")
         if isinstance(source, Identification):
             return cls((_usable(source),), np.ones(1), None)
         if isinstance(source, Ranking):
             ranking = source
         else:
             fits = source.fits if isinstance(source, ModelAverage) else source
+            if not fits:
+                raise FitError("a design is made from identifications or a ranking, found none")
             _refuse_repeated(fits)
             ranking = _with_weights(source) if isinstance(source, ModelAverage) else rank(list(fits), challenge=False)
         remaining = ranking.credible or ranking.laws[:1]

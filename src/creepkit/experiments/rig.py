@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -74,23 +75,17 @@ class Rig(Options, title="settings of a rig", error=FitError):
     largest_output: float = float("inf")
 
     def __post_init__(self) -> None:
-        low, high = numbers(self.levels, "a rig's levels", "(least, greatest) above zero, such as (4, 14) MPa", count=2)
+        low, high = map(float, self.levels)
         if not 0 < low <= high < np.inf:
             raise FitError(f"a rig's levels are (least, greatest) above zero, such as (4, 14) MPa; found {self.levels}")
         if not self.largest_output > 0:
             raise FitError(f"a rig's largest_output must be above zero, found {quoted(repr(self.largest_output), 60)}")
-        temperatures = list(dict.fromkeys(numbers(self.temperatures, "a rig's temperatures", "numbers in K, above 0")))
-        if len(temperatures) > MOST_VALUES:
-            raise FitError(f"a rig has {len(temperatures)} temperatures; give {MOST_VALUES} at most")
-        if not isinstance(self.dimensions, Mapping):
-            raise FitError(f"a rig's dimensions are lengths in mm by name, found {quoted(repr(self.dimensions), 60)}")
-        dimensions = {
-            str(name): tuple(numbers(np.atleast_1d(values), f"a rig's {name}", "lengths in mm above zero"))
-            for name, values in self.dimensions.items()
-        }
+        temperatures = list(dict.fromkeys(map(float, self.temperatures)))
+        dimensions = {n: tuple(float(v) for v in np.atleast_1d(values)) for n, values in self.dimensions.items()}
+        for name, values in {"temperatures": temperatures, **dimensions}.items():
+            if not 1 <= len(values) <= MOST_VALUES:
+                raise FitError(f"a rig has {len(values)} values of {name}; give 1 to {MOST_VALUES}")
         for name, values in dimensions.items():
-            if len(values) > MOST_VALUES:
-                raise FitError(f"a rig has {len(values)} values of {name}; give {MOST_VALUES} at most")
             if not all(0 < value < LONGEST_DIMENSION for value in values):
                 raise FitError(f"a rig's {name} must be lengths in mm above zero, found {values}")
         object.__setattr__(self, "levels", (low, high))
@@ -103,7 +98,7 @@ class Rig(Options, title="settings of a rig", error=FitError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         state = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return _rebuild, ({**state, "dimensions": dict(self.dimensions)},)
+        return partial(Rig, **{**state, "dimensions": dict(self.dimensions)}), ()
 
     def replace(self, **changes: Any) -> Rig:
         """The same rig with some fields changed."""
@@ -125,10 +120,6 @@ class Rig(Options, title="settings of a rig", error=FitError):
                 known = ", ".join(f"{T:.4g}" for T in self.temperatures)
                 return f"{temperature:.4g} K is none of the rig's temperatures ({known} K)"
         return ""
-
-
-def _rebuild(state: dict[str, Any]) -> Rig:
-    return Rig(**state)
 
 
 def changed_rigs(rigs: Sequence[Rig], changes: Mapping[str, Any]) -> list[Rig]:
@@ -198,15 +189,3 @@ MOST_VALUES = 20
 
 LONGEST_DIMENSION = 1e4
 """mm."""
-
-
-def numbers(values: Iterable[float] | object, what: str, allowed: str, count: int | None = None) -> list[float]:
-    """The values as numbers; FitError, naming what is allowed, for anything else."""
-    try:
-        listed: list[Any] = list(values)  # type: ignore[arg-type]
-        result = [] if any(isinstance(value, str) for value in listed) else [float(value) for value in listed]
-    except (TypeError, ValueError):
-        result = []
-    if not result or (count is not None and len(result) != count):
-        raise FitError(f"{what} are {allowed}; found {quoted(repr(values), 60)}")
-    return result

@@ -7,14 +7,13 @@ hardening is written (A q^n [(m+1) e]^m)^(1/(m+1)), which has other A, n and m t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from creepkit.errors import ExportError
 from creepkit.exporters.creep_forms import (
+    CodeInput,
     CreepForm,
-    card_heading,
-    creep_forms_of,
     elastic_table,
     exp_in_range,
     format_number,
@@ -25,9 +24,6 @@ from creepkit.exporters.law_code import Identifiers
 from creepkit.hookspecs import hookimpl
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import Exporter, LawWithValues
-
-_ALTERNATIVE = "export it as 'abaqus', a CREEP subroutine"
-
 
 _SMALLEST_COEFFICIENT = 1e-27
 """Below this A the manual warns of numerical difficulties with LAW=STRAIN and LAW=TIME."""
@@ -46,163 +42,116 @@ _TABLE_NOTE = (
 )
 
 
+_FORMULAS = {
+    "STRAIN": "rate = (A q^n [(m+1) e]^m)^(1/(m+1)), of equivalent stress q and creep strain e",
+    "TIME": "rate = A q^n t^m, of equivalent stress q and total time t, which must start with the load",
+    "POWER LAW": "rate = e0 ((q/q0)^n [(m+1) e]^m)^(1/(m+1))",
+    "TIME POWER LAW": "rate = e0 (q/q0)^n (e0 t)^m, of total time t, which must start with the load",
+}
+"""{LAW: its rate}, in Abaqus' older notation and in its newer one."""
+
+
+CreepCards = tuple[list[str], list[str]]
+"""Comments, and *CREEP with its data."""
+
+
 @dataclass(frozen=True)
-class AbaqusCards:
+class AbaqusCards(CodeInput):
     """Material cards with one of Abaqus' own creep laws.
 
     lowest_temperature, highest_temperature : K, of tables where no tests are known.
     """
 
+    code = "Abaqus' *CREEP"
+    alternative = "export it as 'abaqus', a CREEP subroutine"
+    marker = "**"
     name: str = "abaqus-cards"
     title: str = "Abaqus material cards with one of its own creep laws (*CREEP)"
     suffix: str = ".inp"
     lowest_temperature: float = 873.15
     highest_temperature: float = 1273.15
 
-    def text(self, source: LawWithValues) -> str:
-        """Return *MATERIAL, *ELASTIC where moduli are given, and *CREEP."""
-        forms = creep_forms_of(source, "Abaqus' *CREEP", _ALTERNATIVE)
-        creep = self._creep_cards(source, forms)
+    def content(self, source: LawWithValues, forms: Sequence[CreepForm]) -> tuple[list[str], list[str]]:
+        """*MATERIAL, *ELASTIC where moduli are given, and *CREEP."""
+        creep_comments, creep = self._creep_cards(source, forms)
         names = Identifiers((), ignore_case=True, max_length=80)
         requested = source.name or source.law.name
-        label = names.unique(requested)
         rows = elastic_table(source, (self.lowest_temperature, self.highest_temperature), step=25.0)
-        elastic = [_data_line(m.E, m.nu, *_optional_value(m.T)) for m in rows]
-        cards = [f"*MATERIAL, NAME={label}", *(["*ELASTIC", *elastic] if elastic else []), *creep.cards]
-        missing_elasticity = [] if elastic else ["*ELASTIC is missing: no modulus was given; write it beside *CREEP."]
-        comments = [*names.renaming_notes([requested]), *creep.comments, *missing_elasticity]
-        return "\n".join([*card_heading(source, "**", comments), *cards]) + "\n"
+        elastic = ["*ELASTIC", *(_data_line(m.E, m.nu, m.T) for m in rows)] if rows else []
+        cards = [f"*MATERIAL, NAME={names.unique(requested)}", *elastic, *creep]
+        missing = [] if elastic else ["*ELASTIC is missing: no modulus was given; write it beside *CREEP."]
+        return [*names.renaming_notes([requested]), *creep_comments, *missing], cards
 
-    def _creep_cards(self, source: LawWithValues, forms: Sequence[CreepForm]) -> _CreepCards:
-        stress_functions = [form.stress_function for form in forms]
-        is_power_law = all(form.stress_function == "power" and form.is_steady for form in forms)
-        if is_power_law and (len(forms) == 2 or (len(forms) == 1 and forms[0].Q)):
+    def _creep_cards(self, source: LawWithValues, forms: Sequence[CreepForm]) -> CreepCards:
+        form, functions = forms[0], {form.stress_function for form in forms}
+        is_power_law = functions == {"power"} and all(form.is_steady for form in forms)
+        if is_power_law and (len(forms) == 2 or (len(forms) == 1 and form.Q)):
             return _double_power(source, forms)
         if len(forms) > 1:
             terms = " + ".join(form.label for form in forms)
-            raise _unsupported(source, f"a sum of {len(forms)} ({terms}) that is not one of two power laws")
-        if stress_functions == ["sinh"] and forms[0].is_steady:
-            return _hyperbolic_sine(source, forms[0])
-        if stress_functions == ["power"]:
-            return self._power_law_cards(source, forms[0])
-        raise _unsupported(source, f"{forms[0].label}: its {stress_functions[0]} of stress does not stand alone there")
+            raise self._unsupported(source, f"a sum of {len(forms)} ({terms}) that is not one of two power laws")
+        if functions == {"sinh"} and form.is_steady:
+            return _hyperbolic_sine(source, form)
+        if functions == {"power"}:
+            return self._power_law_cards(source, form)
+        raise self._unsupported(
+            source, f"{form.label}: its {form.stress_function} of stress does not stand alone there"
+        )
 
-    def _power_law_cards(self, source: LawWithValues, form: CreepForm) -> _CreepCards:
-        """LAW=STRAIN or LAW=TIME; their newer notation where A would be too small."""
+    def _unsupported(self, source: LawWithValues, reason: str) -> ExportError:
+        return self.refusal(source, f" is none of Abaqus' own creep laws, {reason}")
+
+    def _power_law_cards(self, source: LawWithValues, form: CreepForm) -> CreepCards:
+        """A power law with strain or time, as a table where temperature enters."""
         if form.strain_exponent and form.time_exponent:
-            raise _unsupported(source, f"{form.label}: a power of strain times a power of time")
+            raise self._unsupported(source, f"{form.label}: a power of strain times a power of time")
         m = form.strain_exponent / (1.0 - form.strain_exponent) if form.strain_exponent else form.time_exponent
         if not (-1.0 < m <= 0.0 and form.n > 0.0):
-            raise _unsupported(
+            raise self._unsupported(
                 source, f"{form.label}: Abaqus asks for n > 0 and -1 < m <= 0 (n = {form.n:g}, m = {m:g})"
             )
-        notation = _time_hardening(form, m) if form.time_exponent else _strain_hardening(form, m)
         if not form.Q:
-            return notation.cards(source, [(form.log_coefficient, None)])
+            return _power_law(source, form, m, {None: form.log_coefficient}, [])
         low, high = temperature_span(source, self.lowest_temperature, self.highest_temperature)
         step = _temperature_step(form, low)
-        rows = [(form.log_coefficient_at(T), T) for T in temperature_grid(low, high, step)]
-        table_note = _TABLE_NOTE.format(low=low, high=high, step=step, tolerance=_INTERPOLATION_TOLERANCE)
-        return notation.cards(source, rows, table_note)
+        rows: dict[float | None, float] = {T: form.log_coefficient_at(T) for T in temperature_grid(low, high, step)}
+        note = _TABLE_NOTE.format(low=low, high=high, step=step, tolerance=_INTERPOLATION_TOLERANCE)
+        return _power_law(source, form, m, rows, [note])
 
 
-@dataclass(frozen=True)
-class _CreepCards:
-    """*CREEP with its data, and comments on it."""
+def _power_law(
+    source: LawWithValues, form: CreepForm, m: float, rows: Mapping[float | None, float], comments: list[str]
+) -> CreepCards:
+    """LAW=STRAIN or LAW=TIME; their newer notation where A would be too small.
 
-    cards: list[str]
-    comments: list[str]
-
-
-def _unsupported(source: LawWithValues, reason: str) -> ExportError:
-    return ExportError(f"law '{source.law.name}' is none of Abaqus' own creep laws, {reason}; {_ALTERNATIVE}")
-
-
-# ---- power laws ----------------------------------------------------------------------------------------------------
-
-CoefficientRows = Sequence[tuple[float, float | None]]
-"""ln of A in A s^n e^m t^k, and the temperature in K or None."""
-
-
-@dataclass(frozen=True)
-class _PowerLawNotation:
-    """A power law of stress with strain or time, in Abaqus' older and newer notations, with Abaqus' n and m.
-
-    log_A(ln A) : of the older notation's A. log_rate(ln A, ln q0) : of the newer one's rate e0 at the stress q0.
+    A s^N e^M has m = M/(1 - M), so that M = m/(m+1) and N = n/(m+1); A s^n t^m stands as it is.
+    rows : {temperature in K or None: ln of A in A s^n e^M t^m}.
     """
-
-    law: str
-    formula: str
-    newer_law: str
-    newer_formula: str
-    n: float
-    m: float
-    log_A: Callable[[float], float]
-    log_rate: Callable[[float, float], float]
-
-    def cards(self, source: LawWithValues, rows: CoefficientRows, table_note: str = "") -> _CreepCards:
-        """The older notation, or the newer where A is too small for it."""
-        comments = [table_note] if table_note else []
-        if min(self.log_A(log_coefficient) for log_coefficient, _ in rows) >= math.log(_SMALLEST_COEFFICIENT):
-            data = [
-                _data_line(exp_in_range(self.log_A(ln), "A", source), self.n, self.m, *_optional_value(T))
-                for ln, T in rows
-            ]
-            return _CreepCards(
-                [f"*CREEP, LAW={self.law}", *data], [f"LAW={self.law}: {self.formula}. A, n, m.", *comments]
-            )
-        q0 = 100.0 / source.units.megapascals
-        rates = [(exp_in_range(self.log_rate(ln, math.log(q0)), "e0", source), T) for ln, T in rows]
-        data = [_data_line(q0, self.n, self.m, rate, *_optional_value(T)) for rate, T in rates]
-        reason = f"A of LAW={self.law} would be below {_SMALLEST_COEFFICIENT:g}, against which the manual warns"
-        comments.insert(
-            0,
-            f"{reason}; LAW={self.newer_law} is in the manual of 2022, not in that of 2017: {self.newer_formula}. "
-            "q0, n, m, e0.",
-        )
-        return _CreepCards([f"*CREEP, LAW={self.newer_law}", *data], comments)
-
-
-def _strain_hardening(form: CreepForm, m: float) -> _PowerLawNotation:
-    """A s^N e^M with M = m/(m+1) and N = n/(m+1)."""
-    return _PowerLawNotation(
-        "STRAIN",
-        "rate = (A q^n [(m+1) e]^m)^(1/(m+1)), of equivalent stress q and creep strain e",
-        "POWER LAW",
-        "rate = e0 ((q/q0)^n [(m+1) e]^m)^(1/(m+1))",
-        n=form.n * (m + 1.0),
-        m=m,
-        log_A=lambda ln: (m + 1.0) * ln - m * math.log(m + 1.0),
-        log_rate=lambda ln, ln_q0: ln + form.n * ln_q0 - form.strain_exponent * math.log(m + 1.0),
+    by_time, share = bool(form.time_exponent), m + 1.0
+    law, n = ("TIME", form.n) if by_time else ("STRAIN", form.n * share)
+    log_A = [ln if by_time else share * ln - m * math.log(share) for ln in rows.values()]
+    if min(log_A) >= math.log(_SMALLEST_COEFFICIENT):
+        data = [_data_line(exp_in_range(ln, "A", source), n, m, T) for ln, T in zip(log_A, rows, strict=True)]
+        return [f"LAW={law}: {_FORMULAS[law]}. A, n, m.", *comments], [f"*CREEP, LAW={law}", *data]
+    q0 = 100.0 / source.units.megapascals
+    shifted = [ln + form.n * math.log(q0) for ln in rows.values()]
+    log_rates = [ln / share if by_time else ln - form.strain_exponent * math.log(share) for ln in shifted]
+    newer = "TIME POWER LAW" if by_time else "POWER LAW"
+    reason = (
+        f"A of LAW={law} would be below {_SMALLEST_COEFFICIENT:g}, against which the manual warns; LAW={newer} is in "
+        f"the manual of 2022, not in that of 2017: {_FORMULAS[newer]}. q0, n, m, e0."
     )
+    data = [_data_line(q0, n, m, exp_in_range(ln, "e0", source), T) for ln, T in zip(log_rates, rows, strict=True)]
+    return [reason, *comments], [f"*CREEP, LAW={newer}", *data]
 
 
-def _time_hardening(form: CreepForm, m: float) -> _PowerLawNotation:
-    """A s^n t^m as it is."""
-    return _PowerLawNotation(
-        "TIME",
-        "rate = A q^n t^m, of equivalent stress q and total time t, which must start with the load",
-        "TIME POWER LAW",
-        "rate = e0 (q/q0)^n (e0 t)^m, of total time t, which must start with the load",
-        n=form.n,
-        m=m,
-        log_A=lambda ln: ln,
-        log_rate=lambda ln, ln_q0: (ln + form.n * ln_q0) / (1.0 + m),
-    )
-
-
-def _double_power(source: LawWithValues, forms: Sequence[CreepForm]) -> _CreepCards:
+def _double_power(source: LawWithValues, forms: Sequence[CreepForm]) -> CreepCards:
     """Two power laws, or one with an activation energy as two equal halves."""
     q0 = 100.0 / source.units.megapascals
-    halves = [*forms, *forms][:2]
-    log_share = math.log(len(forms) / 2.0)
-    data = []
-    for form in halves:
-        data += [
-            exp_in_range(form.log_coefficient + log_share + form.n * math.log(q0), "A", source),
-            form.activation_temperature,
-            form.n,
-        ]
+    log_share, data = math.log(len(forms) / 2.0), []
+    for form in [*forms, *forms][:2]:
+        A = exp_in_range(form.log_coefficient + log_share + form.n * math.log(q0), "A", source)
+        data += [A, form.activation_temperature, form.n]
     comments = [
         "LAW=DOUBLE POWER: rate = A1 exp(-B1/T) (q/q0)^C1 + A2 exp(-B2/T) (q/q0)^C2. A1, B1, C1, A2, B2, C2, q0."
     ]
@@ -210,7 +159,7 @@ def _double_power(source: LawWithValues, forms: Sequence[CreepForm]) -> _CreepCa
         comments.append("One power law as two equal halves.")
     if any(form.Q for form in forms):
         comments.append(_ABSOLUTE_ZERO_NOTE)
-    return _CreepCards(["*CREEP, LAW=DOUBLE POWER", _data_line(*data, q0)], comments)
+    return comments, ["*CREEP, LAW=DOUBLE POWER", _data_line(*data, q0)]
 
 
 _ABSOLUTE_ZERO_NOTE = (
@@ -218,12 +167,12 @@ _ABSOLUTE_ZERO_NOTE = (
 )
 
 
-def _hyperbolic_sine(source: LawWithValues, form: CreepForm) -> _CreepCards:
+def _hyperbolic_sine(source: LawWithValues, form: CreepForm) -> CreepCards:
     comments = ["LAW=HYPERB: rate = A sinh(B q)^n exp(-dH/(R T)), of equivalent stress q. A, B, n, dH, R."]
     energy = [form.Q, GAS_CONSTANT] if form.Q else []
     comments += [f"dH in J/mol. {_ABSOLUTE_ZERO_NOTE}"] if energy else []
     A = exp_in_range(form.log_coefficient, "A", source)
-    return _CreepCards(["*CREEP, LAW=HYPERB", _data_line(A, 1.0 / form.stress_scale, form.n, *energy)], comments)
+    return comments, ["*CREEP, LAW=HYPERB", _data_line(A, 1.0 / form.stress_scale, form.n, *energy)]
 
 
 # ---- tables and numbers --------------------------------------------------------------------------------------------
@@ -241,13 +190,9 @@ def _temperature_step(form: CreepForm, low: float) -> float:
     )
 
 
-def _optional_value(T: float | None) -> list[float]:
-    return [] if T is None else [T]
-
-
-def _data_line(*values: float) -> str:
-    """A data line; Abaqus reads at most 20 characters of a number."""
-    return ", ".join(map(format_number, values))
+def _data_line(*values: float | None) -> str:
+    """A data line; Abaqus reads at most 20 characters of a number, and takes None, a temperature, as left out."""
+    return ", ".join(format_number(value) for value in values if value is not None)
 
 
 @hookimpl

@@ -11,7 +11,7 @@ from typing import Any
 
 import sympy
 
-from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, factor_text
+from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, called_names, factor_text
 from creepkit.exporters.law_description import comment_lines, comment_safe, heading, printable_text
 from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
@@ -133,10 +133,10 @@ def c_assignments(definitions: Iterable[tuple[sympy.Symbol, sympy.Expr]], type_n
 
 def stable_functions_in(texts: Sequence[str]) -> list[str]:
     """The names of the helpers that texts call, and of those that they call in turn, in order."""
-    required = _called_names(texts)
+    required = called_names(texts)
     for name in reversed([*STABLE_FUNCTIONS]):
         if name in required:
-            required |= _called_names([STABLE_FUNCTIONS[name][1]])
+            required |= called_names([STABLE_FUNCTIONS[name][1]])
     return [name for name in STABLE_FUNCTIONS if name in required]
 
 
@@ -155,10 +155,6 @@ def cpp_lambda_definition(name: str) -> str:
 def c_block_comment(lines: Iterable[str]) -> list[str]:
     """Lines, each made ` * ...`, between comment marks; whatever could end a comment is taken apart."""
     return ["/*", *(comment_safe(line) for line in lines), " */"]
-
-
-def _called_names(texts: Iterable[str]) -> set[str]:
-    return {name for text in texts for name in re.findall(r"(\w+)\(", text)}
 
 
 _LINE_LENGTH = 120
@@ -195,20 +191,14 @@ class _CFile:
         factors = dict.fromkeys((stress, principal_stress, mean_stress), self.units.megapascals)
         factors[time] = self.units.seconds
         self.unit_factors = [factors.get(s, 1.0) for s in (*POINT_VARIABLES, *self.law.states)]
-        self.rate, self.update = self.code.function("rate").with_outputs([0]), self.code.function("update")
+        self.update = self.code.function("update")
 
     def text(self) -> str:
         """The whole file."""
-        functions = [
-            self._rate_function(),
-            self._log_rate_function(),
-            *([self._state_rates_function()] if self.law.states else []),
-        ]
-        helpers = [
-            c_function_definition(name) for name in stable_functions_in([line for body in functions for line in body])
-        ]
+        functions = [self._rate(), self._log_rate(), *([self._state_rates()] if self.law.states else [])]
+        helpers = [c_function_definition(name) for name in stable_functions_in([line for f in functions for line in f])]
         blocks = [
-            self._header(),
+            self._header(functions),
             ["#include <math.h>"],
             ["/* The parameters, for stress as a ratio to 1 MPa and time to 1 s. */", *self._parameters()],
             *([self._state_constants()] if self.law.states else []),
@@ -219,21 +209,16 @@ class _CFile:
 
     # ---- comments --------------------------------------------------------------------------------------------------
 
-    def _header(self) -> list[str]:
-        mentions_floors = any(
-            "log_floor" in line or "floored" in line for line in (*self._rate_function(), *self._log_rate_function())
-        )
+    def _header(self, functions: Sequence[Sequence[str]]) -> list[str]:
         header_lines = [
-            *heading(self.source, mentions_floors=mentions_floors),
+            *heading(self.source, mentions_floors=any("floor" in line for body in functions[:2] for line in body)),
             *self.code.renaming_notes(),
             "A result beyond 1.8e308 is INFINITY.",
         ]
         declared = [
             "",
             "Declarations for the code that calls this file (exported by creepkit; link with -lm):",
-            f"  {self._declaration('double', 'rate')};",
-            f"  {self._declaration('double', 'log_rate', self._derivative_argument())};",
-            *([f"  {self._declaration('void', 'state_rates', *self._state_arguments())};"] if self.law.states else []),
+            *(f"  {declaration};" for _, declaration, *_ in functions),
             f"Slopes are derivatives to {', '.join(map(str, self.arguments))}, in this order.",
         ]
         return c_block_comment([*comment_lines(header_lines, " *", _LINE_LENGTH), *comment_lines(declared, " *")])
@@ -258,81 +243,72 @@ class _CFile:
 
     # ---- the functions ---------------------------------------------------------------------------------------------
 
-    def _rate_function(self) -> list[str]:
+    def _rate(self) -> list[str]:
         labels = [comment_safe(printable_text(label)) for label in self.law.terms]
-        comment = f"/* Rate of equivalent creep strain, 1/{self.units.time}: {' + '.join(labels)}. */"
-        body = [f"return {factor_text(self.units.seconds)}{_factor_operand(self.rate.outputs[0], self.units.seconds)};"]
-        return self._function_definition(comment, self._declaration("double", "rate"), self.rate, body)
+        function = self.code.function("rate").with_outputs([0])
+        comment = f"Rate of equivalent creep strain, 1/{self.units.time}: {' + '.join(labels)}."
+        result = f"return {_product(self.units.seconds, function.outputs[0])};"
+        return self._function_definition(comment, "double", "rate", [], function, [result])
 
-    def _log_rate_function(self) -> list[str]:
-        function = self.update.with_outputs([0, *(self._output_index(0, k) for k in self.input_indices)])
-        comment = f"/* ln of the rate in 1/{self.units.time}, and its derivatives. */"
+    def _log_rate(self) -> list[str]:
+        function = self.update.with_outputs([0, *self._output_indices(0)])
         shift = "" if self.units.seconds == 1 else f"log({self.units.seconds!r}) + "
         body = [
             *self._derivative_lines("slopes", function.outputs[1:], 1.0),
             f"return {shift}{c_expression(function.outputs[0])};",
         ]
+        comment = f"ln of the rate in 1/{self.units.time}, and its derivatives."
         return self._function_definition(
-            comment, self._declaration("double", "log_rate", self._derivative_argument()), function, body
+            comment, "double", "log_rate", [f"double slopes[{len(self.arguments)}]"], function, body
         )
 
-    def _state_rates_function(self) -> list[str]:
-        count, width = len(self.law.states), len(self.input_indices)
-        rows = [self._output_index(row, k) for row in range(1, count + 1) for k in self.input_indices]
-        function = self.update.with_outputs([*range(1, count + 1), *rows])
+    def _state_rates(self) -> list[str]:
+        count, width = len(self.law.states), len(self.arguments)
+        rows = range(1, count + 1)
+        function = self.update.with_outputs([*rows, *(index for row in rows for index in self._output_indices(row))])
         body = []
         for k in range(count):
             derivatives = function.outputs[count + k * width : count + (k + 1) * width]
-            rate = _factor_operand(function.outputs[k], self.units.seconds)
-            body.append(f"rates[{k}] = {factor_text(self.units.seconds)}{rate};")
+            body.append(f"rates[{k}] = {_product(self.units.seconds, function.outputs[k])};")
             body += self._derivative_lines(f"slopes[{k}]", derivatives, self.units.seconds)
-        comment = f"/* Rates of internal variables, 1/{self.units.time}, and their derivatives, a row each. */"
-        return self._function_definition(
-            comment, self._declaration("void", "state_rates", *self._state_arguments()), function, body
-        )
+        comment = f"Rates of internal variables, 1/{self.units.time}, and their derivatives, a row each."
+        outputs = [f"double rates[{count}]", f"double slopes[{count}][{width}]"]
+        return self._function_definition(comment, "void", "state_rates", outputs, function, body)
 
     def _function_definition(
-        self, comment: str, declaration: str, function: CodeFunction, results: Sequence[str]
+        self, comment: str, kind: str, name: str, outputs: Sequence[str], function: CodeFunction, results: Sequence[str]
     ) -> list[str]:
-        logs = [f"const double {ln} = log({plain});" for ln, plain in self.code.logarithms_used(function).items()]
-        unused = [f"(void){s};" for s in self.arguments if s not in function.inputs]
-        body = [*unused, *self._unit_conversions(function), *logs, *c_assignments(function.assignments), *results]
-        return [comment, declaration, "{", *(f"    {line}" for line in body), "}"]
-
-    def _unit_conversions(self, function: CodeFunction) -> list[str]:
-        """Stress and time on entry, in the law's own units."""
-        pairs = [(s, self.unit_factors[k]) for k, s in zip(self.input_indices, self.arguments, strict=True)]
-        return [f"{s} *= {scale!r};" for s, scale in pairs if scale != 1 and s in function.inputs]
+        """Comment, declaration and body; stress and time come in the law's own units from the first statements on."""
+        inputs = [f"double {s}" for s in self.arguments]
+        scales = [(s, self.unit_factors[k]) for k, s in zip(self.input_indices, self.arguments, strict=True)]
+        body = [
+            *(f"(void){s};" for s in self.arguments if s not in function.inputs),
+            *(f"{s} *= {scale!r};" for s, scale in scales if scale != 1 and s in function.inputs),
+            *(f"const double {ln} = log({plain});" for ln, plain in self.code.logarithms_used(function).items()),
+            *c_assignments(function.assignments),
+            *results,
+        ]
+        declaration = f"{kind} {self.prefix}_{name}({', '.join((*inputs, *outputs))})"
+        return [f"/* {comment} */", declaration, "{", *(f"    {line}" for line in body), "}"]
 
     def _derivative_lines(self, target: str, derivatives: Sequence[sympy.Expr], factor: float) -> list[str]:
         """One row of derivatives, to the arguments in the units in which they come."""
         factors = [self.unit_factors[k] * factor for k in self.input_indices]
-        texts = [
-            f"{'' if f == 1 or e == 0 else f'{f!r} * '}{_factor_operand(e, f)}"
-            for f, e in zip(factors, derivatives, strict=True)
+        return [
+            f"{target}[{k}] = {_product(f, e) if e != 0 else c_expression(e)};"
+            for k, (f, e) in enumerate(zip(factors, derivatives, strict=True))
         ]
-        return [f"{target}[{k}] = {text};" for k, text in enumerate(texts)]
 
-    def _output_index(self, row: int, column: int) -> int:
-        """Where a derivative stands in the update entry."""
+    def _output_indices(self, row: int) -> list[int]:
+        """Where the derivatives of a row to the arguments stand in the update entry."""
         rows = 1 + len(self.law.states)
-        return rows + row * (len(POINT_VARIABLES) + rows - 1) + column
-
-    def _declaration(self, kind: str, name: str, *outputs: str) -> str:
-        inputs = [f"double {s}" for s in self.arguments]
-        return f"{kind} {self.prefix}_{name}({', '.join((*inputs, *outputs))})"
-
-    def _derivative_argument(self) -> str:
-        return f"double slopes[{len(self.input_indices)}]"
-
-    def _state_arguments(self) -> tuple[str, str]:
-        count = len(self.law.states)
-        return f"double rates[{count}]", f"double slopes[{count}][{len(self.input_indices)}]"
+        return [rows + row * (len(POINT_VARIABLES) + rows - 1) + column for column in self.input_indices]
 
 
-def _factor_operand(expression: sympy.Expr, factor: float) -> str:
-    """An expression after a factor, in brackets where that is needed."""
-    return f"({c_expression(expression)})" if factor != 1 and expression.is_Add else c_expression(expression)
+def _product(factor: float, expression: sympy.Expr) -> str:
+    """A factor times an expression, which stands in brackets where that is needed."""
+    text = c_expression(expression)
+    return f"{factor_text(factor)}({text})" if factor != 1 and expression.is_Add else f"{factor_text(factor)}{text}"
 
 
 @hookimpl

@@ -7,15 +7,14 @@ an activation energy, LEMAITRE_FO takes UN_SUR_K as a formula of TEMP.
 from __future__ import annotations
 
 import keyword
+from collections.abc import Sequence
 
 import sympy
 
-from creepkit.errors import ExportError
 from creepkit.exporters.creep_forms import (
+    CodeInput,
     CreepForm,
-    card_heading,
     constant_elasticity,
-    creep_forms_of,
     elastic_expressions,
     elasticity_varies,
     exp_in_range,
@@ -25,77 +24,67 @@ from creepkit.exporters.law_code import Identifiers
 from creepkit.hookspecs import hookimpl
 from creepkit.records import Exporter, LawWithValues
 
-_ALTERNATIVE = "export it as 'mfront', which code_aster reads with RELATION='MFRONT'"
-
-
 _FORMULA = "LEMAITRE: rate = (UN_SUR_K s / e^UN_SUR_M)^N, of equivalent stress s and creep strain e."
-
-
-_ENCODING = "# -*- coding: utf-8 -*-"
-"""The first line: the file is Python, which else takes the encoding from what a title or note says (PEP 263)."""
 
 
 _RESERVED = (*keyword.kwlist, "_F", "DEFI_CONSTANTE", "DEFI_MATERIAU", "FORMULE")
 
 
-class CodeAsterMaterial:
+class CodeAsterMaterial(CodeInput):
     """A material for COMPORTEMENT=_F(RELATION='LEMAITRE')."""
 
+    code = "code_aster's LEMAITRE"
+    alternative = "export it as 'mfront', which code_aster reads with RELATION='MFRONT'"
+    marker = "#"
+    first_lines = ("# -*- coding: utf-8 -*-",)
+    """The file is Python, which else takes the encoding from what a title or note says (PEP 263)."""
     serves = ("aster",)
     name = "code_aster"
     title = "code_aster DEFI_MATERIAU with LEMAITRE (and Norton's law as its limit)"
     suffix = ".comm"
 
-    def text(self, source: LawWithValues) -> str:
-        """Return DEFI_MATERIAU, with ELAS where moduli are given, and the formulas that it needs."""
-        form = _lemaitre_form(source, creep_forms_of(source, "code_aster's LEMAITRE", _ALTERNATIVE))
+    def content(self, source: LawWithValues, forms: Sequence[CreepForm]) -> tuple[list[str], list[str]]:
+        """DEFI_MATERIAU, with ELAS where moduli are given, and the formulas that it needs."""
+        form = self._lemaitre_form(source, forms)
         names = Identifiers(_RESERVED, max_length=6)
         requested = source.name or source.law.name
         label = names.unique(requested)
         creep_formulas, creep_keyword = _creep_keyword(source, form, label)
         elastic_formulas, elastic_keywords = _elastic_keywords(source, label)
+        formulas = [*elastic_formulas, *creep_formulas]
         comments = [_FORMULA, "Use it with COMPORTEMENT=_F(RELATION='LEMAITRE')."]
-        comments += (
-            ["TEMP, a variable de commande of the material field, must be in K."]
-            if creep_formulas or elastic_formulas
-            else []
-        )
+        comments += ["TEMP, a variable de commande of the material field, must be in K."] if formulas else []
         call = [f"{label} = DEFI_MATERIAU(", *(f"    {line}," for line in (*elastic_keywords, creep_keyword)), ")"]
-        lines = [_ENCODING, *card_heading(source, "#", [*comments, *names.renaming_notes([requested])])]
-        return "\n".join([*lines, *elastic_formulas, *creep_formulas, *call]) + "\n"
+        return [*comments, *names.renaming_notes([requested])], [*formulas, *call]
 
-
-def _lemaitre_form(source: LawWithValues, forms: tuple[CreepForm, ...]) -> CreepForm:
-    """The one form that LEMAITRE has."""
-    form = forms[0]
-    if len(forms) > 1:
-        reason = f"it is a sum ({' + '.join(f.label for f in forms)})"
-    elif form.stress_function != "power":
-        reason = f"{form.label} is a {form.stress_function} of stress"
-    elif form.time_exponent:
-        reason = f"{form.label} depends on time"
-    elif not (form.n > 0.0 and form.strain_exponent <= 0.0):
-        reason = f"it asks for a positive stress exponent and hardening (n = {form.n:g}, m = {form.strain_exponent:g})"
-    else:
-        return form
-    raise ExportError(f"law '{source.law.name}' is not code_aster's LEMAITRE: {reason}; {_ALTERNATIVE}")
+    def _lemaitre_form(self, source: LawWithValues, forms: Sequence[CreepForm]) -> CreepForm:
+        """The one form that LEMAITRE has."""
+        form = forms[0]
+        if len(forms) > 1:
+            reason = f"it is a sum ({' + '.join(f.label for f in forms)})"
+        elif form.stress_function != "power":
+            reason = f"{form.label} is a {form.stress_function} of stress"
+        elif form.time_exponent:
+            reason = f"{form.label} depends on time"
+        elif not (form.n > 0.0 and form.strain_exponent <= 0.0):
+            exponents = f"n = {form.n:g}, m = {form.strain_exponent:g}"
+            reason = f"it asks for a positive stress exponent and hardening ({exponents})"
+        else:
+            return form
+        raise self.refusal(source, f" is not code_aster's LEMAITRE: {reason}")
 
 
 def _creep_keyword(source: LawWithValues, form: CreepForm, label: str) -> tuple[list[str], str]:
     """Formulas, and the keyword that reads them."""
-    hardening = abs(form.strain_exponent) / form.n
     inverse_K = exp_in_range(form.log_coefficient / form.n, "UN_SUR_K", source)
+    n, K, hardening = map(format_number, (form.n, inverse_K, abs(form.strain_exponent) / form.n))
     if not form.Q:
-        constants = (
-            f"N={format_number(form.n)}, UN_SUR_K={format_number(inverse_K)}, UN_SUR_M={format_number(hardening)}"
-        )
-        return [], f"LEMAITRE=_F({constants})"
-    slope = form.activation_temperature / form.n
-    inverse_K_formula = f"{format_number(inverse_K)} * exp({format_number(-slope)} / TEMP)"
+        return [], f"LEMAITRE=_F(N={n}, UN_SUR_K={K}, UN_SUR_M={hardening})"
+    slope = format_number(-form.activation_temperature / form.n)
     formulas = [
-        f"{label}_N = DEFI_CONSTANTE(VALE={format_number(form.n)})",
-        f"{label}_K = FORMULE(NOM_PARA='TEMP', VALE='{inverse_K_formula}')",
-        f"{label}_M = DEFI_CONSTANTE(VALE={format_number(hardening)})",
+        f"{label}_N = DEFI_CONSTANTE(VALE={n})",
+        f"{label}_K = FORMULE(NOM_PARA='TEMP', VALE='{K} * exp({slope} / TEMP)')",
+        f"{label}_M = DEFI_CONSTANTE(VALE={hardening})",
     ]
     return formulas, f"LEMAITRE_FO=_F(N={label}_N, UN_SUR_K={label}_K, UN_SUR_M={label}_M)"
 

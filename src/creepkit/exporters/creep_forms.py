@@ -8,9 +8,9 @@ code needs besides stands here too: the heading, numbers within a double's range
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import sympy
 
@@ -218,6 +218,33 @@ def card_heading(source: LawWithValues, marker: str, lines: Iterable[str]) -> li
     )
 
 
+class CodeInput:
+    """An exporter of the input text of a code, with the creep laws that the code has built in.
+
+    code : the code, or its law, in words. alternative : what to do where it has no such law. marker : of comments.
+    first_lines : what must stand before the heading.
+    """
+
+    code: ClassVar[str]
+    alternative: ClassVar[str]
+    marker: ClassVar[str]
+    first_lines: ClassVar[tuple[str, ...]] = ()
+
+    def text(self, source: LawWithValues) -> str:
+        """Return heading and input; ExportError, with what to do, where the law is none of the code's."""
+        forms = creep_forms_of(source, self.code, self.alternative)
+        comments, lines = self.content(source, forms)
+        return "\n".join([*self.first_lines, *card_heading(source, self.marker, comments), *lines]) + "\n"
+
+    def content(self, source: LawWithValues, forms: Sequence[CreepForm]) -> tuple[list[str], list[str]]:
+        """Comments on the target's form, and the lines of input."""
+        raise NotImplementedError
+
+    def refusal(self, source: LawWithValues, reason: str) -> ExportError:
+        """The error for a law, why, and what to do."""
+        return ExportError(f"law '{source.law.name}'{reason}; {self.alternative}")
+
+
 def exp_in_range(logarithm: float, quantity: str, source: LawWithValues) -> float:
     """exp(logarithm); ExportError where that is no double."""
     if not -700.0 < logarithm < 700.0:
@@ -272,10 +299,9 @@ def elastic_table(source: LawWithValues, limits: tuple[float, float], step: floa
     limits : K, of the table where no tests are known. step : K.
     """
     elastic = source.elastic
-    if elastic is None:
-        return []
-    if not elasticity_varies(elastic):
-        return [_elastic_constants_at(source, elastic, None)]
+    if elastic is None or not elasticity_varies(elastic):
+        constant = constant_elasticity(source)
+        return [constant] if constant else []
     temperatures = temperature_grid(*temperature_span(source, *limits), step)
     return [_elastic_constants_at(source, elastic.at(T), T) for T in temperatures]
 

@@ -43,29 +43,19 @@ class CreepSubroutine:
     def text(self, source: LawWithValues) -> str:
         """Return the file's text; ExportError where CREEP is not given what the law needs."""
         self._check_inputs(source.law)
-        stem = Identifiers(("creep",), ignore_case=True, max_length=_MAX_STEM_LENGTH).unique(
-            source.name or source.law.name
-        )
+        stems = Identifiers(("creep",), ignore_case=True, max_length=_MAX_STEM_LENGTH)
+        stem = stems.unique(source.name or source.law.name)
         reserved = FORTRAN_RESERVED | {f"{stem}_law"}
         code = LawCode(source, Identifiers(reserved, ignore_case=True, max_length=_MAX_NAME_LENGTH))
         substitutions = self._template_values(code, stem.lower())
-        header_lines = [
-            *heading(code.source, mentions_floors=True),
-            *code.renaming_notes(),
-            "",
-            *self.usage_notes(code),
-        ]
-        templates = [f"{self.name}.f", "increment.f"]
-        if code.states and self.state_template:
-            templates.append(self.state_template)
+        header = heading(code.source, mentions_floors=True)
+        header_lines = [*header, *code.renaming_notes(), "", *self.usage_notes(code)]
+        templates = [f"{self.name}.f", "increment.f", *([self.state_template] if code.states else [])]
+        routines = [Template(_template_text(name)).substitute(substitutions) for name in filter(None, templates)]
         parts = [
-            "\n".join(comment_lines(map(comment_safe, header_lines), "!", 71)),
+            *comment_lines(map(comment_safe, header_lines), "!", 71),
             "!",
-            *(
-                line
-                for name in templates
-                for line in wrapped_lines(Template(_template_text(name)).substitute(substitutions))
-            ),
+            *(line for text in routines for line in wrapped_lines(text)),
             "!",
             "! The law: ln of the rate and each state's rate, 1/s, then their",
             "! derivatives to stress, strain, time, temperature, largest",
@@ -92,13 +82,8 @@ class CreepSubroutine:
     def _template_values(self, code: LawCode, stem: str) -> dict[str, str]:
         law, units = code.law, code.source.units
         states = list(law.states.values())
-        limits = [
-            f"        ends({k}) = {fortran_number(1e308 if s is None else s)}"
-            for k, s in enumerate(_state_limits(law), 1)
-        ]
-        initial = [
-            f"      initial({k}) = {fortran_number(v)}" for k, v in enumerate([0.0, *(s.initial for s in states)], 1)
-        ]
+        starts = [0.0, *(s.initial for s in states)]
+        ends = [1e308, *(1e308 if s.limit is None else s.limit for s in states)]
         return {
             "id": stem,
             "ny": str(1 + len(states)),
@@ -110,8 +95,8 @@ class CreepSubroutine:
             "seconds": fortran_number(units.seconds),
             "stress": units.stress,
             "time": units.time,
-            "limits": "\n".join(limits),
-            "initial": "\n".join(initial),
+            "limits": "\n".join(f"        ends({k}) = {fortran_number(end)}" for k, end in enumerate(ends, 1)),
+            "initial": "\n".join(f"      initial({k}) = {fortran_number(v)}" for k, v in enumerate(starts, 1)),
             **self._state_statements(stem, len(states)),
         }
 
@@ -182,10 +167,6 @@ def _time_notes(code: LawCode) -> Iterator[str]:
         yield "Time is the total time, TIME(2), less t_first below: set t_first where loading is not at time zero."
     if code.law.uses(temperature):
         yield "TEMP is taken as K; set to_kelvin = 273.15d0 below where it is in C."
-
-
-def _state_limits(law: CreepLaw) -> list[float | None]:
-    return [None, *(state.limit for state in law.states.values())]
 
 
 def _template_text(name: str) -> str:

@@ -13,7 +13,7 @@ import sympy
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanFunction
 
-from creepkit.exporters.law_code import LawCode
+from creepkit.exporters.law_code import LawCode, called_names
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
 from creepkit.language.symbols import POINT_VARIABLES
 
@@ -122,122 +122,69 @@ def double_declarations(names: Sequence[str]) -> list[str]:
 
 
 def stable_function_definitions(names_called: Iterable[str]) -> list[str]:
-    """Internal functions, as statements: those called and those they need in turn."""
-    required: dict[str, None] = {}
+    """Internal functions, as statements: those called, each after those it calls in turn."""
+    required: dict[str, list[str]] = {}
 
     def require(name: str) -> None:
-        for other in _FUNCTION_CALLS.get(name, ()):
-            require(other)
-        required[name] = None
+        definition = _function_definition(name)
+        for other in called_names(definition):
+            if other in _FUNCTIONS and other != name:
+                require(other)
+        required.setdefault(name, definition)
 
-    for name in sorted(set(names_called) & _FUNCTION_BODIES.keys()):
+    for name in sorted({*names_called} & _FUNCTIONS.keys()):
         require(name)
-    return [line for name in required for line in _function_definition(name)]
-
-
-def called_names(texts: Iterable[str]) -> set[str]:
-    """The names that statements call."""
-    return {name for text in texts for name in re.findall(r"(\w+)\(", text)}
+    return [line for definition in required.values() for line in definition]
 
 
 def _function_definition(name: str) -> list[str]:
-    arguments, locals_, body = _FUNCTION_BODIES[name]
-    logical = name in ("both", "either")
-    kind = "logical" if logical else "double precision"
+    signature, *assignments, result = _FUNCTIONS[name]
+    kind = "logical" if name in ("both", "either") else "double precision"
+    if isinstance(result, str):
+        body = [f"{name} = {result}"]
+    else:
+        condition, where_true, otherwise = result
+        body = [f"if ({condition}) then", f"  {name} = {where_true}", "else", f"  {name} = {otherwise}", "endif"]
     return [
-        f"pure {kind} function {name}({arguments})",
-        f"  {kind}, intent(in) :: {arguments}",
-        *([f"  double precision {locals_}"] if locals_ else []),
+        f"pure {kind} function {name}({signature})",
+        f"  {kind}, intent(in) :: {signature}",
+        *(f"  double precision {variable}" for variable, _ in assignments),
+        *(f"  {variable} = {value}" for variable, value in assignments),
         *(f"  {line}" for line in body),
         f"end function {name}",
     ]
 
 
-_FUNCTION_BODIES: dict[str, tuple[str, str, tuple[str, ...]]] = {
-    "power": ("a, b", "", ("power = a**b",)),
-    "square": ("a", "", ("square = a*a",)),
-    "both": ("a, b", "", ("both = a .and. b",)),
-    "either": ("a, b", "", ("either = a .or. b",)),
-    "larger": ("a, b", "", ("larger = merge(a, b, a >= b .or. a /= a)",)),
-    "smaller": ("a, b", "", ("smaller = merge(a, b, a <= b .or. a /= a)",)),
-    "heaviside": ("a", "", ("heaviside = merge(1.0d0, 0.0d0, a > 0.0d0)",)),
-    "floored": ("a, least", "", ("floored = merge(least, a, a < least)",)),
-    "log_floor": ("a, least", "", ("log_floor = log(merge(least, a, a < least))",)),
-    "expm1": (
-        "a",
-        "",
-        (
-            "if (abs(a) < 1.0d0) then",
-            "  expm1 = 2.0d0*sinh(0.5d0*a)*exp(0.5d0*a)",
-            "else",
-            "  expm1 = exp(min(a, 709.0d0)) - 1.0d0",
-            "endif",
-        ),
-    ),
-    "log1p": (
-        "a",
-        "",
-        (
-            "if (abs(a) < 0.5d0) then",
-            "  log1p = 2.0d0*atanh(a/(2.0d0 + a))",
-            "else",
-            "  log1p = log(1.0d0 + a)",
-            "endif",
-        ),
-    ),
-    "log_sinh": ("a", "b", ("b = max(a, 1.0d-30)", "log_sinh = b + log(-0.5d0*expm1(-2.0d0*b))")),
+_NOT_ZERO = ("b", "max(a, 1.0d-30)")
+
+
+_FUNCTIONS: dict[str, Any] = {
+    "power": ("a, b", "a**b"),
+    "square": ("a", "a*a"),
+    "both": ("a, b", "a .and. b"),
+    "either": ("a, b", "a .or. b"),
+    "larger": ("a, b", "merge(a, b, a >= b .or. a /= a)"),
+    "smaller": ("a, b", "merge(a, b, a <= b .or. a /= a)"),
+    "heaviside": ("a", "merge(1.0d0, 0.0d0, a > 0.0d0)"),
+    "floored": ("a, least", "merge(least, a, a < least)"),
+    "log_floor": ("a, least", "log(merge(least, a, a < least))"),
+    "expm1": ("a", ("abs(a) < 1.0d0", "2.0d0*sinh(0.5d0*a)*exp(0.5d0*a)", "exp(min(a, 709.0d0)) - 1.0d0")),
+    "log1p": ("a", ("abs(a) < 0.5d0", "2.0d0*atanh(a/(2.0d0 + a))", "log(1.0d0 + a)")),
+    "log_sinh": ("a", _NOT_ZERO, "b + log(-0.5d0*expm1(-2.0d0*b))"),
     "log_cosh": (
-        "a",
-        "b",
-        (
-            "b = abs(a)",
-            "if (b < 1.0d0) then",
-            "  log_cosh = log1p(2.0d0*sinh(0.5d0*b)**2)",
-            "else",
-            "  log_cosh = b + log1p(exp(-2.0d0*b)) - log(2.0d0)",
-            "endif",
-        ),
+        *("a", ("b", "abs(a)")),
+        ("b < 1.0d0", "log1p(2.0d0*sinh(0.5d0*b)**2)", "b + log1p(exp(-2.0d0*b)) - log(2.0d0)"),
     ),
-    "log_rise": (
-        "a",
-        "b",
-        (
-            "b = max(a, 1.0d-30)",
-            "if (b > log(2.0d0)) then",
-            "  log_rise = log1p(-exp(-b))",
-            "else",
-            "  log_rise = log(-expm1(-b))",
-            "endif",
-        ),
-    ),
-    "log_tanh": ("a", "b", ("b = max(a, 1.0d-30)", "log_tanh = log_rise(2.0d0*b) - log1p(exp(-2.0d0*b))")),
-    "coth": ("a", "", ("coth = 1.0d0/tanh(max(a, 1.0d-30))",)),
-    "exp_difference": (
-        "a, b",
-        "",
-        (
-            "if (a >= b) then",
-            "  exp_difference = -exp(a)*expm1(b - a)",
-            "else",
-            "  exp_difference = exp(b)*expm1(a - b)",
-            "endif",
-        ),
-    ),
+    "log_rise": ("a", _NOT_ZERO, ("b > log(2.0d0)", "log1p(-exp(-b))", "log(-expm1(-b))")),
+    "log_tanh": ("a", _NOT_ZERO, "log_rise(2.0d0*b) - log1p(exp(-2.0d0*b))"),
+    "coth": ("a", "1.0d0/tanh(max(a, 1.0d-30))"),
+    "exp_difference": ("a, b", ("a >= b", "-exp(a)*expm1(b - a)", "exp(b)*expm1(a - b)")),
 }
-"""{name: (arguments, local variables, statements)}; the formulas are those of kernels.scalar_functions.
+"""{name: (arguments, (variable, value) ..., result)}, a result as a text or as (condition, where it holds, otherwise).
 
-Fortran has neither log1p nor expm1: 2 artanh(a/(2 + a)) and 2 sinh(a/2) exp(a/2) keep all digits near zero, whatever
-an optimiser does to sums.
+The formulas are those of kernels.scalar_functions. Fortran has neither log1p nor expm1: 2 artanh(a/(2 + a)) and
+2 sinh(a/2) exp(a/2) keep all digits near zero, whatever an optimiser does to sums.
 """
-
-
-_FUNCTION_CALLS = {
-    "log_sinh": ("expm1",),
-    "log_cosh": ("log1p",),
-    "log_rise": ("log1p", "expm1"),
-    "log_tanh": ("log_rise", "log1p"),
-    "exp_difference": ("expm1",),
-}
 
 
 def law_subroutine(code: LawCode, name: str) -> list[str]:
@@ -253,8 +200,7 @@ def law_subroutine(code: LawCode, name: str) -> list[str]:
     results = [f"out({k + 1}) = {fortran_expression(e)}" for k, e in enumerate(function.outputs)]
     input_positions = {s: k + 1 for k, s in enumerate((*code.point, *code.states))}
     input_lines = [f"{s} = x({input_positions[s]})" for s in function.inputs]
-    used_symbols = set().union(*(e.free_symbols for e in (*(e for _, e in function.assignments), *function.outputs)))
-    parameters_used = [s for s in code.parameters if s in used_symbols or s in logs.values()]
+    parameters_used = [s for s in code.parameters if s in function.symbols or s in logs.values()]
     logical_names = [str(s) for s, e in function.assignments if isinstance(e, (Relational, BooleanFunction))]
     variables = [
         str(s) for s in (*function.inputs, *logs, *(s for s, _ in function.assignments)) if str(s) not in logical_names

@@ -15,8 +15,8 @@ from typing import Any
 
 import sympy
 
-from creepkit.exporters.c import STABLE_FUNCTIONS, CPrinter, stable_functions_in
-from creepkit.exporters.law_code import Assignments, CodeFunction, Identifiers, LawCode
+from creepkit.exporters.c import STABLE_FUNCTIONS, c_assignments, c_expression, stable_functions_in
+from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
 from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS
@@ -117,7 +117,8 @@ class _JavaScriptLaw:
     def text(self) -> str:
         """The text up to what sets a module apart from an expression."""
         kernel = self._kernel()
-        functions = [_function_definition(name) for name in stable_functions_in(kernel)]
+        called = {name: STABLE_FUNCTIONS[name] for name in stable_functions_in(kernel)}
+        functions = [f"const {name} = ({', '.join(inputs)}) => {result};" for name, (inputs, result) in called.items()]
         if any("erf(" in line for line in kernel):
             functions.append(_ERROR_FUNCTION)
         code = "\n".join([*functions, *kernel])
@@ -127,7 +128,7 @@ class _JavaScriptLaw:
         blocks = [
             "\n".join(self._header(kernel)),
             *(["\n".join(imports)] if imports else []),
-            f"const law = {_json_text(self._description())};",
+            f"const law = Object.freeze({script_safe_json(self._description(), indent=2)});",
             *functions,
             "\n".join(kernel),
             _template(),
@@ -171,24 +172,26 @@ class _JavaScriptLaw:
 
     def _kernel(self) -> list[str]:
         """The function that makes the law's functions for given values of the parameters."""
-        code, width = self.code, len(POINT_VARIABLES) + len(self.law.states)
-        functions = {name: code.function(entry) for name, entry in _ENTRIES.items()}
+        code = self.code
+        places = {symbol: f"point[{k}]" for k, symbol in enumerate((*code.point, *code.states))}
+        closures = {name: _closure(name, code.function(entry), places) for name, entry in _ENTRIES.items()}
         labels = [f"// {_comment_safe(printable_text(label))}" for label in self.law.terms]
-        lines = [
-            f"/** Functions of the law at values of its parameters, in their order; points have {width} numbers. */",
+        return [
+            "/** Functions of the law at values of its parameters, in their order; "
+            f"points have {len(places)} numbers. */",
             "function kernel(values) {",
             *([f"  const [{', '.join(map(str, code.parameters))}] = values;"] if code.parameters else []),
             *(f"  const {ln} = log({symbol});" for ln, symbol in code.logarithms.items()),
             "",
             "  // rate, then rates of internal variables",
-            *_closure("rates", functions["rates"], self._inputs()),
+            *closures["rates"],
             "",
             "  // the rate of each term:",
             *(f"  {label}" for label in labels),
-            *_closure("terms", functions["terms"], self._inputs()),
+            *closures["terms"],
             "",
             "  // ln of the rate, rates of internal variables, then the derivatives of each to the point, row by row",
-            *_closure("update", functions["update"], self._inputs()),
+            *closures["update"],
             "",
             "  // exponent of time in strain ~ t^b as t -> 0+ from a virgin state at constant stress",
             *self._leading_exponent(),
@@ -196,17 +199,12 @@ class _JavaScriptLaw:
             "  return { rates, terms, update, leadingExponent };",
             "}",
         ]
-        return lines
-
-    def _inputs(self) -> dict[sympy.Symbol, str]:
-        """{symbol: where it stands in a point}."""
-        return {symbol: f"point[{k}]" for k, symbol in enumerate((*self.code.point, *self.code.states))}
 
     def _leading_exponent(self) -> list[str]:
         exponents = []
         for (time, strain), coefficients in self.code.leading_exponents():
             active = " && ".join(f"{symbol} !== 0.0" for symbol in coefficients) or "true"
-            pair = f"{_expression(time)}, {_expression(strain)}"
+            pair = f"{c_expression(time)}, {c_expression(strain)}"
             exponents.append(f"    [{active}, {pair}],")
         return [
             "  const exponents = [",
@@ -216,47 +214,26 @@ class _JavaScriptLaw:
         ]
 
 
-class JavaScriptPrinter(CPrinter):
-    """Print lowered expressions as JavaScript: the operators are those of C."""
-
-
-_PRINTER = JavaScriptPrinter({"standard": "python3"})
-
-
-def _expression(expression: sympy.Basic) -> str:
-    return str(_PRINTER.doprint(expression))
-
-
-def _definitions(assignments: Assignments, indent: str) -> list[str]:
-    return [f"{indent}const {symbol} = {_expression(expression)};" for symbol, expression in assignments]
-
-
 def _closure(name: str, function: CodeFunction, places: dict[sympy.Symbol, str]) -> list[str]:
     """A function of `point` that writes into `out`; what depends on the parameters alone is worked out once."""
     varying: set[sympy.Basic] = {*function.inputs}
-    constants, steps = [], []
+    constants: list[tuple[sympy.Symbol, sympy.Expr]] = []
+    steps: list[tuple[sympy.Symbol, sympy.Expr]] = []
     for symbol, expression in function.assignments:
-        if expression.free_symbols & varying:
-            varying.add(symbol)
-            steps.append((symbol, expression))
-        else:
-            constants.append((symbol, expression))
+        varies = not varying.isdisjoint(expression.free_symbols)
+        varying |= {symbol} if varies else set()
+        (steps if varies else constants).append((symbol, expression))
     return [
         f"  let {name};",
         "  {",
-        *_definitions(tuple(constants), "    "),
+        *(f"    {line}" for line in c_assignments(constants, "const")),
         f"    {name} = (point, out) => {{",
         *(f"      const {symbol} = {places[symbol]};" for symbol in function.inputs),
-        *_definitions(tuple(steps), "      "),
-        *(f"      out[{k}] = {_expression(output)};" for k, output in enumerate(function.outputs)),
+        *(f"      {line}" for line in c_assignments(steps, "const")),
+        *(f"      out[{k}] = {c_expression(output)};" for k, output in enumerate(function.outputs)),
         "    };",
         "  }",
     ]
-
-
-def _function_definition(name: str) -> str:
-    arguments, result = STABLE_FUNCTIONS[name]
-    return f"const {name} = ({', '.join(arguments)}) => {result};"
 
 
 def _comment_safe(text: str) -> str:
@@ -268,10 +245,6 @@ def script_safe_json(value: Any, indent: int | None = None) -> str:
     """A value as JSON that ends no script element of a page, and holds no other than ASCII characters."""
     text = json.dumps(value, allow_nan=False, indent=indent)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def _json_text(value: Any) -> str:
-    return f"Object.freeze({script_safe_json(value, indent=2)})"
 
 
 @cache

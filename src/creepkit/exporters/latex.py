@@ -74,22 +74,16 @@ def _align_environment(rows: Sequence[str]) -> list[str]:
 
 
 def _value_table(source: LawWithValues, converted_values: ConvertedValues, printer: LatexLawPrinter) -> list[str]:
-    rows = [
-        (f"{printer.doprint(row.symbol)}{'(0)' if row.is_initial else ''}", row.meaning, row.value, row.unit)
-        for row in parameter_rows(source, converted_values)
-    ]
-    return [
-        r"\begin{tabular}{llll}",
-        r"  \hline",
-        r"  Symbol & Meaning & Value & Unit \\",
-        r"  \hline",
-        *(
-            rf"  ${name}$ & {latex_escaped(meaning)} & ${latex_number(value)}$ & {latex_unit(u)} \\"
-            for name, meaning, value, u in rows
-        ),
-        r"  \hline",
-        r"\end{tabular}",
-    ]
+    rows = []
+    for row in parameter_rows(source, converted_values):
+        symbol, value = f"${_row_symbol(row, printer)}$", f"${latex_number(row.value)}$"
+        rows.append(rf"  {symbol} & {latex_escaped(row.meaning)} & {value} & {latex_unit(row.unit)} \\")
+    heads = r"  Symbol & Meaning & Value & Unit \\"
+    return [r"\begin{tabular}{llll}", r"  \hline", heads, r"  \hline", *rows, r"  \hline", r"\end{tabular}"]
+
+
+def _row_symbol(row: ParameterRow, printer: LatexLawPrinter) -> str:
+    return f"{printer.doprint(row.symbol)}{'(0)' if row.is_initial else ''}"
 
 
 def latex_escaped(text: str) -> str:
@@ -207,10 +201,8 @@ def markdown_escaped(text: str) -> str:
 
 
 def _markdown_row(row: ParameterRow, printer: LatexLawPrinter) -> str:
-    symbol = f"{printer.doprint(row.symbol)}{'(0)' if row.is_initial else ''}"
-    return (
-        f"| ${symbol}$ | {markdown_escaped(row.meaning)} | ${latex_number(row.value)}$ | {markdown_escaped(row.unit)} |"
-    )
+    cells = (f"${_row_symbol(row, printer)}$", markdown_escaped(row.meaning), f"${latex_number(row.value)}$")
+    return f"| {' | '.join(cells)} | {markdown_escaped(row.unit)} |"
 
 
 def _markdown_section(title: str, items: Sequence[str]) -> list[str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import sympy
@@ -18,7 +18,6 @@ import sympy
 from creepkit.errors import ExportError, LawError
 from creepkit.kernels.log_form import leading_exponents
 from creepkit.kernels.symbolic_kernel import KernelFunction, SymbolicKernel, symbolic_kernel
-from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import LawWithValues
 
@@ -39,11 +38,8 @@ class Identifiers:
     def unique(self, requested: str) -> str:
         """The identifier for a requested name: itself where the language allows it and it is free."""
         ascii_name = unicodedata.normalize("NFKD", requested).encode("ascii", "ignore").decode()
-        stem = (
-            ascii_name
-            if re.fullmatch(r"[A-Za-z]\w*", ascii_name)
-            else re.sub(r"\W+", "_", ascii_name).strip("_") or "unnamed"
-        )
+        is_identifier = re.fullmatch(r"[A-Za-z]\w*", ascii_name)
+        stem = ascii_name if is_identifier else re.sub(r"\W+", "_", ascii_name).strip("_") or "unnamed"
         stem = (stem if stem[0].isalpha() else f"x_{stem}")[: self._max_length]
         candidate, count = stem, 1
         while self._normalise(candidate) in self._taken:
@@ -68,6 +64,11 @@ def factor_text(factor: float) -> str:
     return "" if factor == 1 else f"{factor!r} * "
 
 
+def called_names(texts: Iterable[str]) -> dict[str, None]:
+    """The names that texts call as functions, in order, each once."""
+    return {name: None for text in texts for name in re.findall(r"(\w+)\(", text)}
+
+
 Assignments = tuple[tuple[sympy.Symbol, sympy.Expr], ...]
 
 
@@ -85,6 +86,11 @@ class CodeFunction:
     inputs: tuple[sympy.Symbol, ...]
     assignments: Assignments
     outputs: tuple[sympy.Expr, ...]
+
+    @property
+    def symbols(self) -> set[sympy.Basic]:
+        """Every symbol that an assignment or an output reads."""
+        return set().union(*(e.free_symbols for e in (*(e for _, e in self.assignments), *self.outputs)))
 
     def with_outputs(self, indices: Sequence[int]) -> CodeFunction:
         """The same for some of its outputs, with the assignments that those need."""
@@ -126,13 +132,8 @@ class LawCode:
         self._symbols: dict[sympy.Symbol, sympy.Symbol] = {}
         inputs, size = self._lowered.rate.inputs, len(POINT_VARIABLES) + len(self.law.states)
         requested = [(target_names or {}).get(s.name, s.name) for s in (*POINT_VARIABLES, *self.law.states)]
-        input_symbols = [
-            self._new_symbol(symbol, name_requested) for symbol, name_requested in zip(inputs, requested, strict=False)
-        ]
-        self.point, self.states = (
-            tuple(input_symbols[: len(POINT_VARIABLES)]),
-            tuple(input_symbols[len(POINT_VARIABLES) :]),
-        )
+        symbols = [self._new_symbol(symbol, name) for symbol, name in zip(inputs, requested, strict=False)]
+        self.point, self.states = tuple(symbols[: len(POINT_VARIABLES)]), tuple(symbols[len(POINT_VARIABLES) :])
         self.parameters: dict[sympy.Symbol, float] = {}
         self.logarithms: dict[sympy.Symbol, sympy.Symbol] = {}
         for theta, (name, param) in zip(inputs[size:], self.law.table.items(), strict=True):
@@ -154,16 +155,9 @@ class LawCode:
 
         Taken at 100 MPa and 1000 K where it varies with the point, as integrators do.
         """
-        point_values = _reference_point(self.law)
-        values = {s: self.source.values[s.name] for s in self.law.params}
-        logs = {ln: sympy.log(values[s]) for s, ln in self._lowered.form.logs.items()}
-        exponents_found = []
-        for time, strain in leading_exponents(self._lowered.form):
-            time_exponent, strain_exponent = (
-                float(e.subs(logs).subs(values).subs(point_values)) for e in (time, strain)
-            )
-            exponents_found.append((1.0 + time_exponent) / (1.0 - strain_exponent))
-        return min(exponents_found)
+        values = {ln: sympy.log(self.parameters[symbol]) for ln, symbol in self.logarithms.items()} | self.parameters
+        pairs = [[float(e.subs(values)) for e in exponents] for exponents, _ in self.leading_exponents()]
+        return min((1.0 + time) / (1.0 - strain) for time, strain in pairs)
 
     def leading_exponents(self) -> list[tuple[tuple[sympy.Expr, sympy.Expr], tuple[sympy.Symbol, ...]]]:
         """For each term the exponents of time and of strain at t -> 0+, and its coefficients: zero switches it off.
@@ -177,7 +171,9 @@ class LawCode:
         renamed: dict[sympy.Basic, sympy.Basic] = {
             theta: of_logs.get(symbol, symbol) for theta, symbol in zip(form.theta, symbols, strict=True)
         }
-        renamed |= {s: sympy.Float(value) for s, value in _reference_point(self.law).items()}
+        point = dict(zip(POINT_VARIABLES, (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0), strict=True))
+        virgin = point | {symbol: state.initial for symbol, state in self.law.states.items()}
+        renamed |= {s: sympy.Float(value) for s, value in virgin.items()}
         return [
             ((time.xreplace(renamed), strain.xreplace(renamed)), tuple(symbols[k] for k in coefficients))
             for (time, strain), coefficients in zip(leading_exponents(form), form.coefficients, strict=True)
@@ -202,23 +198,14 @@ class LawCode:
             for s, e in assignments
             if self._symbols[s] not in self.parameters
         }
-        results = tuple(e.xreplace(self._symbols) for e in outputs)
-        used = set().union(*(e.free_symbols for e in (*definitions.values(), *results)))
-        inputs = tuple(s for s in (*self.point, *self.states) if s in used)
-        return CodeFunction(inputs, tuple(definitions.items()), results)
+        full = CodeFunction((), tuple(definitions.items()), tuple(e.xreplace(self._symbols) for e in outputs))
+        return replace(full, inputs=tuple(s for s in (*self.point, *self.states) if s in full.symbols))
 
     def logarithms_used(self, function: CodeFunction) -> dict[sympy.Symbol, sympy.Symbol]:
         """The logarithms of parameters that a function reads: {ln_A: A}."""
-        used = set().union(*(e.free_symbols for e in (*(e for _, e in function.assignments), *function.outputs)))
-        return {ln: symbol for ln, symbol in self.logarithms.items() if ln in used}
+        return {ln: symbol for ln, symbol in self.logarithms.items() if ln in function.symbols}
 
     def renaming_notes(self) -> list[str]:
         """One line for each name of the author's that the target could not keep."""
         original_names = {*self.law.names, *(s.name for s in (*POINT_VARIABLES, *self.law.states))}
         return self.identifiers.renaming_notes(original_names)
-
-
-def _reference_point(law: CreepLaw) -> dict[sympy.Symbol, float]:
-    """Where exponents that vary with the point are taken: virgin material at 100 MPa and 1000 K."""
-    values = dict(zip(POINT_VARIABLES, (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0), strict=True))
-    return values | {symbol: state.initial for symbol, state in law.states.items()}

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import sympy
 
-from creepkit.exporters.homogeneity import degree
-from creepkit.exporters.unit_conversion import ConvertedValues, reference_sentence
+from creepkit.exporters.unit_conversion import ConvertedValues, coefficient_unit, reference_sentence
 from creepkit.kernels.log_form import FLOOR, TIME_FLOOR
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import expression_text
-from creepkit.language.symbols import GAS_CONSTANT, mean_stress, principal_stress, strain, stress, temperature, time
-from creepkit.language.temperature_factors import rate_coefficients
+from creepkit.language.symbols import GAS_CONSTANT, temperature
 from creepkit.records import LawWithValues, Units
-
-STRESSES = (stress, principal_stress, mean_stress)
-POINT_VARIABLES = (*STRESSES, strain, time, temperature)
 
 
 def heading(source: LawWithValues, *, units: str = "", mentions_floors: bool = False) -> Iterator[str]:
@@ -72,52 +67,6 @@ def parameter_lines(law: CreepLaw, values: Mapping[str, float]) -> Iterator[str]
         absolute = coefficient_unit(law, name)
         absolute = f" ({absolute} for stress in MPa and time in s)" if absolute else ""
         yield f"  {name} = {values[name]!r}{unit}, {param.meaning}{absolute}"
-
-
-def coefficient_unit(law: CreepLaw, name: str) -> str:
-    """The unit of a rate coefficient where stress and time are no ratios, such as MPa^-n s^-1.
-
-    Empty where it is 1/s all the same, as in a law of (stress/s_0)^n, and where no such unit exists, as for an exponent
-    that depends on temperature.
-    """
-    symbol = next(one for one in law.params if one.name == name)
-    rates = [*law.terms.values(), *(state.rate for state in law.states.values())]
-    rates = [rate for rate in rates if symbol in rate_coefficients(law, rate)]
-    if law.params[symbol].unit != "1/s" or not rates:
-        return ""
-    powers = {(_power(law, rate, STRESSES, "MPa"), _power(law, rate, (time,), "s")) for rate in rates}
-    of_stress, of_time = powers.pop()
-    if powers or of_stress is None or of_time is None or of_stress == of_time == 0:
-        return ""
-    parts = [_unit_with_power("MPa", -of_stress), _unit_with_power("s", -of_time - 1)]
-    return " ".join(part for part in parts if part)
-
-
-def _power(law: CreepLaw, rate: sympy.Expr, variables: Sequence[sympy.Symbol], unit: str) -> sympy.Expr | None:
-    """The power of a unit by which a rate grows when its variables and parameters change; None where there is none.
-
-    A rate coefficient has no part in it: the unit asked for is its own.
-    """
-    coefficients = rate_coefficients(law, rate)
-    powers = {unit: 1, f"1/{unit}": -1}
-    scaled = dict.fromkeys(variables, 1) | {
-        symbol: powers[param.unit]
-        for symbol, param in law.params.items()
-        if param.unit in powers and symbol not in coefficients
-    }
-    power = degree(rate, scaled)
-    return None if power is None or power.free_symbols & {*POINT_VARIABLES, *law.states} else power
-
-
-def _unit_with_power(unit: str, power: sympy.Expr) -> str:
-    power = sympy.expand(power)
-    if power == 0:
-        return ""
-    if power == 1:
-        return unit
-    negative = power.could_extract_minus_sign()
-    text = expression_text(-power if negative else power)
-    return f"{unit}^{'-' if negative else ''}{text if text.isidentifier() or text.isdecimal() else f'({text})'}"
 
 
 def comment_lines(lines: Iterable[str], marker: str, width: int = 0) -> list[str]:

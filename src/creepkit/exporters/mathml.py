@@ -119,15 +119,9 @@ class MathmlPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
         is_negative = activation.Q.could_extract_minus_sign()
         energy = self._node("mfrac", self._print(-activation.Q if is_negative else activation.Q), self._leaf("mi", "R"))
         reference = self._node("mrow", self._leaf("mn", f"{activation.T_ref:g}"), self._leaf("mtext", "\u00a0K"))
-        ones = [self._leaf("mn", "1") for _ in range(2)]
-        difference = self._node(
-            "mrow",
-            self._leaf("mo", "("),
-            self._node("mfrac", ones[0], self._leaf("mi", "T")),
-            self._leaf("mo", "−"),
-            self._node("mfrac", ones[1], reference),
-            self._leaf("mo", ")"),
-        )
+        warm, at_reference = (self._node("mfrac", self._leaf("mn", "1"), T) for T in (self._leaf("mi", "T"), reference))
+        opening, minus, closing = (self._leaf("mo", sign) for sign in "(−)")
+        difference = self._node("mrow", opening, warm, minus, at_reference, closing)
         sign = [] if is_negative else [self._leaf("mo", "−")]
         return self._exponential(self._node("mrow", *sign, energy, difference))
 
@@ -187,22 +181,14 @@ def _equation_block(left: str, summands: Sequence[str]) -> str:
     return _math_element(f'<mtable displaystyle="true">{"".join(rows)}</mtable>', ' display="block"')
 
 
-def symbol_element(symbol: sympy.Basic) -> str:
-    """A symbol within a line of text, as a <math> element."""
-    return _math_element(f"<mrow>{MathmlPrinter().doprint(symbol)}</mrow>")
-
-
 def _math_element(content: str, attributes: str = "") -> str:
     return f'<math xmlns="{MATHML_NAMESPACE}"{attributes}>{content}</math>'
 
 
 def _html_row(row: ParameterRow, printer: MathmlPrinter) -> str:
     initial = "<mo>(</mo><mn>0</mn><mo>)</mo>" if row.is_initial else ""
-    symbol, value = (
-        _math_element(f"<mrow>{printer.doprint(row.symbol)}{initial}</mrow>"),
-        _math_element(_mathml_number(row.value)),
-    )
-    cells = (symbol, _xml_escaped(row.meaning), value, _xml_escaped(row.unit))
+    symbol = _math_element(f"<mrow>{printer.doprint(row.symbol)}{initial}</mrow>")
+    cells = (symbol, _xml_escaped(row.meaning), _math_element(_mathml_number(row.value)), _xml_escaped(row.unit))
     return f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
 

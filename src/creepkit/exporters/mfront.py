@@ -73,29 +73,14 @@ class IntegratorBlock:
         self.states = identifiers.unique_names(s.name for s in reduced.law.states)
         target_names = {s.name: f"{s.name}_now" for s in (*POINT_VARIABLES, *reduced.law.states)}
         self.code = LawCode(reduced, identifiers, target_names)
-        self.source = self.code.source
-        self._law, self._units = self.source.law, self.source.units
-
-    @property
-    def needs_time(self) -> bool:
-        """Whether the law reads the time."""
-        return self._law.uses(time)
-
-    @property
-    def needs_strain(self) -> bool:
-        """Whether the law reads the creep strain."""
-        return self._law.uses(strain)
+        self.source, self.law, self._units = self.code.source, self.code.law, source.units
 
     def renaming_notes(self) -> list[str]:
         """One line for each name of the author's that MFront cannot keep."""
-        state_names = dict(zip((s.name for s in self._law.states), self.states, strict=True))
-        notes = [f"'{old}' is called {new} here" for old, new in state_names.items() if old != new]
-        variables = {*self._law.names, *(s.name for s in POINT_VARIABLES)}
+        pairs = zip(self.law.states, self.states, strict=True)
+        notes = [f"'{old}' is called {new} here" for old, new in pairs if old.name != new]
+        variables = {*self.law.names, *(s.name for s in POINT_VARIABLES)}
         return [*notes, *(line for line in self.code.identifiers.renaming_notes(variables) if line not in notes)]
-
-    def stable_functions(self) -> list[str]:
-        """The stable functions that the law calls."""
-        return stable_functions_in(self.rate_lines())
 
     # ---- the statements --------------------------------------------------------------------------------------------
 
@@ -107,9 +92,9 @@ class IntegratorBlock:
             "const Stensor flow = 3 * deviator(sig) * inverse_seq / 2;",
             "const auto shear = computeMu(young, nu);",
         ]
-        if self._law.uses(principal_stress) or self._law.uses(mean_stress):
+        if self.law.uses(principal_stress) or self.law.uses(mean_stress):
             lines.append("const auto lame = computeLambda(young, nu);")
-        if self._law.uses(principal_stress):
+        if self.law.uses(principal_stress):
             lines += [
                 "tfel::math::tvector<3u, stress> values;",
                 "tfel::math::tmatrix<3u, 3u, real> axes;",
@@ -132,43 +117,26 @@ class IntegratorBlock:
             principal_stress: f"{megapascals}values[first]",
             mean_stress: f"{megapascals}trace(sig) / 3",
         }
-        pairs = list(zip(self.code.point, POINT_VARIABLES, strict=True))
-        lines = [
-            f"const real {symbol} = {texts[variable]};"
-            for symbol, variable in pairs
-            if symbol in self._update_function.inputs
-        ]
-        internal_variables = zip(self.code.states, self.states, self._law.states.values(), strict=True)
-        for symbol, name, state in internal_variables:
-            start = f"{state.initial!r} + " if state.initial else ""
-            lines += (
-                [f"const real {symbol} = {start}{name} + theta * d{name};"]
-                if symbol in self._update_function.inputs
-                else []
-            )
-        return lines
+        values = {symbol: texts[variable] for symbol, variable in zip(self.code.point, POINT_VARIABLES, strict=True)}
+        for symbol, name, state in zip(self.code.states, self.states, self.law.states.values(), strict=True):
+            values[symbol] = f"{f'{state.initial!r} + ' if state.initial else ''}{name} + theta * d{name}"
+        return [f"const real {s} = {text};" for s, text in values.items() if s in self._update_function.inputs]
 
     def rate_lines(self) -> list[str]:
         """The rate and each internal variable's, per unit of time, and what they change with."""
         code, update, time_factor = self.code, self._update_function, self._units.seconds
         logs = [f"const real {ln} = log({plain});" for ln, plain in code.logarithms_used(update).items()]
         lines = [*logs, *c_assignments(update.assignments, "const real")]
-        lines.append(f"const real rate = {factor_text(time_factor)}exp({c_expression(update.outputs[0])});")
-        for row, name in enumerate(self._rate_names[1:], 1):
-            lines.append(f"const real {name} = {factor_text(time_factor)}({c_expression(update.outputs[row])});")
         for row, name in enumerate(self._rate_names):
+            text = f"{'' if row else 'exp'}({c_expression(update.outputs[row])})"
+            lines.append(f"const real {name} = {factor_text(time_factor)}{text};")
+        for row, name in enumerate(self._rate_names):
+            weight = factor_text(time_factor) if row else "rate * "
             for k, label in self._derivative_columns(row):
-                weight = "rate * " if row == 0 else factor_text(time_factor)
                 unit = factor_text(self._units.megapascals) if k in (0, 4, 5) else ""
-                lines.append(
-                    f"const real {name}_by_{label} = {unit}{weight}({c_expression(self._derivative(row, k))});"
-                )
+                text = c_expression(self._derivative(row, k))
+                lines.append(f"const real {name}_by_{label} = {unit}{weight}({text});")
         return lines
-
-    def residual_lines(self) -> list[str]:
-        """The brick has set feel to deel - deto, the DSL every other residual to its increment."""
-        state_rates = zip(self.states, self._rate_names[1:], strict=True)
-        return ["feel += dp * flow;", "fp -= dt * rate;", *(f"f{name} -= dt * {rate};" for name, rate in state_rates)]
 
     def jacobian_lines(self) -> list[str]:
         """The DSL has set the Jacobian to the identity."""
@@ -177,18 +145,14 @@ class IntegratorBlock:
             "dfeel_ddp = flow;",
         ]
         for row, (variable, rate) in enumerate(zip(("p", *self.states), self._rate_names, strict=True)):
-            derivative_names = dict(self._derivative_columns(row))
-            tensor = [
-                text.format(f"{rate}_by_{derivative_names[k]}")
-                for k, text in _ELASTIC_STRAIN_DERIVATIVES.items()
-                if k in derivative_names
-            ]
+            slopes = {k: f"{rate}_by_{label}" for k, label in self._derivative_columns(row)}
+            tensor = [text.format(slopes[k]) for k, text in _ELASTIC_STRAIN_DERIVATIVES.items() if k in slopes]
             if tensor:
                 lines.append(f"df{variable}_ddeel = -theta * dt * ({' + '.join(tensor)});")
             for k, other in ((1, "p"), *enumerate(self.states, len(POINT_VARIABLES))):
-                if k in derivative_names:
+                if k in slopes:
                     sign = "-= " if other == variable else "= -"
-                    lines.append(f"df{variable}_dd{other} {sign}theta * dt * {rate}_by_{derivative_names[k]};")
+                    lines.append(f"df{variable}_dd{other} {sign}theta * dt * {slopes[k]};")
         return lines
 
     # ---- what they are made of -------------------------------------------------------------------------------------
@@ -264,18 +228,18 @@ class MfrontExporter:
 
     def text(self, source: LawWithValues) -> str:
         """Return the file's text."""
-        block_source = IntegratorBlock(source)
+        behaviour = IntegratorBlock(source)
         sections = [
-            list(_header(block_source)),
-            list(_behaviour_declaration(block_source)),
-            list(_mfront_elasticity(block_source.source)),
-            list(_state_variables(block_source)),
-            list(_parameters(block_source)),
-            *([_PREDICTOR_BLOCK] if block_source.needs_strain else []),
-            list(_integrator_block(block_source)),
+            list(_header(behaviour)),
+            list(_behaviour_declaration(behaviour)),
+            list(_mfront_elasticity(behaviour.source)),
+            list(_state_variables(behaviour)),
+            list(_parameters(behaviour)),
+            *([_PREDICTOR_BLOCK] if behaviour.law.uses(strain) else []),
+            list(_integrator_block(behaviour)),
         ]
-        if block_source.needs_time:
-            sections.append(["@UpdateAuxiliaryStateVariables {", f"  {block_source.elapsed} += dt;", "}"])
+        if behaviour.law.uses(time):
+            sections.append(["@UpdateAuxiliaryStateVariables {", f"  {behaviour.elapsed} += dt;", "}"])
         return "\n\n".join("\n".join(section) for section in sections) + "\n"
 
 
@@ -290,11 +254,11 @@ def _header(behaviour: IntegratorBlock) -> Iterator[str]:
         "The midpoint rule (theta = 0.5) is of second order; theta = 1 is of first order and damps more.",
         "Powers of time and strain stay finite at the start; if the rate falls steeply there, keep increments short.",
     ]
-    if behaviour.needs_time:
+    if behaviour.law.uses(time):
         header_lines.append(
             f"Time is counted in {behaviour.elapsed} from the first increment on, where the loading begins."
         )
-    for state, symbol in zip(behaviour.source.law.states.values(), behaviour.states, strict=True):
+    for state, symbol in zip(behaviour.law.states.values(), behaviour.states, strict=True):
         if state.initial:
             header_lines.append(
                 f"{symbol} holds the internal variable less its start, {state.initial!r}, and starts at 0."
@@ -304,16 +268,10 @@ def _header(behaviour: IntegratorBlock) -> Iterator[str]:
 
 def _behaviour_declaration(behaviour: IntegratorBlock) -> Iterator[str]:
     title = printable_text(behaviour.source.title).replace("\\", " ").replace('"', "'")
-    yield "@DSL Implicit;"
-    yield f"@Behaviour {behaviour.behaviour};"
-    yield f'@Description{{ "{comment_safe(title)}, exported by creepkit" }}'
-    yield ""
-    yield '@ModellingHypotheses {".+"};'
-    yield "@Brick StandardElasticity;"
-    yield "@Algorithm NewtonRaphson;"
-    yield "@Theta 0.5;"
-    yield "@Epsilon 1e-14;"
-    yield "@IterMax 100;"
+    yield from ("@DSL Implicit;", f"@Behaviour {behaviour.behaviour};")
+    yield from (f'@Description{{ "{comment_safe(title)}, exported by creepkit" }}', "")
+    yield from ('@ModellingHypotheses {".+"};', "@Brick StandardElasticity;", "@Algorithm NewtonRaphson;")
+    yield from ("@Theta 0.5;", "@Epsilon 1e-14;", "@IterMax 100;")
 
 
 def _mfront_elasticity(source: LawWithValues) -> Iterator[str]:
@@ -345,7 +303,7 @@ def _formula(expression: sympy.Expr) -> str:
 def _state_variables(behaviour: IntegratorBlock) -> Iterator[str]:
     yield "@StateVariable strain p;"
     yield 'p.setGlossaryName("EquivalentViscoplasticStrain");'
-    for symbol, state in zip(behaviour.states, behaviour.source.law.states.values(), strict=True):
+    for symbol, state in zip(behaviour.states, behaviour.law.states.values(), strict=True):
         yield from comment_lines([state.meaning], f"@StateVariable real {symbol}; //")
         if state.limit is not None:
             span = state.limit - state.initial
@@ -353,26 +311,28 @@ def _state_variables(behaviour: IntegratorBlock) -> Iterator[str]:
                 yield f"@PhysicalBounds {symbol} in ]*:{span!r}]; // where the material has failed"
             else:
                 yield f"// the material has failed where {symbol} reaches {span!r}"
-    if behaviour.needs_time:
+    if behaviour.law.uses(time):
         yield f"@AuxiliaryStateVariable real {behaviour.elapsed};"
         yield f'{behaviour.elapsed}.setEntryName("TimeUnderLoad");'
 
 
 def _parameters(behaviour: IntegratorBlock) -> Iterator[str]:
     yield "// for stress as a ratio to 1 MPa and time to 1 s"
-    table = behaviour.source.law.params.values()
+    table = behaviour.law.params.values()
     for (symbol, value), param in zip(behaviour.code.parameters.items(), table, strict=True):
         unit = "" if param.unit == "1" else f"{param.unit}, "
         yield from comment_lines([f"{unit}{param.meaning}"], f"@Parameter {symbol} = {value!r}; //")
 
 
 def _integrator_block(behaviour: IntegratorBlock) -> Iterator[str]:
+    # the brick has set feel to deel - deto, the DSL every other residual to its increment
+    state_residuals = [f"f{name} -= dt * {name}_rate;" for name in behaviour.states]
     parts = {
-        "stable functions": [cpp_lambda_definition(name) for name in behaviour.stable_functions()],
+        "stable functions": [cpp_lambda_definition(name) for name in stable_functions_in(behaviour.rate_lines())],
         "stress and its direction, at t + theta dt": behaviour.tensor_lines(),
         "the point, in MPa and s": behaviour.point_lines(),
         "the law": behaviour.rate_lines(),
-        "the implicit system": behaviour.residual_lines(),
+        "the implicit system": ["feel += dp * flow;", "fp -= dt * rate;", *state_residuals],
         "its Jacobian": behaviour.jacobian_lines(),
     }
     yield "@Integrator {"

@@ -14,14 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from creepkit.errors import ExportError
-from creepkit.exporters.creep_forms import (
-    CreepForm,
-    card_heading,
-    constant_elasticity,
-    creep_forms_of,
-    exp_in_range,
-    format_number,
-)
+from creepkit.exporters.creep_forms import CodeInput, CreepForm, constant_elasticity, exp_in_range, format_number
 from creepkit.exporters.law_code import Identifiers
 from creepkit.hookspecs import hookimpl
 from creepkit.language.symbols import GAS_CONSTANT
@@ -47,9 +40,6 @@ def hit_list(items: Sequence[str]) -> str:
     return f"'{' '.join(items)}'"
 
 
-_MOOSE_ALTERNATIVE = "export it as 'mfront', whose Abaqus interface AbaqusUMATStress calls"
-
-
 _MOOSE_FORMULA = (
     "PowerLawCreepStressUpdate: rate = coefficient s^n_exponent exp(-activation_energy/(gas_constant T)) "
     "(t - start_time)^m_exponent, of equivalent stress s; ComputeMultipleInelasticStress adds the models. "
@@ -60,53 +50,52 @@ _MOOSE_FORMULA = (
 _MOOSE_RESERVED = ("stress", "elasticity")
 
 
-class MooseBlock:
-    """[Materials] with power-law creep, elasticity where moduli are given, and the stress that joins them."""
+class MooseBlock(CodeInput):
+    """[Materials] with power-law creep, elasticity where moduli are given, and the stress that joins them.
 
+    A variable called `temperature` must exist where the law depends on temperature.
+    """
+
+    code, marker = "MOOSE", "#"
+    alternative = "export it as 'mfront', whose Abaqus interface AbaqusUMATStress calls"
     name = "moose"
     title = "MOOSE [Materials] block of power-law creep (PowerLawCreepStressUpdate)"
     suffix = ".i"
 
-    def text(self, source: LawWithValues) -> str:
-        """Return the block; a variable called `temperature` must exist where the law depends on temperature."""
-        forms = creep_forms_of(source, "MOOSE", _MOOSE_ALTERNATIVE)
+    def content(self, source: LawWithValues, forms: Sequence[CreepForm]) -> tuple[list[str], list[str]]:
+        """Comments and the block."""
         for form in forms:
-            _check_moose_form(source, form)
+            if form.stress_function != "power" or form.strain_exponent:
+                is_power = form.stress_function == "power"
+                part = (
+                    f"power {form.strain_exponent:g} of creep strain"
+                    if is_power
+                    else f"{form.stress_function} of stress"
+                )
+                reason = f"MOOSE has no creep model for its {part} (its m_exponent is one of time)"
+                raise self.refusal(source, f", term '{form.label}': {reason}")
         names = Identifiers(_MOOSE_RESERVED)
-        labels_requested = [form.label for form in forms]
-        labels = names.unique_names(labels_requested)
-        several_models = len(forms) > 1
+        labels = names.unique_names(form.label for form in forms)
         models = {
-            name: _moose_creep_model(source, form, name if several_models else "")
+            name: _moose_creep_model(source, form, name if len(forms) > 1 else "")
             for name, form in zip(labels, forms, strict=True)
         }
+        moduli = constant_elasticity(source)
+        elasticity: dict[str, HitBlock] = (
+            {}
+            if moduli is None
+            else {
+                "elasticity": {
+                    "type": "ComputeIsotropicElasticityTensor",
+                    "youngs_modulus": moduli.E,
+                    "poissons_ratio": moduli.nu,
+                }
+            }
+        )
         stress_block: HitBlock = {"type": "ComputeMultipleInelasticStress", "inelastic_models": hit_list(labels)}
-        block: HitBlock = {"Materials": {**_moose_elasticity(source), **models, "stress": stress_block}}
-        comments = [_MOOSE_FORMULA, *_temperature_notes(forms), *names.renaming_notes(labels_requested)]
-        return "\n".join([*card_heading(source, "#", comments), *hit_lines(block)]) + "\n"
-
-
-def _moose_elasticity(source: LawWithValues) -> dict[str, HitBlock]:
-    moduli = constant_elasticity(source)
-    if moduli is None:
-        return {}
-    entries = {"youngs_modulus": moduli.E, "poissons_ratio": moduli.nu}
-    return {"elasticity": {"type": "ComputeIsotropicElasticityTensor", **entries}}
-
-
-def _check_moose_form(source: LawWithValues, form: CreepForm) -> None:
-    """Refuse what is no power law of stress and time."""
-    if form.stress_function == "power" and not form.strain_exponent:
-        return
-    description = (
-        f"its {form.stress_function} of stress"
-        if form.stress_function != "power"
-        else f"its power {form.strain_exponent:g} of creep strain"
-    )
-    raise ExportError(
-        f"law '{source.law.name}', term '{form.label}': MOOSE has no creep model for {description} "
-        f"(its m_exponent is one of time); {_MOOSE_ALTERNATIVE}"
-    )
+        notes = ["The variable called temperature must be in K."] if any(form.Q for form in forms) else []
+        comments = [_MOOSE_FORMULA, *notes, *names.renaming_notes([form.label for form in forms])]
+        return comments, hit_lines({"Materials": {**elasticity, **models, "stress": stress_block}})
 
 
 def _moose_creep_model(source: LawWithValues, form: CreepForm, base_name: str) -> HitBlock:
@@ -123,13 +112,6 @@ def _moose_creep_model(source: LawWithValues, form: CreepForm, base_name: str) -
     if form.Q:
         entries |= {"gas_constant": GAS_CONSTANT, "temperature": "temperature"}
     return entries | ({"base_name": base_name} if base_name else {})
-
-
-def _temperature_notes(forms: Sequence[CreepForm]) -> list[str]:
-    return ["The variable called temperature must be in K."] if any(form.Q for form in forms) else []
-
-
-_NEML2_ALTERNATIVE = "export it as 'python', whose rate a flow rate of your own in NEML2 can follow"
 
 
 _NEML2_FORMULA = (
@@ -149,39 +131,29 @@ _NEML2_RESERVED = (
 )
 
 
-class Neml2Model:
+class Neml2Model(CodeInput):
     """An input file with [Models], [EquationSystems] and [Solvers]; needs the moduli."""
 
+    code, marker = "NEML2 3.1", "#"
+    alternative = "export it as 'python', whose rate a flow rate of your own in NEML2 can follow"
     name = "neml2"
     title = "NEML2 3.1 material model with Norton's law (PerzynaPlasticFlowRate)"
     suffix = ".i"
 
-    def text(self, source: LawWithValues) -> str:
-        """Return the input file."""
-        forms = creep_forms_of(source, "NEML2 3.1", _NEML2_ALTERNATIVE)
+    def content(self, source: LawWithValues, forms: Sequence[CreepForm]) -> tuple[list[str], list[str]]:
+        """Comments and the input file."""
         for form in forms:
-            _check_neml2_form(source, form)
-        names = Identifiers(_NEML2_RESERVED)
-        labels_requested = [form.label for form in forms]
-        rates = _flow_rate_blocks(source, dict(zip(names.unique_names(labels_requested), forms, strict=True)))
-        comments = [
-            _NEML2_FORMULA,
-            *([_NEML2_ARRHENIUS] if any(f.Q for f in forms) else []),
-            *names.renaming_notes(labels_requested),
-        ]
-        return (
-            "\n".join([*card_heading(source, "#", comments), *hit_lines(_neml2_file(rates, _neml2_elasticity(source)))])
-            + "\n"
-        )
-
-
-def _check_neml2_form(source: LawWithValues, form: CreepForm) -> None:
-    if not (form.stress_function == "power" and form.is_steady and form.n > 0.0):
-        exponents = f"strain exponent {form.strain_exponent:g}, time exponent {form.time_exponent:g}"
-        raise ExportError(
-            f"law '{source.law.name}', term '{form.label}': NEML2 3.1 has steady power laws of stress only, "
-            f"and this is a {form.stress_function} of stress, {exponents}; {_NEML2_ALTERNATIVE}"
-        )
+            if not (form.stress_function == "power" and form.is_steady and form.n > 0.0):
+                exponents = f"strain exponent {form.strain_exponent:g}, time exponent {form.time_exponent:g}"
+                reason = (
+                    f"NEML2 3.1 has steady power laws of stress only, and this is a {form.stress_function} of stress"
+                )
+                raise self.refusal(source, f", term '{form.label}': {reason}, {exponents}")
+        names, labels = Identifiers(_NEML2_RESERVED), [form.label for form in forms]
+        rates = _flow_rate_blocks(source, dict(zip(names.unique_names(labels), forms, strict=True)))
+        arrhenius = [_NEML2_ARRHENIUS] if any(f.Q for f in forms) else []
+        comments = [_NEML2_FORMULA, *arrhenius, *names.renaming_notes(labels)]
+        return comments, hit_lines(_neml2_file(rates, _neml2_elasticity(source)))
 
 
 def _flow_rate_blocks(source: LawWithValues, forms: dict[str, CreepForm]) -> dict[str, HitBlock]:
@@ -216,38 +188,28 @@ def _neml2_elasticity(source: LawWithValues) -> HitBlock:
         raise ExportError(
             f"law '{source.law.name}': a NEML2 model needs the moduli; give elastic=Elastic(E=150e3, nu=0.3)"
         )
-    return {
-        "type": "LinearIsotropicElasticity",
-        "coefficients": hit_list([format_number(moduli.E), format_number(moduli.nu)]),
-        "coefficient_types": "'YOUNGS_MODULUS POISSONS_RATIO'",
-        "rate_form": "true",
-    }
+    coefficients = f"{format_number(moduli.E)} {format_number(moduli.nu)}"
+    types = "YOUNGS_MODULUS POISSONS_RATIO"
+    block = _typed_block("LinearIsotropicElasticity", coefficients=coefficients, coefficient_types=types)
+    return {**block, "rate_form": "true"}
 
 
 def _neml2_file(rates: dict[str, HitBlock], elasticity: HitBlock) -> HitBlock:
     """The whole file: the rates of strain and stress, integrated by backward Euler and solved for the stress."""
     stress_blocks: dict[str, HitBlock] = {
-        "mandel_stress": {"type": "IsotropicMandelStress", "cauchy_stress": "'stress'"},
+        "mandel_stress": _typed_block("IsotropicMandelStress", cauchy_stress="stress"),
         "vonmises": _typed_block(
             "SR2Invariant", invariant_type="VONMISES", tensor="mandel_stress", invariant="yield_function"
         ),
     }
-    flow = _typed_block("ComposedModel", models="vonmises")
+    from_mandel = {"from": "mandel_stress", "to": "flow_direction"}
+    from_strain = {"from": "E_rate plastic_strain_rate", "to": "strain_rate", "weights": "1 -1"}
     rate_blocks: dict[str, HitBlock] = {
-        "normality": {
-            **_typed_block("Normality", model="flow", function="yield_function"),
-            "from": "'mandel_stress'",
-            "to": "'flow_direction'",
-        },
+        "normality": _typed_block("Normality", model="flow", function="yield_function", **from_mandel),
         **rates,
         "Eprate": {"type": "AssociativePlasticFlow"},
         "Erate": _typed_block("SR2VariableRate", variable="E"),
-        "Eerate": {
-            "type": "SR2LinearCombination",
-            "from": "'E_rate plastic_strain_rate'",
-            "to": "'strain_rate'",
-            "weights": "'1 -1'",
-        },
+        "Eerate": _typed_block("SR2LinearCombination", **from_strain),
         "elasticity": elasticity,
         "integrate_stress": _typed_block("SR2BackwardEulerTimeIntegration", variable="stress"),
     }
@@ -257,7 +219,7 @@ def _neml2_file(rates: dict[str, HitBlock], elasticity: HitBlock) -> HitBlock:
     return {
         "Models": {
             **stress_blocks,
-            "flow": flow,
+            "flow": _typed_block("ComposedModel", models="vonmises"),
             **rate_blocks,
             "implicit_rate": {"type": "ComposedModel", "models": hit_list(model_names)},
             "predictor": _typed_block("ConstantExtrapolationPredictor", unknowns_SR2="stress"),

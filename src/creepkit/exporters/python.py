@@ -19,15 +19,12 @@ import sympy
 from creepkit.errors import ExportError, LawError
 from creepkit.exporters.law_code import Identifiers, factor_text
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.exporters.unit_conversion import STRESSES
 from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
 from creepkit.kernels.log_form import FLOOR, TIME_FLOOR, log_form
-from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
+from creepkit.language.symbols import POINT_VARIABLES, time
 from creepkit.records import Exporter, LawWithValues, Units
-
-STRESS_SYMBOLS = (stress, principal_stress, mean_stress)
-"""The variables of a point that are in the units of stress."""
-
 
 _MODULE_NAMES = ("INITIAL", "LIMIT", "errstate", "inf", "max", "min", "np", "rate", "state_rates")
 
@@ -107,12 +104,11 @@ class _ModuleFunctions:
     def _return_statement(self) -> list[str]:
         """The return statement, each term under its name."""
         texts = [self._printed(sympy.exp(term, evaluate=False)) for term in self.terms]
-        labels, factor = ([printable_text(label) for label in self.law.terms], factor_text(self.source.units.seconds))
+        labels, factor = [printable_text(label) for label in self.law.terms], factor_text(self.source.units.seconds)
         if len(texts) == 1:
             return [f"# {labels[0]}", f"return {factor}{texts[0]}"]
-        signs = ["", *["+ "] * (len(texts) - 1)]
-        pairs = zip(signs, labels, texts, strict=True)
-        lines = [line for sign, label, text in pairs for line in (f"    # {label}", f"    {sign}{text}")]
+        pairs = enumerate(zip(labels, texts, strict=True))
+        lines = [line for k, (label, text) in pairs for line in (f"    # {label}", f"    {'+ ' if k else ''}{text}")]
         return [f"return {factor}(", *lines, ")"]
 
     def _function_text(self, name: str, title: str, result: list[str], expressions: Sequence[sympy.Expr]) -> str:
@@ -121,21 +117,14 @@ class _ModuleFunctions:
         body = [*self._unit_conversions(used), *logs, *result]
         if self.dialect.context_manager:
             body = [f"{self.dialect.context_manager}:", *(f"    {line}" for line in body)]
-        signature_lines = [
-            f"def {name}(",
-            *self._signature_lines(),
-            "):",
-            f'    """{title}',
-            "",
-            *self._argument_docs(),
-            '    """',
-        ]
-        return "\n".join([*signature_lines, *(f"    {line}" for line in body)])
+        docstring = [f'    """{title}', "", *self._argument_docs(), '    """']
+        signature = [f"def {name}(", *self._signature_lines(), "):"]
+        return "\n".join([*signature, *docstring, *(f"    {line}" for line in body)])
 
     def _unit_conversions(self, used: set[sympy.Basic]) -> list[str]:
         """Stress and time on entry, in the law's own units."""
         units = self.source.units
-        pairs = [*((s, units.megapascals) for s in STRESS_SYMBOLS), (time, units.seconds)]
+        pairs = [*((s, units.megapascals) for s in STRESSES), (time, units.seconds)]
         return [f"{s} = {factor!r} * {s}" for s, factor in pairs if factor != 1 and s in used]
 
     def _signature_lines(self) -> list[str]:
@@ -153,7 +142,9 @@ class _ModuleFunctions:
     def _argument_docs(self) -> list[str]:
         meanings = _argument_meanings(self.source.units)
         lines = [f"    {s.name} : {meanings[s.name]}" for s in POINT_VARIABLES if self.law.uses(s)]
-        lines += [f"    {self.names[s]} : {_docstring_safe(state.meaning)}" for s, state in self.law.states.items()]
+        for symbol, state in self.law.states.items():  # nothing in a meaning ends the docstring, or escapes in it
+            meaning = printable_text(state.meaning).replace("\\", "/").replace('"', "'")
+            lines.append(f"    {self.names[symbol]} : {meaning}")
         unused = [s.name for s in POINT_VARIABLES[:4] if not self.law.uses(s)]
         return [*lines, f"    {', '.join(unused)} : not used by this law"] if unused else lines
 
@@ -162,11 +153,6 @@ class _ModuleFunctions:
 
     def _printed(self, expression: sympy.Expr) -> str:
         return str(self.dialect.printer.doprint(expression))
-
-
-def _docstring_safe(text: str) -> str:
-    """Text that neither ends a docstring nor escapes in it."""
-    return printable_text(text).replace("\\", "/").replace('"', "'")
 
 
 def _argument_meanings(units: Units) -> dict[str, str]:
@@ -217,31 +203,22 @@ def kernel_functions(file: str) -> dict[str, str]:
             for argument in node.args.args:
                 argument.annotation = None
             result[node.name] = ast.unparse(node)
-        elif isinstance(node, ast.Assign):
-            result |= _assignments_of(node)
+        elif isinstance(node, ast.Assign):  # to a name, or to several at once
+            target, value = node.targets[0], node.value
+            several = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+            pairs: Any = zip(target.elts, value.elts, strict=True) if several else [(target, value)]  # type: ignore[attr-defined]
+            result |= {t.id: f"{t.id} = {ast.unparse(v)}" for t, v in pairs if t.id != "__all__"}
     return result
-
-
-def _assignments_of(node: ast.Assign) -> dict[str, str]:
-    """{name: statement} of an assignment to a name, or to several at once."""
-    target, value = node.targets[0], node.value
-    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
-        pairs: list[tuple[Any, Any]] = list(zip(target.elts, value.elts, strict=True))
-    else:
-        pairs = [(target, value)]
-    return {t.id: f"{t.id} = {ast.unparse(v)}" for t, v in pairs if t.id != "__all__"}
 
 
 def _free_names(code: str) -> set[str]:
     """Every name that top-level functions and statements read from outside themselves."""
-    return set().union(*(_free_names_of_statement(node) for node in ast.parse(code).body))
-
-
-def _free_names_of_statement(node: ast.stmt) -> set[str]:
-    nodes = list(ast.walk(node))
-    bound_names = {n.arg for n in nodes if isinstance(n, ast.arg)}
-    bound_names |= {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-    return {n.id for n in nodes if isinstance(n, ast.Name)} - bound_names
+    free: set[str] = set()
+    for statement in ast.parse(code).body:
+        names = [n for n in ast.walk(statement) if isinstance(n, ast.Name)]
+        bound = {n.arg for n in ast.walk(statement) if isinstance(n, ast.arg)}
+        free |= {n.id for n in names} - bound - {n.id for n in names if isinstance(n.ctx, ast.Store)}
+    return free
 
 
 class PythonExporter:

@@ -1,32 +1,34 @@
-"""Parameter values in other units of stress and time, such that the same formula gives the rate in those units.
+"""Units of rate coefficients, and parameter values in other units, such that the same formula gives the rate in those.
 
 A law's stress is a ratio to 1 MPa and its time a ratio to 1 s. With units of k MPa and c seconds a stress parameter B
-becomes B/k and a time parameter tau/c; what then remains of c rate(k stress, c time), such as k^n of A stress^n, is a
-number for each term and goes into the term's rate coefficient. Where it is no number, as with an exponent that depends
-on time or temperature, the conversion is refused.
+becomes B/k and a time parameter tau/c. A rate of degree p in what is a stress, and q in what is a time, then is
+k^p c^(q + 1) of what it must be, a number for each term that goes into the term's rate coefficient. Where there is no
+such degree, as with an exponent that depends on time or temperature, the conversion is refused. Degrees are found from
+the parts of an expression, in time proportional to its length; sympy is not asked to simplify.
 """
 
 from __future__ import annotations
 
-import math
-import random
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import mpmath
+import sympy
 
 from creepkit.errors import ExportError
-from creepkit.kernels.multiprecision import MultiprecisionLaw
 from creepkit.language.law import CreepLaw
+from creepkit.language.printing import expression_text
+from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
+from creepkit.language.temperature_factors import rate_coefficients
 from creepkit.records import LawWithValues, Units
 
+STRESSES = (stress, principal_stress, mean_stress)
+"""The variables of a point that are in the units of stress."""
+
+
 _FACTOR_TOLERANCE = 1e-9
-"""Relative difference of factors that counts as none; rounding of the inputs leaves some 1e-14."""
-
-
-_POINT_COUNT = 12
+"""Relative difference of factors that counts as none."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,8 @@ def convert_values(source: LawWithValues) -> ConvertedValues:
     if not units.is_native:
         for name, param in law.table.items():
             values[name] *= _unit_factor(param.unit, units)
-        for index, factor in _coefficient_factors(law, source.values, values, units).items():
-            values[law.names[index]] *= factor
+        for name, factor in _coefficient_factors(law, source.values, units).items():
+            values[name] *= factor
     return ConvertedValues(values, new_units, reference_sentence(units))
 
 
@@ -55,89 +57,144 @@ def reference_sentence(units: Units) -> str:
     return f"stress is a ratio to 1 {units.stress}, time to 1 {units.time}, rates are per {units.time}"
 
 
-def _coefficient_factors(
-    law: CreepLaw, original_values: Mapping[str, float], scaled_values: Mapping[str, float], units: Units
-) -> dict[int, float]:
-    """{position of a coefficient: what it must be multiplied by}."""
-    new_rates = _RateSamples(law, units)
-    factors: dict[int, float] = {}
-    scaled_rates, target_rates = new_rates.at(scaled_values), _RateSamples(law, Units()).at(original_values)
-    degrees = new_rates.homogeneity_degrees(scaled_values)
-    labels = [f"term '{k}'" for k in law.terms] + [f"rate of '{s}'" for s in law.states]
-    for k, label in enumerate(labels):
-        factor = _common_value(
-            [_finite_ratio(a * units.seconds, b) for a, b in zip(target_rates[k], scaled_rates[k], strict=True)]
-        )
-        if factor is not None and abs(factor - 1) < _FACTOR_TOLERANCE:
+def _coefficient_factors(law: CreepLaw, values: Mapping[str, float], units: Units) -> dict[str, float]:
+    """{rate coefficient: what it must be multiplied by}."""
+    parameter_powers = {symbol: _unit_powers(param.unit) for symbol, param in law.params.items()}
+    of_stress = dict.fromkeys(STRESSES, 1) | {symbol: power for symbol, (power, _) in parameter_powers.items()}
+    of_time = {time: 1} | {symbol: power for symbol, (_, power) in parameter_powers.items()}
+    numbers = {symbol: values[symbol.name] for symbol in law.params}
+    candidates = [s for s, param in law.params.items() if param.scale == "log" and values[s.name] > 0]
+    rates = {f"term '{label}'": term for label, term in law.terms.items()}
+    rates |= {f"rate of '{symbol}'": state.rate for symbol, state in law.states.items()}
+    factors: dict[str, float] = {}
+    for label, rate in rates.items():
+        p, q = (_degree_in_numbers(rate, degrees, numbers) for degrees in (of_stress, of_time))
+        factor = None
+        if p is not None and q is not None:
+            factor = mpmath.mpf(units.megapascals) ** p * mpmath.mpf(units.seconds) ** (1 + q)
+        if rate.xreplace(numbers) == 0 or (factor is not None and abs(factor - 1) < _FACTOR_TOLERANCE):
             continue
-        index = next((p for p, degree in degrees.items() if degree[k]), None)
-        if factor is None or index is None:
+        found = ((s.name, _degree_in_numbers(rate, {s: 1}, numbers)) for s in candidates)
+        name, power = next((pair for pair in found if pair[1]), ("", None))
+        coefficient_factor = 0.0 if factor is None or power is None else float(factor ** (1 / power))
+        if factor is None or power is None:
             reason = "the factor varies with the point" if factor is None else "it has no rate coefficient"
-            raise ExportError(
-                f"law '{law.name}', {label}: no constants give it with {reference_sentence(units)} ({reason}); "
-                "export it in MPa and s"
-            )
-        coefficient_factor = float(factor ** (1 / degrees[index][k]))
-        if not 0 < coefficient_factor < float("inf"):
-            raise ExportError(
-                f"law '{law.name}': {law.names[index]} would leave double precision with {reference_sentence(units)}; "
-                "export it in MPa and s"
-            )
-        if abs(factors.setdefault(index, coefficient_factor) / coefficient_factor - 1) > _FACTOR_TOLERANCE:
-            raise ExportError(
-                f"law '{law.name}': {law.names[index]} would need two values with {reference_sentence(units)}; "
-                "export it in MPa and s"
-            )
+            problem = f"law '{law.name}', {label}: no constants give it with {reference_sentence(units)} ({reason})"
+        elif not 0 < coefficient_factor < float("inf"):
+            problem = f"law '{law.name}': {name} would leave double precision with {reference_sentence(units)}"
+        elif abs(factors.setdefault(name, coefficient_factor) / coefficient_factor - 1) > _FACTOR_TOLERANCE:
+            problem = f"law '{law.name}': {name} would need two values with {reference_sentence(units)}"
+        else:
+            continue
+        raise ExportError(f"{problem}; export it in MPa and s")
     return factors
 
 
-class _RateSamples:
-    """Each term and state rate of a law at several points, in some units: [rate][point], 50 digits."""
-
-    def __init__(self, law: CreepLaw, units: Units) -> None:
-        self.law, self.exact = law, MultiprecisionLaw(law)
-        self.points = _sample_points(law, units)
-
-    def at(self, values: Mapping[str, float]) -> list[list[Any]]:
-        """Rates with these values of the parameters."""
-        rows = [self.exact.term_and_state_rates(point, [values[n] for n in self.law.names]) for point in self.points]
-        return [list(column) for column in zip(*rows, strict=True)]
-
-    def homogeneity_degrees(self, values: Mapping[str, float]) -> dict[int, list[Any]]:
-        """{position of a parameter of log scale: the power in which it multiplies each rate, 0 where it does not}."""
-        base_rates, result = self.at(values), {}
-        for index, (name, param) in enumerate(self.law.table.items()):
-            if param.scale == "log" and values[name] > 0:
-                doubled_rates = self.at({**values, name: 2 * values[name]})
-                factors = [
-                    _common_value([_finite_ratio(b, a) for a, b in zip(*pair, strict=True)])
-                    for pair in zip(base_rates, doubled_rates, strict=True)
-                ]
-                result[index] = [0 if f is None or f == 1 else mpmath.log(f, 2) for f in factors]
-        return result
+def _degree_in_numbers(
+    rate: sympy.Expr, degrees: Mapping[sympy.Symbol, int], numbers: Mapping[sympy.Symbol, float]
+) -> float | None:
+    """The degree where parameters that do not change have their values; None where it varies with the point."""
+    power = degree(rate.xreplace({s: sympy.Float(v) for s, v in numbers.items() if not degrees.get(s)}), degrees)
+    power = None if power is None else power.subs(numbers)
+    return None if power is None or power.free_symbols else float(power)
 
 
-def _common_value(factors: list[Any]) -> Any:
-    """The one value of factors; None where they differ. A rate that is zero everywhere needs no factor."""
-    defined = [f for f in factors if f is not None] or [mpmath.mpf(1)]
-    return defined[0] if all(abs(f - defined[0]) <= _FACTOR_TOLERANCE * abs(defined[0]) for f in defined) else None
+# ---- degrees -------------------------------------------------------------------------------------------------------
+
+_DEGREE_TOLERANCE = 1e-12
+"""By which degrees may differ that are sums of the same numbers."""
 
 
-def _finite_ratio(a: Any, b: Any) -> Any:
-    return a / b if b != 0 and mpmath.isfinite(a / b) else None
+MOST_OPERATIONS = 60
+"""Of a degree; longer ones, of exponents within exponents, count as none."""
 
 
-def _sample_points(law: CreepLaw, units: Units) -> list[list[float]]:
-    """Points spread over what tests visit, in some units; states between their start and their limit."""
-    draw = random.Random(0).uniform
-    spans = [(s.initial, s.initial + 1.0 if s.limit is None else s.limit) for s in law.states.values()]
-    points = []
-    for _ in range(_POINT_COUNT):
-        stress, strain = math.exp(draw(3.0, 5.3)) / units.megapascals, math.exp(draw(-9.0, -2.0))
-        time, temperature, fraction = math.exp(draw(7.0, 14.0)) / units.seconds, draw(850.0, 1250.0), draw(0.1, 0.6)
-        states = [low + fraction * (high - low) for low, high in spans]
-        points.append([stress, strain, time, temperature, 0.9 * stress, stress / 3, *states])
-    return points
+def degree(expression: sympy.Basic, degrees: Mapping[sympy.Symbol, int]) -> sympy.Expr | None:
+    """d in f(c^k x, ...) = c^d f(x, ...), where `degrees` says k of each symbol, else 0.
+
+    None where there is no d.
+    """
+    if not expression.args or not expression.free_symbols & degrees.keys():
+        return sympy.Integer(degrees.get(expression, 0))
+    if isinstance(expression, sympy.Pow):
+        base, exponent = (degree(part, degrees) for part in expression.args)
+        return None if base is None or exponent != 0 else _short(base * expression.exp)
+    if isinstance(expression, sympy.Piecewise):
+        if any(degree(condition, degrees) is None for _, condition in expression.args):
+            return None
+        return _common([branch for branch, _ in expression.args], degrees)
+    if isinstance(expression, sympy.Mul):
+        parts = [degree(part, degrees) for part in expression.args]
+        return None if None in parts else _short(sympy.Add(*parts))
+    if isinstance(expression, sympy.Abs):
+        return degree(expression.args[0], degrees)
+    if isinstance(expression, sympy.Add | sympy.Max | sympy.Min):
+        return _common(expression.args, degrees)
+    if isinstance(expression, sympy.core.relational.Relational):
+        return None if _common(expression.args, degrees) is None else sympy.S.Zero
+    if isinstance(expression, sympy.Heaviside | sympy.sign):
+        return None if degree(expression.args[0], degrees) is None else sympy.S.Zero
+    return sympy.S.Zero if all(degree(part, degrees) == 0 for part in expression.args) else None
+
+
+def _common(parts: Iterable[sympy.Basic], degrees: Mapping[sympy.Symbol, int]) -> sympy.Expr | None:
+    """The degree that all parts have; zero has any."""
+    found = [degree(part, degrees) for part in parts if part != 0]
+    first = found[0] if found else None
+    if first is None:
+        return None
+    gaps = [None if other is None else sympy.expand(other - first) for other in found]
+    return first if all(gap is not None and gap.is_number and abs(gap) < _DEGREE_TOLERANCE for gap in gaps) else None
+
+
+def _short(value: sympy.Expr) -> sympy.Expr | None:
+    return value if value.count_ops() <= MOST_OPERATIONS else None
+
+
+def coefficient_unit(law: CreepLaw, name: str) -> str:
+    """The unit of a rate coefficient where stress and time are no ratios, such as MPa^-n s^-1.
+
+    Empty where it is 1/s all the same, as in a law of (stress/s_0)^n, and where no such unit exists, as for an exponent
+    that depends on temperature.
+    """
+    symbol = next(one for one in law.params if one.name == name)
+    rates = [*law.terms.values(), *(state.rate for state in law.states.values())]
+    rates = [rate for rate in rates if symbol in rate_coefficients(law, rate)]
+    if law.params[symbol].unit != "1/s" or not rates or any(rate.has(sympy.Max, sympy.Min) for rate in rates):
+        return ""
+    powers = {(_power(law, rate, STRESSES, "MPa"), _power(law, rate, (time,), "s")) for rate in rates}
+    of_stress, of_time = powers.pop()
+    if powers or of_stress is None or of_time is None or of_stress == of_time == 0:
+        return ""
+    parts = [_unit_with_power("MPa", -of_stress), _unit_with_power("s", -of_time - 1)]
+    return " ".join(part for part in parts if part)
+
+
+def _power(law: CreepLaw, rate: sympy.Expr, variables: Sequence[sympy.Symbol], unit: str) -> sympy.Expr | None:
+    """The power of a unit by which a rate grows when its variables and parameters change; None where there is none.
+
+    A rate coefficient has no part in it: the unit asked for is its own.
+    """
+    coefficients = rate_coefficients(law, rate)
+    powers = {unit: 1, f"1/{unit}": -1}
+    scaled = dict.fromkeys(variables, 1) | {
+        symbol: powers[param.unit]
+        for symbol, param in law.params.items()
+        if param.unit in powers and symbol not in coefficients
+    }
+    power = degree(rate, scaled)
+    return None if power is None or power.free_symbols & {*POINT_VARIABLES, *law.states} else power
+
+
+def _unit_with_power(unit: str, power: sympy.Expr) -> str:
+    power = sympy.expand(power)
+    if power == 0:
+        return ""
+    if power == 1:
+        return unit
+    negative = power.could_extract_minus_sign()
+    text = expression_text(-power if negative else power)
+    return f"{unit}^{'-' if negative else ''}{text if text.isidentifier() or text.isdecimal() else f'({text})'}"
 
 
 # ---- units as text -------------------------------------------------------------------------------------------------

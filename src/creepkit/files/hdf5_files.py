@@ -24,7 +24,7 @@ LARGEST_COMPRESSION = 100
 """Bytes of all arrays a byte of the file, beyond MAXIMUM_UNPACKED_BYTES; arrays of numbers have 1 to 30."""
 
 
-FAILURES = (OSError, RuntimeError, LookupError, ValueError, TypeError, NotImplementedError, RecursionError)
+FAILURES = (OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError)
 """What h5py and whoever reads by it raise of a damaged file."""
 
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from creepkit import limits
 from creepkit.arrays import single_threaded_blas
-from creepkit.checked_arguments import checked, checked_with_own_words
-from creepkit.errors import FitError, nearest, quoted
+from creepkit.checked_arguments import checked
+from creepkit.errors import FitError, nearest
 from creepkit.forecasts.draws import check_tolerances, law_draws
 from creepkit.forecasts.forecast_of_test import forecast_test
 from creepkit.forecasts.results import TestForecast
@@ -24,7 +24,7 @@ from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedL
 from creepkit.language import temperature
 from creepkit.presentation import Presentable, present
 from creepkit.records import History, Predictor, outputs_of
-from creepkit.registry.arguments import check_histories, resolve_predictors
+from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +37,7 @@ LEAST_WEIGHT, LEAST_DRAWS = 1e-2, 5
 """Of the laws that are left out of a ranking, together; and draws of each of the others at least."""
 
 
-DEFAULT_TARGETS: Mapping[str, Sequence[float]] = {"strain": (0.01,)}
+DEFAULT_TARGETS: Mapping[str, Sequence[float] | float] = {"strain": (0.01,)}
 """Outputs, and values of them, the times to which are forecast where none are asked for."""
 
 
@@ -74,13 +74,13 @@ class Forecast(Presentable, text="reports.forecast:forecast_text"):
         return present("reports.forecast_plot:forecast_figure", self, path)
 
 
-@checked_with_own_words("level", "targets", "tolerances")
+@checked
 def forecast(
     source: Identification | WeightedLaws | ModelAverage,
     tests: History | Sequence[History],
     *,
     level: float = 0.95,
-    targets: Mapping[str, Sequence[float]] | None = None,
+    targets: Mapping[str, Sequence[float] | float] | None = None,
     tolerances: Mapping[str, float] | None = None,
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     draws: int | None = None,
@@ -98,24 +98,23 @@ def forecast(
     draws : of the law and of all else that a band is made of; by default 4000 of a bar, and 800 where each is a
         simulation by finite elements. The seed of random numbers is that of the identification's settings.
     """
-    if not isinstance(level, int | float) or not 0.5 <= level < 1.0:
+    if not 0.5 <= level < 1.0:
         raise FitError(f"level is {level!r}; give a probability from 0.5 to below 1, such as 0.95")
     if draws is not None:
         limits.check_number("draws", draws, limits.BAND_DRAWS, FitError)
-    if not isinstance(tests, History) and not hasattr(tests, "__iter__"):
-        raise FitError(f"tests are histories, found {quoted(repr(tests), 60)}; read_histories(path) returns them")
-    histories = check_histories([tests] if isinstance(tests, History) else tests)
+    histories = [tests] if isinstance(tests, History) else list(tests)
     if not histories:
         raise FitError("there is no test to forecast; give histories, measured or planned")
     for history in histories:
         if not history.times[-1] > 0:
             raise FitError(f"history '{history.name}' has no time above zero; give those at which it is to be forecast")
     weighted = _weighted_laws(source)
-    tolerances, targets_given = _numbers(tolerances, "tolerances"), targets is not None
+    tolerances = {kind: float(sd) for kind, sd in (tolerances or {}).items()}
     for kind in tolerances:
         if kind.startswith("temperature") and not any(f.law.uses(temperature) for f, _ in weighted):
             raise FitError(f"the tolerance of '{kind}' changes nothing: no law has a temperature; leave it out")
-    asked = _checked_targets(DEFAULT_TARGETS if targets is None else targets)
+    given = DEFAULT_TARGETS if targets is None else targets
+    asked = {output: [float(v) for v in np.atleast_1d(values)] for output, values in given.items()}
     predictors = [_predictor(weighted[0][0], history, using) for history in histories]
     if tolerances:
         check_tolerances(
@@ -123,7 +122,7 @@ def forecast(
             histories,
             CompositePredictor({h.specimen: p for h, p in zip(histories, predictors, strict=True)}),
         )
-    _check_targets(asked, targets_given, predictors)
+    _check_targets(asked, targets is not None, predictors)
     made, most_draws = [], 0
     with single_threaded_blas():
         for k, (history, predictor) in enumerate(zip(histories, predictors, strict=True)):
@@ -138,10 +137,10 @@ def forecast(
             )
     if progress is not None:
         progress("tests", len(histories), len(histories))
-    given = len(source.fits) if isinstance(source, ModelAverage) else len(getattr(source, "laws", weighted))
+    tried = len(source.fits) if isinstance(source, ModelAverage) else len(getattr(source, "laws", weighted))
     adequacy = weighted[0][0].adequacy
     rejected = adequacy is not None and adequacy.verdict == "leaves a discrepancy"
-    return Forecast(_named_weights(weighted), level, tuple(made), given - len(weighted), rejected, most_draws)
+    return Forecast(_named_weights(weighted), level, tuple(made), tried - len(weighted), rejected, most_draws)
 
 
 def _predictor(
@@ -162,8 +161,6 @@ def _predictor(
 
 def _weighted_laws(source: Identification | WeightedLaws | ModelAverage) -> list[tuple[Identification, float]]:
     """The laws that count, with weights that add up to one: those of least weight are left out."""
-    if not isinstance(source, Identification | ModelAverage) and not hasattr(source, "laws"):
-        raise FitError(f"a forecast is made by an identification or a ranking, found {quoted(repr(source), 60)}")
     average = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
     ordered = sorted(zip(average.fits, average.weights, strict=True), key=lambda pair: -pair[1])
     kept, total = [], 0.0
@@ -181,26 +178,6 @@ def _named_weights(weighted: Sequence[tuple[Identification, float]]) -> dict[str
     for fit, weight in weighted:
         weights[fit.law.name] = weights.get(fit.law.name, 0.0) + float(weight)
     return weights
-
-
-def _numbers(values: Mapping[str, float] | None, what: str) -> dict[str, float]:
-    """{name: number}; FitError for anything else."""
-    try:
-        return {str(name): float(value) for name, value in (values or {}).items()}
-    except (AttributeError, TypeError, ValueError):
-        raise FitError(
-            f"{what} must be numbers by name, such as {{'thickness': 0.01}}; found {quoted(repr(values), 60)}"
-        ) from None
-
-
-def _checked_targets(targets: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
-    """{output: values}, a single value as a list; FitError for anything else."""
-    try:
-        return {str(name): [float(v) for v in np.atleast_1d(values)] for name, values in targets.items()}
-    except (AttributeError, TypeError, ValueError):
-        raise FitError(
-            f"targets must be numbers by output, such as {{'strain': [0.01]}}; found {quoted(repr(targets), 60)}"
-        ) from None
 
 
 MOST_TARGETS = 50

@@ -23,7 +23,7 @@ from creepkit import limits
 from creepkit.arrays import usable_cores
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, DatasetError, quoted
-from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task, send, setup_message, start_worker
+from creepkit.jobs.worker_process import Job, TaskResult, run_task, send, setup_message, start_worker
 from creepkit.options import Options, option
 
 SHARD_ROWS = 256
@@ -74,7 +74,7 @@ class ParallelExecution(Options, title="settings of an execution", error=Dataset
         if self.cluster is not None and not ADDRESS.fullmatch(self.cluster):
             raise DatasetError(f"'{quoted(self.cluster)}' is no address of a dask scheduler; write tcp://host:port")
 
-    def start(self, job: ShardedJob) -> AbstractContextManager[Workers]:
+    def start(self, job: Job) -> AbstractContextManager[Workers]:
         """The workers, which run in the context that is returned."""
         if self.cluster is not None:
             return cluster_workers(job, self.cluster, self.workers)
@@ -165,7 +165,7 @@ def _death(process: subprocess.Popen[bytes]) -> str:
 class ClusterWorkers:
     """The workers of a dask scheduler, at most `threads` of their threads at once (None: all)."""
 
-    job: ShardedJob
+    job: Job
     client: Any
     executor: Any
     threads: int | None = None
@@ -182,7 +182,7 @@ class ClusterWorkers:
 
 
 @contextmanager
-def cluster_workers(job: ShardedJob, address: str, threads: int | None = None) -> Iterator[ClusterWorkers]:
+def cluster_workers(job: Job, address: str, threads: int | None = None) -> Iterator[ClusterWorkers]:
     """The workers of the dask scheduler at an address; DatasetError where none answers, or dask is not installed."""
     try:
         from distributed import Client

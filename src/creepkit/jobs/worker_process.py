@@ -22,7 +22,6 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from types import ModuleType
 from typing import Protocol
 
@@ -60,32 +59,6 @@ class Job(Protocol):
 
     def run(self, number: int) -> TaskResult:
         """Do one task and leave its outcome in a file."""
-        ...
-
-
-class ShardedJob(Job, Protocol):
-    """A job whose tasks are shards of `rows` samples, each a file in `folder`."""
-
-    def on_one_thread(self) -> ShardedJob:
-        """The same job, to be done on one thread."""
-        ...
-
-    @property
-    def folder(self) -> Path:
-        """Where the files of the shards lie."""
-        ...
-
-    @property
-    def rows(self) -> int:
-        """Samples of a shard."""
-        ...
-
-    def path(self, number: int) -> Path:
-        """The file of a shard."""
-        ...
-
-    def accepted_count(self, number: int) -> int | None:
-        """How many samples of a shard were accepted; None when it has to be simulated."""
         ...
 
 

@@ -1,24 +1,8 @@
-"""Lowering of laws: the log form of each term, its derivatives, and kernels for NumPy, torch and compiled code."""
+"""Lowering of laws: the log form of each term, its derivatives, and kernels for NumPy, torch and compiled code.
 
-from __future__ import annotations
+Every name stands once, in __init__.pyi; its module is loaded when the name is first used.
+"""
 
-from typing import TYPE_CHECKING, Any
+import lazy_loader as _lazy
 
-if TYPE_CHECKING:
-    from creepkit.kernels.interface import CompiledLaw
-    from creepkit.kernels.lowering import ArrayKernel, RateDerivatives, lower
-
-
-__all__ = ["ArrayKernel", "CompiledLaw", "RateDerivatives", "lower"]
-
-
-def __getattr__(name: str) -> Any:
-    if name == "CompiledLaw":
-        from creepkit.kernels.interface import CompiledLaw
-
-        return CompiledLaw
-    if name in __all__:
-        from creepkit.kernels import lowering
-
-        return getattr(lowering, name)
-    raise AttributeError(f"module 'creepkit.kernels' has no attribute '{name}'")
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

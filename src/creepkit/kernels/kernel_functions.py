@@ -7,11 +7,13 @@ llvm_functions, and for exported Python code in scalar_functions.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
+from functools import reduce
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import sympy
-from sympy import cosh, exp, log, sinh, tanh
+from sympy import asinh, atan, cos, cosh, erf, exp, log, sin, sinh, tanh
 from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.pycode import PythonCodePrinter
 
@@ -130,43 +132,28 @@ def in_sympy_functions(expression: sympy.Expr) -> sympy.Expr:
 
 
 TARGET_FUNCTION_NAMES = {
-    "exp": "exp",
-    "log": "log",
-    "sinh": "sinh",
-    "cosh": "cosh",
-    "asinh": "asinh",
-    "tanh": "tanh",
-    "sin": "sin",
-    "cos": "cos",
-    "atan": "atan",
-    "erf": "erf",
-    "LogFloor": "log_floor",
-    "Floored": "floored",
-    "Log1p": "log1p",
-    "LogSinh": "log_sinh",
-    "LogCosh": "log_cosh",
-    "LogTanh": "log_tanh",
-    "LogRise": "log_rise",
-    "Tanh": "tanh",
-    "Coth": "coth",
-    "Expm1": "expm1",
-    "ExpDifference": "exp_difference",
+    **{f.__name__: f.__name__ for f in (exp, log, sinh, cosh, asinh, tanh, sin, cos, atan, erf)},
+    **{f.__name__: re.sub("(?<=[a-z])(?=[A-Z])", "_", f.__name__).lower() for f in StableFunction.__subclasses__()},
     "Heaviside": "heaviside",
 }
 """{sympy class: function of every target}; Heaviside comes from the slopes of Max and Min."""
 
 
-TARGET_FUNCTIONS = (
-    *sorted({*TARGET_FUNCTION_NAMES.values()}),
-    "both",
-    "choose",
-    "either",
-    "larger",
-    "power",
-    "smaller",
-    "sqrt",
-    "square",
-)
+OPERATIONS = ("both", "choose", "either", "larger", "power", "smaller", "sqrt", "square")
+"""Functions of every target for what is no function in sympy."""
+
+
+TARGET_FUNCTIONS = (*sorted({*TARGET_FUNCTION_NAMES.values()}), *OPERATIONS)
+
+
+def _nested(name: str) -> Callable[[Any, Any], str]:
+    """The method that prints an operation of any number of arguments as calls of a function of two."""
+
+    def printed(self: Any, e: Any) -> str:
+        text: str = reduce(lambda first, second: f"{name}({first}, {second})", map(self._print, e.args))
+        return text
+
+    return printed
 
 
 class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
@@ -186,19 +173,10 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
     _print_exp = _print_log = _print_sinh = _print_cosh = _print_tanh = _print_asinh = _print_Function
     _print_sin = _print_cos = _print_atan = _print_erf = _print_Heaviside = _print_Function
 
-    def _print_Float(self, e: Any) -> str:
+    def _print_Number(self, e: Any) -> str:
         return repr(float(e))
 
-    def _print_Integer(self, e: Any) -> str:
-        return repr(float(e))
-
-    def _print_Rational(self, e: Any) -> str:
-        return repr(float(e))
-
-    def _print_NumberSymbol(self, e: Any) -> str:
-        return repr(float(e))
-
-    _print_Pi = _print_Exp1 = _print_NumberSymbol
+    _print_Float = _print_Integer = _print_Rational = _print_NumberSymbol = _print_Pi = _print_Exp1 = _print_Number
 
     def _print_Pow(self, e: Any, rational: bool = False, **_: Any) -> str:
         if e.is_number:
@@ -216,23 +194,7 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
             return f"1.0/{self._print(1 / e)}"
         return f"power({base}, {self._print(e.exp)})"
 
-    def _print_Max(self, e: Any) -> str:
-        return self._nested("larger", list(e.args))
-
-    def _print_Min(self, e: Any) -> str:
-        return self._nested("smaller", list(e.args))
-
-    def _print_And(self, e: Any) -> str:
-        return self._nested("both", list(e.args))
-
-    def _print_Or(self, e: Any) -> str:
-        return self._nested("either", list(e.args))
-
-    def _nested(self, name: str, arguments: list[Any]) -> str:
-        text: str = self._print(arguments[0])
-        for argument in arguments[1:]:
-            text = f"{name}({text}, {self._print(argument)})"
-        return text
+    _print_Max, _print_Min, _print_And, _print_Or = map(_nested, ("larger", "smaller", "both", "either"))
 
     def _print_Piecewise(self, e: Any) -> str:
         text: str = self._print(e.args[-1].expr)

@@ -102,6 +102,14 @@ class Block:
         return self.write(f"shufflevector {vector} {first.name}, {vector} poison, {mask}", value.kind).name
 
 
+def _operator(instruction: str, *, reflected: bool = False) -> Callable[[Any, Any], Value]:
+    return lambda self, other: operation(instruction, *((other, self) if reflected else (self, other)))
+
+
+def _comparison(relation: str) -> Callable[[Any, Any], Value]:
+    return lambda self, other: comparison(relation, self, other)
+
+
 @dataclass(frozen=True, eq=False)
 class Value:
     """A number, integer or condition in each lane of a block; its operators write instructions."""
@@ -110,45 +118,15 @@ class Value:
     name: str
     kind: str
 
-    def __add__(self, other: Any) -> Value:
-        return operation("fadd", self, other)
-
-    def __radd__(self, other: Any) -> Value:
-        return operation("fadd", other, self)
-
-    def __sub__(self, other: Any) -> Value:
-        return operation("fsub", self, other)
-
-    def __rsub__(self, other: Any) -> Value:
-        return operation("fsub", other, self)
-
-    def __mul__(self, other: Any) -> Value:
-        return operation("fmul", self, other)
-
-    def __rmul__(self, other: Any) -> Value:
-        return operation("fmul", other, self)
-
-    def __truediv__(self, other: Any) -> Value:
-        return operation("fdiv", self, other)
-
-    def __rtruediv__(self, other: Any) -> Value:
-        return operation("fdiv", other, self)
+    __add__, __radd__ = _operator("fadd"), _operator("fadd", reflected=True)
+    __sub__, __rsub__ = _operator("fsub"), _operator("fsub", reflected=True)
+    __mul__, __rmul__ = _operator("fmul"), _operator("fmul", reflected=True)
+    __truediv__, __rtruediv__ = _operator("fdiv"), _operator("fdiv", reflected=True)
+    __lt__, __le__, __gt__, __ge__ = map(_comparison, ("olt", "ole", "ogt", "oge"))
 
     def __neg__(self) -> Value:
         block = self.block
         return block.write(f"fneg {block.type_of(DOUBLE)} {self.name}", DOUBLE)
-
-    def __lt__(self, other: Any) -> Value:
-        return comparison("olt", self, other)
-
-    def __le__(self, other: Any) -> Value:
-        return comparison("ole", self, other)
-
-    def __gt__(self, other: Any) -> Value:
-        return comparison("ogt", self, other)
-
-    def __ge__(self, other: Any) -> Value:
-        return comparison("oge", self, other)
 
 
 def constant_text(value: Number, kind: str) -> str:

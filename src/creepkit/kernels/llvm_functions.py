@@ -29,13 +29,6 @@ from creepkit.kernels.llvm_code import (
     select,
 )
 
-__all__ = [
-    "asinh", "atan", "both", "choose", "cos", "cosh", "coth", "either", "erf", "exp", "exp_difference", "expm1",
-    "floored", "heaviside", "larger", "log", "log1p", "log_cosh", "log_floor", "log_rise", "log_sinh", "log_tanh",
-    "power", "sin", "sinh", "smaller", "sqrt", "square", "tanh",
-]  # fmt: skip
-
-
 Formula = Callable[..., Any]
 
 
@@ -393,5 +386,5 @@ def _of_libm(name: str) -> Formula:
 asinh, atan, cos, erf, sin = (_of_libm(name) for name in ("asinh", "atan", "cos", "erf", "sin"))
 
 
-FUNCTIONS = {name: globals()[name] for name in __all__}
+FUNCTIONS = {name: value for name, value in globals().items() if not name.startswith("_")}
 """What printed text calls."""

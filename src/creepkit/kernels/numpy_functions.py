@@ -6,14 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy import cos, cosh, exp, expm1, log, log1p, sin, sinh, sqrt, square, tanh
-
-__all__ = [
-    "asinh", "atan", "both", "choose", "cos", "cosh", "coth", "either", "erf", "exp", "exp_difference", "expm1",
-    "floored", "heaviside", "larger", "log", "log1p", "log_cosh", "log_floor", "log_or_off", "log_rise", "log_sinh",
-    "log_tanh", "power", "sin", "sinh", "smaller", "sqrt", "square", "tanh",
-]  # fmt: skip
-
+from numpy import cos, cosh, exp, expm1, log, log1p, sin, sinh, sqrt, square, tanh  # noqa: F401
 
 asinh, atan, choose, power = np.arcsinh, np.arctan, np.where, np.power
 
@@ -96,7 +89,7 @@ def exp_difference(a: Any, b: Any) -> Any:
     return np.copysign(size, np.subtract(a, b))
 
 
-FUNCTIONS = {name: globals()[name] for name in __all__}
+FUNCTIONS = {name: value for name, value in globals().items() if not name.startswith("_")}
 """What printed text calls."""
 
 

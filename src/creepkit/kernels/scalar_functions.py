@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-from math import asinh, atan, cos, cosh, erf, exp, expm1, log, log1p, sin, sinh, sqrt, tanh
+from math import asinh, atan, cos, cosh, erf, exp, expm1, log, log1p, sin, sinh, sqrt, tanh  # noqa: F401
 from typing import Any
-
-__all__ = [
-    "asinh", "atan", "both", "choose", "cos", "cosh", "coth", "either", "erf", "exp", "exp_difference", "expm1",
-    "floored", "heaviside", "larger", "log", "log1p", "log_cosh", "log_floor", "log_rise", "log_sinh", "log_tanh",
-    "power", "sin", "sinh", "smaller", "sqrt", "square", "tanh",
-]  # fmt: skip
-
 
 _LN2 = log(2.0)
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 import keyword
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, wraps
+from functools import cached_property
 
 import sympy
 
@@ -128,17 +128,6 @@ class KernelFunction:
         return "\n".join(lines) + f"\n    return (\n{outputs}    )\n"
 
 
-def _explained(entry: Callable[[SymbolicKernel], KernelFunction]) -> Callable[[SymbolicKernel], KernelFunction]:
-    """The entry of a kernel, made with what sympy raises as one sentence."""
-
-    @wraps(entry)
-    def explained(kernel: SymbolicKernel) -> KernelFunction:
-        with in_one_sentence(kernel.law):
-            return entry(kernel)
-
-    return explained
-
-
 class SymbolicKernel:
     """A law as entries, ready for a printer, each made when it is first asked for.
 
@@ -153,45 +142,44 @@ class SymbolicKernel:
         self._log_rate, self._weights, self._scaled_terms = _log_sum_exp(self.names, self.form.terms)
         point = (*POINT_VARIABLES, *law.states)
         self._size, self._variables = len(point), (*point, *self.form.theta)
+        self._known_derivatives: dict[tuple[sympy.Expr, int], sympy.Expr] = {}
 
     @cached_property
-    @_explained
     def rate(self) -> KernelFunction:
         """Rates: of creep, then of each state."""
-        return _kernel_function("rate", self.names, self._terms, self._rates)
+        return self._function("rate", self._terms, self._rates)
 
     @cached_property
-    @_explained
     def terms(self) -> KernelFunction:
         """The rate of each term of the law."""
-        return _kernel_function("terms", self.names, self._terms, [*self._terms])
+        return self._function("terms", self._terms, [*self._terms])
 
     @cached_property
-    @_explained
     def log_rate(self) -> KernelFunction:
         """ln of the rate of creep, then rates of states."""
-        return _kernel_function("log_rate", self.names, self._scaled_terms, self._log_rates)
+        return self._function("log_rate", self._scaled_terms, self._log_rates)
 
     @cached_property
-    @_explained
     def update(self) -> KernelFunction:
         """The same, then derivatives to the point and the states."""
         outputs = [*self._log_rates, *self._derivatives(self._weights, 0, self._size)]
-        return _kernel_function("update", self.names, self._scaled_terms, outputs)
+        return self._function("update", self._scaled_terms, outputs)
 
     @cached_property
-    @_explained
     def sensitivity(self) -> KernelFunction:
         """Rates, their derivatives to the point and the states, then to theta."""
         derivatives = self._all_derivatives([*self._terms])
-        return _kernel_function("sensitivity", self.names, self._terms, [*self._rates, *derivatives])
+        return self._function("sensitivity", self._terms, [*self._rates, *derivatives])
 
     @cached_property
-    @_explained
     def log_sensitivity(self) -> KernelFunction:
         """The same of ln of the rate."""
         derivatives = self._all_derivatives(self._weights)
-        return _kernel_function("log_sensitivity", self.names, self._scaled_terms, [*self._log_rates, *derivatives])
+        return self._function("log_sensitivity", self._scaled_terms, [*self._log_rates, *derivatives])
+
+    def _function(self, name: str, steps: Assignments, outputs: Sequence[sympy.Expr]) -> KernelFunction:
+        with in_one_sentence(self.law):
+            return _kernel_function(name, self.names, steps, outputs)
 
     @property
     def _rates(self) -> list[sympy.Expr]:
@@ -217,16 +205,11 @@ class SymbolicKernel:
         ]
 
     def _derivative(self, expression: sympy.Expr, k: int) -> sympy.Expr:
-        result = self._derivative_cache.get((expression, k))
-        if result is None:
-            result = self._derivative_cache[expression, k] = with_all_exponential_differences(
-                sympy.diff(expression, self._variables[k])
-            )
-        return result
-
-    @cached_property
-    def _derivative_cache(self) -> dict[tuple[sympy.Expr, int], sympy.Expr]:
-        return {}
+        if (expression, k) not in self._known_derivatives:
+            with in_one_sentence(self.law):
+                derivative = with_all_exponential_differences(sympy.diff(expression, self._variables[k]))
+            self._known_derivatives[expression, k] = derivative
+        return self._known_derivatives[expression, k]
 
 
 def symbolic_kernel(law: CreepLaw) -> SymbolicKernel:

@@ -13,14 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import torch
-from torch import asinh, atan, cos, cosh, erf, exp, expm1, log, log1p, sin, sinh, sqrt, square, tanh
-
-__all__ = [
-    "asinh", "atan", "both", "choose", "cos", "cosh", "coth", "either", "erf", "exp", "exp_difference", "expm1",
-    "floored", "heaviside", "larger", "log", "log1p", "log_cosh", "log_floor", "log_or_off", "log_rise", "log_sinh",
-    "log_tanh", "power", "sin", "sinh", "smaller", "sqrt", "square", "tanh",
-]  # fmt: skip
-
+from torch import asinh, atan, cos, cosh, erf, exp, expm1, log, log1p, sin, sinh, sqrt, square, tanh  # noqa: F401
 
 both, either = torch.logical_and, torch.logical_or
 
@@ -109,7 +102,7 @@ def exp_difference(a: Any, b: Any) -> Any:
     return -torch.sign(difference) * torch.exp(torch.maximum(a, b)) * torch.expm1(-torch.abs(difference))
 
 
-FUNCTIONS = {name: globals()[name] for name in __all__}
+FUNCTIONS = {name: value for name, value in globals().items() if not name.startswith("_")}
 """What printed text calls."""
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -399,10 +400,6 @@ class LawRecord:
 
     def __reduce__(self) -> tuple[Any, ...]:
         state = {f.name: getattr(self, f.name) for f in fields(self)}
-        plain = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
+        plain: dict[str, Any] = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
         plain["examples"] = tuple(dict(example) for example in self.examples)
-        return _rebuild, (type(self), plain)
-
-
-def _rebuild(kind: type[LawRecord], state: dict[str, Any]) -> LawRecord:
-    return kind(**state)
+        return partial(type(self), **plain), ()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -214,8 +215,8 @@ class History:
 
     def __reduce__(self) -> tuple[Any, ...]:
         state = {f.name: getattr(self, f.name) for f in fields(self)}
-        plain = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
-        return _rebuild, (type(self), plain)
+        plain: dict[str, Any] = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
+        return partial(type(self), **plain), ()
 
     def up_to(self, output: str, limit: float) -> History:
         """Mark unused every frame from the first used one whose `output` exceeds `limit` on.
@@ -260,7 +261,3 @@ class History:
         if np.ptp(kelvin) < 0.5:
             ends = (kelvin[0], kelvin[0])
         return f"{celsius_text(*ends, digits=0)}, {loading_text(self.loading, load_unit(self))}"
-
-
-def _rebuild(kind: type[History], state: dict[str, Any]) -> History:
-    return kind(**state)

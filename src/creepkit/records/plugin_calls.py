@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import sys
+import importlib
+import os
 import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
-from creepkit.errors import CreepkitError, HistoryError, quoted
+import creepkit
+from creepkit.errors import POWER_REMEDY, CreepkitError, HistoryError, quoted
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -34,26 +36,40 @@ def call_of_plugin(call: Callable[[], _T], owner: object, what: str, error: type
     except (Exception, SystemExit) as raised:
         if type(owner).__module__.partition(".")[0] == OWN_PACKAGE:
             raise
-        raise error(_unforeseen(what, raised, owner)) from raised
+        raise error(f"{what} raised {raised_text(raised)}") from raised
 
 
-def _unforeseen(what: str, raised: BaseException, owner: object) -> str:
-    message = quoted(" ".join(str(raised).split()), 300) or "no message"
-    return f"{what} raised {type(raised).__name__}: {message}{_place(raised, owner)}"
+_OURS = (os.path.dirname(creepkit.__file__) + os.sep, os.path.dirname(importlib.__file__), "<frozen importlib")
+"""Where files begin that are none of a plugin."""
+
+
+def raised_text(error: BaseException) -> str:
+    """One sentence for what a plugin raised, with the deepest line of the plugin's own file."""
+    if isinstance(error, SyntaxError):
+        return f"{type(error).__name__}: {error.msg} ({error.filename}, line {error.lineno})"
+    description = " ".join(str(error).split())
+    if not isinstance(error, CreepkitError):
+        of_power = isinstance(error, TypeError) and ("for ^:" in description or "'Xor'" in description)
+        remedy = f"; {POWER_REMEDY}" if of_power else ""
+        description = f"{type(error).__name__}: {quoted(description, 300) or 'no message'}{remedy}"
+    frames = traceback.extract_tb(error.__traceback__)
+    outside = [frame for frame in frames if not frame.filename.startswith(_OURS)] or frames[-1:]
+    of_plugin = [frame for frame in outside if frame.filename == outside[0].filename]
+    return f"{description} ({of_plugin[-1].filename}, line {of_plugin[-1].lineno})" if of_plugin else description
 
 
 def call_of_reader(call: Callable[[], _T], reader: Reader, path: Path, method: str) -> _T:
     """What a reader's accepts() or read() returns; HistoryError whatever it raises, also of creepkit's own readers."""
-    return call_on_file(call, f"{path}: {method}() of reader '{reader.name}'", reader)
+    return call_on_file(call, f"{path}: {method}() of reader '{reader.name}'")
 
 
-def call_on_file(call: Callable[[], _T], what: str, owner: object = None) -> _T:
+def call_on_file(call: Callable[[], _T], what: str) -> _T:
     """What a call that reads a measured file returns; HistoryError, one sentence, whatever else it raises.
 
     The content of a file may lead any reader to an error that nobody has foreseen; the user is told of which file.
     Such an error is the cause of the HistoryError, so that a test can tell it from those that were foreseen.
 
-    what : the file and the call in words. owner : the plugin's object, whose line is named where it is known.
+    what : the file and the call in words.
     """
     try:
         return call()
@@ -66,15 +82,7 @@ def call_on_file(call: Callable[[], _T], what: str, owner: object = None) -> _T:
     except OSError as failure:
         raise HistoryError(f"{what} cannot read it ({quoted(failure.strerror or failure, 120)})") from failure
     except (Exception, SystemExit) as raised:
-        raise HistoryError(_unforeseen(what, raised, owner)) from raised
-
-
-def _place(raised: BaseException, owner: object) -> str:
-    """The deepest line of the plugin's own file, else of any; the frame of this module is none of the plugin."""
-    frames = traceback.extract_tb(raised.__traceback__)[1:]
-    own_file = getattr(sys.modules.get(type(owner).__module__), "__file__", None)
-    of_plugin = [frame for frame in frames if frame.filename == own_file] or list(frames)
-    return f" ({of_plugin[-1].filename}, line {of_plugin[-1].lineno})" if of_plugin else ""
+        raise HistoryError(f"{what} raised {raised_text(raised)}") from raised
 
 
 def accepts_path(reader: Reader, path: Path) -> bool:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -43,8 +44,7 @@ class QuantityKind:
         """Return `number` in creepkit's unit."""
         unit = self.unit(suffix, location, name)
         value = unit.factor * number + unit.offset
-        is_inside = self.low < value < self.high if self.open_interval else self.low <= value <= self.high
-        if not (math.isfinite(value) and is_inside):
+        if not (math.isfinite(value) and self._is_inside(value)):
             raise HistoryError(f"{_before(location)}'{name}' is {number:g}; a {self.name} must lie {self.range_text}")
         return value
 
@@ -69,14 +69,14 @@ class QuantityKind:
         """
         unit = self.unit(suffix, "", name)
         values: Floats = unit.factor * numbers + unit.offset
-        inside = (
-            (self.low < values) & (values < self.high)
-            if self.open_interval
-            else (self.low <= values) & (values <= self.high)
-        )
-        for k in np.flatnonzero(~inside)[:1]:
+        for k in np.flatnonzero(~self._is_inside(values))[:1]:
             self.convert(float(numbers[k]), suffix, locate(int(k)), name)
         return values
+
+    def _is_inside(self, values: Any) -> Any:
+        if self.open_interval:
+            return (self.low < values) & (values < self.high)
+        return (self.low <= values) & (values <= self.high)
 
     def standard_deviation(self) -> QuantityKind:
         """The kind of a standard deviation of this quantity: same units, above zero."""
@@ -168,15 +168,8 @@ ANGLE = QuantityKind("angle", conversions("rad", "deg"))
 
 QUANTITIES: Mapping[str, QuantityKind] = MappingProxyType(
     {
-        **{"strain": STRAIN, "number": NUMBER, "length": LENGTH, "stress": STRESS, "pressure": STRESS},
-        **{
-            "signed stress": SIGNED_STRESS,
-            "force": FORCE,
-            "moment": MOMENT,
-            "angle": ANGLE,
-            "temperature": TEMPERATURE,
-            "time": TIME,
-        },
+        **{one.name: one for one in (STRAIN, NUMBER, LENGTH, STRESS, FORCE, MOMENT, ANGLE, TEMPERATURE, TIME)},
+        **{"pressure": STRESS, "signed stress": SIGNED_STRESS},
     }
 )
 """{name: kind} of what the outputs and loads of a specimen may be; creepkit's own unit is the first of each kind."""

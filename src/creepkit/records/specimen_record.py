@@ -19,8 +19,24 @@ VISIBLE_IN_NOISE = 10.0
 """An output that moved by so many standard deviations of its noise plainly shows creep."""
 
 
+class _OfQuantity:
+    """What has a quantity that decides its unit."""
+
+    quantity: str
+
+    @property
+    def unit(self) -> str:
+        """creepkit's own unit of it, "" for a number without one."""
+        return unit_of(self.quantity)
+
+    @property
+    def kind(self) -> QuantityKind:
+        """The units that files may give it in."""
+        return QUANTITIES[self.quantity]
+
+
 @checked
-class Output(str):
+class Output(_OfQuantity, str):
     """The name of something that is observed of a test piece, with what is known about it.
 
     An output is its name: `Output("deflection", "length") == "deflection"`.
@@ -36,7 +52,6 @@ class Output(str):
     visible : how much of it plainly shows creep, in its unit; ten times the noise by default.
     """
 
-    quantity: str
     long_name: str
     grows: bool
     noise: float | None
@@ -69,16 +84,6 @@ class Output(str):
         return output
 
     @property
-    def unit(self) -> str:
-        """creepkit's own unit of it, "" for a number without one."""
-        return unit_of(self.quantity)
-
-    @property
-    def kind(self) -> QuantityKind:
-        """The units that files may give it in."""
-        return QUANTITIES[self.quantity]
-
-    @property
     def label(self) -> str:
         """Its long name and unit, for the axis of a plot."""
         return f"{self.long_name}, {self.unit}" if self.unit else self.long_name
@@ -91,7 +96,7 @@ class Output(str):
 
 @checked
 @dataclass(frozen=True)
-class Load:
+class Load(_OfQuantity):
     """What can be imposed on a test piece: `Load("force", "force")`, `Load("pressure", "pressure")`.
 
     quantity : as that of an output; it decides the unit. long_name : what people call it. ramp : s, in which it is
@@ -109,16 +114,6 @@ class Load:
             raise SolveError(f"load '{self.name}': ramp is {self.ramp!r}; allowed is a time of 0 s or more")
         _check_quantity(f"load '{self.name}'", self.quantity)
         object.__setattr__(self, "long_name", self.long_name or self.name.replace("_", " "))
-
-    @property
-    def unit(self) -> str:
-        """creepkit's own unit of it, "" for a number without one."""
-        return unit_of(self.quantity)
-
-    @property
-    def kind(self) -> QuantityKind:
-        """The units that files may give it in."""
-        return QUANTITIES[self.quantity]
 
 
 @checked

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit import hookspecs
 from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, nearest, quoted
-from creepkit.registry.plugin_sources import Provenance, error_text
+from creepkit.records.plugin_calls import raised_text
+from creepkit.registry.plugin_sources import Provenance
 
 if TYPE_CHECKING:
     import pluggy
@@ -142,7 +143,7 @@ def contributions_of(kind: ContributionKind, provenance: Provenance, implementat
         raise PluginError(f"{provenance}: {kind.hook} {error}{place}") from None
     except Exception as error:  # of a property of the plugin's record
         raise PluginError(
-            f"{provenance}: {kind.hook} returned a record that cannot be asked its name: {error_text(error)}{place}"
+            f"{provenance}: {kind.hook} returned a record that cannot be asked its name: {raised_text(error)}{place}"
         ) from error
 
 
@@ -153,7 +154,7 @@ def call_hook(provenance: Provenance, implementation: pluggy.HookImpl, **keyword
         return implementation.function(*arguments)
     except (Exception, SystemExit) as error:
         name = implementation.function.__name__
-        raise PluginError(f"{provenance}: {name} raised {error_text(error)}") from error
+        raise PluginError(f"{provenance}: {name} raised {raised_text(error)}") from error
 
 
 def hook_location(function: Any) -> str:
@@ -170,7 +171,7 @@ def _specimen_problem(specimen: Any) -> str:
         known = (*(str(name) for name in outputs), *(one.name for one in loads), *(one.name for one in lengths))
     except Exception as error:
         return (
-            f"has a record that cannot be read: {error_text(error)}; outputs are names, loads ck.Load, lengths fields"
+            f"has a record that cannot be read: {raised_text(error)}; outputs are names, loads ck.Load, lengths fields"
         )
     if not outputs or not all(isinstance(name, str) for name in outputs):
         return f"has outputs {quoted(repr(outputs), 60)}; give at least one name, or ck.Output"

@@ -19,7 +19,6 @@ import importlib.machinery
 import importlib.util
 import os
 import sys
-import traceback
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,7 +28,8 @@ from pathlib import Path
 from types import CodeType, ModuleType
 
 import creepkit
-from creepkit.errors import POWER_REMEDY, CreepkitError, PluginError
+from creepkit.errors import PluginError
+from creepkit.records.plugin_calls import raised_text
 
 GROUP_PREFIX = "creepkit."
 
@@ -83,7 +83,7 @@ class InstalledModule:
         try:
             return import_module(self.place)
         except (Exception, SystemExit) as error:
-            raise PluginError(f"{self.provenance} cannot be imported: {error_text(error)}") from error
+            raise PluginError(f"{self.provenance} cannot be imported: {raised_text(error)}") from error
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class PluginFile:
             loader.exec_module(module)
         except (Exception, SystemExit) as error:
             del sys.modules[name]
-            raise PluginError(f"{self.provenance} cannot be imported: {error_text(error)}") from error
+            raise PluginError(f"{self.provenance} cannot be imported: {raised_text(error)}") from error
         return module
 
 
@@ -173,31 +173,9 @@ def name_key(name: str) -> str:
     return "-".join(name.casefold().replace("_", " ").replace("-", " ").split())
 
 
-def error_text(error: BaseException) -> str:
-    """Return one sentence for what a plugin raised, with the plugin's file and line where they are known."""
-    if isinstance(error, SyntaxError):
-        return f"{type(error).__name__}: {error.msg} ({error.filename}, line {error.lineno})"
-    description = " ".join(str(error).split()) or "no message"
-    if not isinstance(error, CreepkitError):
-        of_power = isinstance(error, TypeError) and ("for ^:" in description or "'Xor'" in description)
-        description = f"{type(error).__name__}: {description}{f'; {POWER_REMEDY}' if of_power else ''}"
-    location = _source_location(error)
-    return f"{description} ({location})" if location else description
-
-
 class _UncachedSourceLoader(importlib.machinery.SourceFileLoader):
     """Compiles the source each time: no bytecode beside the user's file, and never a stale one while it is edited."""
 
     def get_code(self, fullname: str) -> CodeType:
         path = self.get_filename(fullname)
         return self.source_to_code(self.get_data(path), path)
-
-
-def _source_location(error: BaseException) -> str:
-    """Say where the plugin's own file appears deepest in the traceback, below the frames of registry and importlib."""
-    internal_paths = (os.path.dirname(__file__), os.path.dirname(importlib.__file__), "<frozen importlib")
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith(internal_paths)]
-    if not frames:
-        return ""
-    last = [frame for frame in frames if frame.filename == frames[0].filename][-1]
-    return f"{last.filename}, line {last.lineno}"

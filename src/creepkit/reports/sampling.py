@@ -12,7 +12,7 @@ from creepkit.errors import DatasetError
 from creepkit.reports.figures import empty_figure, place_legend_below, save_figure
 from creepkit.reports.terminal import print_json, tell
 from creepkit.sampling.conditions import ROOM_TEMPERATURE
-from creepkit.sampling.criteria import RateLimit
+from creepkit.sampling.criteria import OutcomeCriterion, RateLimit
 from creepkit.sampling.domains import Acceptance, SamplingDomain
 from creepkit.sampling.domains import acceptance as evaluate_acceptance
 from creepkit.sampling.rates import RateArguments, ln_rate
@@ -152,7 +152,7 @@ def _criterion_lines(acceptance: Acceptance) -> list[str]:
     lines = [f"{'criterion':<14} {'meet it':>8} {'rejected':>9}  asks"]
     remaining = np.ones(len(acceptance.draws), bool)
     for criterion in acceptance.design.criteria:
-        if criterion.stage == "after":
+        if isinstance(criterion, OutcomeCriterion):
             numbers = f"{'after simulation':>18}"
         else:
             is_met = acceptance.criteria_met[criterion.name]

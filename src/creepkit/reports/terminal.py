@@ -12,7 +12,7 @@ from typing import Any
 import typer
 
 from creepkit import errors
-from creepkit.jobs.shard_progress import series_of_task
+from creepkit.jobs.progress import series_of_task
 
 
 def printable(text: str) -> str:

@@ -7,24 +7,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import Any
 
 import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
-from creepkit.checked_arguments import checked_with_own_words
-from creepkit.errors import FitError, nearest, quoted
+from creepkit.checked_arguments import checked
+from creepkit.errors import FitError, nearest
 from creepkit.inverse.information_criteria import aicc_penalty, bic_penalty, criterion_weights
 from creepkit.records import History
 from creepkit.records.units import celsius_text
-from creepkit.registry.arguments import check_histories
 from creepkit.rupture_assessment.assessment import (
     AVERAGE,
     RankedRuptureFit,
     RuptureAssessment,
     RuptureSettings,
-    check_hours,
-    check_temperatures,
+    check_conditions,
     interpolated,
 )
 from creepkit.rupture_assessment.checks import AssessmentCheck, effectiveness, physical_realism, repeatability, turning
@@ -54,7 +51,7 @@ LEAST_RATES = 4
 """Tests with a rupture time and a minimum rate from which Monkman-Grant's relation is fitted unasked."""
 
 
-@checked_with_own_words("hours", "temperatures", "methods")
+@checked
 def rupture(
     tests: Sequence[History],
     methods: Sequence[str] | str | None = None,
@@ -76,11 +73,9 @@ def rupture(
     tensile_strength : {temperature in K: MPa}, interpolated between; by default as the tests state it.
     """
     chosen = settings or RuptureSettings()
-    hours = check_hours(hours)
-    if temperatures is not None:
-        temperatures = check_temperatures(temperatures)
+    check_conditions(temperatures, hours)
     asked = _known_names(methods)
-    observed, with_rate, notes = rupture_tests(check_histories(tests))
+    observed, with_rate, notes = rupture_tests(list(tests))
     if not chosen.random_effects:
         observed, with_rate = replace(observed, groups={}), replace(with_rate, groups={})
     T, strengths = tensile_strengths(observed, tensile_strength)
@@ -125,9 +120,6 @@ def _known_names(methods: Sequence[str] | str | None) -> list[str] | None:
     if methods is None:
         return None
     known = [name for name in METHODS if name != MINIMUM_RATE.name]
-    given: Any = methods
-    if not isinstance(given, str | Sequence):
-        raise FitError(f"methods is {quoted(repr(methods))}; give a list of names, such as ['larson-miller']")
     asked = list(dict.fromkeys([methods] if isinstance(methods, str) else methods))
     for name in asked:
         if name not in known:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -214,11 +213,12 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
                 return one
         return self.strengths_at(temperature, hours=[hours], method=method)[0]
 
+    @checked
     def strengths_at(
         self, temperature: float, *, hours: Sequence[float], method: str | None = None
     ) -> list[StrengthEstimate]:
         """Strengths at one temperature, K, and several times, h."""
-        hours, [temperature] = check_hours(hours), check_temperatures([temperature])
+        check_conditions([temperature], hours)
         models, name, unknown = self.models(method), method or AVERAGE, (None, None)
         reason = self.obstacle(models, temperature)
         if reason:
@@ -250,6 +250,7 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
             return f"all tests are at {celsius_text(float(self.tests.temperature.mean()))}"
         return ""
 
+    @checked
     def rupture_time(
         self, stress: float, temperature: float, *, of: str = "test", method: str | None = None
     ) -> tuple[float, float, float]:
@@ -260,10 +261,9 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
         """
         if of not in BOUND_KINDS:
             raise FitError(f"of is {quoted(repr(of))}; allowed are {', '.join(BOUND_KINDS)}")
-        check_temperatures([temperature])
-        given: Any = stress
-        if isinstance(given, bool) or not isinstance(given, Real) or not 0 < float(given) < 1e9:
-            raise FitError(f"stress is {quoted(repr(stress))}; give MPa above zero")
+        check_conditions([temperature])
+        if not 0 < stress < 1e9:
+            raise FitError(f"stress is {stress!r}; give MPa above zero")
         T, s = np.array([float(temperature)]), np.array([float(stress)])
         at = Conditions(s, T, self.tensile(T), np.full(1, np.nan))
         models = self.models(method)
@@ -301,35 +301,11 @@ def interpolated(temperatures: Floats, strengths: Floats, at: Floats) -> Floats:
     return np.where(known, np.interp(at, temperatures, strengths), np.nan)
 
 
-def check_hours(hours: Any) -> list[float]:
-    """The same as a list; FitError unless these are times, h, above zero."""
-    found = _numbers(hours, "hours", "a list of hours, such as [1e3, 1e5]")
-    for one in found:
-        if not 0 < one < 1e12:
-            raise FitError(
-                f"a strength is asked for at {quoted(repr(one))} h; give numbers of hours above zero, below 1e12"
-            )
-    return found
-
-
-def check_temperatures(temperatures: Any) -> list[float]:
-    """The same as a list; FitError unless these are temperatures in K."""
-    found = _numbers(temperatures, "temperatures", "a list of temperatures in K, such as [873.15]")
-    for one in found:
-        if not 0 < one < 1e4:
-            raise FitError(f"a temperature is {quoted(repr(one))}; give K, above 0 and below 10000")
-    return found
-
-
-def _numbers(values: Any, name: str, example: str) -> list[float]:
-    if isinstance(values, str | Mapping) or not isinstance(values, Iterable):
-        raise FitError(f"{name} is {quoted(repr(values))}; give {example}")
-    found = []
-    for one in values:
-        if isinstance(one, bool) or not isinstance(one, Real):
-            raise FitError(f"{name} holds {quoted(repr(one))}; give {example}")
-        number: Any = one  # an integer may be too large for float()
-        found.append(np.inf if abs(number) > 10**30 else float(number))
-    if not found:
-        raise FitError(f"{name} is empty; give {example}")
-    return found
+def check_conditions(temperatures: Sequence[float] | None, hours: Sequence[float] | None = None) -> None:
+    """FitError unless strengths can be asked for at these temperatures, K, and times, h."""
+    for name, given, unit, highest in (("temperatures", temperatures, "K", 1e4), ("hours", hours, "h", 1e12)):
+        if given is not None and not len(given):
+            raise FitError(f"{name} is empty; give numbers, in {unit}")
+        for one in () if given is None else given:
+            if not 0 < one < highest:
+                raise FitError(f"{name} holds {one!r}; give {unit}, above 0 and below {highest:g}")

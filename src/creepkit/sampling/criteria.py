@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar, Literal, TypeAlias
+from typing import Any
 
 import numpy as np
 import sympy
@@ -85,6 +85,10 @@ class SimulationOutcome:
     column: int = 0
     falls: bool = False
 
+    def bursts_long_before(self, time: float) -> bool:
+        """Whether a reduced-order model bursts so early that a simulation is bound to burst before a time, s."""
+        return self.status == Status.RUPTURED and BURST_TIME_FACTOR * self.end_time < time
+
     @property
     def last_output(self) -> float:
         """The output that shows creep in the last frame that has one; NaN without any."""
@@ -105,15 +109,35 @@ class SimulationOutcome:
 
 
 @dataclass(frozen=True)
-class NamedCriterion:
+class Criterion:
     """What criteria have in common: a name, and in words what is asked for."""
 
     name: str
     text: str
 
 
+class DrawCriterion(Criterion):
+    """What is asked of a draw before it is simulated."""
+
+    def passes(self, law: CreepLaw, draws: Draws) -> Bools:
+        """Which draws meet it, (rows,)."""
+        raise NotImplementedError
+
+
+class OutcomeCriterion(Criterion):
+    """What is asked of a simulated sample."""
+
+    def passes(self, outcome: SimulationOutcome) -> bool:
+        """Whether the outcome meets it."""
+        raise NotImplementedError
+
+    def rejects_early(self, screening_outcome: SimulationOutcome) -> bool:
+        """Whether the outcome by the reduced-order model shows that the simulation is bound to fail the criterion."""
+        return False
+
+
 @dataclass(frozen=True)
-class RateLimit(NamedCriterion):
+class RateLimit(DrawCriterion):
     """The law's rate at one point lies within limits, None where there is none: criteria 1 and 2.
 
     stress : MPa. lower, upper : log10 of the rate in 1/s: as logarithms rates do not underflow. time : s.
@@ -124,7 +148,6 @@ class RateLimit(NamedCriterion):
     upper: float | None = None
     strain: float = 0.01
     time: float = 1e4
-    stage: ClassVar[Literal["before"]] = "before"
 
     def passes(self, law: CreepLaw, draws: Draws) -> Bools:
         """Which draws meet it, (rows,)."""
@@ -135,10 +158,8 @@ class RateLimit(NamedCriterion):
 
 
 @dataclass(frozen=True)
-class WithinBounds(NamedCriterion):
+class WithinBounds(DrawCriterion):
     """Every parameter lies within the law's bounds, or is off."""
-
-    stage: ClassVar[Literal["before"]] = "before"
 
     def passes(self, law: CreepLaw, draws: Draws) -> Bools:
         """Which draws meet it, (rows,)."""
@@ -151,11 +172,10 @@ class WithinBounds(NamedCriterion):
 
 
 @dataclass(frozen=True)
-class ConstraintsHold(NamedCriterion):
+class ConstraintsHold(DrawCriterion):
     """The constraints that the law declares hold throughout the test; end : s, of tests whose end is not drawn."""
 
     end: float
-    stage: ClassVar[Literal["before"]] = "before"
 
     def passes(self, law: CreepLaw, draws: Draws) -> Bools:
         """Which draws meet it, (rows,)."""
@@ -163,7 +183,7 @@ class ConstraintsHold(NamedCriterion):
 
 
 @dataclass(frozen=True)
-class SurvivesTime(NamedCriterion):
+class SurvivesTime(OutcomeCriterion):
     """The simulation converged and went on for `seconds`, or to the end of a shorter test: criterion 3.
 
     None stands for the whole test. A burst is no failure of the simulation: with a number of seconds, one after them
@@ -171,7 +191,6 @@ class SurvivesTime(NamedCriterion):
     """
 
     seconds: float | None = None
-    stage: ClassVar[Literal["after"]] = "after"
 
     def passes(self, outcome: SimulationOutcome) -> bool:
         """Whether the outcome meets it."""
@@ -181,19 +200,17 @@ class SurvivesTime(NamedCriterion):
 
     def rejects_early(self, screening_outcome: SimulationOutcome) -> bool:
         """Whether the reduced-order model bursts so early that the simulation is bound to fail the criterion."""
-        burst = screening_outcome.status == Status.RUPTURED
-        return burst and self.seconds is not None and BURST_TIME_FACTOR * screening_outcome.end_time < self.seconds
+        return self.seconds is not None and screening_outcome.bursts_long_before(self.seconds)
 
 
 @dataclass(frozen=True)
-class CreepInEachHold(NamedCriterion):
+class CreepInEachHold(OutcomeCriterion):
     """Creep above `threshold` in either hold, elastic jumps left out: criterion 4.
 
     A hold that a burst cut short counts up to its last frame; a second hold that was never reached is no growth.
     """
 
     threshold: float
-    stage: ClassVar[Literal["after"]] = "after"
 
     def passes(self, outcome: SimulationOutcome) -> bool:
         """Whether the outcome meets it."""
@@ -205,18 +222,14 @@ class CreepInEachHold(NamedCriterion):
         Little creep is no reason. Under a nearly plastic law a clamped test piece creeps at its edge, where the stress
         is high: a model that knows one stress predicted 1e-5 mm where the simulation had 0.02 mm.
         """
-        return (
-            screening_outcome.status == Status.RUPTURED
-            and BURST_TIME_FACTOR * screening_outcome.end_time < screening_outcome.times[-2]
-        )
+        return screening_outcome.bursts_long_before(float(screening_outcome.times[-2]))
 
 
 @dataclass(frozen=True)
-class TotalCreepAbove(NamedCriterion):
+class TotalCreepAbove(OutcomeCriterion):
     """Creep of `threshold` or more in both holds together, elastic jumps left out."""
 
     threshold: float
-    stage: ClassVar[Literal["after"]] = "after"
 
     def passes(self, outcome: SimulationOutcome) -> bool:
         """Whether the outcome meets it."""
@@ -224,27 +237,17 @@ class TotalCreepAbove(NamedCriterion):
 
 
 @dataclass(frozen=True)
-class FinalOutputAbove(NamedCriterion):
+class FinalOutputAbove(OutcomeCriterion):
     """The output that shows creep is above `threshold` at the end: criterion 5.
 
     After a burst, in the last frame before it.
     """
 
     threshold: float
-    stage: ClassVar[Literal["after"]] = "after"
 
     def passes(self, outcome: SimulationOutcome) -> bool:
         """Whether the outcome meets it."""
         return outcome.last_output > self.threshold
-
-
-DrawCriterion: TypeAlias = RateLimit | WithinBounds | ConstraintsHold
-
-
-OutcomeCriterion: TypeAlias = SurvivesTime | CreepInEachHold | TotalCreepAbove | FinalOutputAbove
-
-
-Criterion: TypeAlias = DrawCriterion | OutcomeCriterion
 
 
 PAPER_SHARE_OF_VISIBLE = 0.5

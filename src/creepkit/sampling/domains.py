@@ -35,7 +35,7 @@ from creepkit.sampling.conditions import (
     condition_range,
     condition_ranges,
 )
-from creepkit.sampling.criteria import Criterion, conditioned_criteria, paper_criteria
+from creepkit.sampling.criteria import Criterion, DrawCriterion, conditioned_criteria, paper_criteria
 from creepkit.sampling.draws import (
     SELECTION_DIMENSIONS,
     TERM_COUNT_PROBABILITIES,
@@ -198,7 +198,7 @@ class ConditionedDomain(SamplingDomain):
         return author_parameters(self.law, solve_damage_coefficients(self.law, theta, unit_coordinates, points))
 
     def _meets_draw_criteria(self, draws: Draws) -> Bools:
-        met = [c.passes(self.law, draws) for c in self.criteria if c.stage == "before"]
+        met = [c.passes(self.law, draws) for c in self.criteria if isinstance(c, DrawCriterion)]
         return np.asarray(np.all(met, axis=0))
 
     def document(self) -> dict[str, Any]:
@@ -256,7 +256,7 @@ def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0
     draws : number of rows; a rejection counts for the first criterion that is not met.
     """
     rows = design.draw(0, draws, seed)
-    criteria_met = {c.name: c.passes(design.law, rows) for c in design.criteria if c.stage == "before"}
+    criteria_met = {c.name: c.passes(design.law, rows) for c in design.criteria if isinstance(c, DrawCriterion)}
     end, reference = design.conditions.end, design.reference_stress
     points = reference.evaluation_points(rows, end)
     log10_rates = mean_ln_rate(design.law, design.law.to_internal(rows.parameters), points) / np.log(10.0)

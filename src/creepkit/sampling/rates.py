@@ -25,6 +25,7 @@ from creepkit.sampling.specimen_conditions import (
     TEMPERATURE,
     SpecimenConditions,
     creep_output,
+    mean_reference_stress,
     record_of,
     specimen_conditions,
     stated_method,
@@ -204,18 +205,13 @@ class ReferenceStress:
         return np.array([self._test_growth(draws, row, end) for row in range(len(draws))])
 
     def _test_growth(self, draws: Draws, row: int, end: float) -> float:
-        piece, test = tested_piece(self.specimen, self._held_test(draws, row, 0, end))
+        piece, test = tested_piece(self.specimen, self._held_test(draws, row, 0, end), {})
         return self._positive(float(np.mean(piece.growth_per_strain(test))), "growth_per_strain")
 
     def _level_stresses(self, draws: Draws, level: int, end: float) -> Floats:
         """(rows,) MPa, the reference stress while one of both levels is held."""
-        stresses = []
-        for row in range(len(draws)):
-            piece, test = tested_piece(self.specimen, self._held_test(draws, row, level, end))
-            found = np.atleast_1d(np.asarray(piece.reference_stress(test), float))
-            mean = float(np.exp(np.log(found[found > 0]).mean())) if (found > 0).any() else 0.0
-            stresses.append(self._positive(mean, "reference_stress"))
-        return np.array(stresses)
+        tests = (tested_piece(self.specimen, self._held_test(draws, row, level, end), {}) for row in range(len(draws)))
+        return np.array([self._positive(mean_reference_stress(*test), "reference_stress") for test in tests])
 
     def _held_test(self, draws: Draws, row: int, level: int, end: float) -> History:
         """The test of a row, with one of both levels held throughout."""

@@ -220,7 +220,14 @@ def stated_method(specimen: Predictor, name: str, meaning: str) -> Any:
     return getattr(record, name)
 
 
-def tested_piece(specimen: Predictor, plan: History) -> tuple[Any, History]:
-    """The specimen with the lengths that a test states, and the test."""
+def tested_piece(specimen: Predictor, plan: History, nuisances: Mapping[str, float]) -> tuple[Any, History]:
+    """The specimen with the lengths that a test and its nuisances {kind: value} state, and the test as they say."""
     record = record_of(specimen)
-    return record.of_test(plan, {}) if hasattr(record, "of_test") else (record, plan)
+    return record.of_test(plan, nuisances) if hasattr(record, "of_test") else (record, plan)
+
+
+def mean_reference_stress(piece: Any, test: History) -> float:
+    """The reference stress of a test with a held load, MPa: the geometric mean where several are stated; 0 of none."""
+    stresses = np.atleast_1d(np.asarray(piece.reference_stress(test), float))
+    stresses = stresses[stresses > 0]
+    return float(np.exp(np.log(stresses).mean())) if stresses.size else 0.0

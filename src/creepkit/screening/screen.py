@@ -13,13 +13,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from creepkit.checked_arguments import checked, checked_with_own_words
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets, check_penalty
-from creepkit.jobs.shard_progress import ProgressCallback, duration_text
+from creepkit.jobs.progress import ProgressCallback, duration_text
 from creepkit.jobs.worker_pools import ProcessWorkers, process_count
 from creepkit.jobs.worker_process import TaskResult, run_task
 from creepkit.language import CreepLaw
@@ -72,7 +72,7 @@ class ScreeningOptions:
             raise FitError(f'confirm is {self.confirm!r}; allowed are True, False and "when in doubt"')
 
 
-@checked_with_own_words("histories")
+@checked
 def screen(
     histories: Sequence[History] | str | Path,
     laws: Sequence[CreepLaw | str] | None = None,
@@ -129,8 +129,6 @@ def resolve_tests(histories: Sequence[History] | str | Path, compositions: objec
     if isinstance(histories, (str, Path)):
         table = Path(compositions) if isinstance(compositions, (str, Path)) else None
         return _read_folder(Path(histories).expanduser(), table)
-    if isinstance(histories, History) or not all(isinstance(h, History) for h in histories):
-        raise FitError("screen() takes a list of histories, as read_histories(path) returns them, or a folder of files")
     if not histories:
         raise FitError("there are no histories to screen")
     for name, count in Counter(h.name for h in histories).items():

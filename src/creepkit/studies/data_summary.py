@@ -59,6 +59,11 @@ class DataSummary:
         return [h for h in self.tests if h.outputs or h.minimum_rate is not None]
 
     @property
+    def with_curves(self) -> bool:
+        """Whether any test has a curve."""
+        return any(history.outputs for history in self.tests)
+
+    @property
     def durations_known(self) -> bool:
         """Whether all tests say how long they lasted."""
         return all(map(duration_known, self.tests))

@@ -16,7 +16,7 @@ from creepkit.errors import CreepkitError, StudyError
 from creepkit.files.locking import locked
 from creepkit.files.record_codec import RecordError, record_to_json
 from creepkit.inverse.kept_fits import COMPUTING, keep_fits
-from creepkit.jobs.shard_progress import ProgressCallback, duration_text, series_of_task
+from creepkit.jobs.progress import ProgressCallback, duration_text, series_of_task
 from creepkit.records import History
 from creepkit.reports.contents import StageFailure
 from creepkit.studies.kept_results import ResultFolder, codec_of, key_of

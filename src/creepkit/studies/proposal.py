@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import os.path
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
+from textwrap import wrap
+from typing import Any
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.inverse.duration import needs_durations, rests_on_durations
-from creepkit.records import History
+from creepkit.inverse.duration import followed_duration, needs_durations, rests_on_durations
+from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
+from creepkit.quality.flags import frame_ranges_text
+from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
 from creepkit.registry.reading import read_those_that_can_be
-from creepkit.studies import proposed_tables as tables
-from creepkit.studies.camera_proposal import proposed_cameras
-from creepkit.studies.data_summary import DataSummary
+from creepkit.studies.camera_proposal import found_cameras
+from creepkit.studies.data_summary import FEWEST_RUPTURES, DataSummary
 from creepkit.studies.study_file import parse_study
 from creepkit.studies.swapped_units import swapped_units
 
@@ -31,6 +37,14 @@ TERTIARY_SHARE = 0.3
 
 STRESS_RATIO = 1.5
 """Largest over smallest load, from which laws with another dependence on stress can be told apart."""
+
+
+FEWEST_TEMPERATURES = 3
+"""For forms of temperature."""
+
+
+MOST_REMARKS = 20
+"""Files that were not read, and flags, that the comments name."""
 
 
 MOST_FOLDERS, MOST_FILES_TRIED, MOST_FOLDERS_NAMED = 40, 3, 4
@@ -53,26 +67,92 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
         raise StudyError(f"{folder}: there is no such folder; name the one that holds the measured files")
     base = os.path.relpath(folder, path.absolute().parent).replace("\\", "/")
     names, tests, problems, failure = _readable(folder, path, reader)
-    cameras = proposed_cameras(folder, path, [folder / name for name in names], base)
-    if not tests and not cameras.lines:
+    cameras = found_cameras(folder, path, [folder / name for name in names], base)
+    known: dict[str, Any] = {"title": folder.absolute().name, "cameras": cameras, "summary": None}
+    lines = cameras.summary
+    if tests:
+        named = {str(one) for one in cameras.files}
+        problems = [f"not read: {one}" for one in problems if one.split(":")[0] not in named][:MOST_REMARKS]
+        quality = ck.check_data_quality([history for history in tests if history.outputs])
+        summary, left_out = DataSummary.of(tests), left_out_lines(quality)
+        doubts = [f"check the units: {one}" for one in swapped_units(tests)]
+        lines = (*summary.lines, *doubts, *left_out, *cameras.summary, *problems)
+        known |= {
+            "files": [name if base == "." else base if name == "." else f"{base}/{name}" for name in names],
+            "found": [*summary.lines, *(f"C{one[1:]}" for one in doubts)],
+            "reader": reader, "summary": summary, "left_out": left_out, "problems": problems,
+            "copies": [one for one in quality if one.kind == "copy"],
+            "flags": [
+                one for one in quality if len(one.tests) == 1 and one.kind not in ("copy", *FRAME_FLAG_KINDS)
+            ][:MOST_REMARKS],
+            **(_identification(summary) if summary.framed else {}),
+        }  # fmt: skip
+    elif cameras.cameras:
+        known["laws"] = _installed(SECONDARY_LAWS)
+    else:
         raise failure or StudyError(f"{folder}: none of its files holds a test")
-    if not tests:
-        parts = [tables.study(folder), cameras.lines, *tables.tests_of_cameras(_installed(SECONDARY_LAWS))]
-        text = tables.text_of(parts)
-        parse_study(path, text)
-        return StudyProposal(text, cameras.summary)
-    known = {str(one) for one in cameras.files}
-    problems = [f"not read: {one}" for one in problems if one.split(":")[0] not in known][: tables.MOST_REMARKS]
-    files = [name if base == "." else base if name == "." else f"{base}/{name}" for name in names]
-    quality = ck.check_data_quality([history for history in tests if history.outputs])
-    summary, left_out = DataSummary.of(tests), tables.left_out_lines(quality)
-    doubts = [f"check the units: {one}" for one in swapped_units(tests)]
-    found = [*summary.lines, *(f"C{one[1:]}" for one in doubts)]
-    data = tables.data(files, reader, summary.temperatures, found, left_out, problems)
-    parts = [tables.study(folder), cameras.lines, data, tables.exclude(quality)]
-    text = tables.text_of([*parts, *tables.stages(summary, candidate_laws(summary), TERTIARY_LAWS)])
+    text = rendered(known)
     parse_study(path, text)  # what is written must be valid
-    return StudyProposal(text, (*summary.lines, *doubts, *left_out, *cameras.summary, *problems))
+    return StudyProposal(text, lines)
+
+
+def one_line(text: str, length: int = 200) -> str:
+    """A text without what cannot be seen, of bounded length."""
+    return "".join(character if character.isprintable() else "?" for character in text)[:length]
+
+
+def rendered(known: Mapping[str, Any]) -> str:
+    """The text of the study file of which this is known."""
+    from jinja2 import Environment, StrictUndefined
+
+    filters: dict[str, Any] = {
+        "toml": lambda value: json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f"),
+        "line": one_line,
+        "comment": lambda text: f"# {one_line(text)}",
+        "wrapped": lambda flag: wrap(one_line(str(flag), 2000), 116, break_long_words=False, break_on_hyphens=False),
+        "ranges": frame_ranges_text,
+    }
+    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= filters
+    template = environment.from_string(files("creepkit.studies").joinpath("proposed_study.toml.jinja").read_text())
+    limits = {"fewest_temperatures": FEWEST_TEMPERATURES, "fewest_ruptures": FEWEST_RUPTURES}
+    return re.sub(r"\n{3,}", "\n\n", template.render({**known, **limits})).rstrip("\n") + "\n"
+
+
+def left_out_lines(quality: DataQuality) -> list[str]:
+    """What is left out of the tests: of each its suspect frames with their kind, and copies of other tests."""
+    flags = [one for one in quality if one.kind in FRAME_FLAG_KINDS]
+    lines = [f"left out of {one.history}: {frame_ranges_text(one.frames)} ({one.kind}: {one.reason})" for one in flags]
+    lines += [f"left out: {one.history} ({one.reason})" for one in quality if one.kind == "copy"]
+    more = len(lines) - MOST_REMARKS
+    return [*lines[:MOST_REMARKS], *([f"left out: parts of {more} more tests"] if more > 0 else [])]
+
+
+def _identification(summary: DataSummary) -> dict[str, Any]:
+    """What the tables [identification] and [[forecast]] say of the laws, and of the first test that has a curve."""
+    import creepkit as ck
+    from creepkit.surrogates.loading import reduced_order_models
+
+    laws, one = candidate_laws(summary), summary.framed[0]
+    damage = {name for name in laws if "alpha" in ck.law(name).names}
+    specimens = {history.specimen for history in summary.tests}
+    lengths = dimensions_of(ck.available("specimens").get(summary.tests[0].specimen))
+    longer = {
+        "specimen": one.specimen,
+        "load": "_".join(filter(None, (one.loading.quantity, load_unit(one)))),
+        "level": 0.9 * float(one.loading.program().values.max()),
+        "celsius": one.mean_temperature - ZERO_CELSIUS,
+        "hours": 2 * followed_duration(one) / SECONDS_PER_HOUR,
+        "modulus": None if one.elastic is None else one.elastic.at(one.mean_temperature).E / 1e3,
+    }
+    return {
+        "laws": laws,
+        "damage": damage,
+        "damage_of_tension": damage <= {*TERTIARY_LAWS},
+        "reduced": [name for name, one in reduced_order_models().items() if {getattr(one, "name", name)} == specimens],
+        "lengths": [length for length in lengths if length.tolerance > 0][:1],
+        "longer": longer,
+    }
 
 
 def _readable(

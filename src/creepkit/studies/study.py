@@ -27,7 +27,7 @@ from creepkit.studies.stages import StageInputs, stages_of
 from creepkit.studies.study_file import KeyPath, StudyFile, read_study_file
 
 if TYPE_CHECKING:
-    from creepkit.jobs.shard_progress import ProgressCallback
+    from creepkit.jobs.progress import ProgressCallback
     from creepkit.reports.contents import ReportContents
 
 

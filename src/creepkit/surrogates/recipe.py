@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.errors import SurrogateError
-from creepkit.jobs.shard_progress import ProgressCallback as ProgressCallback
+from creepkit.jobs.progress import ProgressCallback as ProgressCallback
 from creepkit.options import Options, option
 
 if TYPE_CHECKING:

@@ -27,13 +27,10 @@ from creepkit.records import (
     assemble_prediction,
     broadcast_candidates,
     constant_load,
-    dimension_named,
 )
-from creepkit.sampling.specimen_conditions import creep_output, stated_method, tested_piece
-from creepkit.specimens.test_piece import warmer_and_stiffer
+from creepkit.sampling.specimen_conditions import creep_output, mean_reference_stress, stated_method, tested_piece
 
 if TYPE_CHECKING:
-    from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import CreepLaw
 
 
@@ -84,61 +81,28 @@ class ReferenceStressModel:
         """
         kernel = kernels.lower(law, "compiled")
         theta, of_tests = broadcast_candidates(theta, nuisances, len(histories))
-        if not of_tests:
-            parts = self._parts(kernel, theta, histories)
-            return assemble_prediction(parts, histories, self.outputs, len(theta))
-        candidates = []
-        for c in range(len(theta)):
-            changed = [
-                self._changed(history, {kind: float(values[c, k]) for kind, values in of_tests.items()})
-                for k, history in enumerate(histories)
-            ]
-            candidates.append(self._parts(kernel, theta[c : c + 1], changed))
-        parts = [_joined([of_one[k] for of_one in candidates]) for k in range(len(histories))]
-        return assemble_prediction(parts, histories, self.outputs, len(theta))
-
-    def _parts(self, kernel: CompiledLaw, theta: Floats, histories: Sequence[History]) -> list[HistoryPrediction]:
-        pieces = [
-            tested_piece(self.specimen, history.replace(outputs={}, standard_deviation={})) for history in histories
-        ]
-        tests = [_point_test(piece, plan) for piece, plan in pieces]
-        found = integration.integrate(kernel, theta, tests, settings=SETTINGS)
-        parts = []
-        for k, (piece, plan) in enumerate(pieces):
-            values = float(np.mean(piece.growth_per_strain(plan))) * found.of(k)[..., None]
-            parts.append(HistoryPrediction(values, found.status[:, k], found.end_times[:, k]))
-        return parts
-
-    def _changed(self, history: History, nuisances: dict[str, float]) -> History:
-        """A history as its nuisances {kind: value} say."""
-        lengths = dict(history.geometry)
-        for kind, value in nuisances.items():
-            length = dimension_named(self.specimen, kind)
-            if length is not None:
-                lengths[length.name] = value
-        changed = warmer_and_stiffer(history, nuisances.get("temperature", 0.0), nuisances.get("modulus", 0.0))
-        return changed.replace(geometry=lengths)
+        every, parts = np.arange(len(theta)), []
+        for rows in every[:, None] if of_tests else [every]:  # with nuisances each candidate has test pieces of its own
+            tests = []
+            for k, history in enumerate(histories):
+                values = {kind: float(of_test[rows[0], k]) for kind, of_test in of_tests.items()}
+                tests.append(tested_piece(self.specimen, history.replace(outputs={}, standard_deviation={}), values))
+            points = [_point_test(*test) for test in tests]
+            found = integration.integrate(kernel, theta[rows], points, settings=SETTINGS)
+            growth = [float(np.mean(piece.growth_per_strain(plan))) for piece, plan in tests]
+            parts.append(
+                [(growth[k] * found.of(k), found.status[:, k], found.end_times[:, k]) for k in range(len(growth))]
+            )
+        joined = [tuple(map(np.concatenate, zip(*columns, strict=True))) for columns in zip(*parts, strict=True)]
+        of_histories = [HistoryPrediction(values[..., None], status, ends) for values, status, ends in joined]
+        return assemble_prediction(of_histories, histories, self.outputs, len(theta))
 
 
 def _point_test(piece: Any, plan: History) -> PointTest:
     """A material point under the reference stress of each value of the load; zero where there is no load."""
     program = plan.loading.program()
     loads, which = np.unique(program.values, return_inverse=True)
-    stresses = np.array([_held_stress(piece, plan, float(load)) if load > 0.0 else 0.0 for load in loads])
+    quantity = plan.loading.quantity
+    held = [plan.replace(loading=constant_load(quantity, float(load))) if load > 0.0 else None for load in loads]
+    stresses = np.array([mean_reference_stress(piece, test) if test else 0.0 for test in held])
     return PointTest(Program(program.times, stresses[which]), plan.temperature_program(), plan.times)
-
-
-def _held_stress(piece: Any, plan: History, load: float) -> float:
-    """The reference stress, MPa, while a load is held; the geometric mean where several are stated."""
-    held = plan.replace(loading=constant_load(plan.loading.quantity, load))
-    stresses = np.atleast_1d(np.asarray(piece.reference_stress(held), float))
-    return float(np.exp(np.log(stresses[stresses > 0.0]).mean())) if (stresses > 0.0).any() else 0.0
-
-
-def _joined(parts: Sequence[HistoryPrediction]) -> HistoryPrediction:
-    """Candidates one after the other, of one test."""
-    return HistoryPrediction(
-        np.concatenate([part.values for part in parts]),
-        np.concatenate([part.status for part in parts]),
-        np.concatenate([part.end_times for part in parts]),
-    )

@@ -1,6 +1,6 @@
 """Write the small files that are mutated and take long to make: `python tests/data/mutated/make.py`.
 
-Of the class of formats that tests/data/formats lacks; tests/helpers/samples_kept.py reads them.
+Of the class of formats that tests/data/formats lacks; tests/benchmarks/file_samples/kept.py reads them.
 """
 
 import sys

@@ -1,6 +1,7 @@
 """Data sets in files: what is written is read, with h5py alone too; what is something else is said in a sentence."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import dataclass, replace
@@ -174,52 +175,6 @@ def test_a_foreign_hdf5_file(tmp_path):
     assert "an HDF5 file, but no data set of creepkit" in sentence(tmp_path / "a.h5")
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "message"),
-    [
-        ("layout", 2, "its layout is 2, this creepkit reads layout 1; upgrade creepkit"),
-        ("layout", 0, "its layout is 0, this creepkit reads layout 1; generate it again"),
-        ("units", "Pa, m, s, K", "its units are 'Pa, m, s, K'; allowed are 'MPa, mm, s, K'"),
-        ("law", "{", "its law, line 1: not JSON: expecting property name"),
-        ("law", "{}", "this is not a law that creepkit wrote"),
-        ("specimen", '{"name": "bar of soap", "fields": {}}', "'bar of soap' cannot be rebuilt here"),
-        ("specimen", '{"name": "uniaxial", "fields": {"colour": 1}}', "'uniaxial' cannot be rebuilt here"),
-        ("specimen", "[]", "the attribute 'specimen' is missing, or no record"),
-        ("outputs", None, "the attribute 'outputs' is missing"),
-        ("outputs", ["a", "b"], "the array 'values' is .*, which does not fit"),
-    ],
-)
-def test_attributes_that_say_something_else(data, tmp_path, name, value, message):
-    path = storage.write_dataset(data, tmp_path / "a.h5")
-    with h5py.File(path, "r+") as file:
-        if value is None:
-            del file.attrs[name]
-        else:
-            file.attrs[name] = value
-    with pytest.raises(DatasetError, match=message):
-        storage.read_dataset(path)
-    sentence(path)
-
-
-def test_arrays_that_are_missing_or_of_another_length(data, tmp_path):
-    path = storage.write_dataset(data, tmp_path / "a.h5")
-    with h5py.File(path, "r+") as file:
-        file["reasons"].resize(3, axis=0)
-    assert "the array 'reasons' is int8 (3,), which does not fit the others" in sentence(path)
-    with h5py.File(path, "r+") as file:
-        del file["hold_outputs"]
-    assert "the array 'hold_outputs' is missing" in sentence(path)
-
-
-def test_columns_that_are_not_numbers(data, tmp_path):
-    path = storage.write_dataset(
-        replace(data, parameters=np.where(data.parameters > 0, np.nan, 0.0)), tmp_path / "a.h5"
-    )
-    assert "sample 0: its parameters or conditions are no numbers of its law" in sentence(path)
-    path = storage.write_dataset(replace(data, reasons=np.full(32, 6)), tmp_path / "b.h5")
-    assert "sample 0: its reason is none" in sentence(path)
-
-
 def test_every_truncation_of_a_file_is_noticed(data, tmp_path):
     whole = storage.write_dataset(data, tmp_path / "a.h5").read_bytes()
     for length in range(0, len(whole), max(len(whole) // 23, 1)):
@@ -254,14 +209,6 @@ def test_long_attributes_are_no_trouble(data, tmp_path):
     assert storage.read_dataset(storage.write_dataset(long, tmp_path / "a.h5")).design_document == long.design_document
 
 
-def test_shards_are_not_written_through_a_link(tmp_path):
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "a.h5.parts").symlink_to("elsewhere")
-    with pytest.raises(DatasetError, match=r"a\.h5\.parts: is a link, .* remove the link"):
-        ck.generate("norton", "uniaxial", 4, seed=1, to=tmp_path / "a.h5", every=3600.0)
-    assert names_in(tmp_path / "elsewhere") == []
-
-
 def test_a_specimen_that_a_file_cannot_hold_is_refused(data, tmp_path):
     odd = ck.specimen("bulge")
     mesh = odd.geometry.mesh(0.5)
@@ -272,12 +219,12 @@ def test_a_specimen_that_a_file_cannot_hold_is_refused(data, tmp_path):
 # ---- files that mean harm ------------------------------------------------------------------------------------------
 
 
-def changed(data, path, change):
-    """A file of the data set that `change` has had in its hands."""
-    storage.write_dataset(data, path)
-    with h5py.File(path, "r+") as file:
-        change(file)
-    return path
+DAMAGED = "cannot be read, it seems damaged"
+
+
+def said(name, value):
+    """A change of an attribute."""
+    return lambda file: file.attrs.__setitem__(name, value)
 
 
 def replaced(name, values, **how):
@@ -320,47 +267,50 @@ def of_accepted(name, value):
     ("change", "message"),
     [
         (enormous, "its arrays have more than 100 MB unpacked"),
-        (replaced("reasons", np.zeros(32)), "the array 'reasons' is missing, or is none of its kind"),
-        (replaced("parameters", np.zeros((32, 2), complex)), "the array 'parameters' is missing, or is none"),
-        (replaced("parameters", np.full((32, 2), b"1e-12")), "the array 'parameters' is missing, or is none"),
+        (replaced("reasons", np.zeros(32)), "the array 'reasons' is float64 .*, which does not fit"),
+        (replaced("parameters", np.zeros((32, 2), complex)), "the array 'parameters' is complex128 .*, which does not"),
+        (replaced("parameters", np.full((32, 2), b"1e-12")), "the array 'parameters' is .*, which does not fit"),
+        (lambda file: file["reasons"].resize(3, axis=0), r"the array 'reasons' is int8 \(3,\), which does not fit"),
         (replaced("time_grid", np.array([0.0, np.nan, 1000.0, 3600.0])), "a time grid needs two or more finite times"),
         (replaced("time_grid", np.array([0.0, 100.0, 100.0, 3600.0])), "must start at or after 0 and increase"),
-        (replaced("time_grid", np.zeros((4, 4))), r"its time grid is float64 \(4, 4\)"),
-        (replaced("time_grid", np.array([b"0", b"1", b"2", b"3"])), "'time_grid' is missing, or is none of its kind"),
-        (lambda file: file["time_grid"].attrs.__delitem__("relative"), "its time grid is .*, relative None"),
+        (replaced("time_grid", np.zeros((4, 4))), "a time grid needs two or more finite times"),
         (lambda file: file.__setitem__("marks", h5py.ExternalLink("b.h5", "/values")), "is a link to elsewhere"),
         (lambda file: file.__setitem__("marks", h5py.SoftLink("/values")), "is a link to elsewhere"),
         (lambda file: file.create_dataset("x", (4,), "i4", external="x.bin"), "'x' is a link to elsewhere"),
-        (lambda file: file.__delitem__("time_grid"), "the array 'time_grid' is missing"),
-        (lambda file: file.__delitem__("failures"), "the array 'failures/rows' is missing"),
+        (lambda file: file.__delitem__("failures"), DAMAGED),
+        (lambda file: file.__delitem__("hold_outputs"), DAMAGED),
+        (lambda file: file["time_grid"].attrs.__delitem__("relative"), DAMAGED),
+        (put_group("time_grid"), DAMAGED),
+        (put_group("failures/texts"), DAMAGED),
         (replaced("failures/rows", np.array([1, 2, 3])), "its failures are not of samples, each with one text"),
-        (replaced("failures/rows", np.array([1.5])), "'failures/rows' is missing, or is none of its kind"),
         (replaced("failures/rows", np.array([10**9])), "its failures are not of samples"),
-        (put_group("time_grid"), "the array 'time_grid' is missing, or is none of its kind"),
-        (put_group("failures/texts"), "the array 'failures/texts' is missing, or is none of its kind"),
         (of_accepted("status", 77), "sample .*: its status is none"),
+        (of_accepted("reasons", 6), "sample .*: its reason is none"),
+        (of_accepted("values", np.nan), "sample .*: its history is missing, though it was accepted"),
         (of_accepted("parameters", -1.0), "its parameters or conditions are no numbers of its law"),
-        (lambda file: file.attrs.__setitem__("layout", 1.0), "its layout is 1.0, this"),
-        (lambda file: file.attrs.__setitem__("provenance", "[]"), "'provenance' is missing, or no record"),
-        (lambda file: file.attrs.__setitem__("design", "3"), "the attribute 'design' is missing, or no record"),
-        (lambda file: file.attrs.__setitem__("law", "[" * 100_000), "its law: lists nested too deep"),
-        (lambda file: file.attrs.__setitem__("outputs", 3.0), "the attribute 'outputs' is missing, or no list"),
-        (lambda file: file.attrs.__setitem__("parameter_names", ["n", "A"]), "its parameters are n, A, those of its"),
-        (lambda file: file.attrs.__setitem__("reason_texts", ["met"]), "not a text for each reason"),
+        (of_accepted("parameters", np.nan), "its parameters or conditions are no numbers of its law"),
+        (said("layout", 2), "its layout is 2, this creepkit reads layout 1; upgrade creepkit"),
+        (said("layout", 0), "its layout is 0, this creepkit reads layout 1; generate it again"),
+        (said("layout", 1.0), "its layout is 1.0, this"),
+        (said("units", "Pa, m, s, K"), "its units are 'Pa, m, s, K'; allowed are 'MPa, mm, s, K'"),
+        (said("law", "{"), "its law, line 1: not JSON: expecting property name"),
+        (said("law", "{}"), "this is not a law that creepkit wrote"),
+        (said("law", "[" * 100_000), "its law: lists nested too deep"),
+        (said("specimen", '{"name": "bar of soap", "fields": {}}'), "'bar of soap' cannot be rebuilt here"),
+        (said("specimen", '{"name": "uniaxial", "fields": {"colour": 1}}'), "'uniaxial' cannot be rebuilt here"),
+        (said("design", "3"), "the attribute 'design' is no record"),
+        (said("outputs", 3.0), DAMAGED),
+        (lambda file: file.attrs.__delitem__("outputs"), DAMAGED),
+        (said("outputs", ["a", "b"]), "the array 'values' is .*, which does not fit"),
+        (said("parameter_names", ["n", "A"]), "its parameters are n, A, those of its"),
+        (said("reason_texts", ["met"]), "not a text for each reason"),
     ],
 )
 def test_what_a_file_promises_is_checked(data, tmp_path, change, message):
-    with pytest.raises(DatasetError, match=message):
-        storage.read_dataset(changed(data, tmp_path / "a.h5", change))
-    sentence(tmp_path / "a.h5")
-
-
-def test_an_accepted_sample_needs_a_history(data, tmp_path):
-    row = np.flatnonzero(data.reasons == 0)[0]
-    values = np.array(data.values)
-    values[row] = np.nan
-    path = storage.write_dataset(replace(data, values=values), tmp_path / "a.h5")
-    assert f"sample {row}: its history is missing, though it was accepted" in sentence(path)
+    path = storage.write_dataset(data, tmp_path / "a.h5")
+    with h5py.File(path, "r+") as file:
+        change(file)
+    assert re.search(message, sentence(path))
 
 
 def test_nothing_from_a_file_is_unpickled():

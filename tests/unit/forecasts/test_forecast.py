@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import norm
 
 import creepkit as ck
-from creepkit.errors import FitError
+from creepkit.errors import CreepkitError, FitError
 from creepkit.forecasts.draws import law_draws
 from creepkit.forecasts.forecast import forecast
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
@@ -316,15 +316,15 @@ def test_a_dimple_is_forecast_from_bars_with_the_tolerance_of_its_thickness(fit)
         ({"tolerances": {"thickness": 0.1}}, "means nothing to the specimens of these tests"),
         ({"tolerances": {"temperature": 5.0}}, "no law has a temperature; leave it out"),
         ({"tolerances": {"modulus": -1.0}}, "the tolerance of 'modulus' is -1.0"),
-        ({"tolerances": {"modulus": "x"}}, "tolerances must be numbers by name"),
-        ({"targets": {"strain": ["x"]}}, "targets must be numbers by output"),
-        ({"level": "x"}, "level is 'x'"),
+        ({"tolerances": {"modulus": "x"}}, r"tolerances\['modulus'\] of forecast\(\) is 'x'; allowed is"),
+        ({"targets": {"strain": ["x"]}}, r"targets\['strain'\]\[0\] of forecast\(\) is 'x'"),
+        ({"level": "x"}, r"level of forecast\(\) is 'x'; allowed is a finite number"),
         ({"targets": {"amplitude": [0.1]}}, "no test has an output 'amplitude'"),
         ({"targets": {"strain": [-1.0]}}, "targets of strain"),
     ],
 )
 def test_nonsense_is_refused(fit, options, sentence):
-    with pytest.raises(FitError, match=sentence):
+    with pytest.raises(CreepkitError, match=sentence):
         fit.forecast(bar("plan", 100.0, noise=0.0), **options)
 
 

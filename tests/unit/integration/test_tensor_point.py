@@ -15,42 +15,16 @@ from creepkit.integration.tensor_integration import (
 )
 from creepkit.integration.time_discretisation import SDIRK2, SDIRK4
 from creepkit.kernels import lower
-from creepkit.language import (
-    CreepLaw,
-    Param,
-    State,
-    arrhenius,
-    mean_stress,
-    parameters,
-    principal_stress,
-    states,
-    stress,
-)
+from creepkit.language import CreepLaw, State, arrhenius, mean_stress, principal_stress, stress
 from creepkit.laws.norton import NORTON
 from creepkit.records import Program, Status
+from helpers.kachanov_law import A, C, damage, kachanov, n, v
 from helpers.tensor_response import constitutive_response
 
 STEEL = (150e3, 0.3)
-A, n, C, v = parameters("A n C v")
-(damage,) = states("damage")
-RATES = {
-    A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log"),
-    n: Param("stress exponent", bounds=(1, 8)),
-    C: Param("damage coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log"),
-    v: Param("damage exponent", bounds=(1, 8)),
-}
-DAMAGING = CreepLaw(
-    name="multiaxial damage",
-    terms={"creep": A * (stress / (1 - damage)) ** n},
-    params=RATES,
-    states={damage: State(0.0, C * ((0.6 * principal_stress + 0.4 * mean_stress) / (1 - damage)) ** v, limit=0.9)},
-)
-KACHANOV = CreepLaw(
-    name="kachanov",
-    terms={"creep": A * (stress / (1 - damage)) ** n},
-    params=RATES,
-    states={damage: State(0.0, C * (stress / (1 - damage)) ** v, limit=0.9)},
-)
+DAMAGING = kachanov(0.6 * principal_stress + 0.4 * mean_stress, 0.9)
+KACHANOV = kachanov(stress, 0.9)
+RATES = KACHANOV.params
 
 
 def run(law, values, controls, times, temperature=300.0, settings=None, tableau=SDIRK2):

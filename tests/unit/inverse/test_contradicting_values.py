@@ -54,8 +54,8 @@ def test_a_factor_on_the_rate_of_a_test_is_no_contradiction():
 
 
 def test_its_level():
-    """4000 draws of right laws: no more are rejected than SIGNIFICANCE says."""
+    """1000 draws of right laws: no more are rejected than SIGNIFICANCE says."""
     rng, tests = np.random.default_rng(3), bars_at(np.geomspace(50, 300, 12), np.tile([850.0, 900.0, 950.0], 4))
-    draws = np.exp(0.3 * rng.standard_normal((4000, 2, 12)))
+    draws = np.exp(0.3 * rng.standard_normal((1000, 2, 12)))
     rejected = sum(contradicting_values(tests, values(*draw)) is not None for draw in draws)
-    assert binom.ppf(0.001, 4000, SIGNIFICANCE) <= rejected <= binom.ppf(0.999, 4000, SIGNIFICANCE)
+    assert binom.ppf(0.001, 1000, SIGNIFICANCE) <= rejected <= binom.ppf(0.999, 1000, SIGNIFICANCE)

@@ -1,26 +1,33 @@
-"""Conditioned coordinates: the map inverts, its derivative is right, and it does what it is for."""
+"""Conditioned coordinates: the map inverts, its derivative is right, rates and local exponents are what they say."""
 
 import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.coordinates import Coordinates, local_exponents
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.kernels import lower
 from creepkit.language import arrhenius, linear
 from creepkit.laws.combined import COMBINED
-from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
+from creepkit.registry import default_registry
 
-LAWS = [NORTON, DRIFTING_EXPONENT, COMBINED.times(arrhenius(T_ref=1073.15)).with_temperature(n_2=linear(T_ref=1073.15))]
+LAWS = [
+    *(default_registry().law(name) for name in default_registry().laws()),
+    COMBINED.times(arrhenius(T_ref=1073.15)).with_temperature(n_2=linear(T_ref=1073.15)),
+    HYPERBOLIC_SINE + ck.law("kachanov-rabotnov"),  # an exponent stands as it is beside variables it does not mention
+]
 REFERENCE = ReferencePoint(stress=63.0, strain=4e-3, time=2.3e4, temperature=1040.0)
 
 
 def drawn(law, seed=3):
     rng = np.random.default_rng(seed)
     ends = np.array([[p.to_internal(b) for b in p.bounds] for p in law.params.values()])
-    return ends[:, 0] + rng.uniform(size=len(ends)) * (ends[:, 1] - ends[:, 0])
+    theta = ends[:, 0] + rng.uniform(size=len(ends)) * (ends[:, 1] - ends[:, 0])
+    if "s_0" in law.names:  # a threshold, below the reference stress: else there is no rate
+        theta[law.names.index("s_0")] = 20.0
+    return theta
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
@@ -66,9 +73,34 @@ def test_sums_in_either_order_have_the_coordinates_of_their_own_parameters():
     assert u == pytest.approx([*v[2:], *v[:2]])
 
 
-def test_terms_beside_internal_variables_have_the_local_exponent_of_their_own():
-    """The exponent of a power law stands as it is beside a law with damage, whose variables it does not mention."""
-    law = ck.law("hyperbolic-sine") + ck.law("kachanov-rabotnov")
-    coordinates = Coordinates(law, ReferencePoint(stress=100.0, strain=0.01, time=1e5, temperature=1000.0))
-    theta = law.internal_bounds.mean(axis=0)
-    np.testing.assert_allclose(coordinates.theta(coordinates.u(theta)), theta, rtol=1e-9)
+# ---- local exponents -----------------------------------------------------------------------------------------------
+
+EXPONENTS_AT = ReferencePoint(stress=110.0, strain=0.004, time=2.0e4, temperature=1050.0)
+
+
+def inner(law, values):
+    return np.array([p.to_internal(values[name]) for name, p in law.table.items()])
+
+
+def test_that_of_sinh_is_n_x_coth_x():
+    law = ck.law("hyperbolic-sine")
+    values = {"A": 1e-9, "n": 2.5, "B": 60.0}
+    u = Coordinates(law, EXPONENTS_AT).u(inner(law, values))
+    x = 110.0 / 60.0
+    assert u[law.names.index("n")] == pytest.approx(2.5 * x / np.tanh(x), rel=1e-12)
+
+
+def test_that_of_a_drifting_exponent_is_n_at_the_reference_time():
+    law = ck.law("drifting-exponent").fix(m=0)
+    values = {"A": 1e-16, "n_0": 4.9, "n_inf": 4.3, "C": 2.7, "tau_d": 13823.6, "tau_r": 8090.4}
+    (local,) = local_exponents(law)
+    assert law.names[local.position] == "n_inf"
+    u = Coordinates(law, EXPONENTS_AT).u(inner(law, values))
+    decay, rise = np.exp(-2e4 / values["tau_d"]), np.exp(-2e4 / values["tau_r"])
+    n = values["n_inf"] + (values["C"] + values["n_0"] - values["n_inf"]) * decay - values["C"] * rise
+    assert u[local.position] == pytest.approx(n, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["norton", "strain-hardening", "time-hardening"])
+def test_a_power_law_keeps_its_exponent(name):
+    assert local_exponents(ck.law(name)) == ()

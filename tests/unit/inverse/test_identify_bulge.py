@@ -9,7 +9,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.identification import IdentificationSettings
-from creepkit.inverse.identify import identify, refit
+from creepkit.inverse.identify import identify
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance
@@ -235,9 +235,3 @@ def test_what_is_left_is_the_noise(fit):
         assert m["amplitude"].errors.mean_squared_error ** 0.5 < 2 * 1.5e-3
         assert m["width"].errors.mean_squared_error ** 0.5 == pytest.approx(0.02, rel=0.5)
     assert fit.errors["amplitude"].relative_squared_error < 1e-3
-
-
-def test_a_refit_keeps_everything(fit, tests):
-    again = refit(fit, tests)
-    assert again.settings == fit.settings
-    assert (np.abs(again.u - fit.u) < 0.05 * np.sqrt(np.diag(fit.covariance))).all()

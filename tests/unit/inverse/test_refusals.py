@@ -101,6 +101,7 @@ MISTAKES = [
     (lambda tests, fit: ck.identify(NORTON, [stated()]), "has 2 parameters"),
     (lambda tests, fit: ck.identify(NORTON, DIMPLES), "leading output is a strain; of specimen 'bulge'"),
     (lambda tests, fit: History("bar", *BAR, rupture_time=-1.0), "a rupture time of -1 s is not a finite time"),
+    (lambda tests, fit: History("bar", *BAR, rupture_time=np.inf), "a rupture time of inf s is not"),
     (lambda tests, fit: History("bar", *BAR, rupture_time=9.0), "a used frame at 10 s lies after the rupture at 9 s"),
     (lambda tests, fit: History("bar", *BAR, rupture_time=10.0, unruptured=True), "keep one of them"),
     (lambda tests, fit: rank([]), "there are no identifications to rank"),

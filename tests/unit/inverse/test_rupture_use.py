@@ -41,18 +41,12 @@ def test_which_laws_have_tertiary_creep():
     assert has_tertiary_creep(ck.law("strain-hardening").with_bounds(m=(-0.5, 0.5)))
 
 
-@pytest.mark.parametrize(
-    ("exponent", "energy", "product", "power", "scatter"),
-    [(6.5, 430e3, 0.06, 0.9, 0.12), (4.0, 300e3, 0.02, 1.0, 0.3), (8.5, 550e3, 0.15, 0.85, 0.05)],
-)
-def test_rates_hold_the_truth_whatever_the_lives_are(exponent, energy, product, power, scatter):
+def test_rates_hold_the_truth_whatever_the_lives_are():
     """At a constant load a power law breaks after 1 / (n rate); these break up to ten times before, or after."""
-    law = NORTON.with_bounds(n=(1.0, 15.0)).times(ck.arrhenius(T_ref=REFERENCE))
-    seeds = range(3)
-    held = np.zeros(3)
-    for seed in seeds:
-        tests = damaged_table(seed, exponent, energy, product, power, scatter)
-        fit = ck.identify(law, tests, starts=1)
+    law, held = NORTON.with_bounds(n=(1.0, 15.0)).times(ck.arrhenius(T_ref=REFERENCE)), np.zeros(3)
+    cases = np.array([(6.5, 430e3, 0.06, 0.9, 0.12), (4.0, 300e3, 0.02, 1.0, 0.3), (8.5, 550e3, 0.15, 0.85, 0.05)])
+    for seed, (exponent, energy, product, power, scatter) in enumerate([*cases, cases[0]]):
+        fit = ck.identify(law, damaged_table(seed, exponent, energy, product, power, scatter), starts=1)
         values = {e.name: e for e in fit.estimates}
         _, low, high = fit.rate(150.0, REFERENCE)
         held += [
@@ -63,7 +57,7 @@ def test_rates_hold_the_truth_whatever_the_lives_are(exponent, energy, product, 
         assert not fit.adequacy.rejects
         assert "the ends of 18 tests without curves (rupture times and run-outs) were not used" in fit.notes[0]
         assert "left out, for they state nothing else: 'T4', 'T9', 'T14'" in fit.notes[0]
-    assert (held >= len(seeds) - 1).all()
+    assert (held >= 3).all()
 
 
 def test_rates_and_lives_that_contradict_one_another_reject_a_law():

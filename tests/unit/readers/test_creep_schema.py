@@ -9,7 +9,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.testing.reader_checks import history_difference
-from helpers.samples_creep_schema import LIS, SERIES_NAME, document, value
+from helpers.creep_schema import LIS, SERIES_NAME, document, value
 
 
 def write(folder: Path, content: Any, series: str | None = LIS, encoding: str = "utf-8") -> Path:

@@ -27,7 +27,7 @@ def test_times_beyond_a_double_are_infinite() -> None:
     found = ck.rupture(TESTS, "larson-miller")
     assert found.rupture_time(1e-3, 20.0) == (np.inf, np.inf, np.inf)
     with pytest.raises(FitError, match="give MPa above zero"):
-        found.rupture_time("abc", 900.0)
+        found.rupture_time(0.0, 900.0)
 
 
 def test_pairs_of_levels_that_share_tests() -> None:

@@ -228,9 +228,9 @@ def test_crossing_isotherms_fail_a_check():
         ({"methods": "monkman-grant"}, "no test has a minimum creep rate, which monkman-grant needs"),
         ({"methods": "isothermal"}, "isothermal is for tests of one temperature; these have 3"),
         ({"methods": "wilshire", "tensile_strength": dict.fromkeys(TENSILE, 50.0)}, "not below the tensile strength"),
-        ({"hours": []}, "hours is empty; give a list of hours"),
-        ({"hours": [-1.0]}, "a strength is asked for at -1.0 h"),
-        ({"temperatures": [20000.0]}, "a temperature is 20000.0; give K"),
+        ({"hours": []}, "hours is empty; give numbers, in h"),
+        ({"hours": [-1.0]}, "hours holds -1.0; give h, above 0"),
+        ({"temperatures": [20000.0]}, "temperatures holds 20000.0; give K, above 0"),
         ({"tensile_strength": {900.0: -5.0}}, "give numbers above zero: MPa by temperature"),
     ],
 )

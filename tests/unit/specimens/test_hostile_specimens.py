@@ -73,12 +73,15 @@ def plan(**changes):
         ({"sag": TIMES[:3]}, "of shape .3,.; the test has 5 times"),
         (lambda: ck.OneTest({"sag": TIMES}, status="ruptured"), "gave the status 'ruptured'; use ck.Status"),
         (lambda: sys.exit(0), "SystemExit: 0 .*test_hostile_specimens.py"),
+        (lambda: TIMES.missing, r"AttributeError: .*missing.* \(.*test_hostile_specimens.py:\d+\)"),
+        ({"sga": TIMES}, r"one\(\) gave 'sga'; it must give 'sag'"),
+        ({"sag": np.nan * TIMES}, "no finite 'sag' at some time and no end"),
     ],
 )
 def test_what_one_returns_is_judged_where_it_is_written(returned, said):
     with pytest.raises(SolveError, match=said) as raised:
         Piece(returned).predict(NORTON, THETA, [plan()])
-    assert "specimen 'returning', test 'test'" in str(raised.value)
+    assert "specimen 'returning', test 'test' with A = 1e-16, n = 4: " in str(raised.value)
 
 
 @dataclass(frozen=True)

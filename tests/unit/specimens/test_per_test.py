@@ -94,26 +94,6 @@ def test_an_early_end_and_values_without_a_solution_are_results():
     assert found.reason == "no equilibrium"
 
 
-@pytest.mark.parametrize(
-    ("given", "sentence"),
-    [
-        (lambda h: {"strain": h.times[:3]}, r"one\(\) gave 'strain' of shape \(3,\); the test has 20 times"),
-        (lambda h: {"strian": h.times}, r"one\(\) gave 'strian'; it must give 'strain'"),
-        (lambda h: {"strain": np.nan * h.times}, r"no finite 'strain' at some time and no end"),
-        (lambda h: {"strain": h.times / h.missing}, r"AttributeError: .*missing.* \(.*test_per_test.py:\d+\)"),
-    ],
-)
-def test_an_author_is_told_which_test_values_and_line(given, sentence):
-    class Wrong(Bar):
-        def one(self, law, values, history, nuisances):
-            return given(history)
-
-    with pytest.raises(
-        SolveError, match=f"specimen 'closed-form-bar', test 'bar 60' with A = 1e-16, n = 4: .*{sentence}"
-    ):
-        Wrong().predict(NORTON, NORTON.to_internal(TRUTH), plans(60.0))
-
-
 def test_differences_leave_a_coefficient_off_that_is_off():
     """-inf has no neighbours: its derivative is zero, and nothing is warned of."""
     theta = NORTON.to_internal({"A": 0.0, "n": 4.0})

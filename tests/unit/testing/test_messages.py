@@ -9,7 +9,7 @@ import sympy
 import creepkit as ck
 from creepkit.errors import ArgumentError, LawError, SolveError
 from creepkit.language import parameters, states, stress
-from creepkit.registry.plugin_sources import error_text
+from creepkit.records.plugin_calls import raised_text
 from helpers.command_line import creepkit, one_line
 from helpers.paths import ROOT
 
@@ -49,7 +49,7 @@ def test_the_exclusive_or_is_no_power() -> None:
     for wrong in (lambda: A * stress ^ n, lambda: A * (stress ^ n)):
         with pytest.raises(TypeError) as caught:
             wrong()
-        assert "; write ** for powers (" in error_text(caught.value)
+        assert "; write ** for powers (" in raised_text(caught.value)
     with pytest.raises(LawError, match=re.escape("write ** for powers")):
         law(stress ^ n)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from creepkit.exporters.mathml import law_equations, symbol_element
+from creepkit.exporters.mathml import expression_mathml, law_equations
 from creepkit.inverse.duration import STRAIN_OF_UNKNOWN_DURATION, duration_known
 from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
 from creepkit.inverse.unmodelled_effect import NOT_INCLUDED
@@ -153,7 +153,7 @@ def _values(fit: Identification) -> Table:
     table, symbols = fit.law.table, {str(symbol): symbol for symbol in fit.law.params}
     rows = [
         (
-            Markup(symbol_element(symbols[e.name])),
+            Markup(expression_mathml(symbols[e.name])),
             table[e.name].meaning,
             *with_interval(e.value, e.low, e.high, bound_marks(fit.law, e)),
             "" if e.unit == "1" else e.unit,

@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from creepkit.exporters.latex import equations_in_latex
 from creepkit.exporters.law_description import comment_lines
-from creepkit.exporters.mathml import law_equations, symbol_element
+from creepkit.exporters.mathml import expression_mathml, law_equations
 from creepkit.language import CreepLaw, mean_stress, principal_stress, strain, stress, temperature, time
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.language.symbols import GAS_CONSTANT
@@ -71,7 +71,7 @@ def _symbols(k: int, law: CreepLaw) -> Table:
     """The parameters and internal variables of a law."""
     rows = [
         (
-            Markup(symbol_element(symbol)),
+            Markup(expression_mathml(symbol)),
             printable(law.table[str(symbol)].meaning, 160),
             "1" if param.unit == "1" else param.unit,
             f"{number(param.bounds[0], 3)} to {number(param.bounds[1], 3)}",
@@ -81,7 +81,7 @@ def _symbols(k: int, law: CreepLaw) -> Table:
     for symbol, state in law.states.items():
         end = "" if state.limit is None else f"; the material ruptures where it reaches {state.limit:.10g}"
         meaning = f"internal variable, {state.initial:g} before loading{end}"
-        rows.append((Markup(symbol_element(symbol)), meaning, "1", "–"))
+        rows.append((Markup(expression_mathml(symbol)), meaning, "1", "–"))
     columns = ("symbol", "meaning", "unit", "bounds of the search")
     return Table(f"Symbols of Eq. ({k})", columns, rows)
 
@@ -89,9 +89,9 @@ def _symbols(k: int, law: CreepLaw) -> Table:
 def _variables(laws: Sequence[CreepLaw]) -> Table:
     """What the laws depend on, with the gas constant where temperature is among it."""
     used = [one for one in VARIABLES if one[0] is strain or any(law.uses(one[0]) for law in laws)]
-    rows = [(Markup(symbol_element(symbol)), meaning, unit or "1") for symbol, meaning, unit in used]
+    rows = [(Markup(expression_mathml(symbol)), meaning, unit or "1") for symbol, meaning, unit in used]
     if any(law.uses(temperature) for law in laws):
-        gas = Markup(symbol_element(sympy.Symbol("R")))
+        gas = Markup(expression_mathml(sympy.Symbol("R")))
         rows.append((gas, f"gas constant, {GAS_CONSTANT:g}", "J/(mol K)"))
     return Table("Symbols that these equations share", ("symbol", "meaning", "unit"), rows)
 

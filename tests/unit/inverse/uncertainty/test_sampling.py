@@ -81,7 +81,7 @@ def test_rates_that_scatter_between_tests_count_once_a_test():
     slope, level = np.polyfit(x, y, 1)
     sd = np.sqrt(((y - level - slope * x) ** 2).sum() / 10)
     half = student.ppf(0.975, 10) * sd / np.sqrt(((x - x.mean()) ** 2).sum())
-    assert sample_posterior(fit, walkers=16, steps=400, seed=1).interval("n") == pytest.approx(
+    assert sample_posterior(fit, walkers=16, steps=250, seed=1).interval("n") == pytest.approx(
         (slope, slope - half, slope + half), abs=0.25 * half
     )
 
@@ -89,7 +89,7 @@ def test_rates_that_scatter_between_tests_count_once_a_test():
 def test_a_bound_cuts_the_posterior(tests):
     """Far more than n = 3 allows: against its bound the density is an exponential tail, all of it below."""
     short = replace(NORTON, params={A: NORTON.params[A], N: replace(NORTON.params[N], bounds=(1.0, 3.0))})
-    found = sample_posterior(known_scatter(short, tests, SD), walkers=32, steps=1600, seed=2)
+    found = sample_posterior(known_scatter(short, tests, SD), walkers=32, steps=800, seed=2)
     best, covariance = least_squares(tests, SD)
     middle, sd = best[1], float(np.sqrt(covariance[1, 1]))
     expected = middle + sd * norm.ppf(norm.cdf((3.0 - middle) / sd) * np.array([0.5, 0.025]))

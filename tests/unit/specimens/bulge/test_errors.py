@@ -28,67 +28,35 @@ def program(*pressures: float) -> RecordedLoading:
 # ---- what is asked for ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("error", "ask", "said"),
-    [
-        (
-            SolveError,
-            {"elastic": None},
-            f"{WHERE}: a bulge test needs elastic data; set elastic=Elastic(E=...), E in MPa",
-        ),
-        (
-            SolveError,
-            {"loading": ck.constant_stress(100.0)},
-            f"{WHERE}: a bulge specimen is loaded by pressure, found stress; use PressureJump",
-        ),
-        (
-            SolveError,
-            {"using": "uniaxial"},
-            f"{WHERE}: a uniaxial specimen is loaded by stress, found pressure; use StressSteps or constant_stress",
-        ),
-        (
-            SolveError,
-            {"loading": program(0.0, 8.0, -2.0)},
-            f"{WHERE}: the pressure falls to -2 MPa; it must not be negative",
-        ),
-        (
-            HistoryError,
-            {"times": [0.0, 600.0, 300.0]},
-            f"{WHERE}: time does not increase at frame 3 (300 s after 600 s)",
-        ),
-        (HistoryError, {"times": []}, f"{WHERE}: no frames; a history needs at least one time"),
-        (HistoryError, {"times": [0.0, np.inf]}, f"{WHERE}: times must be finite and start at or after 0 s"),
-        (
-            SolveError,
-            {"times": [0.0]},
-            f"{WHERE}: the last time is 0 s, where the load only begins; ask for a time after it",
-        ),
-        (HistoryError, {"temperature": -300.0}, f"{WHERE}: a temperature of -300 K is not above 0 and below 4500 K"),
-        (
-            LawError,
-            {"values": {"A": 5e-13}},
-            "law 'norton' needs a value for n; give all of them, such as {'n': 1.5}, in a command --set n=1.5",
-        ),
-        (
-            LawError,
-            {"values": {"A": -1.0, "n": 3.0}},
-            "law 'norton', parameter 'A': -1 is negative; it must be positive",
-        ),
-        (LawError, {"values": {"A": 5e-13, "n": np.nan}}, "law 'norton', parameter 'n': nan is not a finite number"),
-        (
-            SolveError,
-            {"loading": 8.0},
-            "loading is 8.0; write constant_stress(50) or PressureJump(P1=8, P2=10, Tj=14400)",
-        ),
-    ],
-)
-def test_what_cannot_be_simulated_is_one_sentence(error: type[Exception], ask: dict, said: str) -> None:
-    with pytest.raises(error) as found:
-        simulate(**ask)
-    assert str(found.value) == said
+MISTAKES = [
+    (SolveError, {"elastic": None}, f"{WHERE}: a bulge test needs elastic data; set elastic=Elastic(E=...), E in MPa"),
+    (SolveError, {"loading": ck.constant_stress(100.0)},
+     f"{WHERE}: a bulge specimen is loaded by pressure, found stress; use PressureJump"),
+    (SolveError, {"using": "uniaxial"},
+     f"{WHERE}: a uniaxial specimen is loaded by stress, found pressure; use StressSteps or constant_stress"),
+    (SolveError, {"loading": program(0.0, 8.0, -2.0)},
+     f"{WHERE}: the pressure falls to -2 MPa; it must not be negative"),
+    (HistoryError, {"times": [0.0, 600.0, 300.0]},
+     f"{WHERE}: time does not increase at frame 3 (300 s after 600 s)"),
+    (HistoryError, {"times": []}, f"{WHERE}: no frames; a history needs at least one time"),
+    (HistoryError, {"times": [0.0, np.inf]}, f"{WHERE}: times must be finite and start at or after 0 s"),
+    (SolveError, {"times": [0.0]},
+     f"{WHERE}: the last time is 0 s, where the load only begins; ask for a time after it"),
+    (HistoryError, {"temperature": -300.0}, f"{WHERE}: a temperature of -300 K is not above 0 and below 4500 K"),
+    (LawError, {"values": {"A": 5e-13}},
+     "law 'norton' needs a value for n; give all of them, such as {'n': 1.5}, in a command --set n=1.5"),
+    (LawError, {"values": {"A": -1.0, "n": 3.0}},
+     "law 'norton', parameter 'A': -1 is negative; it must be positive"),
+    (LawError, {"values": {"A": 5e-13, "n": np.nan}}, "law 'norton', parameter 'n': nan is not a finite number"),
+    (SolveError, {"loading": 8.0}, "loading is 8.0; write constant_stress(50) or PressureJump(P1=8, P2=10, Tj=14400)"),
+]  # fmt: skip
 
 
-# ---- the specimen --------------------------------------------------------------------------------------------------
+def test_what_cannot_be_simulated_is_one_sentence() -> None:
+    for error, ask, said in MISTAKES:
+        with pytest.raises(error) as found:
+            simulate(**ask)
+        assert str(found.value) == said
 
 
 # ---- laws that others wrote ----------------------------------------------------------------------------------------

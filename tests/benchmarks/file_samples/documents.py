@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from file_samples.samples import ReaderSample
 
 import creepkit as ck
 from creepkit.cli.shared import read_law_file
@@ -21,7 +22,6 @@ from creepkit.reports.attachments import embed, read_attachments
 from creepkit.reports.contents import Attachment
 from creepkit.studies.study_file import read_study_file
 from helpers.planted_datasets import bars
-from helpers.reader_samples import ReaderSample
 
 STUDY = """[study]
 title = "Planted creep curves"

@@ -1,6 +1,6 @@
 """Samples of every format that creepkit reads, for the program that mutates them.
 
-A module `samples_*.py` beside this one joins by its function `samples()`, which returns ReaderSample objects.
+A module beside this one joins by its function `samples()`, which returns ReaderSample objects.
 """
 
 from __future__ import annotations
@@ -45,6 +45,6 @@ class ReaderSample:
 
 def all_samples() -> dict[str, ReaderSample]:
     """{name: sample} of all modules of samples."""
-    modules = sorted(path.stem for path in Path(__file__).parent.glob("samples_*.py"))
-    found = [sample for name in modules for sample in importlib.import_module(f"helpers.{name}").samples()]
-    return {sample.name: sample for sample in found}
+    others = {path.stem for path in Path(__file__).parent.glob("*.py")} - {"samples", "mutations"}
+    modules = [importlib.import_module(f"file_samples.{name}") for name in sorted(others)]
+    return {sample.name: sample for module in modules for sample in module.samples()}

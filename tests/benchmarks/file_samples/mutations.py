@@ -6,35 +6,14 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from helpers.reader_samples import ReaderSample
+from file_samples.samples import ReaderSample
 
 PIECES = [
     *(b"nan", b"inf", b"-", b"1e308", b"1e-320", b"-0.0", b"", b" ", b"#", b"# ", b":", b";", b'"', b"'", b"\n", b"\r"),
-    *(
-        b"\x00",
-        b"\x0c",
-        b"\xff",
-        b"\xfe\xff",
-        b"\xef\xbb\xbf",
-        "\u2028".encode(),
-        "\u0663".encode(),
-        b"\t",
-        b",,",
-        b"%",
-    ),
-    *(
-        b"label ",
-        b"geometry ",
-        b"specimen: bulge",
-        b"0 s 1 MPa",
-        b"used",
-        b"yes",
-        b"=1+1",
-        b"../x",
-        b"9" * 400,
-        b"[" * 300,
-    ),
-    *(b"{", b"}", b'{"a":', b"null", b"true", b"1_000", b"1,5", b"0x10", b"1e", b"stress_MPa", b"time_s", b"\\u0000"),
+    *(b"\x00", b"\x0c", b"\xff", b"\xfe\xff", b"\xef\xbb\xbf", "\u2028".encode(), "\u0663".encode(), b"\t", b",,"),
+    *(b"%", b"label ", b"geometry ", b"specimen: bulge", b"0 s 1 MPa", b"used", b"yes", b"=1+1", b"../x", b"9" * 400),
+    *(b"[" * 300, b"{", b"}", b'{"a":', b"null", b"true", b"1_000", b"1,5", b"0x10", b"1e", b"stress_MPa", b"time_s"),
+    b"\\u0000",
 ]
 
 
@@ -101,119 +80,124 @@ def _changed(content: bytes, kind: str, draw: random.Random) -> bytes:
     return b"\n".join(lines)
 
 
-def _rows(sample: ReaderSample) -> tuple[list[str], int, list[list[str]]]:
-    """The lines of the head, how many of them there are, and the cells of names and rows."""
+Change = Callable[[ReaderSample, random.Random], Mutation | None]
+MEANINGFUL: list[Change] = []
+"""Mutations of which it is known what they say."""
+
+
+def _of_cells(change: Callable[[list[list[str]], random.Random], tuple[str, list[list[str]], bool] | None]) -> None:
+    """A mutation of a table: change(rows with the names first, draw) gives its kind, the new rows, and `changed`."""
+
+    def mutated(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+        if not sample.delimiter:
+            return None
+        head, rows = _head_and_rows(sample)
+        result = change(rows, draw)
+        return None if result is None else Mutation(result[0], _joined(sample, head, result[1]), result[2])
+
+    MEANINGFUL.append(mutated)
+
+
+def _head_and_rows(sample: ReaderSample) -> tuple[list[str], list[list[str]]]:
+    """The lines of the head, and the cells of names and rows."""
     lines = sample.files[sample.mutated].decode().rstrip("\n").split("\n")
     head = [line for line in lines if line.startswith("#")]
-    return head, len(head), [line.split(sample.delimiter) for line in lines[len(head) :]]
+    return head, [line.split(sample.delimiter) for line in lines[len(head) :]]
 
 
 def _joined(sample: ReaderSample, head: list[str], rows: list[list[str]]) -> bytes:
     return "\n".join([*head, *(sample.delimiter.join(row) for row in rows)]).encode() + b"\n"
 
 
-def _column_twice(sample: ReaderSample, draw: random.Random) -> Mutation | None:
-    """A column stands there twice, the second time with other numbers."""
-    if not sample.delimiter:
-        return None
-    head, _, rows = _rows(sample)
+@_of_cells
+def _column_twice(rows, draw):
+    """The second time with other numbers."""
     k = draw.randrange(len(rows[0]))
-    twice = [[*row, row[k] if n == 0 else row[k] + "1"] for n, row in enumerate(rows)]
-    return Mutation("column twice", _joined(sample, head, twice), changed=True)
+    return "column twice", [[*row, row[k] if n == 0 else row[k] + "1"] for n, row in enumerate(rows)], True
 
 
-def _decimal_sign(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+@_of_cells
+def _decimal_sign(rows, draw):
     """Decimal commas, or the points left out, in one column, one row or all."""
-    if not sample.delimiter:
-        return None
-    head, _, rows = _rows(sample)
     new = draw.choice((",", "", " ", "'"))
     column, row = draw.choice((None, draw.randrange(len(rows[0])))), draw.choice((None, draw.randrange(1, len(rows))))
     changed = [
         [c.replace(".", new) if n and row in (None, n) and column in (None, k) else c for k, c in enumerate(cells)]
         for n, cells in enumerate(rows)
     ]
-    return Mutation("decimal sign", _joined(sample, head, changed), changed=new != "")
+    return "decimal sign", changed, new != ""
 
 
-def _without_unit(sample: ReaderSample, draw: random.Random) -> Mutation | None:
-    """The name of a column or key without its unit."""
-    return _written_otherwise("unit removed", sample, sample.without_unit, draw)
+def _of_words(kind: str, choices: Callable[[ReaderSample], Sequence[tuple[str, str]]]) -> None:
+    """A mutation that replaces one of some texts where it stands first."""
+
+    def mutated(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+        if not (pairs := choices(sample)):
+            return None
+        before, after = draw.choice(pairs)
+        return Mutation(kind, sample.files[sample.mutated].decode().replace(before, after, 1).encode(), changed=True)
+
+    MEANINGFUL.append(mutated)
 
 
-def _misspelt(sample: ReaderSample, draw: random.Random) -> Mutation | None:
-    """A key or the name of a column with a letter missing."""
-    return _written_otherwise("name misspelt", sample, sample.misspelt, draw)
+_of_words("unit removed", lambda sample: sample.without_unit)
+_of_words("name misspelt", lambda sample: sample.misspelt)
 
 
-def _key_repeated(sample: ReaderSample, draw: random.Random) -> Mutation | None:
-    """A key with its value stands there twice."""
-    return _written_otherwise("key repeated", sample, [(text, text + text) for text in sample.repeated], draw)
-
-
-def _written_otherwise(
-    kind: str, sample: ReaderSample, choices: Sequence[tuple[str, str]], draw: random.Random
-) -> Mutation | None:
-    """One of the texts replaced where it stands first; None where there is none to choose."""
-    if not choices:
-        return None
-    before, after = draw.choice(choices)
-    content = sample.files[sample.mutated].decode().replace(before, after, 1)
-    return Mutation(kind, content.encode(), changed=True)
-
-
-def _no_number(sample: ReaderSample, draw: random.Random) -> Mutation | None:
-    """A cell that is no number."""
-    if not sample.delimiter:
-        return None
-    head, _, rows = _rows(sample)
+@_of_cells
+def _no_number(rows, draw):
     n, k = draw.randrange(1, len(rows)), draw.randrange(len(rows[0]))
     rows[n][k] = draw.choice(("nan", "NaN", "inf", "-inf", "", "#N/A", "---", "1.2.3", "1e", "0x1F", "1_0", "n.a."))
-    return Mutation("no number in a cell", _joined(sample, head, rows), changed=True)
+    return "no number in a cell", rows, True
 
 
-def _time_not_increasing(sample: ReaderSample, draw: random.Random) -> Mutation | None:
-    """Two rows in the other order."""
-    if not sample.delimiter:
-        return None
-    head, _, rows = _rows(sample)
+def _time_column(rows: list[list[str]]) -> int | None:
+    """The first column of times of a table of three rows or more."""
     times = [k for k, name in enumerate(rows[0]) if name.startswith("time")]
-    if not times or len(rows) < 4:
+    return times[0] if times and len(rows) >= 4 else None
+
+
+@_of_cells
+def _time_not_increasing(rows, draw):
+    if _time_column(rows) is None:
         return None
     n = draw.randrange(1, len(rows) - 1)
     rows[n], rows[n + 1] = rows[n + 1], rows[n]
-    return Mutation("rows in another order", _joined(sample, head, rows), changed=True)
+    return "rows in another order", rows, True
 
 
-def _time_changed(sample: ReaderSample, draw: random.Random) -> Mutation | None:
+@_of_cells
+def _line_cut(rows, draw):
+    """A row that ends amid its columns, or has one more."""
+    n = draw.randrange(1, len(rows))
+    rows[n] = rows[n][: draw.randrange(1, len(rows[n]))] if draw.random() < 0.7 else [*rows[n], "1.5"]
+    return "row cut amid its columns", rows, True
+
+
+@_of_cells
+def _time_changed(rows, draw):
     """A time that stands in two rows, with other values in the second; or one below zero."""
-    if not sample.delimiter:
-        return None
-    head, _, rows = _rows(sample)
-    times = [k for k, name in enumerate(rows[0]) if name.startswith("time")]
-    if not times or len(rows) < 4:
+    if (k := _time_column(rows)) is None:
         return None
     n = draw.randrange(2, len(rows))
     if draw.random() < 0.5:
-        rows[n][times[0]] = rows[n - 1][times[0]]
-        return Mutation("time twice", _joined(sample, head, rows), changed=True)
-    rows[n][times[0]] = "-" + rows[n][times[0]].lstrip("-")
-    return Mutation("time below zero", _joined(sample, head, rows), changed=True)
+        rows[n][k] = rows[n - 1][k]
+        return "time twice", rows, True
+    rows[n][k] = "-" + rows[n][k].lstrip("-")
+    return "time below zero", rows, True
 
 
-def _names_missing(sample: ReaderSample, draw: random.Random) -> Mutation | None:
-    """The line of names left out."""
-    if not sample.delimiter:
-        return None
-    head, _, rows = _rows(sample)
-    return Mutation("names missing", _joined(sample, head, rows[1:]), changed=True)
+@_of_cells
+def _names_missing(rows, draw):
+    return "names missing", rows[1:], True
 
 
+@MEANINGFUL.append
 def _cut_in_last_row(sample: ReaderSample, draw: random.Random) -> Mutation | None:
     """A file that ends amid its last row; amid its last number, nothing but the missing line end says so."""
     if not sample.delimiter:
         return None
-    head, _, rows = _rows(sample)
+    head, rows = _head_and_rows(sample)
     last = sample.delimiter.join(rows[-1])
     start = draw.randrange(1, len(last))
     amid = sample.delimiter in last[start:]
@@ -221,6 +205,7 @@ def _cut_in_last_row(sample: ReaderSample, draw: random.Random) -> Mutation | No
     return Mutation("cut amid the last row" if amid else "cut in the last cell", content, changed=amid)
 
 
+@MEANINGFUL.append
 def _other_unit(sample: ReaderSample, draw: random.Random) -> Mutation | None:
     """Another unit of the same quantity, with the numbers of the former: no reader can tell."""
     text = sample.files[sample.mutated].decode("utf-8", "replace") if sample.delimiter else ""
@@ -231,27 +216,4 @@ def _other_unit(sample: ReaderSample, draw: random.Random) -> Mutation | None:
     return Mutation("other unit", text.replace(before, after, 1).encode())
 
 
-def _line_cut(sample: ReaderSample, draw: random.Random) -> Mutation | None:
-    """A row that ends amid its columns, or has one more."""
-    if not sample.delimiter:
-        return None
-    head, _, rows = _rows(sample)
-    n = draw.randrange(1, len(rows))
-    rows[n] = rows[n][: draw.randrange(1, len(rows[n]))] if draw.random() < 0.7 else [*rows[n], "1.5"]
-    return Mutation("row cut amid its columns", _joined(sample, head, rows), changed=True)
-
-
-MEANINGFUL: tuple[Callable[[ReaderSample, random.Random], Mutation | None], ...] = (
-    _column_twice,
-    _decimal_sign,
-    _without_unit,
-    _misspelt,
-    _no_number,
-    _time_not_increasing,
-    _line_cut,
-    _time_changed,
-    _names_missing,
-    _cut_in_last_row,
-    _other_unit,
-    _key_repeated,
-)
+_of_words("key repeated", lambda sample: [(text, text + text) for text in sample.repeated])

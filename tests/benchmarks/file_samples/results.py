@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from file_samples.documents import document
+from file_samples.samples import ReaderSample
+
 from creepkit.inverse.identification_document import load
 from creepkit.inverse.ranking_document import load_ranking
 from helpers.paths import ROOT
-from helpers.reader_samples import ReaderSample
-from helpers.samples_documents import document
 
 FORMATS = ROOT / "tests" / "data" / "formats" / "0.1.0"
 

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from file_samples.samples import ReaderSample
 
 import creepkit as ck
 from creepkit.records import CameraFrame
 from helpers.camera_samples import SAMPLES, vic_3d_images
-from helpers.reader_samples import ReaderSample
 
 COMMA_TABLES = ("matchid_2024", "matchid_2023", "pyvale")
 """Samples whose first line names the columns, so that changes of cells have a meaning."""

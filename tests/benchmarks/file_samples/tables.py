@@ -7,10 +7,11 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from file_samples.histories import decided, difference, read, table
+from file_samples.samples import ReaderSample
+
 import creepkit as ck
 from creepkit.records import History
-from helpers.reader_samples import ReaderSample
-from helpers.samples_histories import decided, difference, read, table
 
 GERMAN = (
     "# ignore: Kraft, Bemerkung\nPrüfung 13;;;\nWerkstoff;Alloy 9;;\nTemperatur [°C];850;;\nSpannung [MPa];61,5;;\n"

@@ -1,17 +1,16 @@
-"""Progress of sharded work: the record of finished shards, and the rate with the time left."""
+"""Progress of a generation: the record of finished shards, and the rate with the time left."""
 
 from __future__ import annotations
 
 import itertools
-import re
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
 from creepkit import limits
+from creepkit.dataset.shards import GenerationJob
 from creepkit.errors import DatasetError
-from creepkit.jobs.worker_process import ShardedJob
+from creepkit.jobs.progress import ProgressCallback, duration_text
 
 MOST_DRAWS_WITHOUT_ACCEPTED = 16384
 """Draws after which a design is given up of which none was accepted."""
@@ -23,15 +22,14 @@ class ProgressRecord:
 
     samples : accepted ones wanted; or draws : rows wanted, accepted or not. part : (k, n), only shards k-1, k-1+n ...,
         and as many samples as make an n-th of all.
-    done : {shard: accepted samples} of this part. running : shards that are being simulated.
+    done : {shard: accepted samples} of this part.
     """
 
-    job: ShardedJob
+    job: GenerationJob
     samples: int | None
     draws: int | None
     part: tuple[int, int] | None = None
     done: dict[int, int] = field(default_factory=dict)
-    running: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         for name, value in (("samples", self.samples), ("draws", self.draws)):
@@ -45,15 +43,19 @@ class ProgressRecord:
     def scan_finished(self) -> None:
         """Find the shards that are done already."""
         for path in sorted(self.job.folder.glob("[0-9]*.h5")):
-            if path.stem.isdigit() and self._in_part(int(path.stem)):
+            if path.stem.isdigit() and (self.part is None or int(path.stem) % self.part[1] == self.part[0] - 1):
                 self.mark_done(int(path.stem), self.job.accepted_count(int(path.stem)))
 
     def mark_done(self, number: int, accepted: int | None) -> None:
         """A shard is done."""
-        self.running.discard(number)
         if accepted is not None:
             self.done[number] = accepted
-        self._check_acceptance()
+        drawn = len(self.done) * self.job.rows
+        if self.samples is not None and drawn >= MOST_DRAWS_WITHOUT_ACCEPTED and not self.accepted:
+            raise DatasetError(
+                f"none of the first {drawn} draws was accepted; see 'creepkit surrogate generate --dry-run', change "
+                "the design, or ask for draws instead of samples"
+            )
 
     @property
     def target(self) -> int:
@@ -89,7 +91,7 @@ class ProgressRecord:
             total += self._contribution(number)
         return run
 
-    def next_shard(self) -> int | None:
+    def next_shard(self, running: Collection[int]) -> int | None:
         """The next shard to simulate; None when those done and running are expected to be enough."""
         expected = 0.0
         for number in self._shard_numbers():
@@ -97,7 +99,7 @@ class ProgressRecord:
                 break
             if number in self.done:
                 expected += self._contribution(number)
-            elif number in self.running:
+            elif number in running:
                 expected += self.acceptance_rate * self.job.rows
             else:
                 return number
@@ -112,21 +114,6 @@ class ProgressRecord:
 
     def _contribution(self, number: int) -> int:
         return self.done[number] if self.draws is None else self.job.rows
-
-    def _in_part(self, number: int) -> bool:
-        return self.part is None or number % self.part[1] == self.part[0] - 1
-
-    def _check_acceptance(self) -> None:
-        drawn = len(self.done) * self.job.rows
-        if self.samples is not None and drawn >= MOST_DRAWS_WITHOUT_ACCEPTED and not self.accepted:
-            raise DatasetError(
-                f"none of the first {drawn} draws was accepted; see 'creepkit surrogate generate --dry-run', change "
-                "the design, or ask for draws instead of samples"
-            )
-
-
-ProgressCallback: TypeAlias = Callable[[str, int, int, str], None]
-"""Called with a task, how much of it is done, of how much, and a note on rate, time left and acceptance."""
 
 
 class ProgressReporter:
@@ -155,19 +142,3 @@ class ProgressReporter:
             return accepted
         remaining = max(self._record.target - done, 0) / rate
         return f"{rate:.3g}/s, {duration_text(remaining)} left, {accepted}"
-
-
-def series_of_task(task: str) -> tuple[str, str]:
-    """Of "law 3 of 8: Garofalo" the series "law", whose members share a bar and a time left, and the rest; else "".
-
-    A task that is none of a series is its own.
-    """
-    found = re.match(r"([a-z ]+) (\d+ of \d+: .+)", task)
-    return (found[1], found[2]) if found else (task, "")
-
-
-def duration_text(seconds: float) -> str:
-    """A time in words, such as 12 min."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

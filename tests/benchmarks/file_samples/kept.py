@@ -8,6 +8,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from file_samples.documents import STUDY, document, written
+from file_samples.histories import CREEP
+from file_samples.results import FORMATS
+from file_samples.samples import ReaderSample
+
 import creepkit as ck
 from creepkit.errors import StudyError
 from creepkit.files.json_documents import json_text
@@ -31,10 +36,6 @@ from creepkit.studies.stages import numbers_of_ranking
 from creepkit.surrogates.loading import load_surrogate
 from creepkit.surrogates.weight_files import SURROGATE
 from helpers.paths import ROOT
-from helpers.reader_samples import ReaderSample
-from helpers.samples_documents import STUDY, document, written
-from helpers.samples_histories import CREEP
-from helpers.samples_results import FORMATS
 
 MADE = ROOT / "tests" / "data" / "mutated"
 HASH = "0123456789abcdef" * 4

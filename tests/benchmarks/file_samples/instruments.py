@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from file_samples.samples import ReaderSample
 
 import creepkit as ck
 from creepkit.records import InstrumentRecord
 from helpers.instrument_samples import samples as contents
-from helpers.reader_samples import ReaderSample
 
 TABLES = ("elapsed.csv", "iso.csv", "unix.csv", "us_dates.csv", "dropouts.csv")
 """Samples with commas whose first line names the columns."""

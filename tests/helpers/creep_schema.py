@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
 from typing import Any
-
-from helpers.reader_samples import ReaderSample
-from helpers.samples_histories import decided, difference, read
 
 SERIES_NAME = "Q7-Creep.LIS"
 LIS_HEAD = (
@@ -66,19 +61,3 @@ def document(**changes: Any) -> dict[str, Any]:
             },
         }
     }
-
-
-def samples() -> Iterator[ReaderSample]:
-    """A document with its series, the series alone, and both with the other one mutated."""
-    text = json.dumps(document(), indent=1, ensure_ascii=False).encode()
-    files = {"Q7.json": text, SERIES_NAME: LIS.encode()}
-    keys = (("initialStress", "intialStress"), ("specifiedTemperature", "specifiedTemprature"))
-    yield ReaderSample(
-        "creep schema document", files, "Q7.json", read, difference, decided, misspelt=keys, reader="creep-schema"
-    )
-    entries = (("Initial stress", "Intial stress"), ("Specified temperature", "Specified temprature"))
-    alone = {SERIES_NAME: LIS.encode()}
-    units = (("\tMPa\t", "\t\t"), ("\th\t", "\t\t"), ("h\t%\t", "\t%\t"), ("h\t%\t", "h\t\t"))
-    yield ReaderSample(
-        "creep schema series", alone, SERIES_NAME, read, difference, decided, "", entries, units, "creep-schema"
-    )

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from file_samples.samples import ReaderSample
+
 import creepkit as ck
 from creepkit.records import History
 from creepkit.testing.reader_checks import history_difference
-from helpers.reader_samples import ReaderSample
 
 CREEP = """# name: bar 12
 # alloy: Alloy 9
