@@ -36,7 +36,7 @@ from creepkit.records import Nuisance
 
 IDENTIFICATION = DocumentFormat(
     "creepkit-identification",
-    6,
+    7,
     FileKind("an identification", FitError, "give a file that Identification.save wrote"),
     remedy="identify again",
 )

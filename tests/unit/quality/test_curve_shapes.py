@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.quality.curve_shapes import shows_tertiary_creep
 from creepkit.records import StressSteps
-from creepkit.studies.tertiary_creep import shows_tertiary_creep
 from tests.helpers.paths import SHARED, needs_shared_data
 
 CONCAVE = {
