@@ -48,6 +48,7 @@ from creepkit.inverse.iterative_estimation import (
     linearised,
     starting_point,
 )
+from creepkit.inverse.judged_residuals import at_own_rates
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
@@ -162,7 +163,7 @@ def _beside_the_others(fit: Identification, without: Identification, test: int, 
     others = at(0.0)
     if all(map(is_logarithmic, problem.observations.outputs)):
         size = float(others.rates.median_log_factors[test])
-    elif len(coefficients) == len(fit.law.terms) + len(fit.law.states):
+    elif problem.every_rate_has_coefficient:
         for _ in range(NEWTON_STEPS):
             step = float(at(size).rates.own_log_factors[test])
             size += step
@@ -342,8 +343,9 @@ def _result(
     failed = np.isin(prediction.status[0], FAILED) | tests_without_prediction(prediction, histories)[0]
     unpredicted = tuple(h.name for h, is_failed in zip(histories, failed, strict=True) if is_failed)
     rates = RateExplanations(problem, x, linear, noise_model)
+    judged = at_own_rates(problem, x, linear, noise_model)
     adequacy = adequacy_with_remedies(
-        problem, linear, noise_model, working_estimator.predictor_errors, histories, unmodelled, rates.found
+        problem, judged, noise_model, working_estimator.predictor_errors, histories, unmodelled, rates.found
     ).with_unpredicted(unpredicted)
     adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
     estimates = parameter_estimates(law, coordinates, u, law_covariance, interval_quantile(freedom))

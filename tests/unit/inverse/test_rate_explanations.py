@@ -101,6 +101,21 @@ def test_an_exponent_that_rises_is_the_law_s_fault_and_not_that_of_the_test_at_t
     assert fitted(bars(sinh_law), "hyperbolic-sine").adequacy.explanations == ()
 
 
+def test_the_right_law_is_not_rejected_where_rates_scatter_and_readings_are_exact():
+    """With primary creep a rate that is 15 % higher is no multiple of its derivative: 1e-5 of a strain of 0.05 shows it."""
+    for seed in (3, 4):
+        tests = []
+        for k, history in enumerate(bars(power_law(5.0, 4e5), scatter=0.15, seed=seed)):
+            noise = 1e-5 * np.random.default_rng([seed, k]).standard_normal(history.times.size)
+            steady = history.outputs["strain"][-1] / history.times[-1] * history.times
+            strain = 0.002 * np.log(11.0 * np.exp(steady / 0.002) - 10.0) + noise
+            tests.append(history.replace(outputs={"strain": strain}))
+        law = ck.law("norton*primary").times(ck.arrhenius(T_ref=T_REF))
+        fit = ck.identify(law, tests, starts=2)
+        assert fit.noise_model.rate > 0.08
+        assert not fit.adequacy.rejects, str(fit.adequacy)
+
+
 @pytest.mark.parametrize("scatter", [0.0, 0.03, 0.15])
 def test_clean_campaigns_accuse_nobody(scatter):
     for seed in range(4):

@@ -130,7 +130,7 @@ def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLa
         return []
     laws = [ranked.fit.law for ranked in ranking.laws]
     tried = {law.fingerprint for law in laws}
-    suited = [_with_temperature_of(laws, law, histories) for law in candidates(histories)]
+    suited = [_with_temperature_of(laws, law, histories) for law in (candidates(histories) if histories else [])]
     sums = [laws[0] + other for other in laws[1:]]
     richer = _distinct_laws([*suited, *sums, *_registered_laws(laws, histories)])
     judged = all(map(duration_known, histories))
