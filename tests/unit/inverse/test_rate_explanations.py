@@ -102,7 +102,7 @@ def test_an_exponent_that_rises_is_the_law_s_fault_and_not_that_of_the_test_at_t
 
 
 def test_the_right_law_is_not_rejected_where_rates_scatter_and_readings_are_exact():
-    """With primary creep a rate that is 15 % higher is no multiple of its derivative: 1e-5 of a strain of 0.05 shows it."""
+    """With primary creep a rate that is 15 % higher is no multiple of its derivative, as 1e-5 of strain shows."""
     for seed in (3, 4):
         tests = []
         for k, history in enumerate(bars(power_law(5.0, 4e5), scatter=0.15, seed=seed)):
