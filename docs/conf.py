@@ -43,7 +43,6 @@ autodoc_typehints = "signature"
 autodoc_type_aliases = {name: name for name in ("ArrayLike", "Bools", "Floats", "Ints")}
 python_maximum_signature_line_length = 100
 autodoc_member_order = "bysource"
-autodoc_preserve_defaults = True
 autodoc_default_options = {"members": True, "ignore-module-all": True}
 # Annotations name types without their modules, and two modules may have an alias of the same name.
 suppress_warnings = ["ref.python"]

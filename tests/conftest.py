@@ -27,6 +27,17 @@ def gxx() -> str:
     return compiler_or_skip("g++")
 
 
+@pytest.fixture(scope="module")
+def one_torch_thread() -> Iterator[None]:
+    """Two threads of torch on a busy core are many times slower than one."""
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
 @pytest.fixture(autouse=True)
 def plugin_files_of_one_test_alone() -> Iterator[None]:
     """What a test loads by `load_plugin` or `--plugin` is gone with it: tests run in any order, in any process."""

@@ -9,6 +9,7 @@ import re
 from typing import Any
 
 from sphinx.application import Sphinx
+from sphinx.ext.autodoc.preserve_defaults import update_default_value
 
 _ENTRY = re.compile(r"^([\w*`][\w*`{}\[\]().,/ -]{0,60}?) : (\S.*)$")
 _BULLET = re.compile(r"^- (\S.*)$")
@@ -97,6 +98,12 @@ def _process(app: Sphinx, what: str, name: str, item: Any, options: Any, lines: 
     lines[:] = as_restructured_text(lines)
 
 
+def _keep_defaults(app: Sphinx, item: Any, bound_method: bool) -> None:
+    """Defaults as the source writes them, unless a decorator gave arguments that are not in the source."""
+    if not hasattr(item, "__signature__"):
+        update_default_value(item, bound_method)
+
+
 def _process_signature(
     app: Sphinx, what: str, name: str, item: Any, options: Any, signature: str | None, returns: str | None
 ) -> tuple[str | None, str | None]:
@@ -115,6 +122,7 @@ def _short(text: str | None) -> str | None:
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Connect to autodoc."""
+    app.connect("autodoc-before-process-signature", _keep_defaults)
     app.connect("autodoc-process-docstring", _process)
     app.connect("autodoc-process-signature", _process_signature)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -84,60 +84,16 @@ CASES: dict[str, LawWithValues] = {
 }
 """{name: law with values}; each has a form in at least one code."""
 
+_STEADY = {"norton", "norton with temperature", "strain hardening without hardening"}
+_TWO = {"two power laws", "two power laws with temperature"}
+_STRAIN = {"strain hardening", "strain hardening, small", "strain hardening with temperature"}
+_TIME = {name for name in CASES if name.startswith("time hardening")}
+_OTHER = {"other notation", "combined, all but one off"}
 HAS = {
-    "abaqus-cards": {
-        *(
-            "norton",
-            "norton with temperature",
-            "strain hardening",
-            "strain hardening, small",
-            "strain hardening with temperature",
-        ),
-        *(
-            "time hardening",
-            "time hardening, small",
-            "time hardening with temperature",
-            "time hardening with temperature, small",
-        ),
-        *("sine", "sine with temperature", "garofalo"),
-        *("two power laws", "two power laws with temperature", "other notation", "combined, all but one off"),
-        "strain hardening without hardening",
-    },
+    "abaqus-cards": _STEADY | _TWO | _STRAIN | _TIME | _OTHER | {"sine", "sine with temperature", "garofalo"},
     "ansys": {*CASES},
-    "moose": {
-        *(
-            "norton",
-            "norton with temperature",
-            "time hardening",
-            "time hardening, small",
-            "time hardening with temperature",
-        ),
-        "time hardening with temperature, small",
-        *(
-            "two power laws",
-            "two power laws with temperature",
-            "primary and steady",
-            "primary and steady with temperature",
-            "graham",
-        ),
-        "strain hardening without hardening",
-    },
-    "code_aster": {
-        *(
-            "norton",
-            "norton with temperature",
-            "strain hardening",
-            "strain hardening, small",
-            "strain hardening with temperature",
-        ),
-        *("other notation", "combined, all but one off", "strain hardening without hardening"),
-    },
-    "neml2": {
-        "norton",
-        "norton with temperature",
-        "two power laws",
-        "two power laws with temperature",
-        "strain hardening without hardening",
-    },
+    "moose": _STEADY | _TWO | _TIME | {"primary and steady", "primary and steady with temperature", "graham"},
+    "code_aster": _STEADY | _STRAIN | _OTHER,
+    "neml2": _STEADY | _TWO,
 }
 """{exporter: the cases that its code has}, told from the codes' manuals."""

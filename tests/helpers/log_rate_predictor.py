@@ -13,6 +13,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw
 from creepkit.records import History, Nuisance, Prediction, constant_stress
+from helpers.planted_bars import carried_out
 
 END = 1e5
 """s."""
@@ -58,19 +59,12 @@ def measured(
     frames: int = 10, using: LogRates | None = None,
 ) -> list[History]:  # fmt: skip
     """Tests at these stresses with white noise."""
-    rng, times = np.random.default_rng(seed), np.linspace(0.1, 1.0, frames) * END
+    times = np.linspace(0.1, 1.0, frames) * END
     blank = [
         History(f"{k}: {s:g} MPa", times, {"amplitude": 0 * times}, constant_stress(s, "stress"), 1000.0)
         for k, s in enumerate(stresses)
     ]
-    found = (using or LogRates()).predict(law, law.to_internal(values), blank)
-    return [
-        h.replace(
-            outputs={"amplitude": found.values[0, k, :, 0] + rng.normal(size=frames) * sd},
-            standard_deviation={"amplitude": np.full(frames, sd)},
-        )
-        for k, h in enumerate(blank)
-    ]
+    return carried_out(using or LogRates(), law, values, blank, noise=sd, seed=seed)
 
 
 def known_scatter(

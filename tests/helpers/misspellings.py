@@ -9,34 +9,15 @@ from collections.abc import Collection
 LETTERS = string.ascii_letters + string.digits + "_"
 
 
-def dropped(word: str, draw: random.Random) -> str:
-    """One letter left out."""
-    k = draw.randrange(len(word))
-    return word[:k] + word[k + 1 :]
-
-
-def doubled(word: str, draw: random.Random) -> str:
-    """One letter twice."""
-    k = draw.randrange(len(word))
-    return word[:k] + word[k] + word[k:]
-
-
-def swapped(word: str, draw: random.Random) -> str:
-    """Two neighbours in the other order."""
-    k = draw.randrange(max(len(word) - 1, 1))
-    return word[:k] + word[k + 1 : k + 2] + word[k] + word[k + 2 :]
-
-
-def changed(word: str, draw: random.Random) -> str:
-    """Another letter."""
-    k = draw.randrange(len(word))
-    return word[:k] + draw.choice(LETTERS) + word[k + 1 :]
-
-
-def added(word: str, draw: random.Random) -> str:
-    """One letter more."""
-    k = draw.randrange(len(word) + 1)
-    return word[:k] + draw.choice(LETTERS) + word[k:]
+def edited(word: str, draw: random.Random) -> str:
+    """One letter left out, twice, in the place of the next one, another one, or one more."""
+    kind = draw.choice(("dropped", "doubled", "swapped", "changed", "added"))
+    k = draw.randrange(len(word) + {"swapped": -(len(word) > 1), "added": 1}.get(kind, 0))
+    letter = draw.choice(LETTERS) if kind in ("changed", "added") else ""
+    before, at, after = word[:k], word[k : k + 1], word[k + 1 :]
+    if kind == "swapped":
+        return before + after[:1] + at + after[1:]
+    return before + {"dropped": "", "doubled": at + at, "changed": letter, "added": letter + at}[kind] + after
 
 
 UNITS = ("MPa", "kPa", "GPa", "mm", "um", "m", "s", "min", "h", "d", "K", "C", "N", "kN", "pct")
@@ -46,11 +27,8 @@ def other_unit(word: str, draw: random.Random) -> str:
     """Another unit, which is mostly none of this quantity; one edit where the word ends in no unit."""
     base, _, unit = word.rpartition("_")
     if unit not in UNITS:
-        return draw.choice(EDITS)(word, draw)
+        return edited(word, draw)
     return f"{base}_{draw.choice((*UNITS, 'mV', 'weeks', 'ppm', 'furlong', 'torr', 'kgf'))}"
-
-
-EDITS = (dropped, doubled, swapped, changed, added)
 
 
 def misspelt_keys(keys: Collection[str], count: int, seed: int, accepted: Collection[str]) -> list[tuple[str, str]]:
@@ -63,9 +41,9 @@ def misspelt_keys(keys: Collection[str], count: int, seed: int, accepted: Collec
     while len(pairs) < count:
         key = draw.choice(ordered)
         kind = draw.random()
-        wrong = (other_unit if kind < 0.15 else draw.choice(EDITS))(key, draw)
+        wrong = (other_unit if kind < 0.15 else edited)(key, draw)
         if kind > 0.6 and wrong:
-            wrong = draw.choice(EDITS)(wrong, draw)
+            wrong = edited(wrong, draw)
         plain = "_".join(wrong.casefold().replace("-", " ").replace("_", " ").split())
         if plain and plain not in accepted and wrong not in pairs:
             pairs[wrong] = key

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from creepkit.language import CreepLaw
-from creepkit.records import History, Loading
+from creepkit.records import History, Loading, Predictor
 from creepkit.specimens.uniaxial import Uniaxial
 
 BAR = Uniaxial()
@@ -26,11 +26,21 @@ def bars(
     frames: int = 30,
 ) -> list[History]:
     """One test for each loading."""
-    rng, times = np.random.default_rng(seed), np.geomspace(1e-3, 1.0, frames) * END
+    times = np.geomspace(1e-3, 1.0, frames) * END
     blank = [History(f"bar {k}", times, {"strain": 0 * times}, one, 1000.0) for k, one in enumerate(loadings)]
-    found = BAR.predict(law, law.to_internal(values), blank)
-    sd = {"strain": np.full(frames, noise)}
+    return carried_out(BAR, law, values, blank, noise=noise, seed=seed)
+
+
+def carried_out(
+    predictor: Predictor, law: CreepLaw, values: Mapping[str, float], planned: Sequence[History], *,
+    seed: int, noise: float = 2e-5,
+) -> list[History]:  # fmt: skip
+    """Planned tests with the first output that the law predicts, and noise of a size that is stated."""
+    rng, found = np.random.default_rng(seed), predictor.predict(law, law.to_internal(values), planned)
     return [
-        h.replace(outputs={"strain": found.of(k)[:, 0] + rng.normal(size=frames) * noise}, standard_deviation=sd)
-        for k, h in enumerate(blank)
+        h.replace(
+            outputs={predictor.outputs[0]: found.of(k)[:, 0] + rng.normal(size=h.times.size) * noise},
+            standard_deviation={predictor.outputs[0]: np.full(h.times.size, noise)},
+        )
+        for k, h in enumerate(planned)
     ]

@@ -106,7 +106,7 @@ class Planted(SamplingDomain):
         return {
             "name": self.name,
             "low": self.low,
-            "grid": self.grid.document(),
+            "grid": self.grid.values.tolist(),
             "criteria": [{"name": c.name, "text": c.text} for c in self.criteria],
         }
 

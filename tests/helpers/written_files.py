@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from creepkit.cli.identified_folder import LOCK
 from creepkit.files.writing import RECORD
 
 
 def names_in(folder: Path) -> list[str]:
-    """The names in a folder in their order, but for the list of what was written there and the lock of a run."""
-    return sorted(path.name for path in folder.iterdir() if path.name not in (RECORD, LOCK))
+    """The names in a folder in their order, but for the list of what was written there."""
+    return sorted(path.name for path in folder.iterdir() if path.name != RECORD)

@@ -6,30 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
-from typer.testing import CliRunner
 
 import creepkit as ck
-from creepkit.cli.app import app
 from creepkit.jobs.worker_pools import ParallelExecution
 from creepkit.records import Nuisance
 from creepkit.surrogates.recipe import Training
 from helpers.cantilever import Cantilever
+from helpers.command_line import creepkit
 
 NORTON, BEAM, HOUR = ck.law("norton"), Cantilever(), 3600.0
 ONE_PROCESS = ParallelExecution(workers=1)
 
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
-
-
-@pytest.fixture(scope="module")
-def one_torch_thread():
-    """Two threads of torch on a busy core are many times slower than one."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 def beam_deflection(values, conditions, times):
@@ -104,14 +93,12 @@ def test_the_command_line_generates_and_trains_for_a_specimen_of_a_plugin_file(t
     try:
         ck.load_plugin(Path(sys.modules["helpers.cantilever"].__file__))
         to, model = tmp_path / "beams.h5", tmp_path / "beam.safetensors"
-        words = ["surrogate", "generate", "norton", "--specimen", "cantilever", "--samples", "16", "--interval", "7200"]
-        made = CliRunner().invoke(
-            app, [*words, "--range", "force=6:12", "--range", "span=40:60", "--to", str(to), "--workers", "1"]
-        )
+        ranges = "--interval 7200 --range force=6:12 --range span=40:60"
+        made = creepkit(f"surrogate generate norton --specimen cantilever --samples 16 {ranges} --to {to} --workers 1")
         assert made.exit_code == 0, made.output
         assert "norton on cantilever" in made.output
-        words = ["surrogate", "train", str(to), "--to", str(model), "--hidden", "4", "--layers", "1", "--epochs", "2"]
-        trained = CliRunner().invoke(app, [*words, "--base", "reference-stress"])
+        sizes = "--hidden 4 --layers 1 --epochs 2 --base reference-stress"
+        trained = creepkit(f"surrogate train {to} --to {model} {sizes}")
         assert trained.exit_code == 0, trained.output
         assert "parameter-gru of cantilever" in ck.surrogate(model).name
     finally:

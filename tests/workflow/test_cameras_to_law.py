@@ -9,10 +9,9 @@ import re
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import creepkit as ck
-from creepkit.cli.app import app
+from helpers.command_line import creepkit
 from helpers.virtual_camera import Dimple, VirtualCamera
 
 LAG, START, INTERVAL, REST, LOADED = 37.0, 1755561113.25, 20.0, 10, 30
@@ -70,7 +69,7 @@ def write_record(path, program, start_of_load, end):
 
 
 def run(*words):
-    result = CliRunner().invoke(app, [*map(str, words)])
+    result = creepkit(*words)
     assert result.exit_code == 0, result.output
     return result.stdout
 
@@ -92,26 +91,13 @@ def test_from_frames_and_a_record_to_a_law(laboratory, monkeypatch, tmp_path):
     assert history.mean_temperature == pytest.approx(TEMPERATURE + 273.15, abs=0.5)
     written = (folder / "out" / "D1.csv").read_bytes()
     (folder / "out" / "D1.csv").write_text("edited")
-    again = CliRunner().invoke(app, [*map(str, extract)])
+    again = creepkit(*extract)
     assert again.exit_code == 1
     assert "D1.csv: cannot be written: it is there, and creepkit did not write it as it is now" in again.stderr
     (folder / "out" / "D1.csv").write_bytes(written)
     assert "D1" in run("read", folder / "out" / "D1.csv")
-    answer = json.loads(
-        run(
-            "identify",
-            folder / "out" / "D1.csv",
-            "--law",
-            "norton",
-            "--fix",
-            "n=5",
-            "--starts",
-            1,
-            "--frames",
-            5,
-            "--json",
-        )
-    )
+    words = ["--law", "norton", "--fix", "n=5", "--starts", "1", "--frames", "5", "--json"]
+    answer = json.loads(run("identify", folder / "out" / "D1.csv", *words))
     found = answer["laws"][0]["parameters"]["A"]
     assert found["low"] < LAW["A"] < found["high"]
     assert found["value"] == pytest.approx(LAW["A"], rel=0.15)

@@ -8,27 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import creepkit as ck
-from creepkit.cli.app import app
 from creepkit.cli.demo import PLANTED, PLANTED_BULGE
+from helpers.command_line import creepkit
 from helpers.paths import EXAMPLES
 
 CURVES = sorted(str(p) for p in PLANTED.glob("*.csv"))
-
-
-def creepkit(*words):
-    return CliRunner().invoke(app, [str(w) for w in words])
-
-
-def sentence(result):
-    """The one line on stderr of a failed command, after whatever progress was told."""
-    assert result.exit_code == 1, result.output
-    lines = [line for line in result.stderr.strip().splitlines() if not re.search(r": \d+ of \d+$", line)]
-    assert len(lines) == 1
-    assert lines[0].startswith("creepkit: ")
-    return lines[0]
 
 
 @pytest.fixture(scope="module")
@@ -48,13 +34,6 @@ def test_identify_finds_the_planted_law_and_its_values(identified):
     assert all(best[name]["low"] <= value <= best[name]["high"] for name, value in truth["values"].items())
 
 
-def test_saved_identification_reloads_and_predicts(identified):
-    folder, _ = identified
-    fit = ck.load(folder / "strain-hardening-arrhenius.json")
-    again = fit.with_histories(ck.read_histories(CURVES), ck.specimen("uniaxial"))
-    assert again.predict().values.shape[1] == len(CURVES)
-
-
 def test_exported_python_gives_the_identified_rate(identified):
     """The module needs nothing but `math`; its rate is that of the identification at the same point."""
     folder, _ = identified
@@ -64,34 +43,6 @@ def test_exported_python_gives_the_identified_rate(identified):
     spec.loader.exec_module(module)
     rate, _, _ = fit.rate(80.0, 1073.15, strain=0.01)
     assert module.rate(80.0, strain=0.01, temperature=1073.15) == pytest.approx(float(rate), rel=1e-6)
-
-
-def test_simulate_writes_a_curve_that_identify_reads(tmp_path):
-    path = tmp_path / "curve.csv"
-    result = creepkit(
-        "simulate",
-        "norton",
-        "--set",
-        "A=1e-16",
-        "--set",
-        "n=5",
-        "--stress",
-        100,
-        "--end-h",
-        10,
-        "--control",
-        "stress",
-        "--to",
-        path,
-    )
-    assert result.exit_code == 0, result.output
-    (history,) = ck.read_histories(path)
-    assert history.outputs["strain"][-1] == pytest.approx(1e-16 * 100**5 * 36000, rel=1e-6)
-
-
-def test_a_law_is_never_evaluated_from_text(tmp_path):
-    told = sentence(creepkit("identify", *CURVES, "--law", "__import__('os').getcwd()", "--to", tmp_path / "out"))
-    assert "__import__" in told
 
 
 def test_demo_identifies_measured_curves_then_the_law_of_a_virtual_bulge_test(tmp_path):

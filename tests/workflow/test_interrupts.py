@@ -41,35 +41,14 @@ def words_of(command, folder):
     """The words of a command that works for minutes."""
     if command == "train":
         ck.write_dataset(bars(), folder / "data.h5")
-        return (
-            "surrogate",
-            "train",
-            folder / "data.h5",
-            "--to",
-            folder / "out" / "net.safetensors",
-            "--epochs",
-            "100000",
-        )
+        return f"surrogate train {folder}/data.h5 --to {folder}/out/net.safetensors --epochs 100000"
     if command == "screen":
-        return (
-            "identify",
-            PLANTED_BULGE,
-            "--by",
-            "alloy",
-            "--law",
-            "combined",
-            "--dense",
-            "none",
-            "--to",
-            folder / "out",
-            "--workers",
-            "1",
-        )
+        return f"identify {PLANTED_BULGE} --by alloy --law combined --dense none --to {folder}/out --workers 1"
     if command == "run":
         shutil.copy(next(PLANTED_BULGE.glob("*.csv")), folder / "test.csv")
         (folder / "study.toml").write_text(STUDY)
-        return ("run", folder / "study.toml", "--to", folder / "out")
-    return ("identify", PLANTED_BULGE, "--law", "combined", "--starts", "64", "--to", folder / "out")
+        return f"run {folder}/study.toml --to {folder}/out"
+    return f"identify {PLANTED_BULGE} --law combined --starts 64 --to {folder}/out"
 
 
 def started(process, folder):
@@ -95,7 +74,7 @@ def started(process, folder):
 )
 def test_an_interrupt_is_one_line_and_leaves_nothing_half_written(command, sent, said, tmp_path):
     (tmp_path / "out").mkdir()
-    words = [sys.executable, "-c", f"{HEEDING}{CALLED}", *map(str, words_of(command, tmp_path))]
+    words = [sys.executable, "-c", f"{HEEDING}{CALLED}", *words_of(command, tmp_path).split()]
     with running(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path) as process:
         started(process, tmp_path)
         process.send_signal(sent)

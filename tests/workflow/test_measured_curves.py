@@ -5,12 +5,11 @@ import json
 import numpy as np
 import pytest
 from sympy import exp
-from typer.testing import CliRunner
 
 import creepkit as ck
-from creepkit.cli.app import app
 from creepkit.inverse.cross_validation import cross_validate, loading_strains, times_to_strain
 from creepkit.language import CreepLaw, Param, parameters, strain, stress
+from helpers.command_line import creepkit
 from helpers.paths import SHARED, needs_shared_data
 
 CURVES = SHARED / "uniaxial" / "cmsx6"
@@ -20,8 +19,7 @@ pytestmark = needs_shared_data
 @pytest.fixture(scope="module")
 def answer(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cmsx6")
-    words = ["identify", str(CURVES), "--law", "norton", "--up-to", "0.05", "--starts", "2", "--no-sums"]
-    result = CliRunner().invoke(app, [*words, "--to", str(folder), "--json"])
+    result = creepkit(f"identify {CURVES} --law norton --up-to 0.05 --starts 2 --no-sums --to {folder} --json")
     assert result.exit_code == 0, result.output
     return json.loads(result.stdout), folder
 

@@ -4,12 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import creepkit as ck
-from creepkit.cli.app import app
 from creepkit.language import Elastic
 from creepkit.records import History, Nuisance, PressureJump, constant_stress
+from helpers.command_line import creepkit
 
 TEMPERATURES = (1023.15, 1073.15, 1123.15)
 RATES = (4e-18, 4e-17, 3e-16)
@@ -23,7 +22,7 @@ QUICK_WORDS = ("--starts", "1", "--frames", "14")
 
 
 def command(*words):
-    result = CliRunner().invoke(app, [str(word) for word in words])
+    result = creepkit(*words)
     assert result.exit_code == 0, result.output
     return result
 
@@ -101,6 +100,7 @@ def same(saved, fit):
     return True
 
 
+NUISANCES = [Nuisance("offset"), Nuisance("rate", sd=0.2)]
 ONE_TEMPERATURE = ("--only", "temperature=1023")
 
 
@@ -110,13 +110,7 @@ ONE_TEMPERATURE = ("--only", "temperature=1023")
         ((), {}, True),
         (
             ("--seed", "3", "--frames", "12", "--starts", "2", "--suspect-frames", "keep", "--nuisance", "rate=0:0.2"),
-            {
-                "seed": 3,
-                "frames": 12,
-                "starts": 2,
-                "suspect_frames": "keep",
-                "nuisances": [Nuisance("offset"), Nuisance("rate", sd=0.2)],
-            },
+            {"seed": 3, "frames": 12, "starts": 2, "suspect_frames": "keep", "nuisances": NUISANCES},
             False,
         ),
     ],

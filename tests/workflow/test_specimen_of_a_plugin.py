@@ -4,17 +4,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import creepkit as ck
-from creepkit.cli.app import app
+from helpers.command_line import creepkit as run_words
 
 PLUGIN = Path(__file__).parents[1] / "helpers" / "cantilever_plugin.py"
 TRUTH = ("--set", "A=1e-16", "--set", "n=4")
 
 
 def creepkit(*words):
-    return CliRunner().invoke(app, ["--plugin", str(PLUGIN), *map(str, words)])
+    return run_words("--plugin", PLUGIN, *words)
 
 
 @pytest.fixture

@@ -7,15 +7,10 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 import creepkit as ck
-from creepkit.cli.app import app
+from helpers.command_line import creepkit
 from helpers.paths import EXAMPLES, SHARED, needs_shared_data
-
-
-def creepkit(*words: object):
-    return CliRunner().invoke(app, [str(word) for word in words])
 
 
 @pytest.fixture
@@ -86,11 +81,8 @@ def test_the_studies_of_public_data_are_valid_and_their_tests_are_checked(name: 
 
 @needs_shared_data
 def test_studies_of_public_folders_are_proposed_and_valid(tmp_path: Path) -> None:
-    for name, laws in (
-        ("uniaxial/cmsx6", "kachanov-rabotnov"),
-        ("uniaxial/alloy617", "mpc-omega"),
-        ("dabi/in625", "norton"),
-    ):
+    proposed = {"uniaxial/cmsx6": "kachanov-rabotnov", "uniaxial/alloy617": "mpc-omega", "dabi/in625": "norton"}
+    for name, laws in proposed.items():
         target = tmp_path / Path(name).name / "study.toml"
         target.parent.mkdir()
         (tmp_path / Path(name).name / "data").symlink_to(SHARED / name, target_is_directory=True)

@@ -13,7 +13,7 @@ from creepkit.errors import SolveError
 from creepkit.language import symbols
 from creepkit.records import History, Loading, Predictor, Program, Status, call_of_plugin, predict_with
 from creepkit.registry import resolve_law
-from creepkit.registry.arguments import check_histories, resolve_predictor
+from creepkit.registry.arguments import resolve_predictor
 from creepkit.specimens.run import Run, Runnable, run_from_outputs, unusual_values, with_explanation
 
 if TYPE_CHECKING:
@@ -101,4 +101,4 @@ def check_data_quality(
 
     predictor = None if specimen is None else resolve_predictor(specimen)
     energy = ACTIVATION_ENERGY if activation_energy is None else activation_energy
-    return run(check_histories(histories), predictor, activation_energy=energy)
+    return run(list(histories), predictor, activation_energy=energy)

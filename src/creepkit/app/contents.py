@@ -31,7 +31,6 @@ from creepkit.records import (
 )
 from creepkit.records.units import celsius_text
 from creepkit.registry import resolve_law
-from creepkit.registry.arguments import check_histories
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.relaxation import Relaxation
 from creepkit.specimens.uniaxial import Uniaxial
@@ -106,7 +105,7 @@ def page_contents(
     laws = _page_laws(source)
     law, fit = laws[0].law, laws[0].fit
     known = {name: one for name, one in known_specimens().items() if type(one) in KINDS}
-    given = tuple(check_histories(tests)) or (() if fit is None else fit.histories)
+    given = tuple(tests) or (() if fit is None else fit.histories)
     histories = tuple(history for history in given if history.specimen in known)
     if len(histories) > MOST_TESTS:
         raise FitError(f"a page shows at most {MOST_TESTS} tests, found {len(histories)}; give fewer files")

@@ -32,7 +32,7 @@ STAGES: dict[str, dict[str, str]] = {
         "extract": "Extract measured histories from camera frames.",
     },
     "Laws": {
-        "identify": "Fit laws to creep tests and rank them, for one alloy or many.",
+        "identify": "Fit laws to creep tests and rank them ('fit' is the same).",
         "discover": "Find forms of temperature for the parameters of a law.",
     },
     "What follows": {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from creepkit.cli.command_options import OutputPath
-from creepkit.cli.identified_folder import identifying_alone, write_ranking
+from creepkit.cli.identified_folder import check_identified_folder, write_ranking
 from creepkit.cli.shared import Files, Json, Only, Reader, Workers, is_file_name, selected
 from creepkit.errors import FitError
 from creepkit.inverse.candidate_laws import LawChanges
@@ -21,10 +20,10 @@ from creepkit.options import Option
 from creepkit.records import Predictor
 from creepkit.reports.ranking import print_ranking, ranking_to_json
 from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell
+from creepkit.studies.candidates import by_likelihood, ranked_candidates
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection import Ranking
     from creepkit.language import CreepLaw
     from creepkit.records import History
     from creepkit.screening.screen import ScreeningOptions
@@ -103,27 +102,18 @@ def command(
         return
     _tell_assumptions(histories)
     candidates = LawChanges().changed(changes).applied(candidates, histories)
-    options_of_fits: dict[str, Any] = {
-        "using": surrogate,
-        **settings,
-        **({} if through is None else {"through": through}),
-    }
-    likelihood = {"weights": ("likelihood",), "loss": ("linear",)}
-    by_likelihood = search.global_search is None and search.penalty is None
-    by_likelihood &= all(settings.get(name, words[0]) in words for name, words in likelihood.items())
-    if (search.sums is not None or "by" in how) and not by_likelihood:
+    compared = search.sums is not None or ("by" in how and len(candidates) > 1)
+    if compared and not by_likelihood(search, settings):
         raise FitError(
             "--sums and --criterion compare laws by their likelihood: leave out --weights, --search, --penalty, --loss"
         )
-    with identifying_alone(to, candidates), ProgressBar() as progress:
-        if by_likelihood and (len(candidates) > 1 or search.sums is not None):
-            ranking = ck.select(
-                candidates, histories, sums=search.sums, by=search.by, progress=progress.tick, **options_of_fits
-            )
-        else:
-            searched = {"search": search.global_search, "penalty": search.term_penalty}
-            ranking = _ranked(candidates, histories, progress, **searched, **options_of_fits)
-        written = write_ranking(ranking, to)
+    check_identified_folder(to, candidates)
+    options_of_fits: dict[str, Any] = {"compared": compared, **({} if through is None else {"through": through})}
+    with ProgressBar() as progress:
+        ranking = ranked_candidates(
+            candidates, histories, surrogate, search, settings, progress=progress.tick, **options_of_fits
+        )
+    written = write_ranking(ranking, to)
     if as_json:
         print_json(ranking_to_json(ranking, written))
     else:
@@ -206,21 +196,3 @@ def _tell_assumptions(histories: list[History]) -> None:
         tell(f"note: {line}", err=True)
     for first, second in duplicate_tests(without_copies(histories)[0]):
         tell(f"note: {first} and {second} look like one test published twice; both count", err=True)
-
-
-def _ranked(laws: Sequence[CreepLaw], histories: list[History], progress: ProgressBar, **options: Any) -> Ranking:
-    """Fit each law, and rank them."""
-    import creepkit as ck
-    from creepkit.inverse.rupture_use import common_rupture_times
-    from creepkit.inverse.selection import rank
-
-    asked = ck.IdentificationSettings(rupture_times=options.get("rupture_times", "auto"))
-    options["rupture_times"] = common_rupture_times(laws, asked).rupture_times
-    fits = []
-    for law in laws:
-
-        def tick(task: str, done: int, total: int, name: str = law.name) -> None:
-            progress.tick(f"{name}, {task}", done, total)
-
-        fits.append(ck.identify(law, histories, progress=tick, **options))
-    return rank(fits)

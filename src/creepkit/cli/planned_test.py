@@ -9,8 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
+from creepkit.api.options import PlannedTestOptions, elastic_of
 from creepkit.cli.command_options import CheckedCommand
 from creepkit.cli.generated_options import pair, steps
 from creepkit.cli.shared import DEFAULT_SPECIMEN
@@ -22,10 +23,6 @@ from creepkit.forecasts.planned_tests import (
     planned_history,
     stepped_load,
 )
-from creepkit.limits import GIGAPASCAL, HOURS, RAMP
-from creepkit.options import GIGAPASCAL as IN_GIGAPASCAL
-from creepkit.options import HOURS as IN_HOURS
-from creepkit.options import Options, option
 from creepkit.records import (
     ZERO_CELSIUS,
     History,
@@ -42,25 +39,6 @@ if TYPE_CHECKING:
 
 LOAD_TEXT = re.compile(r"([0-9.]+:)?[+-]?[0-9.]+([eE][+-]?[0-9]+)?")
 """The value of a load: a number, or SECONDS:NUMBER."""
-
-
-@dataclass(frozen=True)
-class TestOptions(Options, title="options of a test", error=SolveError):
-    """What is said of a test beside its load and lengths. temperature : (start in s, C) of its levels.
-
-    end : s. modulus : MPa. control : of a bar under stress. ramp : s in which each level of a load is reached.
-    """
-
-    __test__ = False  # not a test case, whatever its name says to pytest
-
-    end: float | None = option(None, "End of the test.", HOURS, **IN_HOURS)
-    specimen: str | None = option(None, "By default one that takes the load; see 'creepkit list specimens'.")
-    temperature: tuple[tuple[float, float], ...] = option(
-        (), "Temperature, from S seconds on.", unit="C", metavar="[S:]C"
-    )
-    modulus: float | None = option(None, "Young's modulus; some specimens need it.", GIGAPASCAL, **IN_GIGAPASCAL)
-    control: Literal["load", "stress"] | None = option(None, "Of a bar: the load or the true stress is held.")
-    ramp: float | None = option(None, "s in which each level of a load is reached.", RAMP)
 
 
 class Command(CheckedCommand):
@@ -113,7 +91,7 @@ def _flags(specimen: object) -> list[str]:
 class DescribedTest:
     """What options say of a test; lengths : mm of its test piece, temperature : K, None where nothing is said."""
 
-    options: TestOptions
+    options: PlannedTestOptions
     specimen: Specimen
     loading: Loading
     lengths: Mapping[str, float]
@@ -121,15 +99,13 @@ class DescribedTest:
 
     def history(self, temperature: float | Program) -> History:
         """The planned test, without outputs; temperature : K, where the options say none."""
-        from creepkit.language import Elastic
-
         chosen = self.options
         return planned_history(
             self.specimen,
             self.loading,
             float(chosen.end or 0.0),
             temperature=temperature if self.temperature is None else self.temperature,
-            elastic=None if chosen.modulus is None else Elastic(chosen.modulus),
+            elastic=elastic_of(chosen.modulus),
             lengths=self.lengths,
         )
 
@@ -138,7 +114,7 @@ def described_test(given: Mapping[str, Any], others: Mapping[str, Sequence[str]]
     """The test of options and of loads and lengths by name; SolveError where they contradict each other."""
     import creepkit as ck
 
-    options = TestOptions().changed(given)
+    options = PlannedTestOptions().changed(given)
     specimen = ck.specimen(options.specimen or _specimen_for(others))
     own = {load.name: load for load in loads_of(specimen)}
     loads: dict[str, Sequence[str]] = {}
@@ -185,7 +161,11 @@ def steps_of(texts: Sequence[str], flag: str) -> list[tuple[float, float]]:
 
 
 def _loading(
-    specimen: Specimen, own: Mapping[str, Load], loads: Mapping[str, Sequence[str]], options: TestOptions, end: float
+    specimen: Specimen,
+    own: Mapping[str, Load],
+    loads: Mapping[str, Sequence[str]],
+    options: PlannedTestOptions,
+    end: float,
 ) -> Loading:
     """One load by steps; its ramp is the load's own where none is given."""
     if len(loads) != 1:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from creepkit.api.options import ForecastOptions, PlannedTestOptions
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.planned_test import Command as Command
-from creepkit.cli.planned_test import TestOptions, described_test
+from creepkit.cli.planned_test import described_test
 from creepkit.cli.shared import Json, Tests
 from creepkit.errors import FitError
-from creepkit.limits import BAND_DRAWS, PROBABILITY
 from creepkit.options import Option
 from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
 
@@ -26,9 +26,9 @@ def command(
     fit: Annotated[Path, typer.Argument(metavar="FIT.json", help="A saved identification, or a ranking.json.")],
     tests: Tests = None,
     *,
-    test: Annotated[dict[str, Any], TestOptions],
+    test: Annotated[dict[str, Any], PlannedTestOptions],
     label: Annotated[dict[str, str] | None, Option(help="Of the planned test.", example="heat=X7")] = None,
-    level: Annotated[float, Option(help="Probability of bands and intervals.", limits=PROBABILITY)] = 0.95,
+    how: Annotated[dict[str, Any], ForecastOptions],
     target: Annotated[
         dict[str, tuple[float, ...]] | None,
         Option(help="Values the times to which are asked for.", example="strain=0.01,0.05"),
@@ -36,9 +36,6 @@ def command(
     tolerance: Annotated[
         dict[str, float] | None,
         Option(help="Standard deviation of what is not exactly known.", example="thickness=0.01"),
-    ] = None,
-    draws: Annotated[
-        int | None, Option(help="Of the law and all else; more make smoother bands.", limits=BAND_DRAWS)
     ] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Picture of the curves with their bands."), OutputPath("picture")
@@ -66,8 +63,7 @@ def command(
         raise FitError("there is no test to forecast: name files, or describe a test, such as --stress 80 --end-h 100")
     with ProgressBar() as progress:
         forecast = ck.forecast(
-            source, histories, level=level, targets=target, tolerances=tolerance or {}, draws=draws,
-            progress=progress.tick,
+            source, histories, targets=target, tolerances=tolerance or {}, progress=progress.tick, **how
         )  # fmt: skip
     if plot is not None:
         forecast.plot(plot)

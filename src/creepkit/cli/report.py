@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from creepkit.cli.command_options import OutputPath
-from creepkit.cli.shared import is_file_name, law_source
+from creepkit.cli.shared import is_file_name, is_law_name, law_source
 from creepkit.errors import FitError, ReportError
 from creepkit.options import Option
 from creepkit.reports.terminal import tell_written
@@ -58,6 +58,9 @@ def command(
     else:
         if specimen is not None:
             raise ReportError("--specimen belongs to a page of sliders: give --app as well")
+        law = next((name for name in results if is_law_name(name)), None)
+        if law is not None:
+            raise ReportError(f"{law} is a law: give --app for a page of its sliders, or name results of identify")
         found = [_read(Path(name), histories) for name in results]
         path = ck.report(found, to or Path("report.html"), title=title)
     tell_written(path, err=True)

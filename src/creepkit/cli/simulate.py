@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from creepkit.api.options import PlannedTestOptions, elastic_of
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.planned_test import Command as Command
-from creepkit.cli.planned_test import TestOptions, described_test
+from creepkit.cli.planned_test import described_test
 from creepkit.cli.shared import Law, Values, law_source, merged_values
 from creepkit.errors import SolveError
 from creepkit.limits import SECONDS, SIMULATED_FRAMES
@@ -30,7 +31,7 @@ def command(
     law: Law,
     *,
     value: Values = None,
-    test: Annotated[dict[str, Any], TestOptions],
+    test: Annotated[dict[str, Any], PlannedTestOptions],
     points: Annotated[
         int | None, Option(help="Number of frames; 200 of most specimens.", limits=SIMULATED_FRAMES)
     ] = None,
@@ -42,7 +43,6 @@ def command(
 ) -> None:
     """Loads and lengths of a specimen are options of their names, such as --stress 80 or --outer-radius 12."""
     import creepkit as ck
-    from creepkit.language import Elastic
     from creepkit.language.symbols import temperature
     from creepkit.readers.history_csv import history_text, write_history
 
@@ -56,7 +56,6 @@ def command(
     if picture is not None and not hasattr(planned.specimen, "draws_section"):
         raise SolveError(f"--picture: specimen '{planned.specimen.name}' has no section to draw; leave it out")
     specimen: Any = planned.specimen
-    modulus = planned.options.modulus
     run = ck.simulate(
         valued.law,
         specimen.replace(**planned.lengths) if planned.lengths else specimen,
@@ -64,7 +63,7 @@ def command(
         loading=planned.loading,
         times=_frame_times(planned.options.end, points, every, specimen),
         temperature=planned.temperature,
-        elastic=None if modulus is None else Elastic(modulus),
+        elastic=elastic_of(planned.options.modulus),
         name=valued.law.name if to is None else to.stem,
     )
     run = replace(run, geometry={**run.geometry, **planned.lengths})

@@ -87,8 +87,8 @@ def check_heading(data: Any, source: str, document: DocumentFormat) -> dict[str,
     """The entries of a document below its heading; the error of its kind when it is no such document or version."""
     kind = document.kind
     if not isinstance(data, dict) or data.get("format") != document.name:
-        other = _other_document(data)
-        if other:
+        name = data.get("format") if isinstance(data, dict) else None
+        if other := OTHER_DOCUMENTS.get(str(name)):
             raise kind.error(f"{source}: this is {other[0]}, and not {kind.noun}; {other[1]}")
         raise kind.error(
             f"{source}: this is not {kind.noun} that creepkit wrote (format '{document.name}', version "
@@ -106,7 +106,10 @@ def check_heading(data: Any, source: str, document: DocumentFormat) -> dict[str,
 
 
 OTHER_DOCUMENTS = {
-    "creepkit-ranking": ("a ranking", "'creepkit report' and 'creepkit predict' take it"),
+    "creepkit-ranking": (
+        "a ranking",
+        "'creepkit report' and 'creepkit predict' take it, and the identifications of its laws lie beside it",
+    ),
     "creepkit-identification": (
         "an identification",
         "'creepkit report', 'creepkit predict' and 'creepkit export' take it",
@@ -114,32 +117,13 @@ OTHER_DOCUMENTS = {
     "creepkit-valued-law": ("an exported law with its values", "'creepkit export' takes it"),
     "creepkit-law": ("a law without values", "identify its values from tests"),
     "creepkit-rupture-assessment": ("a rupture assessment", "'creepkit report' takes it"),
+    "creepkit-stage-result": (
+        "what a stage of a study found, kept for its next run",
+        "'creepkit run' of its study.toml writes the page, identifications are in the folder identified beside it, and "
+        "'creepkit rupture TESTS --to FILE' writes an assessment",
+    ),
 }
 """{format: (what it is, what can be done with it)}, for whoever gives one document in the place of another."""
-
-
-MOST_FILES_NAMED = 3
-"""Of a ranking, from the best on."""
-
-
-def _other_document(data: Any) -> tuple[str, str] | None:
-    """What a document of another format is, and what to give or do; None of what creepkit does not know."""
-    name = data.get("format") if isinstance(data, dict) else None
-    if name == "creepkit-stage-result":
-        stage = quoted(str(data.get("stage", "?")))
-        what = f"what the stage '{stage}' of a study found, kept for its next run"
-        page = (
-            "'creepkit run' of its study.toml writes the page; identifications are in the folder identified beside it"
-        )
-        assess = ", and 'creepkit rupture TESTS --to FILE' writes an assessment" if stage == "rupture" else ""
-        return what, page + assess
-    if name == "creepkit-ranking":
-        laws = data.get("laws")
-        files = [entry.get("file") for entry in laws if isinstance(entry, dict)] if isinstance(laws, list) else []
-        known = [quoted(one) for one in files if isinstance(one, str)][:MOST_FILES_NAMED]
-        if known:
-            return "a ranking", f"give one of the identifications beside it, the best first: {', '.join(known)}"
-    return OTHER_DOCUMENTS.get(name) if isinstance(name, str) else None
 
 
 def check_keys(data: Mapping[str, Any], allowed: tuple[str, ...], place: str, *, optional: bool = False) -> str:

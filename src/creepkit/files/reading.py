@@ -22,10 +22,6 @@ MAXIMUM_UNPACKED_BYTES = 100_000_000
 """Of all that a compressed file holds together."""
 
 
-PIECE_BYTES = 1_000_000
-"""Bytes that are read at once."""
-
-
 @dataclass(frozen=True)
 class FileKind:
     """A kind of file that creepkit reads or writes.
@@ -63,14 +59,8 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
 
     first : bytes to read of a file however large; by default all of one that is at most `kind.maximum_bytes` long.
     """
-    descriptor = _open_regular(path, kind, any_size=first is not None)
-    try:
-        with os.fdopen(descriptor, "rb") as stream:
-            content = _read_pieces(stream, kind.most_bytes + 1 if first is None else first)
-    except OSError as error:
-        raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
-    except MemoryError:
-        raise kind.error(f"{path}: holds more than there is memory for") from None
+    with open_binary(path, kind, any_size=first is not None) as stream:
+        content = stream.read() if first is None else stream.read(first)
     if first is None and len(content) > kind.most_bytes:
         raise kind.error(_too_large(path, kind, len(content)))
     return content
@@ -78,39 +68,28 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
 
 def read_range(path: Path, kind: FileKind, start: int, count: int) -> bytes:
     """Bytes of a regular file however large: `count` of them from byte `start`, fewer at its end."""
-    descriptor = _open_regular(path, kind, any_size=True)
-    try:
-        with os.fdopen(descriptor, "rb") as stream:
-            stream.seek(start)
-            return stream.read(count)
-    except OSError as error:
-        raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
+    with open_binary(path, kind, any_size=True) as stream:
+        stream.seek(start)
+        return stream.read(count)
 
 
 @contextmanager
-def open_binary(path: Path, kind: FileKind) -> Iterator[BufferedReader]:
-    """A regular file of at most `kind.maximum_bytes`, open for reading part by part; its error where reading fails."""
-    descriptor = _open_regular(path, kind)
+def open_binary(path: Path, kind: FileKind, *, any_size: bool = False) -> Iterator[BufferedReader]:
+    """A regular file of at most `kind.maximum_bytes` or of any size, open for reading; its error where that fails."""
+    descriptor = _open_regular(path, kind, any_size=any_size)
     try:
         with os.fdopen(descriptor, "rb") as stream:
             yield stream
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
+    except MemoryError:
+        raise kind.error(f"{path}: holds more than there is memory for") from None
 
 
 def sha256_of(path: Path, kind: FileKind) -> str:
     """SHA-256 of the content of a regular file."""
     with open_binary(path, kind) as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def _read_pieces(stream: BufferedReader, limit: int) -> bytes:
-    """At most `limit` bytes; piece by piece, for to ask for all at once would reserve memory for the limit."""
-    pieces: list[bytes] = []
-    while limit > 0 and (piece := stream.read(min(limit, PIECE_BYTES))):
-        pieces.append(piece)
-        limit -= len(piece)
-    return b"".join(pieces)
 
 
 def read_text(path: Path, kind: FileKind) -> str:

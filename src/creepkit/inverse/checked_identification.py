@@ -23,7 +23,7 @@ from creepkit.language import CreepLaw
 from creepkit.options import takes_options
 from creepkit.records import History, Predictor
 from creepkit.registry import resolve_law
-from creepkit.registry.arguments import check_histories, resolve_predictors
+from creepkit.registry.arguments import resolve_predictors
 
 
 @takes_options(IdentificationSettings)
@@ -54,9 +54,9 @@ def identify(
         are left out. changes : single fields of it, see IdentificationSettings:
         starts=4, nuisances=["offset", Nuisance("rate", sd=0.1)], weights="likelihood".
     """
-    law, predictor = resolve_law(law), resolve_predictors(using, check_histories(histories))
+    law, predictor = resolve_law(law), resolve_predictors(using, histories)
     settings = (settings or IdentificationSettings()).changed(changes, predictor)
-    histories, left_out = sound_tests(check_histories(histories), settings)
+    histories, left_out = sound_tests(list(histories), settings)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     surrogate = _resolve_through(through, predictor)
     if through == "auto":
@@ -101,14 +101,14 @@ def select(
         asked for explains the tests, has 95 % of the weight, and nothing that the tests allow stands against it.
     using, through, settings, changes : as for identify(); weights are "likelihood".
     """
-    predictor = resolve_predictors(using, check_histories(histories))
+    predictor = resolve_predictors(using, histories)
     settings = (settings or IdentificationSettings()).changed(changes, predictor)
     if changes.get("weights") not in (None, "likelihood"):
         raise FitError(
             f"select() compares laws by their likelihood, found weights={changes['weights']!r}; leave weights out, or "
             "identify each law with them and rank() the results"
         )
-    histories, left_out = sound_tests(check_histories(histories), settings)
+    histories, left_out = sound_tests(list(histories), settings)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     ranking = select_law(
         [resolve_law(law) for law in ((laws,) if isinstance(laws, str) else laws)],

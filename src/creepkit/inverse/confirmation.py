@@ -19,7 +19,7 @@ from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
 from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.presentation import Presentable
 from creepkit.records import History, Prediction, Predictor, Status
-from creepkit.registry.arguments import check_histories, resolve_predictors
+from creepkit.registry.arguments import resolve_predictors
 
 AGREEMENT_LIMIT = 1.0
 """Largest rms difference to what the fit predicts, in standard deviations of the noise, that confirms it."""
@@ -157,7 +157,7 @@ def confirm(
     using : the specimen, or {specimen: predictor}; by default the specimen that the tests name, with the settings that
         it was identified with.
     """
-    tests = without_suspect_frames(check_histories(list(fit.histories if tests is None else tests)), fit.settings)
+    tests = without_suspect_frames(list(fit.histories if tests is None else tests), fit.settings)
     if not tests:
         raise FitError(f"law '{fit.law.name}': there are no tests to confirm it with")
     known = registered_specimens(fit.predictor) if using is None else {}

@@ -33,7 +33,7 @@ from creepkit.inverse.unmodelled_effect import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import History, LawWithValues, Nuisance, Prediction, Predictor
-from creepkit.registry.arguments import check_histories, resolve_predictors
+from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -318,6 +318,7 @@ class Identification(Presentable, text="reports.identification_text:identificati
                 values[n.key] = values.get(n.key, 0.0) + np.array([[of(n, h) for h in histories]])
         return values
 
+    @checked
     def with_histories(
         self, histories: Sequence[History], using: Predictor | str | Mapping[str, Predictor | str] | None = None
     ) -> Identification:
@@ -325,7 +326,6 @@ class Identification(Presentable, text="reports.identification_text:identificati
 
         using : by default the specimen that the file names, with its settings.
         """
-        histories = check_histories(histories)
         by_name = {h.name: h for h in histories}
         missing = [m.name for m in self.tests if m.name not in by_name]
         if missing:

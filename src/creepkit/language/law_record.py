@@ -32,7 +32,9 @@ def validate_law(law: LawRecord) -> None:
     """Raise LawError when the law is not well formed."""
     _check_names_and_titles(law)
     origin = f"law '{law.name}'"
-    _check_tables(law, origin)
+    for symbol in (*law.params, *law.states):
+        if isinstance(symbol, SymbolTuple):
+            symbol.refuse()
     _check_names(law, origin)
     _check_expressions(law, origin)
     _check_symbols(law, origin)
@@ -67,21 +69,6 @@ def _check_names_and_titles(law: LawRecord) -> None:
     for text in (law.title, *law.references):
         if not isinstance(text, str) or not text.isprintable():
             raise LawError(f"law '{law.name}': the title or reference {text!r} must be one line of text")
-
-
-def _check_tables(law: LawRecord, origin: str) -> None:
-    for symbol, param in law.params.items():
-        if isinstance(symbol, SymbolTuple):
-            symbol.refuse()
-        if not isinstance(symbol, sympy.Symbol):
-            raise LawError(f"{origin}: the parameter table must be keyed by symbols, found {symbol!r}")
-        if not isinstance(param, Param):
-            raise LawError(f"{origin}, parameter '{symbol}': found {type(param).__name__}, write Param(...)")
-    for symbol, state in law.states.items():
-        if isinstance(symbol, SymbolTuple):
-            symbol.refuse()
-        if not isinstance(symbol, sympy.Symbol) or not isinstance(state, State):
-            raise LawError(f"{origin}: states must be written as {{symbol: State(...)}}, found {symbol!r}: {state!r}")
 
 
 def _check_names(law: LawRecord, origin: str) -> None:

@@ -132,12 +132,7 @@ class Param:
         if self.scale not in ("linear", "log"):
             raise LawError(f"parameter '{self.meaning}': scale is '{self.scale}'; allowed are 'linear' and 'log'")
         _check_text("parameter", self.meaning, self.unit)
-        try:
-            low, high = (float(b) for b in self.bounds)
-        except (TypeError, ValueError):
-            raise LawError(
-                f"parameter '{self.meaning}': bounds are {self.bounds!r}; write two numbers (low, high)"
-            ) from None
+        low, high = map(float, self.bounds)
         if not (math.isfinite(low) and math.isfinite(high)):
             raise LawError(f"parameter '{self.meaning}': bounds ({low:g}, {high:g}) must be finite")
         if low >= high:
@@ -227,18 +222,11 @@ class State:
                 f"state '{self.meaning}': it starts at its limit, {self.limit:g}, so the material would never last; "
                 "write limit=None for a state without one"
             )
-        try:
-            object.__setattr__(self, "rate", sympy.sympify(self.rate, strict=True))
-        except sympy.SympifyError:
-            raise LawError(f"state '{self.meaning}': {self.rate!r} is not a sympy expression") from None
 
 
 def _checked_limits(meaning: str, given: tuple[float, float], bounds: tuple[float, float]) -> tuple[float, float]:
     """Limits as floats, around the bounds."""
-    try:
-        low, high = (float(limit) for limit in given)
-    except (TypeError, ValueError):
-        raise LawError(f"parameter '{meaning}': limits are {given!r}; write two numbers (low, high)") from None
+    low, high = map(float, given)
     if not low <= bounds[0] < bounds[1] <= high:
         description = f"bounds ({bounds[0]:g}, {bounds[1]:g}) must lie within the limits ({low:g}, {high:g})"
         raise LawError(f"parameter '{meaning}': {description}")

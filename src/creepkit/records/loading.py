@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Floats, frozen
+from creepkit.arrays import ArrayLike, Floats, frozen, set_fields
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import SolveError, quoted
 
@@ -39,8 +39,7 @@ class Program:
             raise SolveError("a program of times and values must hold finite numbers only")
         if times[0] != 0.0 or (np.diff(times) < 0).any():
             raise SolveError("the times of a program must start at 0 and never decrease")
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "values", values)
+        set_fields(self, times=times, values=values)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Program):
@@ -105,7 +104,7 @@ class StressSteps:
     quantity: Quantity = field(default="stress", init=False)
 
     def __post_init__(self) -> None:
-        steps = _checked_steps("stress steps", self.steps, "((0.0, 50.0), (3600.0, 60.0)), s and MPa")
+        steps = _checked_steps("stress steps", self.steps)
         if any(not 0 <= s < 1e5 for _, s in steps):
             raise SolveError(f"stress must lie from 0 to 1e5 MPa in every step, found {[s for _, s in steps]}")
         if self.control not in ("load", "stress"):
@@ -136,7 +135,7 @@ class StrainSteps:
     quantity: Quantity = field(default="strain", init=False)
 
     def __post_init__(self) -> None:
-        steps = _checked_steps("strain steps", self.steps, "((0.0, 0.002), (3600.0, 0.003)), s and strain")
+        steps = _checked_steps("strain steps", self.steps)
         if any(not 0 <= e <= 1 for _, e in steps):
             raise SolveError(f"total strain must lie from 0 to 1 in every step, found {[e for _, e in steps]}")
         _check_ramp(self.ramp, steps)
@@ -248,17 +247,14 @@ def load_steps(quantity: Quantity, steps: Sequence[tuple[float, float]], ramp: f
 
     steps : (time in s, value in the unit of the load). ramp : s, in which each value is reached; 0 is at once.
     """
-    pairs = _checked_steps(f"steps of {quantity}", steps, "[(0, 100), (3600, 120)], s and the load's unit")
+    pairs = _checked_steps(f"steps of {quantity}", steps)
     _check_ramp(ramp, pairs)
     return RecordedLoading(_ramped_program(pairs, ramp), quantity)
 
 
-def _checked_steps(what: str, steps: Sequence[tuple[float, float]], example: str) -> tuple[tuple[float, float], ...]:
+def _checked_steps(what: str, steps: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
     """Steps as pairs of float; SolveError unless they start at 0 and follow one another."""
-    try:
-        pairs = tuple((float(t), float(value)) for t, value in steps)
-    except (TypeError, ValueError):
-        raise SolveError(f"{what} are pairs such as {example}; found {steps!r}") from None
+    pairs = tuple((float(t), float(value)) for t, value in steps)
     if not pairs or pairs[0][0] != 0.0 or any(b[0] <= a[0] for a, b in pairwise(pairs)):
         raise SolveError(f"{what} must start at time 0 and follow one another in time")
     return pairs

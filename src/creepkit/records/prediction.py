@@ -37,16 +37,7 @@ class Status(IntEnum):
     @property
     def text(self) -> str:
         """It in words."""
-        return STATUS_TEXT[self]
-
-
-STATUS_TEXT = {
-    Status.COMPLETE: "complete",
-    Status.RUPTURED: "burst",
-    Status.NOT_CONVERGED: "not converged",
-    Status.OUTSIDE_DOMAIN: "outside the domain",
-    Status.OUTSIDE_CLASS: "outside the class of laws",
-}
+        return ("complete", "burst", "not converged", "outside the domain", "outside the class of laws")[self]
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,9 +178,6 @@ class Nuisance:
             )
         if self.kind not in STEP_NUISANCES and self.start != 0.0:
             raise SolveError(f"nuisance '{self.kind}' has no start; only {', '.join(STEP_NUISANCES)} begin later")
-        names: object = self.tests
-        if isinstance(names, str):
-            raise SolveError(f"nuisance '{self.kind}': tests is '{self.tests}'; give names, such as ('{self.tests}',)")
         object.__setattr__(self, "start", float(self.start))
         object.__setattr__(self, "tests", tuple(self.tests))
 

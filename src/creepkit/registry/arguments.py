@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
-from creepkit.errors import FitError, SolveError, quoted
+from creepkit.errors import FitError
 from creepkit.records import History, Predictor, Specimen, known_specimens, remember_specimen
 from creepkit.registry.plugin_registry import default_registry
 
@@ -20,8 +19,6 @@ def resolve_predictor(predictor: Predictor | str) -> Predictor:
     """The predictor itself, or the specimen of that name."""
     if isinstance(predictor, str):
         return default_registry().specimen(predictor)
-    if not hasattr(predictor, "predict"):
-        raise SolveError(f"a specimen, its name or another predictor is needed, found {type(predictor).__name__}")
     remember_specimen(predictor)
     return predictor
 
@@ -39,18 +36,3 @@ def resolve_predictors(
     if isinstance(predictors, Mapping):
         return {name: resolve_predictor(predictor) for name, predictor in predictors.items()}
     return resolve_predictor(predictors)
-
-
-def check_histories(values: Sequence[History]) -> list[History]:
-    """The histories as a list; FitError for anything else."""
-    if isinstance(values, (str, Path, History)):
-        raise FitError("histories must be a list of them: read_histories(path) returns one, [history] makes one")
-    if not hasattr(values, "__iter__"):
-        raise FitError(
-            f"histories must be a list of them, found {quoted(repr(values))}; read_histories(path) returns one"
-        )
-    histories = list(values)
-    wrong_types = [type(h).__name__ for h in histories if not isinstance(h, History)]
-    if wrong_types:
-        raise FitError(f"histories must be a list of them, found {wrong_types[0]} in it; use read_histories(path)")
-    return histories

@@ -217,7 +217,10 @@ class Registry:
                 f"there is no {kind.label} '{name}'; choose one of those that serve it: {', '.join(serving)}"
             )
         more = f"; {MORE_LAWS}" if kind is contributions.LAW and all(one.is_own for one in self._sources) else ""
-        raise kind.error(f"there is no {kind.label} '{name}': {nearest(name, known)}{more}{self.broken_hint()}")
+        near = nearest(name, known)
+        if kind is contributions.LAW and not near.startswith("did you mean"):
+            more += "; that of a file: creepkit --plugin FILE.py before the command, or ck.load_plugin"
+        raise kind.error(f"there is no {kind.label} '{name}': {near}{more}{self.broken_hint()}")
 
     def _named(self, kind: ContributionKind, names: Iterable[str]) -> list[Source]:
         """The sources that may have an object of one of these names: by their entry points, and all files."""

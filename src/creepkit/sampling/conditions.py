@@ -85,10 +85,6 @@ class TimeGrid:
         """The times, s, of a test that ends at `end_time`, (frames,); those of an absolute grid may lie beyond it."""
         return self.values * end_time if self.relative else self.values
 
-    def document(self) -> dict[str, Any]:
-        """As JSON-able data."""
-        return {"values": self.values.tolist(), "relative": self.relative}
-
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, TimeGrid):
             return NotImplemented
@@ -206,10 +202,6 @@ class ConditionRanges:
         first, second = self.levels
         drawn[first], drawn[second] = (f(drawn[first], drawn[second]) for f in (np.minimum, np.maximum))
         return np.stack([drawn[name] for name in self.names], axis=1)
-
-    def document(self) -> dict[str, Any]:
-        """As JSON-able data."""
-        return {"kind": self.kind, "end": self.end, "ranges": {name: vars(r) for name, r in self.ranges}}
 
 
 def condition_ranges(

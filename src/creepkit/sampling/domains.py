@@ -16,8 +16,9 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import DatasetError, nearest
+from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.language import CreepLaw, temperature
-from creepkit.language.law_codec import law_to_json
+from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.presentation import Presentable, present
 from creepkit.records import Specimen
 from creepkit.sampling.coefficients import (
@@ -38,7 +39,6 @@ from creepkit.sampling.conditions import (
 from creepkit.sampling.criteria import Criterion, DrawCriterion, conditioned_criteria, paper_criteria
 from creepkit.sampling.draws import (
     SELECTION_DIMENSIONS,
-    TERM_COUNT_PROBABILITIES,
     Draws,
     active_terms,
     additive_recurrence_step,
@@ -58,6 +58,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+CODEC = RecordCodec(
+    values={CreepLaw: ValueCodec(law_to_json, law_from_json)},
+    omitted={ReferenceStress: ("specimen",)},  # which a data set states itself
+)
+"""Of designs."""
+
+
 @dataclass(frozen=True)
 class SamplingDomain:
     """A design that draws a law's parameters and the conditions of its tests from ranges.
@@ -74,7 +81,7 @@ class SamplingDomain:
     screened: bool = field(default=False, kw_only=True)
 
     name: ClassVar[str]
-    """The word for it; part of its document."""
+    """The word for it."""
 
     @property
     def condition_names(self) -> tuple[str, ...]:
@@ -91,15 +98,8 @@ class SamplingDomain:
         raise NotImplementedError
 
     def document(self) -> dict[str, Any]:
-        """Everything that decides the draws, as JSON-able data; each kind of domain adds what is theirs."""
-        return {
-            "domain": self.name,
-            "version": 1,
-            "law": law_to_json(self.law),
-            "conditions": self.conditions.document(),
-            "grid": self.grid.document(),
-            "criteria": [{"criterion": type(c).__name__, **vars(c)} for c in self.criteria],
-        }
+        """Everything that decides the draws, as JSON-able data."""
+        return {"domain": self.name, **CODEC.to_json(self)}
 
 
 def uniform_in_bounds(law: CreepLaw, unit_coordinates: Floats) -> Floats:
@@ -132,10 +132,6 @@ class PaperDomain(SamplingDomain):
         unit_coordinates = sobol_rows(parameter_count + len(self.condition_names), first, count, seed)
         parameters = author_parameters(self.law, uniform_in_bounds(self.law, unit_coordinates[:, :parameter_count]))
         return Draws(parameters, self.conditions.draw(unit_coordinates[:, parameter_count:]), self.condition_names)
-
-    def document(self) -> dict[str, Any]:
-        """Everything that decides the draws, as JSON-able data."""
-        return {**super().document(), "screened": self.screened}
 
 
 MOST_TRIALS = 32
@@ -200,14 +196,6 @@ class ConditionedDomain(SamplingDomain):
     def _meets_draw_criteria(self, draws: Draws) -> Bools:
         met = [c.passes(self.law, draws) for c in self.criteria if isinstance(c, DrawCriterion)]
         return np.asarray(np.all(met, axis=0))
-
-    def document(self) -> dict[str, Any]:
-        """Everything that decides the draws, as JSON-able data."""
-        return {
-            **super().document(),
-            "reference": self.reference_stress.document(),
-            "how_many": TERM_COUNT_PROBABILITIES,
-        }
 
 
 DEFAULT_DRAWS = 4096

@@ -65,11 +65,6 @@ class Draws:
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", frozen(self.parameters))
         object.__setattr__(self, "conditions", frozen(self.conditions))
-        shapes = self.parameters.shape, self.conditions.shape
-        if {len(s) for s in shapes} != {2} or shapes[0][0] != shapes[1][0]:
-            raise DatasetError(f"draws need a row of parameters and of conditions each, found {shapes[0]}, {shapes[1]}")
-        if shapes[1][1] != len(self.condition_names):
-            raise DatasetError(f"draws have {shapes[1][1]} conditions and {len(self.condition_names)} names of them")
 
     def __len__(self) -> int:
         return len(self.parameters)

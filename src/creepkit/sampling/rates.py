@@ -24,11 +24,11 @@ from creepkit.sampling.specimen_conditions import (
     END,
     TEMPERATURE,
     SpecimenConditions,
+    check_stated,
     creep_output,
     mean_reference_stress,
     record_of,
     specimen_conditions,
-    stated_method,
     tested_piece,
 )
 from creepkit.specimens.load_scaling import LoadScaling
@@ -187,11 +187,6 @@ class ReferenceStress:
         end_times = draws.condition(END, end)
         return np.log10(least_strain / end_times), np.log10(LARGEST_REFERENCE_STRAIN / end_times)
 
-    def document(self) -> dict[str, Any]:
-        """What decides the rates, as JSON-able data."""
-        found = {"kind": self.known.kind, "visible_creep": self.visible_creep}
-        return found if self.scaling is None else {**found, **self.scaling.document()}
-
     # ---- of all rows at once -----------------------------------------------------------------------------------------
 
     def _lengths(self, draws: Draws, scaling: LoadScaling) -> Floats:
@@ -236,7 +231,7 @@ def reference_stress_of(specimen: Specimen) -> ReferenceStress:
     known, visible = specimen_conditions(specimen), creep_output(specimen).visible
     scaling: LoadScaling | None = getattr(record_of(specimen), "load_scaling", None)
     if scaling is None:
-        stated_method(specimen, "reference_stress", "which von Mises stress, MPa, stands for a test")
+        check_stated(specimen, "reference_stress", "which von Mises stress, MPa, stands for a test")
         growth = "by how much its output grows for each unit of strain at the reference stress"
-        stated_method(specimen, "growth_per_strain", growth)
+        check_stated(specimen, "growth_per_strain", growth)
     return ReferenceStress(specimen, known, visible, scaling)

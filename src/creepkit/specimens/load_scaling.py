@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -44,15 +43,6 @@ class LoadScaling:
     def growth(self, lengths: Floats) -> Floats:
         """(rows,) growth of the output, in its unit, for each unit of reference strain; lengths : (rows,) mm."""
         return np.asarray(self.growth_per_strain * self._relative(lengths) ** self.exponents[1])
-
-    def document(self) -> dict[str, Any]:
-        """As JSON-able data, by the names that documents of designs have had from the first."""
-        return {
-            "stress_per_load": self.stress_per_load,
-            "creep_per_strain": self.growth_per_strain,
-            "thickness": self.nominal,
-            "thickness_exponents": self.exponents,
-        }
 
     def _relative(self, lengths: Floats) -> Floats:
         return lengths / self.nominal if self.length else np.ones(len(lengths))

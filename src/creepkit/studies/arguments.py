@@ -26,9 +26,8 @@ from creepkit.records import (
     outputs_of,
 )
 from creepkit.records.quantities import LENGTH, QuantityKind
-from creepkit.records.units import UNITS, UnitConversion
 from creepkit.studies.study_file import KeyPath, StudyFile
-from creepkit.studies.tables import NuisanceTable, Step, TableModel
+from creepkit.studies.tables import NuisanceTable, Step
 
 if TYPE_CHECKING:
     from creepkit.inverse.settings import IdentificationSettings
@@ -36,23 +35,6 @@ if TYPE_CHECKING:
 
 
 # ---- numbers with units --------------------------------------------------------------------------------------------
-
-
-def stated(table: TableModel, *keys: str, **renamed: str) -> dict[str, Any]:
-    """{argument: value} of the keys of a table that are stated: in the unit of the key, but K for C, and MPa for GPa.
-
-    renamed : {argument: key} of keys that are not called like the argument.
-    """
-    values = {}
-    for argument, key in (*zip(keys, keys, strict=True), *renamed.items()):
-        value, unit = getattr(table, key), key.rpartition("_")[2]
-        if value not in (None, [], {}):
-            values[argument] = _converted(value, UNITS[unit].conversion) if unit in ("C", "GPa") else value
-    return values
-
-
-def _converted(value: Any, unit: UnitConversion) -> Any:
-    return [_converted(one, unit) for one in value] if isinstance(value, list) else unit.factor * value + unit.offset
 
 
 def quantity(file: StudyFile, key: KeyPath, kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:
@@ -206,7 +188,7 @@ def settings_of(file: StudyFile) -> IdentificationSettings:
     model, base = file.model, ck.IdentificationSettings()
     changes: dict[str, Any] = {"seed": model.study.seed, "suspect_frames": model.data.suspect_frames}
     if model.selection is not None:
-        changes |= stated(model.selection, "further_laws")
+        changes["further_laws"] = model.selection.further_laws
     if model.identification is not None:
         part, place = model.identification, "identification"
         changes |= values_of_table(ck.IdentificationSettings, part) | {"nuisances": None}

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from creepkit.api.extraction import WATCHED, extract_as_described, history_of, imposed_on, operator_of
+from creepkit.api.options import elastic_of
 from creepkit.cameras.sequences import in_order
 from creepkit.errors import CreepkitError, HistoryError, StudyError, nearest
 from creepkit.extraction import Extraction
@@ -23,7 +24,6 @@ from creepkit.files.record_codec import record_to_json
 from creepkit.forecasts.planned_tests import stepped_load
 from creepkit.instruments.imposed import Imposed
 from creepkit.inverse.fingerprints import predictor_fingerprint
-from creepkit.language import Elastic
 from creepkit.options import values_of_table
 from creepkit.records import History, Loading, Specimen, SupportsSurfaceObservation, loads_of
 from creepkit.registry.reading import frame_files
@@ -312,11 +312,11 @@ class StudyCamera:
     def _history(self, name: str, one: Extraction, under: Imposed | None) -> History:
         part, stated = self.part, self.stated_loading
         history = one.history_under(*stated) if stated is not None else history_of(one, under)  # type: ignore[arg-type]
-        modulus = arguments.stated(part, E="modulus_GPa")
+        modulus = None if part.modulus_GPa is None else 1e3 * part.modulus_GPa
         return history.replace(
             name=name,
             alloy=part.alloy or "",
-            elastic=Elastic(**modulus, nu=part.poisson) if modulus else None,
+            elastic=elastic_of(modulus, part.poisson),
             geometry={**history.geometry, **self.lengths},
             labels={**history.labels, **part.labels},
             source=f"{part.frames[0]} ({one.name})",

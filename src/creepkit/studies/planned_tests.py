@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from creepkit.api.options import PlannedTestOptions, elastic_of
 from creepkit.forecasts.planned_tests import (
     COMPONENTS,
     load_of_components,
@@ -11,6 +12,7 @@ from creepkit.forecasts.planned_tests import (
     planned_history,
     stepped_load,
 )
+from creepkit.options import values_of_table
 from creepkit.readers.vocabulary import split_unit
 from creepkit.records import (
     SECONDS_PER_HOUR,
@@ -23,7 +25,7 @@ from creepkit.records import (
     loads_of,
 )
 from creepkit.records.quantities import QUANTITIES, QuantityKind
-from creepkit.studies.arguments import lengths_of, levels_of, quantity, stated, temperature_of
+from creepkit.studies.arguments import lengths_of, levels_of, quantity, temperature_of
 from creepkit.studies.study_file import StudyFile
 from creepkit.studies.tables import ForecastTable
 
@@ -55,8 +57,6 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
 
     StudyError where a test cannot be made of what is said.
     """
-    import creepkit as ck
-
     part, place = file.model.forecast[number], ("forecast", number)
     assert part.end_h is not None
     specimen, end = _specimen_of(file, number, part), SECONDS_PER_HOUR * part.end_h
@@ -65,12 +65,12 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
         temperature = temperature_of(file, (*place, "temperature_C"), part.temperature_C)
     if temperature is None:
         raise file.error(place, "the fitted tests were made at several temperatures; give temperature_C")
-    modulus = stated(part, E="modulus_GPa")
-    if not modulus and needs_modulus(specimen, loading):
+    chosen = PlannedTestOptions().changed(values_of_table(PlannedTestOptions, part))
+    if chosen.modulus is None and needs_modulus(specimen, loading):
         raise file.error(place, f"specimen '{specimen.name}' needs modulus_GPa, such as 150")
     lengths = lengths_of(file, (*place, "lengths"), part.lengths, specimen)
     with file.at(*place):
-        elastic = ck.Elastic(**modulus) if modulus else None
+        elastic = elastic_of(chosen.modulus)
         return planned_history(
             specimen, loading, end, temperature=temperature, elastic=elastic, lengths=lengths, name=part.name
         ).replace(labels=dict(part.labels))
@@ -88,7 +88,7 @@ def _loading_of(file: StudyFile, number: int, part: ForecastTable, specimen: Spe
         name, levels = levels_of(file, (*place, "load", key), {n: load.kind for n, load in loads.items()}, steps)
         with file.at(*place, "load", key):
             return stepped_load(name, loads[name], levels, control=part.control, ramp=part.ramp_s, end=end)
-    for key in stated(part, "control", "ramp_s"):
+    for key in (one for one in ("control", "ramp_s") if getattr(part, one) is not None):
         raise file.error((*place, key), "belongs to a single load; leave it out")
     given: dict[str, dict[str, list[tuple[float, float]]]] = {"stress": {}, "strain": {}}
     for key, steps in part.load.items():

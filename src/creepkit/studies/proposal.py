@@ -58,6 +58,7 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
     names, tests, problems, failure = _readable(folder, path, reader)
     cameras = found_cameras(folder, path, [folder / name for name in names], base)
     known: dict[str, Any] = {"title": folder.absolute().name, "cameras": cameras, "summary": None}
+    known["report"] = "report.html" if path.stem == "study" else f"{path.stem}.html"
     lines = cameras.summary
     if tests:
         named = {str(one) for one in cameras.files}

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import creepkit as ck
+from creepkit.api.options import ExportOptions, ForecastOptions, elastic_of
 from creepkit.discovery.discover import DiscoveryOptions
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.files.file_names import hashed_stem
@@ -17,13 +18,14 @@ from creepkit.inverse.fingerprints import predictor_fingerprint, short_hash
 from creepkit.inverse.kept_fits import history_digest
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.search_options import SearchOptions
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.options import values_of_table
 from creepkit.quality import DataQuality
-from creepkit.records import History
+from creepkit.records import ZERO_CELSIUS, History
 from creepkit.registry import default_registry
 from creepkit.reports.contents import ExportedFile
 from creepkit.studies import arguments
-from creepkit.studies.arguments import stated
+from creepkit.studies.candidates import by_likelihood, ranked_candidates
 from creepkit.studies.inputs import StudyInputs, TestGroup
 from creepkit.studies.planned_tests import check_forecast, planned_test
 from creepkit.studies.stage import STAGE_KINDS, Results, Stage, StageKind, Tick, stage_name
@@ -127,19 +129,18 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
     part, selection = model.identification, model.selection
     assert part is not None
     laws, tests = [fitted for _, fitted in study.laws(group)], list(group.histories)
-    asked = SearchOptions().changed(values_of_table(SearchOptions, part))
-    search, penalty = asked.global_search, asked.term_penalty
-    by_likelihood = part.weights in (None, "likelihood") and part.loss in (None, "linear")
-    by_likelihood = by_likelihood and search is None and penalty is None
-    if selection is not None and not by_likelihood:
+    how = {} if selection is None else values_of_table(SearchOptions, selection)
+    asked = SearchOptions().changed({**values_of_table(SearchOptions, part), **how})
+    changes = values_of_table(IdentificationSettings, part) | {"nuisances": None}  # which the settings have
+    if selection is not None and not by_likelihood(asked, changes):
         what = "compares laws by their likelihood: leave out weights, loss, search and penalty"
         raise study.file.error(("selection",), what)
 
     def make(results: Results, tick: Tick) -> Ranking:
-        if by_likelihood and (len(laws) > 1 or selection is not None):
-            how = {} if selection is None else values_of_table(SearchOptions, selection)
-            return ck.select(laws, tests, using, settings=settings, progress=tick, **how)
-        return _each_by_itself(laws, tests, using, settings, tick, search=search, penalty=penalty)
+        compared = selection is not None
+        return ranked_candidates(
+            laws, tests, using, asked, changes, compared=compared, settings=settings, progress=tick
+        )
 
     described = {
         "laws": [[law.name, law.fingerprint, [[n, *p.bounds, p.off] for n, p in law.table.items()]] for law in laws],
@@ -150,23 +151,6 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
     }
     name = stage_name("identification", group.name)
     return Stage(name, "identification", group.name, described, make, Ranking, numbers_of_ranking, predictor=using)
-
-
-def _each_by_itself(
-    laws: Sequence[CreepLaw], tests: list[History], using: Any, settings: Any, tick: Tick, **how: Any
-) -> Ranking:
-    """Each law identified by itself, and all ranked. how : search and penalty."""
-    from creepkit.inverse.rupture_use import common_rupture_times
-
-    fits, settings = [], common_rupture_times(laws, settings)
-    for k, law in enumerate(laws, start=1):
-        place = f"law {k} of {len(laws)}: {law.title or law.name}"
-
-        def of_law(task: str, done: int, total: int, place: str = place) -> None:
-            tick(f"{place}, {task}", done, total)
-
-        fits.append(ck.identify(law, tests, using, settings=settings, progress=of_law, **how))
-    return ck.rank(fits)
 
 
 def numbers_of_ranking(ranking: Ranking) -> dict[str, Any]:
@@ -245,9 +229,8 @@ def _rupture_stage(study: StageInputs, group: TestGroup) -> Stage:
         settings = ck.RuptureSettings(seed=study.file.model.study.seed)
         settings = settings.changed(values_of_table(RuptureSettings, part))
     how = values_of_table(RuptureQuestion, part)
-    strengths = [stated(one, "strength_MPa", T="temperature_C") for one in part.tensile_strengths]
-    if strengths:
-        how["tensile_strength"] = {one["T"]: one["strength_MPa"] for one in strengths}
+    if part.tensile_strengths:
+        how["tensile_strength"] = {o.temperature_C + ZERO_CELSIUS: o.strength_MPa for o in part.tensile_strengths}
 
     def make(results: Results, tick: Tick) -> RuptureAssessment:
         return ck.rupture(tests, settings=settings, **how)
@@ -280,7 +263,7 @@ def _forecast_stage(study: StageInputs, number: int) -> Stage:
         with file.at(*place, "tests"):
             measured = ck.read_histories(paths)
     targets, tolerances = arguments.targets_of(file, number), arguments.tolerances_of(file, number)
-    how = stated(part, "level", "draws") | ({"targets": targets} if targets else {})
+    how = values_of_table(ForecastOptions, part) | ({"targets": targets} if targets else {})
 
     def make(results: Results, tick: Tick) -> Forecast:
         ranking: Ranking = results[need]
@@ -326,27 +309,30 @@ def _design_stage(study: StageInputs, group: TestGroup) -> Stage:
     return Stage(name, "design", group.name, [part.model_dump(), seed], make, Design, numbers, (need,))
 
 
+def export_name(file: StudyFile, number: int) -> str:
+    """The file of the export of this number; StudyError for a target that there is not."""
+    part = file.model.export[number]
+    with file.at("export", number, "target"):
+        return part.file or f"law{default_registry().exporter(part.target).suffix}"
+
+
 def _export_stage(study: StageInputs, number: int, group: TestGroup) -> Stage:
     """The export of this number in the study file, for a group."""
     part, place = study.file.model.export[number], ("export", number)
     need = study.needed(place, "temperature" if part.law == "temperature" else "identification", group)
-    with study.file.at(*place, "target"):
-        exporter = default_registry().exporter(part.target)
-    file = part.file or f"law{exporter.suffix}"
+    file = export_name(study.file, number)
     if len(study.groups_of(place, part.group)) > 1:
         stem, dot, suffix = file.rpartition(".")
         file = f"{stem or suffix}_{hashed_stem(group.name)}{dot}{suffix if stem else ''}"
-    units = {"stress": part.stress_unit, "time": part.time_unit}
-    modulus, how = stated(part, E="modulus_GPa"), stated(part, temperature="temperature_C")
     with study.file.at(*place):
-        ck.Units(**units)
-        elastic = ck.Elastic(**modulus, nu=part.poisson) if modulus else None
+        options = ExportOptions().changed(values_of_table(ExportOptions, part))
+        ck.Units(options.stress_unit, options.time_unit)
+        elastic_of(options.modulus, options.poisson)
 
     def make(results: Results, tick: Tick) -> ExportedFile:
         source = results[need]
         law = source.temperature_law if part.law == "temperature" else source  # a ranking gives its verdict along
-        record = ck.law_with_values(law, elastic=elastic, name=part.name or "")
-        return ExportedFile(file, part.target, ck.export(record, part.target, units=units, **how))
+        return ExportedFile(file, part.target, options.text(law, part.target))
 
     def numbers(export: ExportedFile) -> dict[str, Any]:
         return {"hash of the text": short_hash(export.text.encode())}

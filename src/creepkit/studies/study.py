@@ -23,7 +23,7 @@ from creepkit.studies.lock import changed_results, differences, lock_of, read_lo
 from creepkit.studies.planned_tests import check_forecast
 from creepkit.studies.result import StudyResult
 from creepkit.studies.stage import STAGE_KINDS, Stage, needed_stages
-from creepkit.studies.stages import StageInputs, stages_of
+from creepkit.studies.stages import StageInputs, export_name, stages_of
 from creepkit.studies.study_file import KeyPath, StudyFile, read_study_file
 
 if TYPE_CHECKING:
@@ -80,10 +80,7 @@ class Study:
                 raise file.error(("forecast", k, "name"), f"two forecasts are called '{part.name}'; rename one of them")
         if model.design is not None:
             arguments.goal_of(file)
-        exporters = ck.available("exporters")
-        for k, export in enumerate(model.export):
-            file.check_name(("export", k, "target"), "target", export.target, exporters)
-        self._check_outputs([one.file or f"law{exporters[one.target].suffix}" for one in model.export])
+        self._check_outputs([export_name(file, k) for k in range(len(model.export))])
 
     def _check_outputs(self, exports: Sequence[str]) -> None:
         """StudyError for data files that there are not, and for files that would replace data or be written twice."""
@@ -229,16 +226,10 @@ class _Run:
             raise StudyError(f"{self.lock_path}: {what}")
 
     def check_exports(self, stages: Sequence[Stage], *, force: bool) -> None:
-        """StudyError, before all the work, for exports that could not be written, or would replace each other."""
-        report = self.study.file.model.report
-        names = [] if report is None else [same_name(report.file)]
+        """StudyError, before all the work, for exports that could not be written."""
         for stage in stages:
-            if stage.file and same_name(stage.file) in names:
-                what = f"{stage.name} would write '{stage.file}', which is written already; give file = another name"
-                raise StudyError(f"{self.study.path}: {what}")
             if stage.file:
                 check_target(self.folder / stage.file, StudyError, force=force)
-                names.append(same_name(stage.file))
 
     def with_page(self, result: StudyResult, name: str, *, force: bool) -> StudyResult:
         """The result with its report written, unless the same one is there; one that cannot be is a failed stage."""

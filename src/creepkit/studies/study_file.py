@@ -124,6 +124,9 @@ def parse_study(path: Path, text: str, root: Path | None = None) -> StudyFile:
         raise StudyError(_sentence(path, error, key_lines(text))) from None
     if not model.data.files and not model.camera:
         raise StudyError(f"{path}:{_no_tests(data, key_lines(text))}")
+    if model.report is not None and "file" not in model.report.model_fields_set and path.stem != "study":
+        named = model.report.model_copy(update={"file": f"{path.stem}.html"})  # of several studies in a folder
+        model = model.model_copy(update={"report": named})
     return StudyFile(path, text, model, root)
 
 

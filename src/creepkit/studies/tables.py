@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
+from creepkit.api.options import ExportOptions, ForecastOptions, PlannedTestOptions
 from creepkit.discovery.discover import DiscoveryOptions
 from creepkit.experiments.design_options import GoalOptions
 from creepkit.experiments.rig import Rig
@@ -272,7 +273,7 @@ class RuptureTable(_keys(RuptureSettings, RuptureQuestion, without=("seed",)), T
     tensile_strengths: Annotated[list[TensileStrength], Field(max_length=MOST_ITEMS)] = []
 
 
-class ForecastTable(TableModel):
+class ForecastTable(_keys(PlannedTestOptions, ForecastOptions, without=("temperature",)), TableModel):  # type: ignore[misc]
     """[[forecast]]: measured tests by their files, or a planned one by its load, temperature and end.
 
     load : as { stress_MPa = 80 } or steps, of components as
@@ -282,19 +283,12 @@ class ForecastTable(TableModel):
     name: Text
     group: Text | None = None
     tests: Annotated[Texts, BeforeValidator(_one_or_more)] = []
-    specimen: Text | None = None
     load: dict[Text, LevelOrSteps] = {}
-    control: Literal["load", "stress"] | None = None
-    ramp_s: Annotated[float, Field(ge=0.0)] | None = None
     temperature_C: LevelOrSteps | None = None
-    end_h: Annotated[float, Field(gt=0.0, lt=1e9)] | None = None
-    modulus_GPa: Positive | None = None
     lengths: dict[Text, Positive] = {}
     labels: dict[Text, Text] = {}
-    level: Annotated[float, Field(ge=0.5, lt=1.0)] | None = None
     targets: dict[Text, Numbers] = {}
     tolerances: dict[Text, Positive] = {}
-    draws: Annotated[int, Field(ge=50, le=100_000)] | None = None
 
 
 class DesignTable(_keys(GoalOptions, Rig, without=("levels", "dimensions")), TableModel):  # type: ignore[misc]
@@ -305,19 +299,13 @@ class DesignTable(_keys(GoalOptions, Rig, without=("levels", "dimensions")), Tab
     lengths: dict[Text, Numbers] = {}
 
 
-class ExportTable(TableModel):
+class ExportTable(_keys(ExportOptions), TableModel):  # type: ignore[misc]
     """[[export]]: the best law of a group, or its law of temperature, as text for a target."""
 
     target: Text
     file: Text | None = None
     group: Text | None = None
     law: Literal["identified", "temperature"] = "identified"
-    name: Text | None = None
-    stress_unit: Text = "MPa"
-    time_unit: Text = "s"
-    temperature_C: float | None = None
-    modulus_GPa: Positive | None = None
-    poisson: Annotated[float, Field(gt=-1.0, lt=0.5)] = 0.3
 
 
 class ReportTable(TableModel):

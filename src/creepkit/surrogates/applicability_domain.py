@@ -25,10 +25,6 @@ LEAST_VARIANCE = 1e-9
 """Variance of a standardised direction below which it never varied."""
 
 
-INPUTS_NAMED = 3
-"""Inputs named when a row is outside."""
-
-
 @dataclass(frozen=True, eq=False)
 class ApplicabilityDomain:
     """Where training rows lie.
@@ -85,31 +81,16 @@ class ApplicabilityDomain:
         """How far rows (..., inputs) lie out, (...): up to 1 is inside; NaN, an input that is not there, is not far."""
         rows = np.where(np.isnan(rows), self.mean, rows)
         mahalanobis = np.sqrt((((rows - self.mean) / self.scale @ self.whitening) ** 2).sum(axis=-1)) / self.limit
-        return np.asarray(np.maximum(mahalanobis, 1.0 + self._beyond_margin(rows).max(axis=-1, initial=-1.0)))
+        return np.asarray(np.maximum(mahalanobis, 1.0 + (self._excess(rows) - self.margin).max(axis=-1, initial=-1.0)))
 
     def outside(self, rows: Floats) -> Bools:
         """Which rows (..., inputs) lie outside, (...)."""
         return np.asarray(self.distance(rows) > 1.0)
 
-    def excess(self, rows: Floats) -> Floats:
+    def _excess(self, rows: Floats) -> Floats:
         """By what share of its training range each input of rows (..., inputs) leaves it, likewise; negative inside."""
         extent = np.where(self.high > self.low, self.high - self.low, 1e-6 * self.scale)
         return np.asarray(np.maximum(self.low - rows, rows - self.high) / extent)
-
-    def _beyond_margin(self, rows: Floats) -> Floats:
-        return self.excess(rows) - self.margin
-
-    def reason(self, row: Floats) -> str:
-        """Why one row (inputs,) is outside, in words; "" inside."""
-        row = np.asarray(row, float)
-        if not self.outside(row):
-            return ""
-        excess = self._beyond_margin(row)
-        farthest = [k for k in np.argsort(-excess) if excess[k] > 0][:INPUTS_NAMED]
-        descriptions = [
-            f"{self.names[k]} = {row[k]:.4g} (trained on {self.low[k]:.4g} to {self.high[k]:.4g})" for k in farthest
-        ]
-        return ", ".join(descriptions) or "a combination of inputs far from those of the training"
 
 
 def _leave_one_out_distance(square: Floats, n: int) -> Floats:

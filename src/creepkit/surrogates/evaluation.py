@@ -8,7 +8,7 @@ R2.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,17 +17,15 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.dataset.dataset import first_difference
 from creepkit.errors import DatasetError
+from creepkit.files.record_codec import record_to_json
 from creepkit.registry.specimen_documents import specimen_to_json
 from creepkit.surrogates.recipe import SampleArrays, SurrogateMetadata
 from creepkit.surrogates.surrogate import Surrogate
 from creepkit.surrogates.training_rows import dataset_fingerprint, output_deviation, trainable_samples, training_split
 
 if TYPE_CHECKING:
-    from creepkit.sampling.conditions import TimeGrid
-
-
-if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
+    from creepkit.sampling.conditions import TimeGrid
 
 
 PAPER_EVALUATION_TIMES = (7_500.0, 22_500.0, 37_500.0)
@@ -128,7 +126,7 @@ def comparison_metrics(comparison: PredictionComparison, times: Sequence[float])
         "times": {f"{time:g}": _metrics_at_time(comparison, time) for time in times},
         "worst": worst_histories(comparison, largest),
     }
-    result: dict[str, Any] = _without_nan(metrics)
+    result: dict[str, Any] = record_to_json(metrics)
     return result
 
 
@@ -167,15 +165,6 @@ def evaluation_times(grid: TimeGrid, end: float) -> tuple[float, ...]:
     return tuple(float(f"{time / PAPER_TEST_DURATION * last:.4g}") for time in PAPER_EVALUATION_TIMES)
 
 
-def _without_nan(value: Any) -> Any:
-    """JSON has no NaN."""
-    if isinstance(value, Mapping):
-        return {k: _without_nan(v) for k, v in value.items()}
-    if isinstance(value, list):
-        return [_without_nan(v) for v in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
 EVALUATION_BATCH = 256
 
 
@@ -199,9 +188,7 @@ def evaluate(surrogate: Surrogate, data: Dataset) -> Evaluation:
     if provenance.get("data") == dataset_fingerprint(data):
         train, rows = training_split(len(data), surrogate.recipe.training, int(provenance["seed"]))
         scale = output_deviation(samples, train)
-    comparison = compare_predictions(surrogate, samples, data, rows, scale)
-    times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
-    return Evaluation(comparison, comparison_metrics(comparison, times), times)
+    return evaluate_rows(surrogate, samples, data, rows, scale)
 
 
 def check_same_kind(metadata: SurrogateMetadata, data: Dataset) -> None:
@@ -215,13 +202,11 @@ def check_same_kind(metadata: SurrogateMetadata, data: Dataset) -> None:
         raise DatasetError(f"the data set has the outputs {', '.join(data.outputs)}, not {', '.join(metadata.outputs)}")
 
 
-def compare_predictions(
-    surrogate: Surrogate, samples: SampleArrays, data: Dataset, rows: Ints, scale: Floats
-) -> PredictionComparison:
+def evaluate_rows(surrogate: Surrogate, samples: SampleArrays, data: Dataset, rows: Ints, scale: Floats) -> Evaluation:
     """What a network predicts for rows (n,) of a data set, beside what is true; scale : (outputs,)."""
     parts = [rows[first : first + EVALUATION_BATCH] for first in range(0, len(rows), EVALUATION_BATCH)]
     predicted = [surrogate.predict_samples({name: v[part] for name, v in samples.items()}) for part in parts]
-    return PredictionComparison(
+    comparison = PredictionComparison(
         times=np.stack([data.times(int(k)) for k in rows]),
         true=np.asarray(samples["targets"][rows], float),
         predicted=np.concatenate(predicted),
@@ -230,3 +215,5 @@ def compare_predictions(
         scale=scale,
         index=data.index[rows],
     )
+    times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
+    return Evaluation(comparison, comparison_metrics(comparison, times), times)

@@ -7,13 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import CreepkitError, SurrogateError, nearest, quoted
-from creepkit.files.json_documents import check_keys
+from creepkit.errors import CreepkitError, SurrogateError, nearest
 from creepkit.files.safetensors_files import read_safetensors
 from creepkit.records import Predictor, SupportsReducedOrderModel, known_specimens
-from creepkit.surrogates.parameter_gru import ParameterGru
-from creepkit.surrogates.recipe import SurrogateMetadata
-from creepkit.surrogates.surrogate import Surrogate
+from creepkit.surrogates.surrogate import Surrogate, SurrogateHeader
 from creepkit.surrogates.weight_files import CODEC, SURROGATE
 
 
@@ -52,14 +49,8 @@ def load_surrogate(path: str | Path) -> Surrogate:
     """Return the surrogate in a file; SurrogateError says what is wrong with any other file."""
     weights, header = read_safetensors(path, SURROGATE)
     try:
-        problem = check_keys(header, ("kind", "recipe", "metadata"), "its header")
-        if problem:
-            raise SurrogateError(f"{problem}; train it again")
-        if header["kind"] != ParameterGru.kind:
-            raise SurrogateError(f"kind '{quoted(header['kind'])}' is unknown here; it must be '{ParameterGru.kind}'")
-        recipe = CODEC.from_json(ParameterGru, header["recipe"], "recipe")
-        metadata = CODEC.from_json(SurrogateMetadata, header["metadata"], "metadata")
-        surrogate = Surrogate(recipe, weights, metadata)
+        found = CODEC.from_json(SurrogateHeader, header, "its header")
+        surrogate = Surrogate(found.recipe, weights, found.metadata)
         infinite = [name for name, one in weights.items() if not np.isfinite(np.asarray(one, dtype=float)).all()]
         if infinite:
             raise SurrogateError(f"its weights '{infinite[0]}' are not finite; train it again")

@@ -55,7 +55,7 @@ class ParameterGru(Options, title="settings of a network", error=SurrogateError,
     base: Literal["none", "reduced-order", "reference-stress"] = option("none", "The model that the network corrects.")
     training: Training = field(default_factory=Training)
 
-    kind: ClassVar[str] = "parameter-gru"
+    kind: ClassVar[Literal["parameter-gru"]] = "parameter-gru"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "inputs", tuple(self.inputs))
@@ -91,25 +91,22 @@ class ParameterGru(Options, title="settings of a network", error=SurrogateError,
         network = ParameterModule(sizes, self.hidden, self.layers, self.cell, logarithm=log, corrects_base=based)
         return network.with_scales(samples, train)
 
-    def metadata(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateMetadata:
+    def metadata(
+        self, data: Dataset, samples: SampleTensors, train: Tensor, module: ParameterModule
+    ) -> SurrogateMetadata:
         """Scales by name, the domain, and what was constant; train : (rows,) positions of training rows."""
         history_inputs, law = self._history_inputs(data), LawInputs(data.law)
         names = (*law.names, *history_inputs.constants)
-        module = self.module(data, samples, train)
         series = (*history_inputs.series, *(["ln base"] if self.base != "none" else []))
         scaling = {
             "inputs": _scale_pairs(names, module.constants),
             "series": _scale_pairs(series, module.series),
             "outputs": _scale_pairs(data.outputs, module.targets),
         }
-        domain_names = (*law.names, *history_inputs.domain_names(data.planned_test(0)))
-        constant_names = [n for n, c in zip(names, samples["constants"][train].T, strict=True) if _is_constant(c)]
-        constant_names = [n for n in constant_names if not n.endswith(" is off")]
-        notes = (
-            (f"constant in training, so that nothing is known beyond: {', '.join(constant_names)}",)
-            if constant_names
-            else ()
-        )
+        domain_names = (*law.names, *history_inputs.domain_inputs(data.planned_test(0), data.times(0)))
+        columns = zip(names, samples["constants"][train].T, strict=True)
+        constant = ", ".join(n for n, column in columns if _is_constant(column) and not n.endswith(" is off"))
+        notes = (f"constant in training, so that nothing is known beyond: {constant}",) if constant else ()
         domain = ApplicabilityDomain.from_rows(domain_names, samples["domain"][train].numpy())
         return SurrogateMetadata.from_dataset(data, scaling=scaling, domain=domain, notes=notes)
 

@@ -20,17 +20,12 @@ from creepkit.dataset.storage import read_dataset
 from creepkit.errors import SurrogateError
 from creepkit.files.json_documents import as_read_back
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
-from creepkit.surrogates.evaluation import (
-    PredictionComparison,
-    compare_predictions,
-    comparison_metrics,
-    evaluation_times,
-)
+from creepkit.surrogates.evaluation import evaluate_rows
 from creepkit.surrogates.loading import load_surrogate
 from creepkit.surrogates.network_evaluation import RecurrentCell
 from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru
 from creepkit.surrogates.parameter_network import sample_tensors, weights_of
-from creepkit.surrogates.recipe import ProgressCallback, SurrogateMetadata, Training
+from creepkit.surrogates.recipe import ProgressCallback, Training
 from creepkit.surrogates.surrogate import Surrogate
 from creepkit.surrogates.training_loop import NetworkTraining
 from creepkit.surrogates.training_rows import dataset_fingerprint, output_deviation, trainable_samples, training_split
@@ -113,35 +108,29 @@ def train(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         tensors, train_rows = sample_tensors(samples), torch.from_numpy(rows[0])
-        module, metadata = recipe.module(data, tensors, train_rows), recipe.metadata(data, tensors, train_rows)
-    fit, checkpoint = (
-        NetworkTraining(module, samples, rows, recipe.training, seed, torch_device),
-        Checkpoint(path, request),
-    )
+        module = recipe.module(data, tensors, train_rows)
+    metadata = recipe.metadata(data, tensors, train_rows, module)
+    fit = NetworkTraining(module, samples, rows, recipe.training, seed, torch_device)
+    checkpoint = Checkpoint(path, request)
     checkpoint.restore(fit)
     fit.run(checkpoint.save, progress)
     weights = weights_of(fit.best)
-    comparison = compare_predictions(
-        Surrogate(recipe, weights, metadata), samples, data, rows[1], output_deviation(samples, rows[0])
-    )
-    result = Surrogate(recipe, weights, _training_metadata(metadata, data, comparison, rows, fit, request))
+    trained, scale = Surrogate(recipe, weights, metadata), output_deviation(samples, rows[0])
+    metrics = evaluate_rows(trained, samples, data, rows[1], scale).metrics
+    provenance = _provenance(data, rows, fit, request)
+    metadata = replace(metadata, metrics=metrics, curves=fit.curves, provenance=provenance)
+    result = Surrogate(recipe, weights, metadata)
     if path is not None:
         result.save(path)
         checkpoint.remove()
     return result
 
 
-def _training_metadata(
-    metadata: SurrogateMetadata,
-    data: Dataset,
-    comparison: PredictionComparison,
-    rows: tuple[Ints, Ints],
-    fit: NetworkTraining,
-    request: dict[str, Any],
-) -> SurrogateMetadata:
-    """The metadata of the surrogate, with how its training went."""
-    times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
-    provenance = {
+def _provenance(
+    data: Dataset, rows: tuple[Ints, Ints], fit: NetworkTraining, request: dict[str, Any]
+) -> dict[str, Any]:
+    """What was asked for, by what and how it was trained."""
+    return {
         **request,
         "creepkit": version("creepkit"),
         "torch": torch.__version__,
@@ -153,7 +142,6 @@ def _training_metadata(
         "data_set": dict(data.provenance),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    return replace(metadata, metrics=comparison_metrics(comparison, times), curves=fit.curves, provenance=provenance)
 
 
 def _load_finished(path: Path, request: dict[str, Any]) -> Surrogate:

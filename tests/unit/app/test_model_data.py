@@ -15,7 +15,6 @@ from creepkit.errors import CreepkitError
 from creepkit.exporters.javascript import script_safe_json
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.laws.norton import NORTON
-from creepkit.records import LawWithValues
 from creepkit.registry import default_registry
 
 
@@ -70,11 +69,6 @@ def test_a_fit_brings_its_values_intervals_and_likely_directions():
     lengths = np.linalg.norm(steps / known.sd, axis=1)
     assert (np.diff(lengths) <= 0).all()
     assert steps[0, 0] * steps[0, 1] < 0  # a larger exponent goes with a smaller coefficient
-
-
-def test_values_of_a_law_with_values_stay():
-    data = law_data(LawWithValues(NORTON, {"A": 0.0, "n": 3.0}))
-    assert [p["value"] for p in data["parameters"]] == [0.0, 3.0]
 
 
 class Elements(HTMLParser):

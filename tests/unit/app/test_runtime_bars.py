@@ -95,13 +95,9 @@ def test_a_closed_form_is_met(tmp_path):
     A, n, stress = 1e-15, 5.0, 100.0
     rate = A * stress**n
     times = [0.0, 1e3, 1e4, 5e4, 1e6]
-    creep, curve = in_page(
-        tmp_path,
-        [
-            (NORTON, "simulateCreep", {"A": A, "n": n}, {"stress": stress, "times": times, "tolerance": 1e-9}),
-            (NORTON, "rateCurve", {"A": A, "n": n}, {"stresses": [50.0, 100.0, 200.0]}),
-        ],
-    )
+    values, held = {"A": A, "n": n}, {"stress": stress, "times": times, "tolerance": 1e-9}
+    curve = (NORTON, "rateCurve", values, {"stresses": [50.0, 100.0, 200.0]})
+    creep, curve = in_page(tmp_path, [(NORTON, "simulateCreep", values, held), curve])
     exact = -np.log1p(-n * rate * np.array(times[:3])) / n
     np.testing.assert_allclose(np.array(creep["strain"][:3], float), exact, rtol=1e-8)
     assert creep["strain"][4] == "NaN"
@@ -124,12 +120,7 @@ def test_mistakes_are_one_sentence(tmp_path):
             (NORTON, "simulateCreep", {}, good | {"times": [2.0, 1.0]}),
             (LAWS["combined with temperature"], "simulateCreep", {}, good),
             (NORTON, "simulateRelaxation", {}, held),
-            (
-                NORTON,
-                "simulateRelaxation",
-                {},
-                {"strain": 1e-3, "times": [1.0], "temperature": warm, "elastic": elastic},
-            ),
+            (NORTON, "simulateRelaxation", {}, held | {"temperature": warm, "elastic": elastic}),
         ],
     )
     assert found == [

@@ -6,13 +6,10 @@ import types
 from pathlib import Path
 from typing import Annotated, Union, get_args, get_origin, get_type_hints
 
-import pytest
-
 from creepkit.cli.app import COMMANDS, STAGES
 from creepkit.cli.command_options import OutputPath
-from creepkit.cli.shared import is_file_name
 from creepkit.options import Option, Options, options_of
-from helpers.command_line import creepkit, one_line
+from helpers.command_line import answers, creepkit
 
 INPUTS = {"surrogate", "times", "record", "compositions", "example"}
 """Options that name files to read."""
@@ -78,36 +75,22 @@ def test_commands_are_in_one_table_by_stage_and_each_has_its_module():
     assert sum(map(len, STAGES.values())) == len(COMMANDS) <= 18
 
 
-SIMULATE = ["simulate", "norton", "--set", "A=1e-16", "--set", "n=4", "--stress", "100"]
-GENERATE = ["surrogate", "generate", "norton", "--dry-run"]
+SIMULATE = "simulate norton --set A=1e-16 --set n=4 --stress 100"
+GENERATE = "surrogate generate norton --dry-run"
+
+MEANINGLESS = [
+    (f"{SIMULATE} --end-h 10 --end-h 20", "--end-h is given twice; keep one of them"),
+    (f"{SIMULATE} --end-h 1_0", "--end-h 1_0 is not known; write NUMBER"),
+    (f"{SIMULATE} --end-h 1e-320", "--end-h is 1e-320; allowed are numbers from 1e-09"),
+    (f"{SIMULATE} --end-h 10 --specimen ''", "--specimen is empty; give a value, or leave the option out"),
+    (f"{SIMULATE} --end-h 10 --set n", "--set A=1e-16 n=4 n is not known; write NAME=NUMBER"),
+    (f"{SIMULATE} --end-h 10 --set n=5", "n is given twice"),
+    (f"{SIMULATE} --end-h 1 --modulus-gpa nan", "--modulus-gpa nan is not known; write NUMBER"),
+    (f"{SIMULATE} --end-h 1 --modulus-gpa 0", "allowed are numbers above 0 up to 1000000"),
+    (f"{GENERATE} --part -1", "--part -1 is not known; write K/N"),
+    (f"{GENERATE} --cluster garbage", "'garbage' is no address of a dask scheduler"),
+]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ([*SIMULATE, "--end-h", "10", "--end-h", "20"], "--end-h is given twice; keep one of them"),
-        ([*SIMULATE, "--end-h", "1_0"], "--end-h 1_0 is not known; write NUMBER"),
-        ([*SIMULATE, "--end-h", "1e-320"], "--end-h is 1e-320; allowed are numbers from 1e-09"),
-        ([*SIMULATE, "--end-h", "10", "--specimen", ""], "--specimen is empty; give a value, or leave the option out"),
-        ([*SIMULATE, "--end-h", "10", "--set", "n"], "--set A=1e-16 n=4 n is not known; write NAME=NUMBER"),
-        ([*SIMULATE, "--end-h", "10", "--set", "n=5"], "n is given twice"),
-        ([*SIMULATE, "--end-h", "1", "--modulus-gpa", "nan"], "--modulus-gpa nan is not known; write NUMBER"),
-        ([*SIMULATE, "--end-h", "1", "--modulus-gpa", "0"], "allowed are numbers above 0 up to 1000000"),
-        ([*GENERATE, "--part", "-1"], "--part -1 is not known; write K/N"),
-        ([*GENERATE, "--cluster", "garbage"], "'garbage' is no address of a dask scheduler"),
-    ],
-)
-def test_options_that_cannot_be_meant_are_one_sentence(words: list[str], message: str) -> None:
-    assert message in one_line(creepkit(*words))
-
-
-def test_a_registered_law_comes_before_a_file_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    values = ("--set", "A=1e-16", "--set", "n=4")
-    expected = creepkit("export", "norton", *values, "--to", "latex").output
-    for name in ("norton", "norton+strain-hardening"):
-        Path(name).write_text("{}")
-    assert creepkit("export", "norton", *values, "--to", "latex").output == expected
-    assert "./norton: this is not an identification" in one_line(creepkit("export", "./norton", "--to", "latex"))
-    named = {"norton": False, "norton+strain-hardening": False, "./norton": True, "fit.json": True, "unknown": False}
-    assert {word: is_file_name(word) for word in named} == named
+def test_options_that_cannot_be_meant_are_one_sentence() -> None:
+    assert answers(MEANINGLESS) == []

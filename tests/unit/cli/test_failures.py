@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shlex
 import subprocess
 import sys
 
@@ -12,26 +13,29 @@ from creepkit.cli.ending import AS_TERMINALS_CAN
 from helpers.command_line import creepkit, one_line
 
 CREEPKIT = (sys.executable, "-m", "creepkit")
+SIMULATE = "simulate norton --set A=1 --end-h 1"
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="devices and closed streams are those of Linux")
 
 
-def test_a_fault_is_one_line(monkeypatch):
-    def fault(*_, **__):
-        raise ZeroDivisionError("two\nlines \x1b[2J")
+def raising(error):
+    """A function that raises it, whatever it is given."""
 
-    monkeypatch.setattr(ck, "law", fault)
-    words = ("simulate", "norton", "--set", "A=1", "--end-h", "1")
-    said = one_line(creepkit(*words))
+    def raises(*_, **__):
+        raise error
+
+    return raises
+
+
+def test_a_fault_is_one_line(monkeypatch):
+    monkeypatch.setattr(ck, "law", raising(ZeroDivisionError("two\nlines \x1b[2J")))
+    said = one_line(creepkit(SIMULATE))
     assert said.startswith("creepkit: internal error (ZeroDivisionError: two lines \\u001b[2J); this is a fault")
-    assert isinstance(creepkit("--debug", *words).exception, ZeroDivisionError)
+    assert isinstance(creepkit(f"--debug {SIMULATE}").exception, ZeroDivisionError)
 
 
 def test_no_memory_is_no_fault(monkeypatch):
-    def full(*_, **__):
-        raise MemoryError
-
-    monkeypatch.setattr(ck, "law", full)
-    assert "not enough memory" in one_line(creepkit("simulate", "norton", "--set", "A=1", "--end-h", "1"))
+    monkeypatch.setattr(ck, "law", raising(MemoryError()))
+    assert "not enough memory" in one_line(creepkit(SIMULATE))
 
 
 @LINUX
@@ -69,20 +73,7 @@ def test_a_degree_is_left_out_where_the_encoding_lacks_it():
 @LINUX
 def test_without_a_home_or_a_cache_or_a_known_user(tmp_path):
     """As in a container that runs under any number of a user; the cache folder is none."""
-    words = (
-        "simulate",
-        "norton",
-        "--set",
-        "A=1e-16",
-        "--set",
-        "n=4",
-        "--stress",
-        "60",
-        "--end-h",
-        "1",
-        "--points",
-        "3",
-    )
+    words = shlex.split("simulate norton --set A=1e-16 --set n=4 --stress 60 --end-h 1 --points 3")
     environment = {"PATH": "/usr/bin", "PYTHONPATH": os.environ.get("PYTHONPATH", ""), "CREEPKIT_CACHE": "/proc/none"}
     program = (
         "import pwd, sys\n"
@@ -98,9 +89,6 @@ def test_without_a_home_or_a_cache_or_a_known_user(tmp_path):
 
 
 def test_without_temporary_folder_training_says_what_to_set(monkeypatch):
-    def none(*_, **__):
-        raise FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/none']")
-
-    monkeypatch.setattr(ck, "law", none)
-    run = creepkit("simulate", "norton", "--set", "A=1", "--end-h", "1")
-    assert "set the environment variable TMPDIR" in one_line(run)
+    none = FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/none']")
+    monkeypatch.setattr(ck, "law", raising(none))
+    assert "set the environment variable TMPDIR" in one_line(creepkit(SIMULATE))

@@ -1,4 +1,4 @@
-"""The folder of `creepkit identify` holds one run: a second one at once is refused, a later one replaces it."""
+"""The folder of `creepkit identify` holds one run: a later one replaces it."""
 
 import json
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.cli.identified_folder import identifying_alone, write_ranking
+from creepkit.cli.identified_folder import check_identified_folder, write_ranking
 from creepkit.errors import FitError
 from creepkit.inverse.ranking_document import load_ranking
 from creepkit.inverse.selection import rank
@@ -33,8 +33,8 @@ def _names(folder):
 
 
 def _run(ranking, folder):
-    with identifying_alone(folder, [one.fit.law for one in ranking.laws]):
-        return write_ranking(ranking, folder)
+    check_identified_folder(folder, [one.fit.law for one in ranking.laws])
+    return write_ranking(ranking, folder)
 
 
 def test_a_later_run_leaves_nothing_of_the_former_one_and_what_is_not_its(rankings, tmp_path):
@@ -54,22 +54,6 @@ def test_a_changed_file_of_the_former_run_is_neither_removed_nor_mixed_with_anot
         _run(rankings[1], tmp_path)
     assert _names(tmp_path) == before
     assert (tmp_path / "norton.tex").read_text() == "edited by hand"
-
-
-def test_two_runs_at_once_are_refused(rankings, tmp_path):
-    law = rankings[0].best.law
-    with (
-        identifying_alone(tmp_path / "o", [law]),
-        pytest.raises(FitError, match="another process is writing its results there"),
-        identifying_alone(tmp_path / "o", [law]),
-    ):
-        pass
-
-
-def test_a_run_that_fails_leaves_no_folder_behind(rankings, tmp_path):
-    with pytest.raises(ZeroDivisionError), identifying_alone(tmp_path / "o", [rankings[0].best.law]):
-        raise ZeroDivisionError
-    assert not (tmp_path / "o").exists()
 
 
 def test_a_ranking_refuses_a_file_that_another_run_has_written_under_the_same_name(rankings, tmp_path):

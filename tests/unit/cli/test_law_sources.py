@@ -3,6 +3,7 @@
 import numpy as np
 
 import creepkit as ck
+from creepkit.cli.shared import is_file_name
 from helpers.command_line import creepkit, one_line
 
 TEST = ("--stress", "100", "--end-h", "10", "--points", "5", "--temperature-c", "20")
@@ -26,6 +27,9 @@ def test_a_file_of_a_law_with_values_is_simulated_as_its_values_are(tmp_path):
 
 def test_names_of_laws_come_before_files_and_a_file_without_a_suffix_needs_its_path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "norton+strain-hardening").write_text("{}")
+    named = {"norton": False, "norton+strain-hardening": False, "./norton": True, "fit.json": True, "unknown": False}
+    assert {word: is_file_name(word) for word in named} == named
     for name in ("norton", "mine"):
         ck.export("norton", "json", {"A": 1e-16, "n": 4.0}, to=f"{name}.json")
         (tmp_path / f"{name}.json").rename(name)

@@ -12,7 +12,7 @@ from creepkit.surrogates import training as sweeping
 from creepkit.surrogates.evaluation import evaluate
 from creepkit.surrogates.parameter_gru import NetworkSizes
 from creepkit.surrogates.training_rows import training_split
-from helpers.command_line import creepkit, one_line
+from helpers.command_line import answers, creepkit
 from helpers.planted_datasets import bars
 
 PNG = b"\x89PNG"
@@ -27,8 +27,8 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_train_writes_a_surrogate_and_its_pictures(file: Path, tmp_path: Path) -> None:
-    words = ("surrogate", "train", str(file), "--to", str(tmp_path / "m.safetensors"), "--hidden", "6", "--layers", "1")
-    shown = creepkit(*words, "--epochs", "3", "--target", "log")
+    to = tmp_path / "m.safetensors"
+    shown = creepkit(f"surrogate train {file} --to {to} --hidden 6 --layers 1 --epochs 3 --target log")
     assert shown.exit_code == 0, shown.output
     assert "validation loss (Eq. 4, outputs together)" in shown.stdout
     assert "48 samples for training, 12 for validation" in shown.stdout
@@ -40,32 +40,20 @@ def test_train_writes_a_surrogate_and_its_pictures(file: Path, tmp_path: Path) -
 
 
 def test_train_tells_its_errors_as_json(file: Path, tmp_path: Path) -> None:
-    words = ("surrogate", "train", str(file), "--to", str(tmp_path / "m.safetensors"), "--hidden", "4", "--layers", "1")
-    shown = creepkit(*words, "--epochs", "1", "--json")
-    told = json.loads(shown.stdout)
+    words = f"surrogate train {file} --to {tmp_path / 'm.safetensors'} --hidden 4 --layers 1 --epochs 1 --json"
+    told = json.loads(creepkit(words).stdout)
     assert set(told["metrics"]["outputs"]["strain"]) >= {"rse", "mse", "mae", "r2"}
     assert len(told["pictures"]) == 3
 
 
 def test_a_sweep_is_a_table_and_a_picture_and_is_not_redone(file: Path, tmp_path: Path) -> None:
-    words = (
-        "surrogate",
-        "sweep",
-        str(file),
-        "--to",
-        str(tmp_path),
-        "--layers",
-        "1",
-        "--hidden",
-        "4,6",
-        "--cells",
-        "gru,lstm",
-    )
-    first = creepkit(*words, "--samples", "20,48", "--epochs", "2", "--json")
+    sizes = "--layers 1 --hidden 4,6 --cells gru,lstm --samples 20,48"
+    words = f"surrogate sweep {file} --to {tmp_path} {sizes} --epochs 2 --json"
+    first = creepkit(words)
     assert first.exit_code == 0, first.output
     found = json.loads(first.stdout)["trainings"]
-    sizes = {(e["cell"], e["hidden"], e["layers"], e["samples"]) for e in found}
-    assert sizes == {(c, h, 1, n) for c in ("gru", "lstm") for h in (4, 6) for n in (20, 48)}
+    trained = {(e["cell"], e["hidden"], e["layers"], e["samples"]) for e in found}
+    assert trained == {(c, h, 1, n) for c in ("gru", "lstm") for h in (4, 6) for n in (20, 48)}
     gru = next(e for e in found if (e["cell"], e["hidden"]) == ("gru", 4))
     # 3 gates of (4 + 4 + 2) x 4 numbers for log10 A, n, off and the load, and a head of 4 + 1
     assert gru["weight_count"] == 3 * 4 * (4 + 4 + 2) + 5
@@ -73,7 +61,7 @@ def test_a_sweep_is_a_table_and_a_picture_and_is_not_redone(file: Path, tmp_path
     stamps = {p: p.stat().st_mtime_ns for p in tmp_path.glob("*.safetensors")}
     assert len(stamps) == 8
     (tmp_path / "gru-4x1-20.safetensors").unlink()
-    again = creepkit(*words, "--samples", "20,48", "--epochs", "2", "--json")
+    again = creepkit(words)
     assert json.loads(again.stdout)["trainings"] == found
     assert sum(p.stat().st_mtime_ns == stamp for p, stamp in stamps.items()) == 7
 
@@ -98,30 +86,13 @@ def test_the_best_of_a_sweep_stands_on_top(file: Path, tmp_path: Path) -> None:
     assert losses == sorted(losses)
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (("surrogate", "train", "{set}", "--to", "{to}", "--cell", "rnn"), "--cell rnn is not known; write gru|lstm"),
-        (("surrogate", "train", "{to}", "--to", "{to}"), "no such"),
-        (
-            ("surrogate", "sweep", "{set}", "--to", "{to}", "--hidden", "64;128"),
-            "--hidden 64;128 is not known; write INTEGER,...",
-        ),
-        (
-            ("surrogate", "sweep", "{set}", "--to", "{to}", "--samples", "900"),
-            "there are not 900 samples to learn from: the data set has 60 accepted ones, of which 12",
-        ),
-    ],
-)
-def test_what_cannot_be_is_one_line(file: Path, tmp_path: Path, words: tuple[str, ...], told: str) -> None:
-    places = {"set": file, "to": tmp_path / "m.safetensors"}
-    shown = creepkit(*(word.format(**places) for word in words))
-    assert shown.exit_code == 1
-    assert told in one_line(shown)
-
-
-def test_verbs_say_what_they_take() -> None:
-    with pytest.raises(ck.errors.ArgumentError, match=r"recipe of train\(\) is <class .* allowed is a ParameterGru"):
-        ck.train(bars(10), ck.ParameterGru)
-    with pytest.raises(ck.errors.ArgumentError, match=r"data of train\(\) is \[1, 2\]; allowed is a Dataset"):
-        ck.train([1, 2], ck.ParameterGru())
+def test_what_cannot_be_is_one_line(file: Path, tmp_path: Path) -> None:
+    train, sweep, to = "surrogate train", "surrogate sweep", tmp_path / "m.safetensors"
+    missing = "there are not 900 samples to learn from: the data set has 60 accepted ones, of which 12"
+    table = [
+        (f"{train} {file} --to {to} --cell rnn", "--cell rnn is not known; write gru|lstm"),
+        (f"{train} {to} --to {to}", "no such"),
+        (f"{sweep} {file} --to {to} --hidden '64;128'", "--hidden 64;128 is not known; write INTEGER,..."),
+        (f"{sweep} {file} --to {to} --samples 900", missing),
+    ]
+    assert answers(table) == []

@@ -18,7 +18,7 @@ from creepkit.dataset.dataset import COLUMNS
 from creepkit.dataset.shards import GenerationJob
 from creepkit.dataset.simulation import rounded_outputs, simulate_rows
 from creepkit.errors import DatasetError
-from creepkit.files.writing import replace_on_success
+from helpers.dataset_runs import assert_same
 from helpers.planted_sampling import BAR, GRID, Planted, Raising, strain, stress_of
 from helpers.written_files import names_in
 
@@ -32,12 +32,6 @@ def simulated(tmp_path, design=None, first=0, rows=32, seed=0, specimen=BAR):
 def data(tmp_path):
     raising = Raising(stress_of(next(r for r in range(32) if stress_of(r) <= 120.0)))
     return simulated(tmp_path, Planted((*Planted().criteria, raising)))
-
-
-def assert_same(one, other):
-    for name in COLUMNS:
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
-    assert dict(one.failures) == dict(other.failures)
 
 
 def test_histories_are_those_of_nortons_law_under_constant_load(data):
@@ -189,21 +183,6 @@ def test_a_target_that_cannot_be_written(data, tmp_path):
             storage.write_dataset(data, target)
 
 
-def half_written(path):
-    with replace_on_success(path, DatasetError) as temporary:
-        temporary.write_bytes(b"half")
-        raise OSError(28, "nothing left")
-
-
-def test_a_writing_that_fails_leaves_what_was_there(data, tmp_path):
-    path = storage.write_dataset(data, tmp_path / "a.h5")
-    before = path.read_bytes()
-    with pytest.raises(DatasetError, match="No space left on device; free some space and start again"):
-        half_written(path)
-    assert path.read_bytes() == before
-    assert names_in(tmp_path) == ["a.h5"]
-
-
 def test_long_attributes_are_no_trouble(data, tmp_path):
     long = replace(data, design_document={"name": "long", "numbers": list(range(30_000))})
     assert storage.read_dataset(storage.write_dataset(long, tmp_path / "a.h5")).design_document == long.design_document
@@ -274,9 +253,6 @@ def of_accepted(name, value):
         (replaced("time_grid", np.array([0.0, np.nan, 1000.0, 3600.0])), "a time grid needs two or more finite times"),
         (replaced("time_grid", np.array([0.0, 100.0, 100.0, 3600.0])), "must start at or after 0 and increase"),
         (replaced("time_grid", np.zeros((4, 4))), "a time grid needs two or more finite times"),
-        (lambda file: file.__setitem__("marks", h5py.ExternalLink("b.h5", "/values")), "is a link to elsewhere"),
-        (lambda file: file.__setitem__("marks", h5py.SoftLink("/values")), "is a link to elsewhere"),
-        (lambda file: file.create_dataset("x", (4,), "i4", external="x.bin"), "'x' is a link to elsewhere"),
         (lambda file: file.__delitem__("failures"), DAMAGED),
         (lambda file: file.__delitem__("hold_outputs"), DAMAGED),
         (lambda file: file["time_grid"].attrs.__delitem__("relative"), DAMAGED),

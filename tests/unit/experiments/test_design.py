@@ -18,7 +18,7 @@ from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import History, StressSteps, constant_stress
 from creepkit.reports.design import cheapest_text
 from helpers.log_rate_predictor import END, known_scatter, measured
-from helpers.planted_bars import BAR, SPL, bars
+from helpers.planted_bars import BAR, SPL, bars, carried_out
 
 TRUTH = {"A": float(np.exp(-15.0 - 5.0 * np.log(50.0))), "n": 5.0}
 SD, FRAMES, HOURS = 0.02, 20, END / 3600.0
@@ -86,13 +86,8 @@ def test_expected_precision_is_met_when_the_test_is_made():
     tests = bars(STRAIN_HARDENING, SPL, [constant_stress(s, "stress") for s in (45.0, 55.0)], seed=3)
     fit = identify(STRAIN_HARDENING, tests, BAR, settings=LIKELY)
     found = design(fit, goal=rate_at(30.0))
-    planned = found.best.histories[0]
-    blank = planned.replace(name="made")
-    prediction = BAR.predict(STRAIN_HARDENING, STRAIN_HARDENING.to_internal(SPL), [blank])
-    noise = 2e-5 * np.random.default_rng(0).normal(size=blank.times.size)
-    sd = {"strain": np.full(blank.times.size, 2e-5)}
-    made = blank.replace(outputs={"strain": prediction.of(0)[:, 0] + noise}, standard_deviation=sd)
-    after = identify(STRAIN_HARDENING, [*tests, made], BAR, settings=LIKELY)
+    made = carried_out(BAR, STRAIN_HARDENING, SPL, found.best.histories[:1], seed=0)
+    after = identify(STRAIN_HARDENING, [*tests, *made], BAR, settings=LIKELY)
     _, low, high = after.rate(30.0, warn=False)
     assert np.log(high / low) / (2 * after._quantile) == pytest.approx(found.best.expectation.sd, rel=0.15)
 
@@ -165,13 +160,7 @@ def test_one_law_is_made_decisive_by_excluding_what_the_tests_allow_beside_it():
     assert found.goal == "law"
     assert "strain-hardening+time-hardening" in found.altered
     assert "makes strain-hardening decisive, against strain-hardening+time-hardening" in found.sentence
-    made = []
-    for history in found.best.histories:
-        prediction = BAR.predict(STRAIN_HARDENING, STRAIN_HARDENING.to_internal(SPL), [history])
-        noise = 2e-5 * np.random.default_rng(1).normal(size=history.times.size)
-        sd = {"strain": np.full(history.times.size, 2e-5)}
-        outputs = {"strain": prediction.of(0)[:, 0] + noise}
-        made.append(history.replace(name="made", outputs=outputs, standard_deviation=sd))
+    made = carried_out(BAR, STRAIN_HARDENING, SPL, found.best.histories, seed=1)
     assert found.best.expectation.probability > 0.95
     after = [identify(law, [*tests, *made], BAR, settings=LIKELY) for law in (STRAIN_HARDENING, TIME_HARDENING)]
     assert rank(after).decisive
@@ -179,12 +168,8 @@ def test_one_law_is_made_decisive_by_excluding_what_the_tests_allow_beside_it():
 
 def test_the_expected_chi_square_is_met_when_the_test_is_made(hardening):
     found = design(hardening, goal="law")
-    planned = found.best.histories[0]
-    prediction = BAR.predict(STRAIN_HARDENING, STRAIN_HARDENING.to_internal(SPL), [planned])
-    noise = 2e-5 * np.random.default_rng(1).normal(size=planned.times.size)
-    sd = {"strain": np.full(planned.times.size, 2e-5)}
-    made = planned.replace(outputs={"strain": prediction.of(0)[:, 0] + noise}, standard_deviation=sd)
-    tests = [*hardening.best.histories, made]
+    made = carried_out(BAR, STRAIN_HARDENING, SPL, found.best.histories[:1], seed=1)
+    tests = [*hardening.best.histories, *made]
     fits = [identify(law, tests, BAR, settings=LIKELY) for law in (STRAIN_HARDENING, TIME_HARDENING)]
     again = rank(fits, challenge=False)
     assert again.best.law.name == "strain-hardening"

@@ -19,7 +19,6 @@ from creepkit.exporters.fortran_code import (
 from creepkit.exporters.law_code import Identifiers, LawCode
 from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
 from creepkit.language.symbols import POINT_VARIABLES
-from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import LawWithValues, Units
@@ -229,17 +228,6 @@ def test_what_creep_is_not_told_is_refused():
     assert "-p*mpa" in AbaqusCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
     with pytest.raises(ExportError, match="mean stress, which CalculiX does not pass"):
         CalculixCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
-
-
-def test_every_term_off_is_refused():
-    with pytest.raises(ExportError, match="nothing to export"):
-        AbaqusCreepSubroutine().text(LawWithValues(NORTON, {"A": 0.0, "n": 5.0}))
-
-
-def test_what_is_off_is_left_out():
-    text = AbaqusCreepSubroutine().text(LawWithValues(COMBINED, COMBINED.center() | {"A_1": 0.0, "m_1": 0.0}))
-    assert "log_sinh" not in text
-    assert "switched off and left out: A_1 = 0, m_1 = 0" in text
 
 
 def test_units_are_constants_of_the_file():

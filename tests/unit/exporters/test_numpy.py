@@ -4,14 +4,10 @@ import ast
 import importlib.util
 
 import numpy as np
-import pytest
 
 from creepkit.exporters.python import NumpyExporter, PythonExporter
-from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.laws.combined import COMBINED
-from creepkit.laws.norton import NORTON
-from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import LawWithValues, Units
+from creepkit.records import LawWithValues
 from helpers.export_cases import LAWS, TOLERANCE, case, renamed
 
 
@@ -53,33 +49,6 @@ def test_arguments_and_parameters_broadcast(tmp_path):
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
-def test_numbers_give_numbers(tmp_path):
-    assert float(module(NORTON, tmp_path, {"A": 1e-16, "n": 5.0}).rate(100.0)) == pytest.approx(1e-6, rel=1e-12)
-
-
-def test_beyond_doubles_the_rate_is_infinite_without_a_warning(tmp_path):
-    loaded = module(LAWS["registered hyperbolic-sine"], tmp_path, {"A": 1e-5, "n": 8.0, "B": 1.0})
-    found = loaded.rate(np.array([1.0, 2000.0]))
-    assert found[0] == pytest.approx(1e-5 * np.sinh(1.0) ** 8, rel=1e-13)
-    assert found[1] == np.inf
-
-
-def test_virgin_material_has_a_finite_rate(tmp_path):
-    assert np.isfinite(module(COMBINED, tmp_path).rate(np.array([0.0, 100.0]), strain=0.0, time=0.0)).all()
-
-
-def test_units_are_converted_on_entry_and_rates_on_exit(tmp_path):
-    law = LAWS["foreign Kachanov-Rabotnov"] + TIME_HARDENING
-    point = {"omega": 0.3}
-    plain = module(law, tmp_path)
-    rate = plain.rate(120.0, time=7.2e4, principal_stress=90.0, **point)
-    growth = plain.state_rates(120.0, time=7.2e4, principal_stress=90.0, **point)["omega"]
-    other = module(law, tmp_path, units=Units("Pa", "h"))
-    there = {"time": 20.0, "principal_stress": 9e7, **point}
-    assert other.rate(1.2e8, **there) == pytest.approx(3600 * rate, rel=1e-13)
-    assert other.state_rates(1.2e8, **there)["omega"] == pytest.approx(3600 * growth, rel=1e-13)
-
-
 def test_the_module_needs_numpy_alone():
     """The error function, which NumPy lacks, comes from the standard library."""
     for law in LAWS.values():
@@ -88,15 +57,3 @@ def test_the_module_needs_numpy_alone():
         modules = {getattr(node, "module", None) or node.names[0].name for node in imports}
         assert modules <= {"numpy", "math"}, law.name
         assert ("math" in modules) == ("erf" in text), law.name
-
-
-def test_words_of_numpy_may_name_parameters(tmp_path):
-    words = parameters("np exp errstate choose")
-    law = CreepLaw(
-        "odd",
-        {"x": words[0] * stress ** words[1] * words[2] * words[3]},
-        {words[0]: Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0)}
-        | dict.fromkeys(words[1:], Param("number", (1, 8))),
-    )
-    loaded = module(law, tmp_path, {"np": 1e-9, "exp": 2.0, "errstate": 3.0, "choose": 4.0})
-    assert loaded.rate(8.0) == pytest.approx(1e-9 * 64 * 12, rel=1e-13)

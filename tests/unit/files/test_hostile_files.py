@@ -93,22 +93,6 @@ def test_groups_in_a_circle_end(tmp_path):
         assert list(file) == ["a"]
 
 
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
-        ('{"a": ' + "9" * 5000 + "}", "an integer too long"),
-        ("[" * 100_000, "nested too deep"),
-        ("[" * 300 + "]" * 300, "nested too deep"),
-        ('{"a\\u001b": 1, "a\\u001b": 2}', r"the key 'a\\u001b' stands twice"),
-        ("{" + ",".join(f'"k{k}": 1' for k in range(50_000)) + ', "k49999": 1}', "'k49999' stands twice"),
-        ('{"a": NaN}', "NaN is no number"),
-    ],
-)
-def test_json_is_refused_in_a_sentence(text, problem):
-    with pytest.raises(FitError, match=f"x.json: .*{problem}"):
-        parse_json(text, "x.json", NOTE)
-
-
 def test_json_of_honest_size_is_read():
     """As of 50 MB of numbers of 15 digits, in rows of 8."""
     rows = ",".join(["[" + ",".join(["0.12345678901234"] * 8) + "]"] * 300_000)

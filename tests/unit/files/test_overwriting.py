@@ -68,15 +68,17 @@ def test_nothing_is_written_through_links(tmp_path):
 
 
 def test_devices_folders_and_missing_folders_are_refused_even_by_force(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
     for path, problem in (
-        (Path("/dev/null"), "device"),
+        (Path("/dev/null"), "it is a device, a pipe or the like"),
+        (tmp_path / "pipe", "it is a device, a pipe or the like"),
         (tmp_path, "it is a folder"),
         (tmp_path / "none" / "note", "there is no folder"),
         (tmp_path / ("n" * 300), "File name too long"),
         (tmp_path / "null\0byte", "cannot be written"),
     ):
         with pytest.raises(ExportError, match=problem):
-            check_target(path, ExportError, force=True)
+            write_text("new", path, ExportError, force=True)
     write_text("long", tmp_path / ("n" * 255), ExportError)
 
 

@@ -79,17 +79,6 @@ def test_a_failed_writing_leaves_what_was_there(tmp_path):
     assert sorted(os.listdir(tmp_path)) == [RECORD, "note"]
 
 
-def test_special_files_are_not_replaced(tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(ExportError, match="it is a device, a pipe or the like"):
-        write_text("new", tmp_path / "pipe", ExportError)
-    with pytest.raises(ExportError, match="it is a folder"):
-        write_text("new", tmp_path, ExportError)
-    with pytest.raises(ExportError, match="there is no folder .*; choose a file in a folder that exists"):
-        write_text("new", tmp_path / "none" / "note", ExportError)
-    assert os.listdir(tmp_path) == ["pipe"]
-
-
 def test_what_a_killed_process_left_is_removed(tmp_path):
     temporary_name(tmp_path / "note").touch()
     kept = temporary_name(tmp_path / "other")

@@ -191,6 +191,8 @@ def test_any_change_gives_a_record_or_an_error(key, value):
         ("[" + "9" * 5000 + "]", "an integer too long"),
         ("[" * 100_000, "lists nested too deep"),
         ("[" * 300 + "]" * 300, "lists nested too deep"),
+        ('{"a\\u001b": 1, "a\\u001b": 2}', r"the key 'a\u001b' stands twice"),
+        ("{" + ",".join(f'"k{k}": 1' for k in range(50_000)) + ', "k49999": 1}', "'k49999' stands twice"),
         ('{"a":\n', "note, line 2: not JSON: expecting value"),
         ("", "note, line 1: not JSON"),
     ],

@@ -106,6 +106,7 @@ MISTAKES = [
     (lambda tests, fit: History("bar", *BAR, rupture_time=10.0, unruptured=True), "keep one of them"),
     (lambda tests, fit: rank([]), "there are no identifications to rank"),
     (lambda tests, fit: rank([fit], "hold-up"), "rank(by='hold-up') is not known"),
+    (lambda tests, fit: rank([fit, replace(fit, provenance={"data": "others"})]), "were made from different histories"),
     (lambda tests, fit: ck.select([], tests, "uniaxial"), "there are no candidate laws"),
     (lambda tests, fit: L2(-1.0), "-1"),
     (lambda tests, fit: check_penalty(L2), "penalty is L2; write L2()"),

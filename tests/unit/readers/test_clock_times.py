@@ -9,6 +9,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.records import History
+from helpers.workbooks import workbook
 
 HEAD = "# stress_MPa: 60\n# temperature_C: 850\n"
 
@@ -81,19 +82,13 @@ def test_what_is_refused(name: str, cells: list[str], head: str, message: str, t
 
 def test_cells_of_a_spreadsheet(tmp_path: Path):
     """A spreadsheet keeps an elapsed time above a day as a day of the year 1900."""
-    openpyxl = pytest.importorskip("openpyxl")
     for name, times in (
         ("durations", [timedelta(hours=7 * k) for k in range(6)]),
         ("stamps", [datetime(2025, 3, 4, 8) + timedelta(hours=7 * k) for k in range(6)]),
         ("days", [0.0, *(datetime(1899, 12, 31) + timedelta(hours=24 + 7 * k) for k in range(5))]),
     ):
-        book = openpyxl.Workbook()
-        sheet = book.active
-        for row in (["# stress_MPa: 60"], ["# temperature_C: 850"], ["Time", "Strain (%)"]):
-            sheet.append(row)
-        for k, time in enumerate(times):
-            sheet.append([timedelta(0) if time == 0.0 else time, 0.3 * k])
-        book.save(tmp_path / f"{name}.xlsx")
-        (history,) = ck.read_histories(tmp_path / f"{name}.xlsx")
+        frames = [[timedelta(0) if time == 0.0 else time, 0.3 * k] for k, time in enumerate(times)]
+        rows = [["# stress_MPa: 60"], ["# temperature_C: 850"], ["Time", "Strain (%)"], *frames]
+        (history,) = ck.read_histories(workbook(tmp_path / f"{name}.xlsx", {"S": rows}))
         expected = [7.0 * k for k in range(6)] if name != "days" else [0, *(24 + 7.0 * k for k in range(5))]
         np.testing.assert_allclose(history.times / 3600, expected, rtol=1e-9, err_msg=name)

@@ -7,6 +7,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
+from helpers.workbooks import workbook
 
 GERMAN = """# Zeitstandversuch DIN EN ISO 204;;;;
 # Prüfer: Müller;;;;
@@ -35,22 +36,10 @@ def test_a_german_table(tmp_path: Path) -> None:
     assert (test.labels["heat"], test.labels["operator"], test.operator) == ("K7", "Müller", "")
 
 
-def workbook(path: Path, **sheets: list[list[object]]) -> Path:
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    book.remove(book.active)
-    for name, rows in sheets.items():
-        sheet = book.create_sheet(name)
-        for row in rows:
-            sheet.append(row)
-    book.save(path)
-    return path
-
-
 def test_titles_above_conditions_and_remarks_beside_frames(tmp_path: Path) -> None:
     conditions = [["Program Z, 2024"], [], ["Test", "Stress (MPa)", "Temperature (°C)"], ["Z1", 120, 650]]
     frames = [["Test Z1"], ["Time (h)", "Creep strain (%)", "Remark"], [0, 0.0, "start"], [1, 0.01], [5, 0.02]]
-    file = workbook(tmp_path / "program.xlsx", Summary=conditions, Z1=frames)
+    file = workbook(tmp_path / "program.xlsx", {"Summary": conditions, "Z1": frames})
     (test,) = ck.read_histories(file, ignore=["Remark"])
     assert (test.loading.program().values.tolist(), test.temperature) == ([120.0], 923.15)
     with pytest.raises(HistoryError, match=r"sheet 'Z1', row 2: column 'Remark' is not understood"):
@@ -61,6 +50,6 @@ def test_values_with_units_above_pairs_are_conditions(tmp_path: Path) -> None:
     head = ["120 MPa / 650 °C", None, None, "140 MPa / 923.15 K", None]
     names = ["Time (h)", "Creep strain (%)", None, "Time (h)", "Creep strain (%)"]
     rows = [head, names, *([t, 0.01 * t, None, t, 0.02 * t] for t in (0, 1, 2))]
-    tests = ck.read_histories(workbook(tmp_path / "wide.xlsx", curves=rows))
+    tests = ck.read_histories(workbook(tmp_path / "wide.xlsx", {"curves": rows}))
     assert [test.loading.program().values.tolist() for test in tests] == [[120.0], [140.0]]
     assert [test.temperature for test in tests] == [923.15, 923.15]

@@ -8,6 +8,7 @@ from creepkit.errors import HistoryError
 from creepkit.readers.history_csv import write_history
 from creepkit.readers.rate_and_rupture_tables import key_of_column
 from creepkit.records import UNKNOWN_DURATION, History, constant_stress
+from helpers.workbooks import workbook
 
 TABLE = """# alloy: Alloy X
 # control: stress
@@ -50,14 +51,9 @@ def test_the_same_in_another_dialect_and_without_names(tmp_path):
 
 
 def test_a_sheet_of_a_spreadsheet(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    book.active.title = "rates"
-    for row in (("test", "stress_MPa", "T_C", "minimum_rate_1/h", "t_r (h)"), ("A", 100, 700, 1e-6, 1000),
-                ("B", 80, 700, None, ">5000")):  # fmt: skip
-        book.active.append(row)
-    book.save(tmp_path / "x.xlsx")
-    first, second = ck.read_histories(tmp_path / "x.xlsx")
+    head = ("test", "stress_MPa", "T_C", "minimum_rate_1/h", "t_r (h)")
+    rows = (head, ("A", 100, 700, 1e-6, 1000), ("B", 80, 700, None, ">5000"))
+    first, second = ck.read_histories(workbook(tmp_path / "x.xlsx", {"rates": rows}))
     assert (first.minimum_rate, first.rupture_time) == (pytest.approx(1e-6 / 3600), 3.6e6)
     assert (second.unruptured, second.times[-1]) == (True, 1.8e7)
 

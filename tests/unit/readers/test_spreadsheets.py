@@ -3,35 +3,21 @@
 import io
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
+from creepkit.readers.rate_and_rupture_tables import TEST_TABLE
 from creepkit.readers.spreadsheets import SPREADSHEET
 from creepkit.records import History
+from helpers.workbooks import workbook
 
-openpyxl = pytest.importorskip("openpyxl")
+pytest.importorskip("openpyxl")
 
 FRAMES = [["Time (h)", "Strain (%)"], [0, 0], [0.1, 0.012], [1 / 3, 0.025]]
 CONDITIONS = [["Stress (MPa)", 60], ["Temperature (°C)", 850]]
-
-
-def written(path: Path, sheets: dict[str, list[list[Any]]], merged: tuple[str, ...] = (), percent: str = "") -> Path:
-    book = openpyxl.Workbook()
-    book.remove(book.active)
-    for name, rows in sheets.items():
-        sheet = book.create_sheet(name)
-        for row in rows:
-            sheet.append(row)
-        for part in merged:
-            sheet.merge_cells(part)
-        for (cell,) in sheet[percent] if percent else ():
-            cell.number_format = "0.00%"
-    book.save(path)
-    return path
 
 
 def read(path: Path) -> list[History]:
@@ -39,8 +25,12 @@ def read(path: Path) -> list[History]:
     return SPREADSHEET.read(path)
 
 
+def merging(*parts: str):
+    return lambda sheet: [sheet.merge_cells(part) for part in parts]
+
+
 def test_one_test_in_one_sheet_keeps_every_digit(tmp_path: Path):
-    (history,) = read(written(tmp_path / "bar.xlsx", {"Sheet1": CONDITIONS + FRAMES}))
+    (history,) = read(workbook(tmp_path / "bar.xlsx", {"Sheet1": CONDITIONS + FRAMES}))
     assert (history.name, history.condition) == ("bar", "850 °C, 60 MPa")
     np.testing.assert_array_equal(history.times, 3600.0 * np.array([0, 0.1, 1 / 3]))
     np.testing.assert_array_equal(history.outputs["strain"], 0.01 * np.array([0, 0.012, 0.025]))
@@ -48,7 +38,7 @@ def test_one_test_in_one_sheet_keeps_every_digit(tmp_path: Path):
 
 def test_head_lines_of_canonical_files(tmp_path: Path):
     head = [["# stress_MPa: 60"], ["# temperature_C:", 850], ["# a remark"]]
-    (history,) = read(written(tmp_path / "bar.xlsx", {"Sheet1": head + FRAMES}))
+    (history,) = read(workbook(tmp_path / "bar.xlsx", {"Sheet1": head + FRAMES}))
     assert history.condition == "850 °C, 60 MPa"
 
 
@@ -59,23 +49,23 @@ def test_a_test_a_sheet_with_a_sheet_of_conditions(tmp_path: Path):
         "A1": FRAMES,
         "A2": FRAMES,
     }
-    first, second = read(written(tmp_path / "bars.xlsx", sheets))
+    first, second = read(workbook(tmp_path / "bars.xlsx", sheets))
     assert (first.name, second.name) == ("A1", "A2")
     assert (first.condition, second.condition) == ("850 °C, 60 MPa", "860 °C, 80 MPa")
     assert second.labels["heat"] == "X8"
     assert "sheet 'Notes' not read as it has no column of time" in first.labels["assumed"]
     sheets["Conditions"].append(["A3", 80, 860, "X8"])
     with pytest.raises(HistoryError, match="sheet 'Conditions', row 4: 'A3' has conditions, but no sheet or column"):
-        read(written(tmp_path / "bars.xlsx", sheets))
+        read(workbook(tmp_path / "bars.xlsx", sheets))
 
 
 def test_a_sheet_of_remarks_is_left_out(tmp_path: Path):
     """A sheet without columns of time that states nothing of a test; one that seems to is left out by its name."""
     remarks = [["Probe", "KZ01"], ["Bemerkung", "Ofen 3"]]
-    (history,) = read(written(tmp_path / "bar.xlsx", {"KZ01": CONDITIONS + FRAMES, "Auswertung": remarks}))
+    (history,) = read(workbook(tmp_path / "bar.xlsx", {"KZ01": CONDITIONS + FRAMES, "Auswertung": remarks}))
     assert "sheet 'Auswertung' not read" in history.labels["assumed"]
     stated = [["Probe", "Stress (MPa)"], ["KZ02", 60]]
-    path = written(tmp_path / "bars.xlsx", {"KZ01": CONDITIONS + FRAMES, "Auswertung": stated})
+    path = workbook(tmp_path / "bars.xlsx", {"KZ01": CONDITIONS + FRAMES, "Auswertung": stated})
     with pytest.raises(HistoryError, match=r"sheet 'Auswertung', row 2: 'KZ02' .* leave the sheet out .* --ignore"):
         read(path)
     (history,) = ck.read_histories([path], ignore=["Auswertung"])
@@ -92,7 +82,7 @@ def test_pairs_below_merged_names(tmp_path: Path):
         [1, 0.5, 2, 0.7],
         [3, 0.9, None, None],
     ]
-    first, second = read(written(tmp_path / "x.xlsx", {"Sheet1": rows}, merged=("A1:B1", "C1:D1")))
+    first, second = read(workbook(tmp_path / "x.xlsx", {"Sheet1": rows}, merging("A1:B1", "C1:D1")))
     assert (first.name, second.name, first.times.size, second.times.size) == ("A1", "A2", 3, 2)
     assert second.condition == "860 °C, 80 MPa"
 
@@ -106,7 +96,7 @@ def test_one_column_a_test_below_merged_quantity(tmp_path: Path):
         [0, 0, 0],
         [1, 0.5, 0.7],
     ]
-    first, second = read(written(tmp_path / "x.xlsx", {"Sheet1": rows}, merged=("B2:C2", "B3:C3", "A3:A4")))
+    first, second = read(workbook(tmp_path / "x.xlsx", {"Sheet1": rows}, merging("B2:C2", "B3:C3", "A3:A4")))
     assert (first.name, second.name) == ("A1", "A2")
     assert second.condition == "860 °C, 80 MPa".replace("860", "850")
     assert "holds for all" not in second.labels["assumed"]
@@ -114,32 +104,36 @@ def test_one_column_a_test_below_merged_quantity(tmp_path: Path):
 
 def test_cells_that_are_shown_in_per_cent(tmp_path: Path):
     frames = [["Time (h)", "Strain"], [0, 0], [1, 0.0123]]
-    (history,) = read(written(tmp_path / "x.xlsx", {"Sheet1": CONDITIONS + frames}, percent="B4:B5"))
+
+    def shaped(sheet):
+        for (cell,) in sheet["B4:B5"]:
+            cell.number_format = "0.00%"
+
+    (history,) = read(workbook(tmp_path / "x.xlsx", {"Sheet1": CONDITIONS + frames}, shaped))
     assert history.outputs["strain"][1] == pytest.approx(0.0123, rel=1e-15)
 
 
 def test_numbers_entered_as_text_with_decimal_commas(tmp_path: Path):
     frames = [["Time (h)", "Strain (%)"], [0, "0,0"], [1, "0,51"]]
-    (history,) = read(written(tmp_path / "x.xlsx", {"Sheet1": CONDITIONS + frames}))
+    (history,) = read(workbook(tmp_path / "x.xlsx", {"Sheet1": CONDITIONS + frames}))
     assert history.outputs["strain"][1] == pytest.approx(0.0051, rel=1e-15)
 
 
-REFUSED = {
-    "formula": ([*FRAMES, [2, "=B3*2"]], "x.xlsx, sheet 'S', cell B7: a formula without a computed value"),
-    "error value": ([*FRAMES, ["#N/A", 2]], "x.xlsx, sheet 'S', row 7: 'Time .h.' is '#N/A'; write a finite number"),
-    "time of day": ([*FRAMES, ["01:30:00", 2]], "x.xlsx, sheet 'S', row 7: 'Time .h.' is '01:30:00'"),
-    "falling time": ([*FRAMES, [0.05, 2]], "x.xlsx, sheet 'S', row 7: time falls from 1200 s to 180 s"),
-    "no time": ([["Strain (%)"], [1]], "x.xlsx: no sheet has a column of time .sheets: 'S'.; name one time_h"),
-    "thousands": ([["Time (h)", "Strain (%)"], [0, "1,234"]], "x.xlsx, sheet 'S': '1,234' may be 1.234 or 1234"),
-}
+REFUSED = [
+    ([*FRAMES, [2, "=B3*2"]], "x.xlsx, sheet 'S', cell B7: a formula without a computed value"),
+    ([*FRAMES, ["#N/A", 2]], "x.xlsx, sheet 'S', row 7: 'Time .h.' is '#N/A'; write a finite number"),
+    ([*FRAMES, ["01:30:00", 2]], "x.xlsx, sheet 'S', row 7: 'Time .h.' is '01:30:00'"),
+    ([*FRAMES, [0.05, 2]], "x.xlsx, sheet 'S', row 7: time falls from 1200 s to 180 s"),
+    ([["Strain (%)"], [1]], "x.xlsx: no sheet has a column of time .sheets: 'S'.; name one time_h"),
+    ([["Time (h)", "Strain (%)"], [0, "1,234"]], "x.xlsx, sheet 'S': '1,234' may be 1.234 or 1234"),
+]
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_is_refused(case: str, tmp_path: Path):
-    frames, message = REFUSED[case]
-    with pytest.raises(HistoryError, match=message) as caught:
-        read(written(tmp_path / "x.xlsx", {"S": CONDITIONS + frames}))
-    assert "\n" not in str(caught.value)
+def test_what_is_refused(tmp_path: Path):
+    for frames, message in REFUSED:
+        with pytest.raises(HistoryError, match=message) as caught:
+            read(workbook(tmp_path / "x.xlsx", {"S": CONDITIONS + frames}))
+        assert "\n" not in str(caught.value)
 
 
 def zipped(parts: dict[str, bytes]) -> bytes:
@@ -150,25 +144,29 @@ def zipped(parts: dict[str, bytes]) -> bytes:
     return stream.getvalue()
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (b"time_h,strain_pct\n0,0\n", "x.xlsx: is no spreadsheet that can be read"),
-        (b"", "x.xlsx: is no spreadsheet that can be read"),
-        (zipped({"a.txt": b"a"}), "x.xlsx: is no spreadsheet that can be read"),
-        (
-            zipped({"xl/worksheets/sheet1.xml": bytes(600_000_000)}),
-            "x.xlsx: unpacks to 600 MB, more than 100 MB; save it as CSV, or if it is right, CREEPKIT_LIMITS=7",
-        ),
-        (
-            zipped({"xl/workbook.xml": b'<?xml version="1.0"?><!DOCTYPE a>'}),
-            "x.xlsx: is no spreadsheet that can be read",
-        ),
-    ],
-    ids=["text", "empty", "another archive", "bomb", "entities"],
-)
-def test_what_is_no_spreadsheet(content: bytes, message: str, tmp_path: Path):
-    (tmp_path / "x.xlsx").write_bytes(content)
-    with pytest.raises(HistoryError, match=message) as caught:
-        SPREADSHEET.read(tmp_path / "x.xlsx")
-    assert "\n" not in str(caught.value)
+def test_what_is_no_spreadsheet(tmp_path: Path):
+    """Text, nothing, another archive, entities, and a bomb."""
+    entities = zipped({"xl/workbook.xml": b'<?xml version="1.0"?><!DOCTYPE a>'})
+    bomb = zipped({"xl/worksheets/sheet1.xml": bytes(600_000_000)})
+    none = [(x, "is no spreadsheet that can be read") for x in (b"t,s\n0,0\n", b"", zipped({"a.txt": b"a"}), entities)]
+    for content, said in (*none, (bomb, "unpacks to 600 MB, more than 100 MB; .* if it is right, CREEPKIT_LIMITS=7")):
+        (tmp_path / "x.xlsx").write_bytes(content)
+        with pytest.raises(HistoryError, match=f"x.xlsx: {said}") as caught:
+            SPREADSHEET.read(tmp_path / "x.xlsx")
+        assert "\n" not in str(caught.value)
+
+
+def test_what_is_hidden_is_told(tmp_path: Path):
+    """Hidden sheets are left aside, hidden rows and columns are read."""
+
+    def hidden(sheet):
+        sheet.row_dimensions[5].hidden = sheet.column_dimensions["B"].hidden = True
+        sheet.sheet_state = "hidden" if sheet.title == "old" else "visible"
+
+    frames = CONDITIONS + FRAMES
+    (history,) = read(workbook(tmp_path / "x.xlsx", {"S": frames, "old": frames}, hidden))
+    for remark in ("sheet 'old' not read", "rows of sheet 'S' read too: 5", "columns of sheet"):
+        assert f"hidden {remark}" in history.labels["assumed"]
+    rows = [["Test", "Stress (MPa)", "T (C)", "t_r (h)"], *([f"A{k}", 60, 850, 100] for k in range(5))]
+    table = workbook(tmp_path / "x.xlsx", {"S": rows}, hidden)
+    assert "hidden rows of sheet 'S' read too: 5" in TEST_TABLE.read(table)[1].labels["assumed"]

@@ -159,78 +159,75 @@ def test_texts_in_columns_are_conditions_and_labels(read):
 
 
 HEAD = "# temperature_C: 850\n# stress_MPa: 60\n"
-STRAINS_WITHOUT_UNIT = {
-    "values above one": ("time_h,strain\n0,0\n1,3.5\n", 0.035, "strain in per cent (up to 3.5)"),
-    "values below a thousandth": ("time_h,strain\n0,0\n1,2e-4\n", 2e-4, "strain a fraction (up to 0.0002)"),
-    "key of per cent": ("# strain_unit: %\ntime_h,strain\n0,0\n1,0.5\n", 0.005, ""),
-    "key of one": ("# strain_unit: 1\ntime_h,strain,strain_sd\n0,0,1e-4\n1,0.5,1e-4\n", 0.5, ""),
-    "cells in per cent": ("time_h,strain\n0,0 %\n1,0.5 %\n", 0.005, ""),
-    "file of an earlier version": (
+STRAINS_WITHOUT_UNIT = [
+    ("time_h,strain\n0,0\n1,3.5\n", 0.035, "strain in per cent (up to 3.5)"),
+    ("time_h,strain\n0,0\n1,2e-4\n", 2e-4, "strain a fraction (up to 0.0002)"),
+    ("# strain_unit: %\ntime_h,strain\n0,0\n1,0.5\n", 0.005, ""),
+    ("# strain_unit: 1\ntime_h,strain,strain_sd\n0,0,1e-4\n1,0.5,1e-4\n", 0.5, ""),
+    ("time_h,strain\n0,0 %\n1,0.5 %\n", 0.005, ""),
+    (
         "# name: a\n# specimen: uniaxial\n# control: load\n# temperature_K: 1123.15\n# strain_measure: logarithmic\n"
         "# includes_elastic: no\ntime_s,strain\n0,0\n3600,0.5\n",
         0.5,
         "strain a fraction as in files of write_history",
     ),
-}
+]
 
 
-@pytest.mark.parametrize("case", STRAINS_WITHOUT_UNIT)
-def test_strain_without_unit_that_is_decided(read, case: str):
-    text, strain, assumption = STRAINS_WITHOUT_UNIT[case]
-    head = "# stress_MPa: 60\n" if "temperature_K" in text else HEAD
-    (history,) = read(head + text)
-    assert history.outputs["strain"][1] == strain
-    assert assumption in history.labels.get("assumed", "")
+def test_strain_without_unit_that_is_decided(read):
+    for text, strain, assumption in STRAINS_WITHOUT_UNIT:
+        (history,) = read(("# stress_MPa: 60\n" if "temperature_K" in text else HEAD) + text)
+        assert history.outputs["strain"][1] == strain, text
+        assert assumption in history.labels.get("assumed", ""), text
 
 
-REFUSED = {
-    "strain without unit": (
+REFUSED = [
+    (
         "time_h,strain\n0,0\n1,0.5\n",
         "x.csv:3: 'strain' has no unit, and values up to 0.5 may be fractions or per cent; name it strain_1 or",
     ),
-    "scatter without unit": ("time_h,strain_pct,strain_sd\n0,0,1\n1,1,1\n", "x.csv:3: 'strain_sd' has no unit"),
-    "thousands or decimals": ("time_h;strain_pct\n0;0\n1,234;2,345\n", "x.csv: '1,234' may be 1.234 or 1234; write"),
-    "two signs": ("time_h;strain_pct\n0;0\n1,5;2.5\n1,5;2,5\n", "x.csv:5: 'strain_pct' is '2.5' with a point"),
-    "per cent twice": ("time_h,strain_1\n0,0%\n1,5%\n", "x.csv:3: 'strain_1' is not in per cent, but its cells are"),
-    "condition below": ("time_h,strain_pct\n0,0\n# stress_MPa: 70\n1,1\n", "x.csv:5: 'stress_MPa' stands below the"),
-    "footer of numbers": ("time_h,strain_pct\n0,0\n1,1\nMaximum,1\n", "x.csv:6: 'time_h' is 'Maximum'; write a fini"),
-    "lost values at the end": ("time_h,strain_pct\n0,0\n1,1\nnan,nan\n", "x.csv:6: 'time_h' is 'nan'; write a finite"),
-    "columns that say nothing": ("Time (h);A1;A2\n0;0;0\n1;1;1\n", "x.csv:3: the column 'A1' does not say what it"),
-    "tests or sensors": ("Time (h),Strain 1 (%),Strain 2 (%)\n0,0,0\n1,1,1\n", "x.csv:3: several columns of one quan"),
-    "two strains": ("Time (h),Plastic strain (%),Strain (%)\n0,0,0\n1,1,1\n", "x.csv:3: column 'Plastic strain .*is n"),
-    "test twice": (
+    ("time_h,strain_pct,strain_sd\n0,0,1\n1,1,1\n", "x.csv:3: 'strain_sd' has no unit"),
+    ("time_h;strain_pct\n0;0\n1,234;2,345\n", "x.csv: '1,234' may be 1.234 or 1234; write"),
+    ("time_h;strain_pct\n0;0\n1,5;2.5\n1,5;2,5\n", "x.csv:5: 'strain_pct' is '2.5' with a point"),
+    ("time_h,strain_1\n0,0%\n1,5%\n", "x.csv:3: 'strain_1' is not in per cent, but its cells are"),
+    ("time_h,strain_pct\n0,0\n# stress_MPa: 70\n1,1\n", "x.csv:5: 'stress_MPa' stands below the"),
+    ("time_h,strain_pct\n0,0\n1,1\nMaximum,1\n", "x.csv:6: 'time_h' is 'Maximum'; write a fini"),
+    ("time_h,strain_pct\n0,0\n1,1\nnan,nan\n", "x.csv:6: 'time_h' is 'nan'; write a finite"),
+    ("Time (h);A1;A2\n0;0;0\n1;1;1\n", "x.csv:3: the column 'A1' does not say what it"),
+    ("Time (h),Strain 1 (%),Strain 2 (%)\n0,0,0\n1,1,1\n", "x.csv:3: several columns of one quan"),
+    ("Time (h),Plastic strain (%),Strain (%)\n0,0,0\n1,1,1\n", "x.csv:3: column 'Plastic strain .*is n"),
+    (
         "Time (h);A1 strain (%);A1 strain (%)\n0;0;0\n1;1;1\n",
         "x.csv:3: two tests are called 'A1'; give each its own name",
     ),
-    "cell of a test in wide rows": (
+    (
         "Time (h);A1 strain (%);A2 strain (%)\n0;0;0\n1;a lot;1\n",
         "x.csv:5, column 2: 'strain .%.' is 'a lot'; write a finite number",
     ),
-    "cell beside the columns": (
+    (
         "Time (h);A1 strain (%);A2 strain (%);\n0;0;0;\n1;1;1;5\n",
         "x.csv:5: '5' stands in a column without a name; name it or remove it",
     ),
-    "a line of text with a cell lost": (
+    (
         "Time (h);A1 strain (%);A2 strain (%)\n0;0;0\n1;1\n",
         "x.csv:5: number of cells 2, of columns 3; write one cell a column, empty ones too",
     ),
-    "a test without rows": (
+    (
         "Time (h);A1 strain (%);A2 strain (%)\n0;0;\n1;1;\n",
         "x.csv:3: test 'A2' has no rows below the names of its columns",
     ),
-    "number above": ("5;6\ntime_h;strain_pct\n0;0\n1;1\n", "x.csv:3: the number 5 stands above the names of the col"),
-    "key given twice": ("Stress (MPa);70\ntime_h;strain_pct\n0;0\n1;1\n", "x.csv:3: 'stress_MPa' was already given"),
-    "decimal sign": ("# decimal: dot\ntime_h;strain_pct\n0;0\n1;1\n", "x.csv:3: decimal is 'dot'; allowed: point"),
-    "unit that means two": ("# stress (mPa): 3\ntime_h;strain_pct\n0;0\n1;1\n", "x.csv:3: .*mPa"),
-}
+    ("5;6\ntime_h;strain_pct\n0;0\n1;1\n", "x.csv:3: the number 5 stands above the names of the col"),
+    ("Stress (MPa);70\ntime_h;strain_pct\n0;0\n1;1\n", "x.csv:3: 'stress_MPa' was already given"),
+    ("# decimal: dot\ntime_h;strain_pct\n0;0\n1;1\n", "x.csv:3: decimal is 'dot'; allowed: point"),
+    ("# stress (mPa): 3\ntime_h;strain_pct\n0;0\n1;1\n", "x.csv:3: .*mPa"),
+]
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_is_asked_for(read, case: str):
-    text, message = REFUSED[case]
-    with pytest.raises(HistoryError, match=message) as caught:
-        read(HEAD + text)
-    assert "\n" not in str(caught.value)
+def test_what_is_asked_for(read):
+    for text, message in REFUSED:
+        with pytest.raises(HistoryError, match=message) as caught:
+            read(HEAD + text)
+        assert "\n" not in str(caught.value)
 
 
 def test_a_canonical_file_that_a_spreadsheet_saved(read):

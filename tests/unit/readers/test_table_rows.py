@@ -4,8 +4,6 @@ import pytest
 
 from creepkit.readers.table_rows import TableRow, packed, without_empty
 
-RAGGED = [TableRow(k, tuple("x" * n for n in range(k % 4 + 1))) for k in range(50)]
-
 
 @pytest.mark.parametrize("empty", [{0}, {49}, {10, 11}, set(range(50))], ids=str)
 def test_empty_rows_are_left_out(empty):

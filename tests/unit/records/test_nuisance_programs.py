@@ -79,7 +79,5 @@ def test_what_is_no_nuisance_is_refused_in_one_sentence():
         Nuisance("rate step")
     with pytest.raises(SolveError, match="nuisance 'thickness' has no start; only temperature step, rate step, load"):
         Nuisance("thickness", start=5.0)
-    with pytest.raises(SolveError, match="tests is 'test_01'; give names"):
-        Nuisance("rate step", start=5.0, tests="test_01")
     with pytest.raises(SolveError, match="scope 'tests' is not known; did you mean 'test'"):
         Nuisance("rate step", "tests", start=5.0)

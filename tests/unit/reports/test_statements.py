@@ -8,8 +8,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+import sympy
 
 import creepkit as ck
+from creepkit.exporters.latex import equations_in_latex
+from creepkit.exporters.mathml import law_equations
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection.discrimination import chi_square_by_test
 from creepkit.inverse.selection.ranking import Ranking, rank
@@ -83,10 +86,21 @@ def test_what_an_interval_does_not_include_adds_in_quadrature() -> None:
     assert combined_change_text([]) == ""
 
 
-# ---- exponents ------------------------------------------------------------------------------------------------------
+# ---- equations ------------------------------------------------------------------------------------------------------
 
 
-# ---- forecasts ------------------------------------------------------------------------------------------------------
+def test_a_law_has_one_form_in_mathml_and_latex() -> None:
+    """exp(-c s) is a factor in both, and no denominator in one of them."""
+    A, c = ck.parameters("A c")
+    rate = A * sympy.exp(ck.strain * sympy.exp(-c * ck.stress))
+    params = {A: ck.Param("a", (1e-9, 1.0), "1/s", "log"), c: ck.Param("b", (0, 1), "1/MPa")}
+    law = ck.CreepLaw(name="x", terms={"x": rate}, params=params)
+    (mathml,) = law_equations(law)
+    assert "<mfrac>" not in mathml
+    assert mathml.count("<mi>exp</mi>") == "\n".join(equations_in_latex(law)).count(r"\exp") == 2
+
+
+# ---- chi-square of a test --------------------------------------------------------------------------------------------
 
 
 def test_the_terminal_and_the_report_state_one_chi_square_of_a_test() -> None:

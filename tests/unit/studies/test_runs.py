@@ -22,14 +22,10 @@ from helpers.study_runs import ONE_FIT, STUDY, made, numbers, study_in
 
 
 def test_only_what_changed_runs_again(study: Path) -> None:
-    everything = {
-        "quality",
-        "identification of A",
-        "identification of B",
-        "forecast of next",
-        "export 1 of A: python",
-        "export 1 of B: python",
+    groups = {
+        f"{one} of {group}{rest}" for one, rest in (("identification", ""), ("export 1", ": python")) for group in "AB"
     }
+    everything = {"quality", "forecast of next", *groups}
     first = ck.Study.load(study).run()
     assert made(first) == everything
     assert made(ck.Study.load(study).run()) == set()

@@ -32,11 +32,8 @@ def test_loads_in_psi_are_found():
 @pytest.mark.parametrize(("factor", "units"), [(60.0, "as of min and s"), (3600.0, "as of h and s")])
 def test_times_of_repeated_tests_in_another_unit_are_found(factor, units):
     """Rates scatter by a third, and the tests last unlike long."""
-    slow, fast = (
-        bar("a.csv", 100.0, hours=300.0, rate=1.3e-8),
-        bar("b.csv", 100.0, hours=100.0 / factor, rate=1e-8 * factor),
-    )
-    (said,) = swapped_units([slow, fast])
+    slow = bar("a.csv", 100.0, hours=300.0, rate=1.3e-8)
+    (said,) = swapped_units([slow, bar("b.csv", 100.0, hours=100.0 / factor, rate=1e-8 * factor)])
     assert f"times of 'a.csv' are about {factor:g} times those of 'b.csv', {units}" in said
 
 

@@ -27,13 +27,11 @@ def test_training_rows_are_inside() -> None:
     assert not ApplicabilityDomain.from_rows("abcdef", rows).outside(rows).any()
 
 
-def test_one_input_beyond_its_range_is_outside_and_named() -> None:
+def test_one_input_beyond_its_range_is_outside() -> None:
     domain = ApplicabilityDomain.from_rows(
         ("log10 A", "n"), np.random.default_rng(2).uniform(size=(100, 2)) * [10, 1] + [-20, 3]
     )
-    assert domain.outside(np.array([-15.0, 4.2]))
-    assert domain.reason(np.array([-15.0, 4.2])).startswith("n = 4.2 (trained on 3.0")
-    assert domain.reason(np.array([-15.0, 3.5])) == ""
+    assert domain.outside(np.array([[-15.0, 4.2], [-15.0, 3.5]])).tolist() == [True, False]
 
 
 def test_a_combination_that_never_occurred_is_outside_though_each_input_is_within_its_range() -> None:
@@ -44,7 +42,6 @@ def test_a_combination_that_never_occurred_is_outside_though_each_input_is_withi
     assert (domain.low < odd).all()
     assert (odd < domain.high).all()
     assert domain.outside(odd)
-    assert "combination" in domain.reason(odd)
     assert not domain.outside(np.array([-7.0 - 2.0 * 5.0, 5.0]))
 
 
@@ -59,8 +56,6 @@ def test_each_input_is_forgiven_what_it_is_told() -> None:
     rows = np.random.default_rng(7).uniform(size=(400, 2)) * [1, 10]
     domain = replace(ApplicabilityDomain.from_rows(("thickness", "exponent"), rows, [0.05, 0.5]), limit=np.inf)
     assert domain.outside(np.array([[1.04, 5.0], [1.06, 5.0], [0.5, 14.5], [0.5, 15.5]])).tolist() == [0, 1, 0, 1]
-    assert domain.reason(np.array([1.06, 14.5])).startswith("thickness = 1.06 (trained on 0.00")
-    assert "exponent" not in domain.reason(np.array([1.06, 14.5]))
 
 
 def test_a_document_without_margins_is_damaged() -> None:

@@ -271,25 +271,6 @@ def test_other_kinds_of_tests_are_refused(
         bulging.predict(plates.law, plates.theta_of(0), [plate], nuisances={"window": np.ones((1, 1))})
 
 
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({"cell": "rnn"}, "cell 'rnn' is not known; allowed are gru, lstm"),
-        ({"hidden": 0}, "hidden is 0"),
-        ({"inputs": ("laod",)}, "there is no input 'laod': did you mean 'load'"),
-        ({"base": "one-dof"}, "base 'one-dof' is not known; allowed are none, reduced-order, reference-stress"),
-    ],
-)
-def test_recipes_that_make_no_sense(changes: dict, told: str) -> None:
-    with pytest.raises(SurrogateError, match=told):
-        ParameterGru(**changes)
-
-
-def test_a_bar_has_no_reduced_order_model(tension: Dataset) -> None:
-    with pytest.raises(SurrogateError, match="specimen 'uniaxial' has no reduced-order model"):
-        train(tension, ParameterGru(4, 1, base="reduced-order", training=BRIEF))
-
-
 # ---- studies ---------------------------------------------------------------------------------------------------------
 
 
@@ -338,20 +319,6 @@ def test_an_answer_outside_the_domain_says_so(learnt: Surrogate, tension: Datase
     shown = learnt.predict(tension.law, tension.law.to_internal(truth), [odd]).values[0, 0]
     fit = ck.identify(tension.law, [measured(odd, shown, ("strain",), "odd")], using=learnt, starts=1)
     assert [note for note in fit.notes if "outside the domain that the surrogate was trained in, in test 'odd'" in note]
-
-
-def test_identify_of_real_bars_with_a_network_is_off_by_its_error(learnt: Surrogate, tension: Dataset) -> None:
-    truth = tension.values_of(7)
-    tests = []
-    for k, row in enumerate((7, 8, 9, 10)):
-        shown = tension.specimen.predict(
-            tension.law, tension.law.to_internal(truth), [tension.planned_test(row)]
-        ).values[0, 0]
-        tests.append(measured(tension.planned_test(row), shown, ("strain",), f"t{k}"))
-    fit = ck.identify(tension.law, tests, using=learnt, starts=3)
-    by_name = {e.name: e.value for e in fit.estimates}
-    assert by_name["n"] == pytest.approx(truth["n"], abs=0.5)
-    assert by_name["A"] * 100 ** by_name["n"] == pytest.approx(truth["A"] * 100 ** truth["n"], rel=0.3)
 
 
 def test_simulate_with_a_network_is_a_history_of_its_specimen(learnt: Surrogate, tension: Dataset) -> None:

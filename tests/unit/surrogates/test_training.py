@@ -17,6 +17,7 @@ from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.training import train
 from creepkit.surrogates.training_loop import epochs_since_best, learning_rate
 from creepkit.surrogates.training_rows import dataset_fingerprint, training_split
+from helpers.mistakes import said_otherwise
 from helpers.planted_datasets import bars
 from helpers.written_files import names_in
 
@@ -191,21 +192,21 @@ def test_fingerprints_see_what_can_be_learnt(data: Dataset) -> None:
     assert dataset_fingerprint(replace(data, provenance={})) == dataset_fingerprint(data)
 
 
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({"epochs": 0}, "epochs is 0"),
-        ({"batch": 2.5}, "batch is 2.5"),
-        ({"schedule": "step"}, "schedule 'step' is not known; allowed are plateau, cosine, constant"),
-        ({"rate": 0.0}, "rate is 0.0; allowed are numbers above 0"),
-        ({"validation": 1.0}, "validation is 1.0"),
-    ],
-)
-def test_settings_that_make_no_sense(changes: dict, told: str) -> None:
-    with pytest.raises(SurrogateError, match=told):
-        Training(**changes)
-
-
-def test_a_device_that_is_not_there(data: Dataset) -> None:
-    with pytest.raises(SurrogateError, match="device 'tpu' is not there; allowed are auto"):
-        train(data, SMALL, device="tpu")
+def test_settings_that_make_no_sense_and_a_device_that_is_not_there(data: Dataset) -> None:
+    mistakes = [
+        (lambda: Training(epochs=0), "epochs is 0"),
+        (lambda: Training(batch=2.5), "batch is 2.5"),
+        (lambda: Training(schedule="step"), "schedule 'step' is not known; allowed are plateau, cosine, constant"),
+        (lambda: Training(rate=0.0), "rate is 0.0; allowed are numbers above 0"),
+        (lambda: Training(validation=1.0), "validation is 1.0"),
+        (lambda: ParameterGru(cell="rnn"), "cell 'rnn' is not known; allowed are gru, lstm"),
+        (lambda: ParameterGru(hidden=0), "hidden is 0"),
+        (lambda: ParameterGru(inputs=("laod",)), "there is no input 'laod': did you mean 'load'"),
+        (
+            lambda: ParameterGru(base="one-dof"),
+            "base 'one-dof' is not known; allowed are none, reduced-order, reference-stress",
+        ),
+        (lambda: train(data, replace(SMALL, base="reduced-order")), "specimen 'uniaxial' has no reduced-order model"),
+        (lambda: train(data, SMALL, device="tpu"), "device 'tpu' is not there; allowed are auto"),
+    ]
+    assert not said_otherwise(mistakes, SurrogateError)

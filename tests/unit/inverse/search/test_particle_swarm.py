@@ -13,6 +13,8 @@ from helpers.cost_functions import SUM, TRIPLE, Known, cube, quadratic, rastrigi
 
 BARE = ParticleSwarm(refined_candidates=0)
 SMALL = ParticleSwarm(particles=40, iterations=30)
+BEYOND = Bounds(np.array([2.0, -5.0]), np.array([5.0, 5.0]))
+"""The minimum lies beyond a wall."""
 
 
 def paths(landscape):
@@ -33,7 +35,12 @@ def paths(landscape):
 )
 @pytest.mark.parametrize(
     ("cost", "box", "at"),
-    [(quadratic, cube(3), [1, 2, 3]), (rosenbrock, cube(2), [1, 1]), (rastrigin, cube(3, 5.12), [0, 0, 0])],
+    [
+        (quadratic, cube(3), [1, 2, 3]),
+        (quadratic, BEYOND, [2, 2]),
+        (rosenbrock, cube(2), [1, 1]),
+        (rastrigin, cube(3, 5.12), [0, 0, 0]),
+    ],
 )
 def test_the_papers_swarm_finds_known_minima_by_itself(swarm, cost, box, at):
     found = swarm.minima(Known(cost, box)).minima[0]
@@ -68,8 +75,11 @@ def test_inertia_falls_from_its_first_value_to_its_last():
 @pytest.mark.parametrize("velocity", [0.05, 0.15])
 def test_no_step_is_longer_than_the_limit_and_none_leaves_the_box(boundary, velocity):
     landscape = Known(rastrigin, Bounds(np.array([0.5, -5.0]), np.array([5.0, 0.1])))
-    ParticleSwarm(particles=50, iterations=40, boundary=boundary, max_velocity=velocity).minima(landscape)
-    x = paths(landscape)[:40]
+    swarm = ParticleSwarm(50, 40, boundary=boundary, max_velocity=velocity, refined_candidates=0)
+    found = swarm.minima(landscape)
+    assert landscape.calls == [50] * 40
+    np.testing.assert_array_equal(found.trace.evaluations, 50 * np.arange(1, 41))
+    x = paths(landscape)
     assert x.min() >= 0
     assert x.max() <= 1
     steps = np.abs(np.diff(x, axis=0))
@@ -149,9 +159,17 @@ CAREFUL = ParticleSwarm(particles=100, iterations=60, maskable_terms="any")
 @pytest.mark.parametrize("terms", [(POWER,), (HARDENING,), (POWER, HARDENING)])
 @pytest.mark.parametrize("off", ["any", (POWER, HARDENING)])
 def test_an_absent_term_is_switched_off_and_a_present_one_is_not(terms, off):
+    """What is off rests at the bottom of its rate."""
     found = replace(CAREFUL, maskable_terms=off).minima(planted(*terms)).minima[0]
     assert {POWER, HARDENING} - set(found.terms_off) == set(terms)
+    assert all(found.x[2 * (term == HARDENING)] == -12.0 for term in found.terms_off)
     assert found.cost < 5 * len(terms) + 10  # half of the chi-square of the planted waves is 5
+
+
+def test_only_what_may_be_off_is():
+    found = replace(SMALL, maskable_terms=POWER).minima(planted(POWER)).minima
+    assert all(HARDENING not in m.terms_off for m in found)
+    assert SMALL.minima(planted(POWER)).minima[0].terms_off == ()
 
 
 def test_minima_are_the_best_of_each_subset_and_more_terms_fit_no_worse():
@@ -171,13 +189,6 @@ def test_of_subsets_that_fit_alike_the_simplest_comes_first():
     found = CAREFUL.minima(flat).minima
     assert found[0].terms_off == (HARDENING,)
     assert found[0].cost == pytest.approx(0.0, abs=1e-4)
-
-
-def test_only_what_may_be_off_is():
-    landscape = planted(POWER)
-    found = ParticleSwarm(particles=40, iterations=20, maskable_terms=POWER).minima(landscape)
-    assert all(HARDENING not in m.terms_off for m in found.minima)
-    assert ParticleSwarm(particles=40, iterations=20).minima(landscape).minima[0].terms_off == ()
 
 
 def test_masks_of_three_terms_are_never_empty_and_reach_every_subset():
@@ -202,7 +213,7 @@ def test_a_parameter_shared_with_another_term_does_not_rest():
     assert [name for name, is_live in live.items() if not is_live] == ["A_2", "n_2", "m"]
 
 
-# ---- what cannot be ------------------------------------------------------------------------------------------------
+# ---- refinement ----------------------------------------------------------------------------------------------------
 
 
 def test_refined_minima_differ_and_come_best_first():
@@ -211,23 +222,3 @@ def test_refined_minima_differ_and_come_best_first():
     starts = np.array([m.x for m in found])
     assert len(found) == 4
     assert len(np.unique(starts.round(2), axis=0)) > 1
-
-
-def test_an_optimum_beyond_a_wall_is_found_on_it():
-    box = Bounds(np.array([2.0, -5.0]), np.array([5.0, 5.0]))
-    found = BARE.minima(Known(quadratic, box)).minima[0]
-    assert found.x[0] == 2.0
-    assert found.x[1] == pytest.approx(2.0, abs=1e-3)
-
-
-def test_each_iteration_is_one_call():
-    landscape = Known(quadratic, cube(2))
-    found = ParticleSwarm(particles=30, iterations=12).minima(landscape)
-    assert landscape.calls == [30] * 12
-    np.testing.assert_array_equal(found.trace.evaluations, 30 * np.arange(1, 13))
-
-
-def test_what_is_off_rests_at_the_bottom_of_its_rate():
-    found = CAREFUL.minima(planted(POWER)).minima[0]
-    assert found.terms_off == (HARDENING,)
-    assert found.x[2] == -12.0

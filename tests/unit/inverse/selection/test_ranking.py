@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import FitError
 from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
 from creepkit.inverse.identify import identify
 from creepkit.inverse.largest_deviation import LargestDeviation
@@ -105,18 +104,6 @@ def test_only_a_law_that_is_singled_out_and_can_be_predicted_is_challenged(monke
         assert challenged(other) is other
 
 
-def test_what_cannot_be_ranked_is_refused():
-    tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(55.0, 1000.0), (65.0, 1000.0)], seed=0, noise=2e-4)
-    settings = IdentificationSettings(starts=1, sobol_points=8, frames=20, nuisances=())
-    one = identify(NORTON, tests, Steady(), settings=settings)
-    with pytest.raises(FitError, match="there are no identifications to rank"):
-        rank([])
-    with pytest.raises(FitError, match=r"rank\(by='hold-out'\) is not known"):
-        rank([one], "hold-out")
-    with pytest.raises(FitError, match="were made from different histories"):
-        rank([one, replace(one, provenance={**one.provenance, "data": "others"})])
-
-
 def test_an_export_of_a_ranking_carries_its_verdict():
     """What is not decisive must not be read as proved where the law is used."""
     tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(55.0, 1000.0), (65.0, 1000.0)], seed=0, noise=2e-4)
@@ -182,8 +169,3 @@ def test_without_known_noise_nothing_is_decided():
     found = verdict_of(ranking([0.99, 0.01], [UNKNOWN, UNKNOWN]))
     assert found.startswith("not decisive: of 2 laws tried norton is best (weight 0.99 of the laws tried); it cannot")
     assert "cannot be judged: no noise is stated" in found
-
-
-def test_weights_are_of_the_laws_tried():
-    for one in (ranking([0.99, 0.01], challenges=(SUM,)), ranking([1.0, 0.0], [LEAVES] * 2)):
-        assert "of the laws tried" in one.verdict
