@@ -15,7 +15,7 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 270,
-    "app": 650,
+    "app": 630,
     "cameras": 1200,
     "cli": 2300,
     "core": 100,
@@ -44,13 +44,13 @@ BUDGET = {
     "sampling": 1110,
     "screening": 740,
     "specimens": 4050,
-    "studies": 2750,
+    "studies": 2670,
     "surrogates": 1850,
     "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 33740
+TESTS = 33500
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

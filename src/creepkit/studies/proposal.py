@@ -22,7 +22,6 @@ from creepkit.registry.reading import read_those_that_can_be
 from creepkit.studies.camera_proposal import found_cameras
 from creepkit.studies.data_summary import FEWEST_RUPTURES, DataSummary
 from creepkit.studies.study_file import parse_study
-from creepkit.studies.swapped_units import swapped_units
 
 PLANNED_LAWS = ["norton", "strain-hardening", "time-hardening"]
 """Of tests that cameras are still to be read of."""
@@ -65,11 +64,9 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
         problems = [f"not read: {one}" for one in problems if one.split(":")[0] not in named][:MOST_REMARKS]
         quality = ck.check_data_quality([history for history in tests if history.outputs])
         summary, left_out = DataSummary.of(tests), left_out_lines(quality)
-        doubts = [f"check the units: {one}" for one in swapped_units(tests)]
-        lines = (*summary.lines, *doubts, *left_out, *cameras.summary, *problems)
+        lines = (*summary.lines, *left_out, *cameras.summary, *problems)
         known |= {
             "files": [name if base == "." else base if name == "." else f"{base}/{name}" for name in names],
-            "found": [*summary.lines, *(f"C{one[1:]}" for one in doubts)],
             "reader": reader, "summary": summary, "left_out": left_out, "problems": problems,
             "copies": [one for one in quality if one.kind == "copy"],
             "flags": [
@@ -104,7 +101,9 @@ def rendered(known: Mapping[str, Any]) -> str:
     }
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= filters
-    template = environment.from_string(files("creepkit.studies").joinpath("proposed_study.toml.jinja").read_text())
+    template = environment.from_string(
+        files("creepkit.studies").joinpath("proposed_study.toml.jinja").read_text("utf-8")
+    )
     limits = {"fewest_temperatures": FEWEST_TEMPERATURES, "fewest_ruptures": FEWEST_RUPTURES}
     return re.sub(r"\n{3,}", "\n\n", template.render({**known, **limits})).rstrip("\n") + "\n"
 
