@@ -15,42 +15,42 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 270,
-    "app": 650,
+    "app": 630,
     "cameras": 1200,
     "cli": 2300,
     "core": 100,
     "dataset": 820,
-    "discovery": 1250,
-    "experiments": 1800,
+    "discovery": 1210,
+    "experiments": 1710,
     "exporters": 2690,
     "extraction": 1150,
     "fem": 1900,
     "files": 1310,
-    "forecasts": 1510,
+    "forecasts": 1490,
     "instruments": 1400,
     "integration": 1100,
-    "inverse": 11550,
+    "inverse": 12100,
     "jobs": 260,
-    "kernels": 1850,
-    "language": 1600,
-    "laws": 150,
-    "modules": 760,
-    "quality": 1400,
+    "kernels": 1720,
+    "language": 1580,
+    "laws": 140,
+    "modules": 770,
+    "quality": 1470,
     "readers": 4150,
-    "records": 2050,
-    "registry": 650,
+    "records": 1960,
+    "registry": 610,
     "reports": 8250,
-    "rupture_assessment": 1950,
+    "rupture_assessment": 1880,
     "sampling": 1070,
-    "screening": 750,
+    "screening": 740,
     "specimens": 4050,
-    "studies": 2750,
+    "studies": 2670,
     "surrogates": 1790,
     "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 33740
+TESTS = 33500
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
