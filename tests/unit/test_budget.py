@@ -34,7 +34,7 @@ BUDGET = {
     "kernels": 1720,
     "language": 1580,
     "laws": 140,
-    "modules": 770,
+    "modules": 760,
     "quality": 1470,
     "readers": 4150,
     "records": 1960,
