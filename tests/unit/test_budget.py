@@ -44,7 +44,7 @@ BUDGET = {
     "sampling": 1110,
     "screening": 740,
     "specimens": 4050,
-    "studies": 2670,
+    "studies": 2590,
     "surrogates": 1850,
     "testing": 1900,
 }
