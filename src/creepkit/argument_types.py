@@ -144,12 +144,13 @@ def kind_of(annotation: Any, finite: bool) -> Kind:
 def _kind_of_class(kind: Any) -> Kind:
     if not isinstance(kind, type) or kind in (Any, object):
         return Kind("anything")
+    words = f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
     if not getattr(kind, "_is_protocol", False):
-        article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        return Kind(f"{article} {kind.__name__}", lambda value: isinstance(value, kind))
+        return Kind(words, lambda value: isinstance(value, kind))
     names = {name for one in kind.__mro__ if getattr(one, "_is_protocol", False) for name in vars(one)}
     members = sorted(name for name in names if name == "__call__" or not name.startswith("_"))
-    words = "a function" if "__call__" in members else f"an object with {' and '.join(members)}"
+    if not getattr(kind, "_is_runtime_protocol", False):  # whose name tells a user nothing
+        words = "a function" if "__call__" in members else f"an object with {' and '.join(members)}"
     return Kind(words, lambda value: not isinstance(value, type) and all(hasattr(value, one) for one in members))
 
 

@@ -20,7 +20,7 @@ Ints: TypeAlias = NDArray[np.int64]
 Bools: TypeAlias = NDArray[np.bool_]
 
 
-__all__ = ["ArrayLike", "Bools", "Floats", "Ints", "frozen", "single_threaded_blas", "usable_cores"]
+__all__ = ["ArrayLike", "Bools", "Floats", "Ints", "frozen", "set_fields", "single_threaded_blas", "usable_cores"]
 
 
 def frozen(values: ArrayLike | Sequence[Any], dtype: type = np.float64) -> NDArray[Any]:
@@ -28,6 +28,12 @@ def frozen(values: ArrayLike | Sequence[Any], dtype: type = np.float64) -> NDArr
     array: NDArray[Any] = np.array(values, dtype=dtype, order="C")
     array.flags.writeable = False
     return array
+
+
+def set_fields(record: object, **values: Any) -> None:
+    """Set fields of a frozen record while it is made."""
+    for name, value in values.items():
+        object.__setattr__(record, name, value)
 
 
 def single_threaded_blas() -> AbstractContextManager[object]:

@@ -100,10 +100,6 @@ class FitWarning(UserWarning):
     """An identification answers beyond what its tests cover; `warnings.simplefilter` turns it off, or into an error."""
 
 
-class SurrogateWarning(UserWarning):
-    """A surrogate answers without knowing where it may; `warnings.simplefilter` turns it off, or into an error."""
-
-
 class CacheWarning(UserWarning):
     """Compiled laws are not kept on disk, for others could change what is executed."""
 

@@ -52,11 +52,9 @@ HOLD_TIMES = 4
 """Ends of the first ramp, of the first hold, of the second ramp, and of the test."""
 
 
-def empty_columns(sizes: Mapping[str, int]) -> dict[str, Any]:
-    """Every column without samples, {name: (0, ...)}.
-
-    sizes : {axis: length}.
-    """
+def empty_columns(names: Mapping[str, Sequence[str]], frames: int) -> dict[str, Any]:
+    """Every column without samples, {name: (0, ...)}; names : those of parameters, conditions and outputs."""
+    sizes = {**{axis: len(several) for axis, several in names.items()}, "holds": HOLD_TIMES, "frames": frames}
     shapes = {name: tuple(sizes[axis] for axis in column.axes) for name, column in COLUMNS.items()}
     return {name: np.empty((0, *shapes[name]), column.memory_type) for name, column in COLUMNS.items()}
 

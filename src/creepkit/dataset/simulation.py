@@ -7,13 +7,13 @@ Samples are simulated one at a time on one thread.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from creepkit.arrays import Ints
-from creepkit.dataset.dataset import FAILED, HOLD_TIMES, NOT_SIMULATED, Dataset, empty_columns
+from creepkit.dataset.dataset import FAILED, NOT_SIMULATED, Dataset, empty_columns
 from creepkit.errors import DatasetError
 from creepkit.jobs.worker_process import error_text
 from creepkit.records import Predictor, Status, SupportsReducedOrderModel, predict_with
@@ -77,26 +77,15 @@ REJECTED_DIGITS = 12
 
 def empty_dataset(design: SamplingDomain, specimen: Specimen, provenance: dict[str, object]) -> Dataset:
     """The data set of a design with no samples in it yet."""
-    sizes = {
-        "parameter_names": len(design.law.names),
-        "condition_names": len(design.condition_names),
-        "outputs": len(specimen.outputs),
-        "frames": design.grid.frames,
-        "holds": HOLD_TIMES,
+    names: dict[str, Any] = {
+        "outputs": tuple(specimen.outputs),
+        "parameter_names": tuple(design.law.names),
+        "condition_names": tuple(design.condition_names),
+        "reason_names": ("accepted", *(c.name for c in design.criteria)),
+        "reason_texts": ("all criteria are met", *(c.text for c in design.criteria)),
     }
-    return Dataset(
-        law=design.law,
-        specimen=specimen,
-        design_document=design.document(),
-        grid=design.grid,
-        outputs=tuple(specimen.outputs),
-        parameter_names=tuple(design.law.names),
-        condition_names=tuple(design.condition_names),
-        reason_names=("accepted", *(c.name for c in design.criteria)),
-        reason_texts=("all criteria are met", *(c.text for c in design.criteria)),
-        provenance=provenance,
-        **empty_columns(sizes),
-    )
+    columns = empty_columns(names, design.grid.frames)
+    return Dataset(design.law, specimen, design.document(), design.grid, provenance=provenance, **names, **columns)
 
 
 def simulate_rows(design: SamplingDomain, header: Dataset, seed: int, first: int, count: int) -> Dataset:

@@ -38,14 +38,13 @@ from numpy.typing import NDArray
 
 from creepkit.arrays import Bools
 from creepkit.checked_arguments import checked
-from creepkit.dataset.dataset import COLUMNS, HOLD_TIMES, NOT_SIMULATED, Dataset, empty_columns
+from creepkit.dataset.dataset import COLUMNS, NOT_SIMULATED, Dataset, empty_columns
 from creepkit.errors import DatasetError, LawError, printable, quoted, quoted_value
 from creepkit.files.hdf5_files import open_hdf5, write_hdf5, write_names
 from creepkit.files.json_documents import compact_json, parse_json
 from creepkit.files.reading import FileKind
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.records import Status
-from creepkit.registry.arguments import specimen_by_name
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid
 
@@ -144,11 +143,10 @@ def write_header(file: h5py.File, data: Dataset) -> None:
     }
     for name, document in documents.items():
         file.attrs[name] = compact_json(document, sort_keys=True)
-    grid = file.create_dataset("time_grid", data=data.grid.values, dtype=np.float64)
-    grid.attrs["relative"] = bool(data.grid.relative)
-    sizes = {**{name: len(getattr(data, name)) for name in NAME_LISTS}, "holds": HOLD_TIMES, "frames": grid.size}
+    file["time_grid"] = data.grid.values
+    file["time_grid"].attrs["relative"] = bool(data.grid.relative)
     for name, column in COLUMNS.items():
-        shape = tuple(sizes[axis] for axis in column.axes)
+        shape = getattr(data, name).shape[1:]
         # the last axis apart: neighbours in a chunk are then neighbours in time, which compress better
         chunks = (column.chunk, *(max(size, 1) for size in shape[:-1]), *(1 for _ in shape[-1:]))
         file.create_dataset(name, (0, *shape), column.file_type, maxshape=(None, *shape), chunks=chunks, **COMPRESSION)
@@ -198,8 +196,6 @@ def read_header(file: h5py.File, source: str) -> Dataset:
     if not name_lists["outputs"] or len(name_lists["reason_names"]) != len(name_lists["reason_texts"]):
         raise _damaged(source, "names no output, or not a text for each reason")
     times = file["time_grid"]
-    lengths = {name: len(values) for name, values in name_lists.items()}
-    columns = empty_columns({**lengths, "holds": HOLD_TIMES, "frames": len(times)})
     try:
         law, grid = law_from_json(documents["law"], source), TimeGrid(times[:], bool(times.attrs["relative"]))
     except (LawError, DatasetError) as error:
@@ -208,12 +204,12 @@ def read_header(file: h5py.File, source: str) -> Dataset:
         raise _damaged(source, f"its parameters are {', '.join(names)}, those of its law {', '.join(law.names)}")
     header = Dataset(
         law=law,
-        specimen=specimen_from_json(documents["specimen"], source, specimen_by_name),
+        specimen=specimen_from_json(documents["specimen"], source),
         design_document=documents["design"],
         grid=grid,
         provenance=documents["provenance"],
         **name_lists,
-        **columns,
+        **empty_columns(name_lists, len(times)),
     )
     check_columns(file, header, source)
     return header

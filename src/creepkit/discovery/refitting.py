@@ -252,9 +252,7 @@ class _RefitCache:
 
 def _coordinates_within_bounds(law: CreepLaw, values: Mapping[str, float], estimates: IsothermalEstimates) -> Floats:
     """Conditioned coordinates, (parameters,), of internal values, within the bounds."""
-    bounds = [[p.to_internal(b) for b in p.bounds] for p in law.params.values()]
-    low, high = np.array(bounds).T
-    theta = np.clip([values[name] for name in law.names], low, high)
+    theta = np.clip([values[name] for name in law.names], *law.internal_bounds)
     return Coordinates(law, estimates.reference).u(theta)
 
 

@@ -86,10 +86,8 @@ class IsothermalEstimates:
     def has_undetermined_parameters(self) -> bool:
         """Whether some parameter, rate coefficients aside, is undetermined at most temperatures."""
         coordinates = Coordinates(self.law, self.reference)
-        bound_widths = np.array(
-            [p.to_internal(p.bounds[1]) - p.to_internal(p.bounds[0]) for p in self.law.params.values()]
-        )
-        determined = np.sqrt(np.einsum("kii->ki", self.covariance)) < UNDETERMINED_WIDTH * bound_widths
+        widths = np.ptp(self.law.internal_bounds, axis=0)
+        determined = np.sqrt(np.einsum("kii->ki", self.covariance)) < UNDETERMINED_WIDTH * widths
         determined[:, list(coordinates.coefficients)] = True
         return bool((np.median(determined, axis=0) < 0.5).any())
 
@@ -154,9 +152,8 @@ def _theta_covariance(fit: Identification) -> Floats:
 
 def _bound_variance(fit: Identification) -> Floats:
     """(parameters, parameters) variance to add where an estimate lies at its bound, which says nothing but that."""
-    bounds = [[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]
     at_bound = [e.verdict == "at its bound" for e in fit.estimates]
-    return np.asarray(np.diag(np.where(at_bound, np.ptp(bounds, axis=1) ** 2 / 12.0, 0.0)))
+    return np.asarray(np.diag(np.where(at_bound, np.ptp(fit.law.internal_bounds, axis=0) ** 2 / 12.0, 0.0)))
 
 
 def _central_reference(references: Sequence[ReferencePoint]) -> ReferencePoint:
@@ -217,16 +214,10 @@ class Regression:
 
     def within_bounds(self) -> bool:
         """Whether its numbers lie within their bounds, or near."""
-        standard_deviations = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        for (name, value), standard_deviation in zip(self.values.items(), standard_deviations, strict=True):
-            low, high = (self.table[name].to_internal(b) for b in self.table[name].bounds)
-            if (
-                not low - BOUND_TOLERANCE_SD * standard_deviation
-                <= value
-                <= high + BOUND_TOLERANCE_SD * standard_deviation
-            ):
-                return False
-        return True
+        margin = BOUND_TOLERANCE_SD * np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        params, values = [self.table[name] for name in self.values], np.array([*self.values.values()])
+        low, high = np.array([[p.to_internal(b) for b in p.bounds] for p in params]).reshape(-1, 2).T
+        return bool(((values >= low - margin) & (values <= high + margin)).all())
 
 
 class _DesignMatrix:

@@ -59,14 +59,8 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
 
     first : bytes to read of a file however large; by default all of one that is at most `kind.maximum_bytes` long.
     """
-    descriptor = _open_regular(path, kind, any_size=first is not None)
-    try:
-        with os.fdopen(descriptor, "rb") as stream:
-            content = stream.read() if first is None else stream.read(first)
-    except OSError as error:
-        raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
-    except MemoryError:
-        raise kind.error(f"{path}: holds more than there is memory for") from None
+    with open_binary(path, kind, any_size=first is not None) as stream:
+        content = stream.read() if first is None else stream.read(first)
     if first is None and len(content) > kind.most_bytes:
         raise kind.error(_too_large(path, kind, len(content)))
     return content
@@ -74,24 +68,22 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
 
 def read_range(path: Path, kind: FileKind, start: int, count: int) -> bytes:
     """Bytes of a regular file however large: `count` of them from byte `start`, fewer at its end."""
-    descriptor = _open_regular(path, kind, any_size=True)
-    try:
-        with os.fdopen(descriptor, "rb") as stream:
-            stream.seek(start)
-            return stream.read(count)
-    except OSError as error:
-        raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
+    with open_binary(path, kind, any_size=True) as stream:
+        stream.seek(start)
+        return stream.read(count)
 
 
 @contextmanager
-def open_binary(path: Path, kind: FileKind) -> Iterator[BufferedReader]:
-    """A regular file of at most `kind.maximum_bytes`, open for reading part by part; its error where reading fails."""
-    descriptor = _open_regular(path, kind)
+def open_binary(path: Path, kind: FileKind, *, any_size: bool = False) -> Iterator[BufferedReader]:
+    """A regular file of at most `kind.maximum_bytes` or of any size, open for reading; its error where that fails."""
+    descriptor = _open_regular(path, kind, any_size=any_size)
     try:
         with os.fdopen(descriptor, "rb") as stream:
             yield stream
     except OSError as error:
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
+    except MemoryError:
+        raise kind.error(f"{path}: holds more than there is memory for") from None
 
 
 def sha256_of(path: Path, kind: FileKind) -> str:

@@ -49,8 +49,6 @@ def read_safetensors(path: str | Path, document: DocumentFormat) -> tuple[dict[s
         arrays = load(content)  # checks types, shapes and places of all arrays
     except (SafetensorError, ValueError, KeyError, TypeError):  # KeyError: a type of numbers that NumPy lacks
         raise kind.error(f"{path}: damaged, or not a safetensors file; {kind.advice}") from None
-    except MemoryError:
-        raise kind.error(f"{path}: holds more than there is memory for") from None
     end = LENGTH_BYTES + int.from_bytes(content[:LENGTH_BYTES], "little")
     text = parse_json(content[LENGTH_BYTES:end].decode(), f"{path}: its header", kind).get("__metadata__", {})
     if HEADER_KEY not in text:

@@ -115,7 +115,7 @@ def _predictor_of(document: PredictorDocument) -> Predictor | None:
     if document.kind in OF_SPECIMENS and document.name in default_registry().specimens():
         fields = {"name": document.name, "fields": document.fields}
         try:
-            specimen = specimen_from_json(fields, "predictor_documents", default_registry().specimen)
+            specimen = specimen_from_json(fields, "predictor_documents")
         except DatasetError as error:
             raise FitError(str(error)) from None
         if document.kind == "specimen":

@@ -25,12 +25,10 @@ if TYPE_CHECKING:
 KernelTarget = Literal["numpy", "torch", "compiled"]
 
 
-@checked
 @overload
 def lower(law: CreepLaw, target: Literal["numpy", "torch"]) -> ArrayKernel: ...
 
 
-@checked
 @overload
 def lower(law: CreepLaw, target: Literal["compiled"]) -> CompiledLaw: ...
 

@@ -93,14 +93,9 @@ def law_to_json(law: CreepLaw) -> dict[str, Any]:
         title=law.title,
         fingerprint=law.fingerprint,
         terms=tuple(TermDocument(label, expression_to_tree(term)) for label, term in law.terms.items()),
-        params=tuple(
-            ParamDocument(name, param.meaning, param.unit, param.bounds, param.scale, param.off, param.limits)
-            for name, param in law.table.items()
-        ),
+        params=tuple(ParamDocument(name, **vars(param)) for name, param in law.table.items()),
         states=tuple(
-            StateDocument(
-                symbol.name, state.meaning, state.unit, state.initial, expression_to_tree(state.rate), state.limit
-            )
+            StateDocument(symbol.name, **{**vars(state), "rate": expression_to_tree(state.rate)})
             for symbol, state in law.states.items()
         ),
         constraints=tuple(expression_to_tree(relation) for relation in law.constraints),
@@ -143,22 +138,20 @@ def _law_of(record: LawDocument) -> CreepLaw:
             t.name: _with_location(f"term '{t.name}'", expression_from_tree, t.expression, symbols)
             for t in record.terms
         },
-        params={symbols[p.name]: _param_of(p) for p in record.params},
+        params={symbols[p.name]: Param(**_without_name(p)) for p in record.params},
         states={symbols[s.name]: _state_of(s, symbols) for s in record.states},
         constraints=tuple(_with_location("a constraint", condition_from_tree, c, symbols) for c in record.constraints),
         references=tuple(record.references),
     )
 
 
-def _param_of(entry: ParamDocument) -> Param:
-    if entry.limits is None:
-        return Param(entry.meaning, entry.bounds, entry.unit, entry.scale, entry.off)
-    return Param(entry.meaning, entry.bounds, entry.unit, entry.scale, entry.off, entry.limits)
-
-
 def _state_of(entry: StateDocument, symbols: Mapping[str, sympy.Symbol]) -> State:
     rate = _with_location(f"rate of state '{entry.name}'", expression_from_tree, entry.rate, symbols)
-    return State(entry.initial, rate, entry.meaning, entry.unit, entry.limit)
+    return State(**{**_without_name(entry), "rate": rate})
+
+
+def _without_name(entry: ParamDocument | StateDocument) -> dict[str, Any]:
+    return {name: value for name, value in vars(entry).items() if name != "name"}
 
 
 def _with_location(location: str, read: Callable[[Any, Mapping[str, sympy.Symbol]], _T], tree: Any, symbols: Any) -> _T:

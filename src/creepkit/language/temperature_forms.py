@@ -193,29 +193,20 @@ def t_log_t(T_ref: float = 1073.15) -> TemperatureForm:
 def boltzmann(T_ref: float = 1073.15, T0: tuple[float, float] = T0_BOUNDS) -> TemperatureForm:
     """p(T) = p + p_E (T_ref^2/T0) [exp(-T0 (1/T - 1/T_ref)) - 1]: a + b exp(-T0/T) with slope p_E per K at T_ref."""
 
-    def build(symbol: sympy.Symbol, param: Param) -> Built:
-        start, extra = _exponent_parameter(symbol, param, T0)
-        expression = sympy.Float(T_ref) ** 2 / start * (sympy.exp(-start * _reciprocal_increase(T_ref)) - 1)
-        shape = _BasisFunction("E", expression, "slope at T_ref of", "1/K", 1 / (2 * TEMPERATURE_SPAN))
-        built, coefficients = _basis_expansion(symbol, param, [shape])
-        return built, coefficients | extra
+    def shape(start: sympy.Symbol) -> sympy.Expr:
+        return sympy.Float(T_ref) ** 2 / start * (sympy.exp(-start * _reciprocal_increase(T_ref)) - 1)
 
-    return TemperatureForm("boltzmann", build, "exponential of reciprocal temperature", float(T_ref))
+    return _form_with_T0("boltzmann", "exponential of reciprocal temperature", T_ref, T0, "E", shape)
 
 
 def wachtman_form(T_ref: float = 1073.15, T0: tuple[float, float] = T0_BOUNDS) -> TemperatureForm:
     """p(T) = a + b T exp(-T0/T), the form of Wachtman's modulus, written with its slope p_W per K at T_ref."""
 
-    def build(symbol: sympy.Symbol, param: Param) -> Built:
-        start, extra = _exponent_parameter(symbol, param, T0)
+    def shape(start: sympy.Symbol) -> sympy.Expr:
         grown = temperature * sympy.exp(-start * _reciprocal_increase(T_ref)) - sympy.Float(T_ref)
-        shape = _BasisFunction(
-            "W", grown / (1 + start / sympy.Float(T_ref)), "slope at T_ref of", "1/K", 1 / (2 * TEMPERATURE_SPAN)
-        )
-        built, coefficients = _basis_expansion(symbol, param, [shape])
-        return built, coefficients | extra
+        return grown / (1 + start / sympy.Float(T_ref))
 
-    return TemperatureForm("wachtman", build, "Wachtman et al. (1961), Phys. Rev. 122, 1754", float(T_ref))
+    return _form_with_T0("wachtman", "Wachtman et al. (1961), Phys. Rev. 122, 1754", T_ref, T0, "W", shape)
 
 
 def curved(T_ref: float = 1073.15) -> TemperatureForm:
@@ -234,28 +225,17 @@ def modified_arrhenius(T_ref: float = 1073.15) -> TemperatureForm:
     ln p(T) = ln p - (Q_p/R)(1/T - 1/T_ref) + p_B [ln(T/T_ref) + T_ref/T - 1]; on a linear scale p + p_I (1/T_ref -
     1/T) 1000 and the same bend.
     """
-    per = sympy.Float(T_ref) * temperature
-    reciprocal_decrease = (temperature - sympy.Float(T_ref)) / per
+    reciprocal_decrease = _reciprocal_decrease(T_ref)
     curvature = sympy.log(temperature / sympy.Float(T_ref)) - sympy.Float(T_ref) * reciprocal_decrease
 
     def build(symbol: sympy.Symbol, param: Param) -> Built:
         bent = _BasisFunction("B", curvature, "bend against 1/T of", "1", 2 * (T_ref / TEMPERATURE_SPAN) ** 2)
         if param.scale == "log":
-            first = _BasisFunction(
-                "Q",
-                reciprocal_decrease / GAS_CONSTANT,
-                "activation energy at T_ref of",
-                "J/mol",
-                9e5 / LOG_PARAMETER_RANGE,
-            )
+            expression, reach = reciprocal_decrease / GAS_CONSTANT, 9e5 / LOG_PARAMETER_RANGE
+            first = _BasisFunction("Q", expression, "activation energy at T_ref of", "J/mol", reach)
         else:
-            first = _BasisFunction(
-                "I",
-                -1000 * reciprocal_decrease,
-                "slope against 1000/T of",
-                "1000 K",
-                T_ref**2 / (2 * TEMPERATURE_SPAN * 1000.0),
-            )
+            expression, reach = -1000 * reciprocal_decrease, T_ref**2 / (2 * TEMPERATURE_SPAN * 1000.0)
+            first = _BasisFunction("I", expression, "slope against 1000/T of", "1000 K", reach)
         return _basis_expansion(symbol, param, [first, bent])
 
     return TemperatureForm("modified-arrhenius", build, "Kooij (1893), Z. Phys. Chem. 12, 155", float(T_ref))
@@ -286,11 +266,23 @@ def _coefficient_unit(unit: str, param: Param) -> str:
     return param.unit if unit == "1" else f"{param.unit} {unit}"
 
 
-def _exponent_parameter(
-    symbol: sympy.Symbol, param: Param, T0: tuple[float, float]
-) -> tuple[sympy.Symbol, dict[sympy.Symbol, Param]]:
-    temperature_scale = sympy.Symbol(f"{symbol.name}_T0", real=True)
-    return temperature_scale, {temperature_scale: Param(f"T0 of {param.meaning}", bounds=T0, unit="K")}
+def _form_with_T0(
+    name: str,
+    reference: str,
+    T_ref: float,
+    T0: tuple[float, float],
+    suffix: str,
+    shape: Callable[[sympy.Symbol], sympy.Expr],
+) -> TemperatureForm:
+    """The form of one shape, which a parameter T0 inside its exponential belongs to."""
+
+    def build(symbol: sympy.Symbol, param: Param) -> Built:
+        start = sympy.Symbol(f"{symbol.name}_T0", real=True)
+        basis = _BasisFunction(suffix, shape(start), "slope at T_ref of", "1/K", 1 / (2 * TEMPERATURE_SPAN))
+        built, coefficients = _basis_expansion(symbol, param, [basis])
+        return built, coefficients | {start: Param(f"T0 of {param.meaning}", bounds=T0, unit="K")}
+
+    return TemperatureForm(name, build, reference, float(T_ref))
 
 
 def _reciprocal_increase(T_ref: float) -> sympy.Expr:

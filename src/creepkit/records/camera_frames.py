@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Bools, Floats, frozen
+from creepkit.arrays import ArrayLike, Bools, Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 
@@ -45,13 +45,7 @@ class CameraFrame:
         seen = np.concatenate([points[valid], displacements[valid]], axis=1)
         if not np.isfinite(seen).all():
             raise HistoryError(f"{self.source or 'frame'}: a valid point has a coordinate that is no finite number")
-        for name, value in (
-            ("points", points),
-            ("displacements", displacements),
-            ("valid", valid),
-            ("confidence", confidence),
-        ):
-            object.__setattr__(self, name, value)
+        set_fields(self, points=points, displacements=displacements, valid=valid, confidence=confidence)
 
 
 @checked
@@ -76,7 +70,7 @@ class Frames(Sequence[CameraFrame]):
         times = frozen(self.times)
         if times.ndim != 1 or not times.size:
             raise HistoryError(f"frames '{self.name}': no frames; a sequence needs at least one")
-        object.__setattr__(self, "times", times)
+        set_fields(self, times=times)
 
     @classmethod
     @checked

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Floats, frozen
+from creepkit.arrays import ArrayLike, Floats, frozen, set_fields
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import HistoryError
 from creepkit.presentation import Presentable
@@ -47,8 +47,7 @@ class ClockAlignment(Presentable, text="reports.instrument_records:alignment_tex
             raise HistoryError(
                 f"an alignment with lag {self.lag} s and drift {self.drift}; give finite numbers, a drift within +-1"
             )
-        for name in ("lags", "probability", "steps"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+        set_fields(self, lags=frozen(self.lags), probability=frozen(self.probability), steps=frozen(self.steps))
 
     @classmethod
     @checked_with_own_words("lag", "drift", "zero")

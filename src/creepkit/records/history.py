@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats, frozen
+from creepkit.arrays import Bools, Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, quoted
 from creepkit.limits import HOTTEST
@@ -105,10 +105,7 @@ class History:
         used = np.ones(times.size, bool) if self.used is EVERY_FRAME else self.used
         if np.shape(used) != times.shape:
             raise HistoryError(f"{origin}: 'used' marks {np.size(used)} frames of {times.size}")
-        freeze = object.__setattr__
-        freeze(self, "times", times)
-        freeze(self, "outputs", MappingProxyType(outputs))
-        freeze(self, "used", frozen(used, dtype=bool))
+        set_fields(self, times=times, outputs=MappingProxyType(outputs), used=frozen(used, dtype=bool))
         temperatures = (
             self.temperature.values if isinstance(self.temperature, Program) else np.array([float(self.temperature)])
         )
@@ -118,7 +115,7 @@ class History:
                 f"{origin}: a temperature of {temperatures[~possible][0]:g} K is not above 0 and below {HOTTEST:g} K"
             )
         if not isinstance(self.temperature, Program):
-            freeze(self, "temperature", float(self.temperature))
+            set_fields(self, temperature=float(self.temperature))
         if not callable(getattr(self.loading, "program", None)):
             raise HistoryError(
                 f"{origin}: loading is {quoted(repr(self.loading))}; give what was imposed, such as "
@@ -126,11 +123,9 @@ class History:
             )
         self._check_end(origin)
         sd = {n: self._checked_sd(origin, n, v, times.size) for n, v in self.standard_deviation.items()}
-        freeze(self, "standard_deviation", MappingProxyType(sd))
-        freeze(self, "geometry", MappingProxyType(dict(self.geometry)))
-        freeze(self, "stated", MappingProxyType(dict(self.stated)))
-        freeze(self, "labels", MappingProxyType(dict(self.labels)))
-        freeze(self, "noise_correlation", MappingProxyType(self._checked_correlation(origin)))
+        given = {name: dict(getattr(self, name)) for name in ("geometry", "stated", "labels")}
+        given |= {"standard_deviation": sd, "noise_correlation": self._checked_correlation(origin)}
+        set_fields(self, **{name: MappingProxyType(mapping) for name, mapping in given.items()})
         self._check_minimum_rate(origin)
 
     @staticmethod

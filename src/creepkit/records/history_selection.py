@@ -85,10 +85,6 @@ def _values_text(label: str, labels_by_test: Sequence[Mapping[str, str | float]]
 
 
 def _text(value: str | float) -> str:
-    return (
-        value
-        if isinstance(value, str)
-        else f"{value:g}"
-        if abs(value) < 1e3
-        else f"{value:.2f}".rstrip("0").rstrip(".")
-    )
+    if isinstance(value, str):
+        return value
+    return f"{value:g}" if abs(value) < 1e3 else f"{value:.2f}".rstrip("0").rstrip(".")

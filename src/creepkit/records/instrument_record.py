@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.arrays import Floats, frozen
+from creepkit.arrays import Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest
 from creepkit.presentation import Presentable, present
@@ -85,9 +85,8 @@ class InstrumentRecord(Presentable, text="reports.instrument_records:record_text
         for name, channel in self.channels.items():
             if channel.values.shape != times.shape:
                 raise HistoryError(f"{self.origin}: channel '{name}' has {channel.values.size} of {times.size} values")
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
-        object.__setattr__(self, "channel_patterns", MappingProxyType(dict(self.channel_patterns)))
+        channels, patterns = MappingProxyType(dict(self.channels)), MappingProxyType(dict(self.channel_patterns))
+        set_fields(self, times=times, channels=channels, channel_patterns=patterns)
 
     @property
     def origin(self) -> str:

@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Floats, frozen
+from creepkit.arrays import ArrayLike, Floats, frozen, set_fields
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import SolveError, quoted
 
@@ -39,8 +39,7 @@ class Program:
             raise SolveError("a program of times and values must hold finite numbers only")
         if times[0] != 0.0 or (np.diff(times) < 0).any():
             raise SolveError("the times of a program must start at 0 and never decrease")
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "values", values)
+        set_fields(self, times=times, values=values)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Program):

@@ -37,16 +37,7 @@ class Status(IntEnum):
     @property
     def text(self) -> str:
         """It in words."""
-        return STATUS_TEXT[self]
-
-
-STATUS_TEXT = {
-    Status.COMPLETE: "complete",
-    Status.RUPTURED: "burst",
-    Status.NOT_CONVERGED: "not converged",
-    Status.OUTSIDE_DOMAIN: "outside the domain",
-    Status.OUTSIDE_CLASS: "outside the class of laws",
-}
+        return ("complete", "burst", "not converged", "outside the domain", "outside the class of laws")[self]
 
 
 @dataclass(frozen=True, eq=False)

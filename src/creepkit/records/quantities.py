@@ -84,11 +84,8 @@ class QuantityKind:
         return replace(self, name=f"standard deviation of a {self.name}", units=units, low=0.0, open_interval=True)
 
     def _unit_error(self, name: str, suffix: str) -> str:
-        return (
-            f"the unit '{quoted(suffix)}' of '{quoted(name, 60)}' is not understood"
-            if suffix
-            else f"'{quoted(name, 60)}' has no unit"
-        )
+        named = f"'{quoted(name, 60)}'"
+        return f"the unit '{quoted(suffix)}' of {named} is not understood" if suffix else f"{named} has no unit"
 
     def _spellings(self, name: str, suffix: str) -> str:
         if not name.endswith(suffix):  # the unit stood apart from the name

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from creepkit.arrays import Bools, Floats, frozen
+from creepkit.arrays import Bools, Floats, frozen, set_fields
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,6 @@ class SurfaceObservation:
     fitted: Floats
 
     def __post_init__(self) -> None:
-        for name in ("gains", "residuals", "terms", "fitted"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "converged", frozen(self.converged, dtype=bool))
-        object.__setattr__(self, "outputs", MappingProxyType({n: frozen(v) for n, v in self.outputs.items()}))
+        set_fields(self, **{name: frozen(getattr(self, name)) for name in ("gains", "residuals", "terms", "fitted")})
+        outputs = MappingProxyType({n: frozen(v) for n, v in self.outputs.items()})
+        set_fields(self, converged=frozen(self.converged, dtype=bool), outputs=outputs)

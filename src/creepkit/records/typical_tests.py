@@ -44,12 +44,13 @@ def typical_history(
         Load(load or "stress", "stress") if load or not loads else loads[0]
     )
     conditions = dict(getattr(record, "conditions", None) or {})
+    value = TYPICAL_VALUES.get(chosen.quantity, TYPICAL_STRESS)
     low, high = conditions.get("modulus", (150e3, 150e3))
     plan = History(
         name=f"typical test of {getattr(record, 'name', type(record).__name__)}",
         times=np.linspace(0.0, end, frames),
         outputs={},
-        loading=_held(chosen, TYPICAL_VALUES.get(chosen.quantity, TYPICAL_STRESS)),
+        loading=_held(chosen, value),
         temperature=TYPICAL_TEMPERATURE,
         specimen=getattr(record, "name", "uniaxial"),
         elastic=Elastic(round(math.sqrt(low * high), 3)),
@@ -59,7 +60,6 @@ def typical_history(
         low, high = conditions[chosen.name]
         return plan.replace(loading=_held(chosen, float(f"{low ** (1.0 - level) * high**level:.6g}")))
     scale = _reference_scale(record, plan) * 4.0 ** (level - 0.5)
-    value = TYPICAL_VALUES.get(chosen.quantity, TYPICAL_STRESS)
     return plan.replace(loading=_held(chosen, float(f"{value * scale:.6g}")))
 
 

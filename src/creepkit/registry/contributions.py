@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from inspect import isgeneratorfunction, signature
+from inspect import isgeneratorfunction
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -111,7 +111,7 @@ CONTRIBUTION_KINDS = (LAW, SPECIMEN, READER, CAMERA_FORMAT, INSTRUMENT, EXPORTER
 
 
 def check_hooks(provenance: Provenance, module: ModuleType) -> None:
-    """PluginError for a module with no hook, or with one that could never be called or takes other parameters."""
+    """PluginError for a module with no hook, or with one that could never be called."""
     hooks = [name for name in vars(module) if name.startswith("creepkit_") and callable(getattr(module, name))]
     if not hooks:
         raise PluginError(f"{provenance} offers nothing; mark one of its functions @hookimpl ({', '.join(HOOKS)})")
@@ -122,14 +122,6 @@ def check_hooks(provenance: Provenance, module: ModuleType) -> None:
             raise PluginError(f"{provenance} has a function '{name}' without @hookimpl; add the decorator{place}")
         if name not in HOOKS:
             raise PluginError(f"{provenance} has an unknown hook '{name}': {nearest(name, HOOKS)}{place}")
-        allowed = list(signature(getattr(hookspecs, name)).parameters)
-        unknown = [parameter for parameter in signature(function).parameters if parameter not in allowed]
-        if unknown:
-            wanted = f"({', '.join(allowed)})" if allowed else "no parameters"
-            raise PluginError(
-                f"{provenance} does not fit the hooks of creepkit: {name} has the parameter '{unknown[0]}', "
-                f"creepkit calls it with {wanted}{place}"
-            )
         if isgeneratorfunction(function):
             raise PluginError(f"{provenance}: {name} is a generator; return a list in the place of yield{place}")
 

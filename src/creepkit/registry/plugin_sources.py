@@ -100,6 +100,13 @@ class PluginFile:
         return os.path.realpath(self.path)
 
     @property
+    def problem(self) -> str:
+        """Why it cannot be run, as a part of a sentence; "" where it can."""
+        if not is_plugin_file_name(self.path):
+            return "is not executed, for only files whose names end in .py are"
+        return "" if self.path.is_file() else "does not exist"
+
+    @property
     def provenance(self) -> Provenance:
         """The file, and its name without ending."""
         return Provenance(self.place, self.path.stem)
@@ -110,10 +117,8 @@ class PluginFile:
 
     def load(self) -> ModuleType:
         """Run the file as a module of its own name; PluginError when it is no .py, is missing or raises."""
-        if not is_plugin_file_name(self.path):
-            raise PluginError(f"plugin file {self.path} is {_NO_PLUGIN_FILE}; name a Python file with hooks in it")
-        if not self.path.is_file():
-            raise PluginError(f"plugin file {self.path} does not exist; name a Python file with hooks in it")
+        if self.problem:
+            raise PluginError(f"plugin file {self.path} {self.problem}; name a Python file with hooks in it")
         import hashlib  # which takes longer to import than a law to be made
 
         name = f"creepkit_plugin_{self.path.stem}_{hashlib.sha256(self.place.encode()).hexdigest()[:8]}"
@@ -152,15 +157,10 @@ def plugin_files_in_environment() -> list[PluginFile]:
 
 def check_files_in_environment() -> None:
     """PluginError, in one sentence, where the environment variable names what is no plugin file or does not exist."""
-    for path in (one.path for one in plugin_files_in_environment()):
-        advice = f"separate several files with '{os.pathsep}'" if "," in str(path) else "correct or unset it"
-        if not is_plugin_file_name(path):
-            raise PluginError(f"{ENVIRONMENT_VARIABLE} names {path}, which is {_NO_PLUGIN_FILE}; {advice}")
-        if not path.is_file():
-            raise PluginError(f"{ENVIRONMENT_VARIABLE} names the plugin file {path}, which does not exist; {advice}")
-
-
-_NO_PLUGIN_FILE = "not executed, for only files whose names end in .py are"
+    for one in plugin_files_in_environment():
+        advice = f"separate several files with '{os.pathsep}'" if "," in str(one.path) else "correct or unset it"
+        if one.problem:
+            raise PluginError(f"{ENVIRONMENT_VARIABLE} names the file {one.path}, which {one.problem}; {advice}")
 
 
 def is_plugin_file_name(path: str | Path) -> bool:

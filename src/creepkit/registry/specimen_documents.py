@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import CreepkitError, DatasetError, quoted
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError
+from creepkit.registry.arguments import specimen_by_name
 
 if TYPE_CHECKING:
     from creepkit.records import Specimen
@@ -45,16 +45,12 @@ def _refuse_arrays(record: Any, place: str) -> None:
         _refuse_arrays(value, f"{place}.{f.name}")
 
 
-def specimen_from_json(document: Any, source: str, registered: Callable[[str], Specimen]) -> Specimen:
-    """The specimen that specimen_to_json wrote; DatasetError, naming `source`, when that cannot be.
-
-    registered : gives the registered specimen of a name.
-    """
+def specimen_from_json(document: Any, source: str) -> Specimen:
+    """The specimen that specimen_to_json wrote; DatasetError, naming `source`, when that cannot be."""
     if not (isinstance(document, dict) and isinstance(document.get("name"), str) and "fields" in document):
         raise DatasetError(f"{source}: does not say its specimen; it is damaged or was not written by creepkit")
     name = document["name"]
     try:
-        template = registered(name)
-        return CODEC.updated(template, document["fields"])
+        return CODEC.updated(specimen_by_name(name), document["fields"])
     except CreepkitError as error:
         raise DatasetError(f"{source}: its specimen '{quoted(name)}' cannot be rebuilt here: {error}") from None

@@ -207,13 +207,7 @@ def tensile_strengths(tests: RuptureTests, stated: Mapping[float, float] | None)
     Both are empty where nothing is known.
     """
     if stated:
-        try:
-            pairs = sorted((float(T), float(s)) for T, s in stated.items())
-        except (AttributeError, TypeError, ValueError):
-            raise HistoryError(
-                f"tensile_strength is {quoted(repr(stated), 60)}; give MPa by temperature in K, such as "
-                f"{{1123.15: 420.0}}"
-            ) from None
+        pairs = sorted((float(T), float(s)) for T, s in stated.items())
         if not all(0 < T < 1e4 and 0 < s < 1e5 for T, s in pairs):
             raise HistoryError(
                 f"tensile_strength is {quoted(repr(stated), 60)}; give numbers above zero: MPa by temperature in K"

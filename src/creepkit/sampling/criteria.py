@@ -255,11 +255,8 @@ PAPER_SHARE_OF_VISIBLE = 0.5
 cameras."""
 
 
-def paper_criteria(specimen: Specimen | str) -> tuple[Criterion, ...]:
-    """Criteria 1 to 5 of the paper; 4 and 5 concern the output that shows creep, and 5 only one that grows with it.
-
-    specimen : a specimen, or the name of a known one.
-    """
+def paper_criteria(specimen: Specimen) -> tuple[Criterion, ...]:
+    """Criteria 1 to 5 of the paper; 4 and 5 concern the output that shows creep, and 5 only one that grows with it."""
     shown = creep_output(specimen)
     least = PAPER_SHARE_OF_VISIBLE * shown.visible
     final = FinalOutputAbove("5", f"{shown.output} of more than {shown.text(least)} at the end", least)
@@ -272,10 +269,10 @@ def paper_criteria(specimen: Specimen | str) -> tuple[Criterion, ...]:
     )
 
 
-def conditioned_criteria(law: CreepLaw, specimen: Specimen | str, end: float) -> tuple[Criterion, ...]:
+def conditioned_criteria(law: CreepLaw, specimen: Specimen, end: float) -> tuple[Criterion, ...]:
     """Criteria of the conditioned domain: a law as its author means it, a full history, and visible creep.
 
-    specimen : a specimen, or the name of a known one. end : s, of tests whose end is not drawn.
+    end : s, of tests whose end is not drawn.
     """
     label = ("constraints", "what the law declares of its parameters holds throughout the test")
     constraint_criteria = (ConstraintsHold(*label, end),) if law.constraints else ()

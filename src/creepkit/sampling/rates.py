@@ -24,11 +24,11 @@ from creepkit.sampling.specimen_conditions import (
     END,
     TEMPERATURE,
     SpecimenConditions,
+    check_stated,
     creep_output,
     mean_reference_stress,
     record_of,
     specimen_conditions,
-    stated_method,
     tested_piece,
 )
 from creepkit.specimens.load_scaling import LoadScaling
@@ -231,7 +231,7 @@ def reference_stress_of(specimen: Specimen) -> ReferenceStress:
     known, visible = specimen_conditions(specimen), creep_output(specimen).visible
     scaling: LoadScaling | None = getattr(record_of(specimen), "load_scaling", None)
     if scaling is None:
-        stated_method(specimen, "reference_stress", "which von Mises stress, MPa, stands for a test")
+        check_stated(specimen, "reference_stress", "which von Mises stress, MPa, stands for a test")
         growth = "by how much its output grows for each unit of strain at the reference stress"
-        stated_method(specimen, "growth_per_strain", growth)
+        check_stated(specimen, "growth_per_strain", growth)
     return ReferenceStress(specimen, known, visible, scaling)

@@ -25,7 +25,6 @@ from creepkit.records import (
     RecordedLoading,
     constant_load,
     dimensions_of,
-    known_specimens,
     loads_of,
     outputs_of,
 )
@@ -82,16 +81,6 @@ class SpecimenConditions:
 def record_of(specimen: Predictor) -> Any:
     """The specimen itself, or the one that a reduced-order model or a surrogate stands for."""
     return getattr(specimen, "specimen", specimen)
-
-
-def specimen_named(specimen: Predictor | str) -> Any:
-    """The specimen itself, or the known one of this name."""
-    if not isinstance(specimen, str):
-        return specimen
-    known = known_specimens()
-    if specimen not in known:
-        raise DatasetError(f"no specimen is called '{specimen}'; {nearest(specimen, known)}")
-    return known[specimen]
 
 
 def specimen_conditions(specimen: Predictor) -> SpecimenConditions:
@@ -172,30 +161,22 @@ class CreepOutput:
     """The output of a specimen by which its creep is judged.
 
     column : its position among the outputs. output : its record. falls : whether creep makes it smaller, as a stress
-        that relaxes does.
+        that relaxes does. visible : how much of it plainly shows creep, in its unit.
     """
 
     column: int
     output: Output
     falls: bool
-
-    @property
-    def visible(self) -> float:
-        """How much of it plainly shows creep, in its unit."""
-        assert self.output.visible is not None  # creep_output() has complained
-        return self.output.visible
+    visible: float
 
     def text(self, value: float) -> str:
         """A value with its unit."""
         return f"{value:g} {self.output.unit}".rstrip()
 
 
-def creep_output(specimen: Predictor | str) -> CreepOutput:
-    """The first output that grows with creep, else the first; DatasetError where nobody says how much of it is visible.
-
-    specimen : a specimen, or the name of a known one.
-    """
-    record = record_of(specimen_named(specimen))
+def creep_output(specimen: Predictor) -> CreepOutput:
+    """The first output that grows with creep, else the first; DatasetError where nothing says how much is visible."""
+    record = record_of(specimen)
     outputs = outputs_of(record)
     if not outputs:
         raise DatasetError(f"specimen '{record.name}' has no outputs; a data set needs one: add the attribute outputs")
@@ -206,18 +187,17 @@ def creep_output(specimen: Predictor | str) -> CreepOutput:
             f"specimen '{record.name}' does not say how much of its output '{output}' shows creep: write "
             f'ck.Output("{output}", "{output.quantity}", noise=...) with the noise of its measurement, or visible=...'
         )
-    return CreepOutput(column, output, not output.grows)
+    return CreepOutput(column, output, not output.grows, output.visible)
 
 
-def stated_method(specimen: Predictor, name: str, meaning: str) -> Any:
-    """A method of the specimen's record; DatasetError, with what it is to give, where there is none."""
+def check_stated(specimen: Predictor, name: str, meaning: str) -> None:
+    """DatasetError, with what it is to give, where the specimen's record has no such method."""
     record = record_of(specimen)
     if not hasattr(record, name):
         raise DatasetError(
             f"specimen '{record.name}' does not say {meaning}, which a data set needs: add the method "
             f"{name}(self, history)"
         )
-    return getattr(record, name)
 
 
 def tested_piece(specimen: Predictor, plan: History, nuisances: Mapping[str, float]) -> tuple[Any, History]:

@@ -8,7 +8,7 @@ R2.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.dataset.dataset import first_difference
 from creepkit.errors import DatasetError
+from creepkit.files.record_codec import record_to_json
 from creepkit.registry.specimen_documents import specimen_to_json
 from creepkit.surrogates.recipe import SampleArrays, SurrogateMetadata
 from creepkit.surrogates.surrogate import Surrogate
@@ -125,7 +126,7 @@ def comparison_metrics(comparison: PredictionComparison, times: Sequence[float])
         "times": {f"{time:g}": _metrics_at_time(comparison, time) for time in times},
         "worst": worst_histories(comparison, largest),
     }
-    result: dict[str, Any] = _without_nan(metrics)
+    result: dict[str, Any] = record_to_json(metrics)
     return result
 
 
@@ -162,15 +163,6 @@ def evaluation_times(grid: TimeGrid, end: float) -> tuple[float, ...]:
     if np.isclose(last, PAPER_TEST_DURATION):
         return PAPER_EVALUATION_TIMES
     return tuple(float(f"{time / PAPER_TEST_DURATION * last:.4g}") for time in PAPER_EVALUATION_TIMES)
-
-
-def _without_nan(value: Any) -> Any:
-    """JSON has no NaN."""
-    if isinstance(value, Mapping):
-        return {k: _without_nan(v) for k, v in value.items()}
-    if isinstance(value, list):
-        return [_without_nan(v) for v in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 EVALUATION_BATCH = 256

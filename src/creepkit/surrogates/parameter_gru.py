@@ -103,7 +103,7 @@ class ParameterGru(Options, title="settings of a network", error=SurrogateError,
             "series": _scale_pairs(series, module.series),
             "outputs": _scale_pairs(data.outputs, module.targets),
         }
-        domain_names = (*law.names, *history_inputs.domain_names(data.planned_test(0)))
+        domain_names = (*law.names, *history_inputs.domain_inputs(data.planned_test(0), data.times(0)))
         columns = zip(names, samples["constants"][train].T, strict=True)
         constant = ", ".join(n for n, column in columns if _is_constant(column) and not n.endswith(" is off"))
         notes = (f"constant in training, so that nothing is known beyond: {constant}",) if constant else ()

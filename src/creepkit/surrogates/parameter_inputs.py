@@ -118,25 +118,23 @@ class LoadHistoryInputs:
         program = imposed_program(history)
         return np.stack([_SERIES_FUNCTIONS[name](program, times) for name in self.series], axis=1)
 
-    def domain_inputs(self, history: History, times: Floats) -> Floats:
-        """Inputs of the applicability domain from a test, (inputs,), named by `domain_names`; times : (frames,) s.
+    def domain_inputs(self, history: History, times: Floats) -> dict[str, float]:
+        """Inputs of the applicability domain from a test, by name; times : (frames,) s.
 
         The constants, and lengths that differ from test piece to test piece also where they did not vary; of the load
         over the frames the value at the first that is loaded, the last, the mean, and how unlike one jump from the
         first to the last it is; and where grids stretch with the test log10 of its end.
         """
-        load = _load_after_start(history, times)
-        load_summary = [load[0], load[-1], load.mean(), _deviation_from_jump(load)]
-        fixed_lengths = [length_of(history, length) for length in self._fixed_lengths]
-        end = [np.log10(times[-1])] if self.relative else []
-        return np.array([*self.constant_values(history), *fixed_lengths, *load_summary, *end])
-
-    def domain_names(self, history: History) -> tuple[str, ...]:
-        """Of what `domain` gives."""
-        load = history.loading.quantity
-        load_names = (f"first {load}", f"last {load}", f"mean {load}", f"{load} unlike one jump")
-        fixed_names = (length.name for length in self._fixed_lengths)
-        return (*self.constants, *fixed_names, *load_names, *(("log10 end_time",) if self.relative else ()))
+        load, quantity = _load_after_start(history, times), history.loading.quantity
+        return {
+            **dict(zip(self.constants, self.constant_values(history).tolist(), strict=True)),
+            **{length.name: length_of(history, length) for length in self._fixed_lengths},
+            f"first {quantity}": load[0],
+            f"last {quantity}": load[-1],
+            f"mean {quantity}": load.mean(),
+            f"{quantity} unlike one jump": _deviation_from_jump(load),
+            **({"log10 end_time": np.log10(times[-1])} if self.relative else {}),
+        }
 
     @property
     def _fixed_lengths(self) -> tuple[Dimension, ...]:
@@ -338,7 +336,7 @@ def load_history_arrays(
             (
                 history_inputs.constant_values(plan),
                 history_inputs.series_values(plan, times),
-                history_inputs.domain_inputs(plan, times),
+                np.array([*history_inputs.domain_inputs(plan, times).values()]),
             )
         )
         if progress is not None and (k + 1) % 1000 == 0:

@@ -75,8 +75,8 @@ class SurrogateMetadata:
     grid: TimeGrid
     parameters: tuple[str, ...]
     conditions: tuple[str, ...]
+    domain: ApplicabilityDomain
     scaling: Mapping[str, Any] = field(default_factory=dict)
-    domain: ApplicabilityDomain | None = None
     metrics: Mapping[str, Any] = field(default_factory=dict)
     curves: Mapping[str, list[float]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)

@@ -28,7 +28,7 @@ from creepkit.records import (
     broadcast_candidates,
     constant_load,
 )
-from creepkit.sampling.specimen_conditions import creep_output, mean_reference_stress, stated_method, tested_piece
+from creepkit.sampling.specimen_conditions import check_stated, creep_output, mean_reference_stress, tested_piece
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
@@ -49,7 +49,7 @@ class ReferenceStressModel:
 
     def __post_init__(self) -> None:
         for name, meaning in (("reference_stress", "its reference stress"), ("growth_per_strain", "its growth")):
-            stated_method(self.specimen, name, meaning)
+            check_stated(self.specimen, name, meaning)
         if creep_output(self.specimen).falls:
             raise SurrogateError(
                 f"specimen '{self.specimen.name}': its output falls under creep, which its reference stress follows; "

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import SurrogateError, SurrogateWarning
+from creepkit.errors import SurrogateError
 from creepkit.files.safetensors_files import write_safetensors
 from creepkit.presentation import Presentable
 from creepkit.records import (
@@ -85,21 +83,6 @@ class NetworkQuery:
         rows = np.repeat(self.law_rows, tests, axis=0)
         constants = np.concatenate([rows, self.constants.reshape(count * tests, -1)], axis=1)
         return constants, self.series, None if self.base is None else self.base.reshape(count * tests, -1)
-
-
-def warn_of_unknown_domain(surrogate: Surrogate) -> None:
-    """SurrogateWarning, once for each surrogate, where it does not say where its training rows lie."""
-    if surrogate not in _WARNED:
-        _WARNED.add(surrogate)
-        warnings.warn(
-            f"{surrogate.title}: its file states no domain, so that answers far from its training are not recognised; "
-            "train it again, or confirm what is found by the specimen itself",
-            SurrogateWarning,
-            stacklevel=2,
-        )
-
-
-_WARNED: weakref.WeakSet[Surrogate] = weakref.WeakSet()
 
 
 class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
@@ -327,17 +310,14 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
 
     def _status(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Ints:
         """(candidates, tests): complete, or outside the domain."""
-        outside = np.zeros(query.constants.shape[:2], bool)
-        if self.metadata.domain is None:
-            warn_of_unknown_domain(self)
-        else:
-            outside = self.metadata.domain.outside(self._domain_inputs(query, histories, frames))
+        outside = self.metadata.domain.outside(self._domain_inputs(query, histories, frames))
         return np.where(outside, int(Status.OUTSIDE_DOMAIN), int(Status.COMPLETE)).astype(np.int64)
 
     def _domain_inputs(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Floats:
         """(candidates, tests, inputs) of the applicability domain."""
         count, tests, constants = query.constants.shape
-        test_rows = np.stack([self._history_inputs.domain_inputs(h, t) for h, t in zip(histories, frames, strict=True)])
+        pairs = zip(histories, frames, strict=True)
+        test_rows = np.array([[*self._history_inputs.domain_inputs(*pair).values()] for pair in pairs])
         test_summary = np.broadcast_to(test_rows[None, :, constants:], (count, tests, test_rows.shape[1] - constants))
         rows = np.broadcast_to(query.law_rows[:, None], (count, tests, query.law_rows.shape[1]))
         return np.concatenate([rows, query.constants, test_summary], axis=2)

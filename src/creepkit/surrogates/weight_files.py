@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from creepkit.errors import SurrogateError
 from creepkit.files.json_documents import DocumentFormat
 from creepkit.files.reading import FileKind
@@ -11,7 +9,6 @@ from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, ValueCodec
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.records import Specimen
-from creepkit.registry.arguments import specimen_by_name
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
@@ -34,14 +31,10 @@ CHECKPOINT = DocumentFormat(
 """It holds the weights, the best ones, and two moments of each."""
 
 
-def _registered_specimen(document: Any, source: str) -> Specimen:
-    return specimen_from_json(document, source, specimen_by_name)
-
-
 CODEC = RecordCodec(
     values={
         CreepLaw: ValueCodec(law_to_json, law_from_json),
-        Specimen: ValueCodec(specimen_to_json, _registered_specimen),
+        Specimen: ValueCodec(specimen_to_json, specimen_from_json),
     },
     names={
         "CreepLaw": CreepLaw,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import suppress
 
 from creepkit.errors import CreepkitError, ExportError, quoted
 from creepkit.exporters.exporting import exported_text
@@ -32,12 +34,9 @@ HOSTILE_NAMES = ("two words", "9th", "class", "a\nb", "x*/ int y;", 'quote"d', "
 
 def registered_sources() -> list[LawWithValues]:
     """Every registered law at the middle of its bounds, and at 1073 K where it depends on temperature."""
-    sources = []
-    for registered in default_registry().laws().values():
-        law = registered.value
-        source = LawWithValues(law, law.center(), elastic=Elastic(150e3))
-        sources += [source, *([source.at(1073.0)] if law.uses(temperature) else [])]
-    return sources
+    laws = [registered.value for registered in default_registry().laws().values()]
+    sources = [LawWithValues(law, law.center(), elastic=Elastic(150e3)) for law in laws]
+    return [*sources, *(source.at(1073.0) for source in sources if source.law.uses(temperature))]
 
 
 @finding("suffix")
@@ -69,29 +68,31 @@ def check_every_law(exporter: Exporter) -> str:
     return f"{len(sources) - refused} texts, {refused} refused with a reason"
 
 
-@finding("deterministic")
-def check_determinism(exporter: Exporter) -> str | None:
+def _writable(exporter: Exporter) -> Iterator[LawWithValues]:
+    """The first registered law that an exporter can write."""
+    for source in registered_sources():
+        with suppress(CreepkitError):
+            exported_text(exporter, source)
+            yield source
+            return
+
+
+@finding("deterministic", each=_writable)
+def check_determinism(exporter: Exporter, source: LawWithValues) -> str:
     """The same law gives the same text."""
-    source = _first_source(exporter)
-    same = source is None or exported_text(exporter, source) == exported_text(exporter, source)
+    same = exported_text(exporter, source) == exported_text(exporter, source)
     assert same, "two texts of one law differ; leave out dates and orders of sets"
     return "twice the same text"
 
 
-@finding("notes")
-def check_notes(exporter: Exporter) -> str | None:
+@finding("notes", each=_writable)
+def check_notes(exporter: Exporter, source: LawWithValues) -> str:
     """Notes break no lines and end no comments."""
-    source = _first_source(exporter)
-    if source is None:
-        return None
     text = exported_text(exporter, source.replace(notes=HOSTILE_NOTES))
-    lines = text.splitlines()
-    first, second = ([line for line in lines if mark in line] for mark in (FIRST_LINE, SECOND_LINE))
+    first, second = ([line for line in text.splitlines() if mark in line] for mark in (FIRST_LINE, SECOND_LINE))
     for a, b in zip(first, second, strict=False):
-        stands_alone = a is not b and _prefix(a, FIRST_LINE) != _prefix(b, SECOND_LINE)
-        shown = quoted(repr(b), 60)
-        assert not stands_alone, (
-            f"the second line of a note stands alone, {shown}; put the comment sign before each line of it"
+        assert a == b or _prefix(a, FIRST_LINE) == _prefix(b, SECOND_LINE), (
+            f"the second line of a note stands alone, {quoted(repr(b), 60)}; put the comment sign before each line"
         )
     assert "\x00" not in text, (
         "a null character of a note is in the text; creepkit.exporters.law_description leaves them out"
@@ -99,31 +100,19 @@ def check_notes(exporter: Exporter) -> str | None:
     return "stay in their comments"
 
 
-@finding("names")
-def check_names(exporter: Exporter) -> str | None:
+@finding("names", each=_writable)
+def check_names(exporter: Exporter, source: LawWithValues) -> str:
     """Names break no lines."""
-    source = _first_source(exporter)
-    for name in HOSTILE_NAMES if source else ():
+    for name in HOSTILE_NAMES:
         try:
-            text = exported_text(exporter, source.replace(name=name))  # type: ignore[union-attr]
+            text = exported_text(exporter, source.replace(name=name))
         except ExportError as error:
             assert " raised " not in str(error), f"name {name!r}: {error}; raise ExportError, or change it"
             continue
         breaks = "\n" in name and name in text
         assert not breaks, f"name {name!r} breaks a line; refuse it, or make it an identifier"
-    return f"{len(HOSTILE_NAMES)} names written or refused" if source else None
+    return f"{len(HOSTILE_NAMES)} names written or refused"
 
 
 def _prefix(line: str, marker: str) -> str:
     return re.sub(r"[\w:,.]+", "", line.partition(marker)[0]).strip()
-
-
-def _first_source(exporter: Exporter) -> LawWithValues | None:
-    """The first registered law that an exporter can write."""
-    for source in registered_sources():
-        try:
-            exported_text(exporter, source)
-        except CreepkitError:
-            continue
-        return source
-    return None

@@ -8,7 +8,7 @@ import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 from typing import Any
 
 from creepkit import limits
@@ -186,19 +186,18 @@ def _report(subject: Any, kind: str, checks: ModuleType, *further: Any) -> Confo
     return ConformanceReport(subject, tuple(found), kind)
 
 
-def check_temperature_form(name: str, form: Callable[..., Any]) -> ConformanceReport:
+def check_temperature_form(form: Callable[..., Any]) -> ConformanceReport:
     """Run every check on a temperature form or factor, a function of T_ref."""
-    found = run(temperature_form_checks, form)
-    return ConformanceReport(SimpleNamespace(name=name), tuple(found), "temperature form")
+    return ConformanceReport(form, tuple(run(temperature_form_checks, form)), "temperature form")
 
 
-_KITS: dict[str, Callable[[str, Any], ConformanceReport]] = {
-    "law": lambda _, law: check_law(law),
-    "specimen": lambda _, specimen: check_specimen(specimen),
-    "reader": lambda _, reader: check_reader(reader),
-    "camera format": lambda _, format: check_camera_format(format),
-    "exporter": lambda _, exporter: check_exporter(exporter),
-    "instrument format": lambda _, format: check_instrument_format(format),
+_KITS: dict[str, Callable[..., ConformanceReport]] = {
+    "law": check_law,
+    "specimen": check_specimen,
+    "reader": check_reader,
+    "camera format": check_camera_format,
+    "exporter": check_exporter,
+    "instrument format": check_instrument_format,
     "temperature form": check_temperature_form,
 }
 
@@ -208,14 +207,12 @@ _KINDS = " or ".join([", ".join([*_KITS][:-1]), [*_KITS][-1]])
 
 def check_plugin(plugin: Plugin) -> list[ConformanceReport]:
     """Run the kit of each thing that a plugin offers; PluginError where it offers nothing that can be checked."""
-    offered = [
-        (kind, name, one) for kind, kit in _KITS.items() for name, one in plugin.contributions.get(kind, {}).items()
-    ]
-    if not offered:
+    contributions = {kind: plugin.contributions.get(kind, {}).values() for kind in _KITS}
+    if not any(contributions.values()):
         raise PluginError(
             f"{plugin.provenance} offers no {', '.join(_KITS)}; return one from a hook such as creepkit_laws"
         )
-    return [_KITS[kind](name, one) for kind, name, one in offered]
+    return [_KITS[kind](one) for kind, offered in contributions.items() for one in offered]
 
 
 def check_named(name: str) -> list[ConformanceReport]:
@@ -226,13 +223,11 @@ def check_named(name: str) -> list[ConformanceReport]:
         *(registry.instruments(), registry.temperature_forms()),
     )
     offered: dict[str, Mapping[str, Any]] = dict(zip(_KITS, registered, strict=True))
-    reports = [_KITS[kind](name, known[name].value) for kind, known in offered.items() if name in known]
+    reports = [_KITS[kind](known[name].value) for kind, known in offered.items() if name in known]
     if not reports:
         clashes = [sentence for sentence in registry.conflicts() if f"'{name}' is offered twice" in sentence]
-        near = difflib.get_close_matches(
-            name, sorted({one for known in offered.values() for one in known}), n=1, cutoff=0.55
-        )
+        names = sorted({one for known in offered.values() for one in known})
+        near = difflib.get_close_matches(name, names, n=1, cutoff=0.55)
         advice = f"did you mean '{near[0]}'?" if near else "'creepkit list' says what there is"
-        sentence = f"no {_KINDS} is called '{name}'; {advice}{registry.broken_hint()}"
-        raise PluginError(clashes[0] if clashes else sentence)
+        raise PluginError(*clashes[:1] or [f"no {_KINDS} is called '{name}'; {advice}{registry.broken_hint()}"])
     return reports

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import partial
 
 import numpy as np
@@ -45,11 +44,7 @@ _RAYS = {stress: (STRESS_COLUMNS, STRESS_RANGE, "MPa"), time: ([2], TIME_RANGE, 
 """{variable: (columns of a point that grow together, range, unit)}."""
 
 
-def _rays(law: CreepLaw, _: LawSamples) -> Iterable[sympy.Symbol]:
-    return (symbol for symbol in _RAYS if law.uses(symbol))
-
-
-@finding("rate is continuous in {}", each=_rays)
+@finding("rate is continuous in {}", each=lambda law, _: filter(law.uses, _RAYS))
 def check_continuity(law: CreepLaw, samples: LawSamples, symbol: sympy.Symbol) -> str:
     """The rate does not jump as stress, time or strain grow; an equilibrium that jumps has no solution."""
     columns, (low, high), unit = _RAYS[symbol]
@@ -89,11 +84,9 @@ def check_time_exponents(law: CreepLaw, samples: LawSamples) -> str | None:
     return "above -1 at the corners of the bounds"
 
 
-def _limited(law: CreepLaw, _: LawSamples) -> Iterable[sympy.Symbol]:
-    return (symbol for symbol, state in law.states.items() if state.limit is not None)
-
-
-@finding("state {} moves towards its limit", each=_limited)
+@finding(
+    "state {} moves towards its limit", each=lambda law, _: [s for s, z in law.states.items() if z.limit is not None]
+)
 def check_state(law: CreepLaw, samples: LawSamples, symbol: sympy.Symbol) -> str:
     """An internal variable leaves its start towards its limit."""
     state, position = law.states[symbol], list(law.states).index(symbol)

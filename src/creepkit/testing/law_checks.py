@@ -85,11 +85,7 @@ def check_monotonic(law: CreepLaw, samples: LawSamples) -> str:
 LIMITS = {"value": VALUE_TOLERANCE, "derivatives": DERIVATIVE_TOLERANCE}
 
 
-def _parities(law: CreepLaw, samples: LawSamples) -> list[str]:
-    return [f"{target} {what}" for target in KERNEL_EVALUATORS for what in LIMITS]
-
-
-@finding("{} against 50 digits", each=_parities)
+@finding("{} against 50 digits", each=lambda law, _: [f"{t} {what}" for t in KERNEL_EVALUATORS for what in LIMITS])
 def check_parity(law: CreepLaw, samples: LawSamples, of: str) -> str:
     """Every target agrees with 50-digit arithmetic."""
     target, what = of.split()

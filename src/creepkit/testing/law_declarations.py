@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import pickle
 import re
-from collections.abc import Iterable, Mapping
-from typing import Any
 
 import mpmath
 import numpy as np
@@ -111,20 +109,11 @@ def check_temperature(law: CreepLaw, samples: LawSamples) -> str | None:
     return f"at {rising} of {int(counted.sum())} points"
 
 
-def _examples(law: CreepLaw, _: LawSamples) -> Iterable[Any]:
-    return [_Example(number, example) for number, example in enumerate(law.examples, 1)]
-
-
-class _Example:
-    def __init__(self, number: int, values: Mapping[str, float]) -> None:
-        self.name, self.values = str(number), dict(values)
-
-
-@finding("example {}", each=_examples)
-def check_example(law: CreepLaw, _: LawSamples, example: _Example) -> str:
+@finding("example {}", each=lambda law, _: range(1, len(law.examples) + 1))
+def check_example(law: CreepLaw, _: LawSamples, number: int) -> str:
     """An example of the author has the rate that he states."""
-    variables = (*POINT_VARIABLES, *law.states)
-    given = {key: value for key, value in example.values.items() if key != "rate"}
+    variables, given = (*POINT_VARIABLES, *law.states), dict(law.examples[number - 1])
+    stated = float(given.pop("rate"))
     missing = [key for key in law.names if key not in given]
     missing += [s.name for s in variables if law.uses(s) and s.name not in given]
     remedy = "give every parameter and what the rates use of the point"
@@ -133,7 +122,7 @@ def check_example(law: CreepLaw, _: LawSamples, example: _Example) -> str:
     assert not unknown, f"it has {min(unknown)}, which the law does not know; {remedy}"
     theta = law.to_internal(law.values({key: given[key] for key in law.names}))[0]
     point = np.array([float(given.get(s.name, 0.0)) for s in variables])
-    found, stated = float(sum(MultiprecisionLaw(law).terms(point, theta))), float(example.values["rate"])
+    found = float(sum(MultiprecisionLaw(law).terms(point, theta)))
     assert abs(found - stated) <= EXAMPLE_TOLERANCE * abs(stated), (
         f"{found:.7g} 1/s, and the example states {stated:.7g}; correct one of them"
     )

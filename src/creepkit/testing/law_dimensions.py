@@ -8,8 +8,9 @@ but where an energy stands over the temperature it must be the gas constant, or 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import operator
 from fractions import Fraction
+from functools import reduce
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -58,7 +59,7 @@ class DimensionError(LawError):
 
 def check_dimensions(law: CreepLaw) -> None:
     """DimensionError, saying which part has which unit, unless all rates of a law are consistent."""
-    units: dict[sympy.Symbol, Unit] = {strain: NO_UNIT, temperature: UnitPowers(1.0, {KELVIN: Fraction(1)})}
+    units: dict[sympy.Symbol, Unit] = {strain: NO_UNIT, temperature: parse_unit(KELVIN)}
     units |= {s: UnitPowers(1.0, {RATIO_OF_STRESS: Fraction(1)}) for s in (stress, principal_stress, mean_stress)}
     units[time] = UnitPowers(1.0, {RATIO_OF_TIME: Fraction(1)})
     declared = {symbol: param.unit for symbol, param in law.params.items()}
@@ -94,7 +95,7 @@ class _Analysis:
         """The unit of an expression; DimensionError where its parts do not go together."""
         if isinstance(expression, sympy.Symbol):
             return self.units.get(expression)
-        if isinstance(expression, sympy.Number) or expression.is_number:
+        if expression.is_number:
             return NO_UNIT if _is_plain(expression) else None
         if isinstance(expression, sympy.Mul):
             return self.product(expression)
@@ -107,57 +108,26 @@ class _Analysis:
             return self.sum_of(expression, [branch for branch, _ in expression.args])
         if isinstance(expression, sympy.Pow):
             return self.power(expression)
-        if isinstance(expression, sympy.Abs):
-            return self.unit(expression.args[0])
-        if isinstance(expression, sympy.Heaviside | sympy.sign):
-            self.unit(expression.args[0])
-            return NO_UNIT
+        if isinstance(expression, sympy.Abs | sympy.Heaviside | sympy.sign):
+            unit = self.unit(expression.args[0])
+            return unit if isinstance(expression, sympy.Abs) else NO_UNIT
         for argument in expression.args:  # of exp, log, sinh and so on
             self.require_none(argument, f"the argument of {type(expression).__name__}")
         return NO_UNIT
 
     def product(self, expression: sympy.Mul) -> Unit:
-        result, known = NO_UNIT, True
-        number = 1.0
-        for factor in expression.args:
-            if factor.is_number and not _is_plain(factor):
-                number *= float(factor)
-                continue
-            unit = self.unit(factor)
-            if unit is None:
-                known = False
-            else:
-                result = result * unit
-        if not known:
+        numbers = [factor for factor in expression.args if factor.is_number]
+        units = [self.unit(factor) for factor in expression.args if not factor.is_number]
+        known = [unit for unit in units if unit is not None]
+        if len(known) < len(units):
             return None
-        if number == 1.0:
-            return result
-        return self.with_constant(expression, result, abs(number) * _plain_value(expression))
-
-    def with_constant(self, expression: sympy.Mul, unit: UnitPowers, number: float) -> Unit:
-        """The unit of a product with a number; an energy over the temperature needs the right constant."""
-        for constant, amount in ((GAS_CONSTANT, Fraction(-1)), (BOLTZMANN_CONSTANT, Fraction())):
-            powers = {PRESSURE: Fraction(1), LENGTH: Fraction(3), KELVIN: Fraction(-1)} | (
-                {AMOUNT: amount} if amount else {}
-            )
-            if dict(unit.powers) == powers:
-                joules = unit.factor / 1e3
-                if _is_multiple(number * constant / joules):
-                    return NO_UNIT
-                if _is_multiple(number * constant):
-                    raise DimensionError(
-                        f"{expression} divides an energy in {joules:g} J by a constant in J; give the energy in "
-                        f"{'J/mol' if amount else 'J'}, or multiply by {joules:g}"
-                    )
-                raise DimensionError(
-                    f"{expression} divides an energy in {_text(unit)} by a number that is not "
-                    f"{constant:.5g} {'J/(mol K)' if amount else 'J/K'} in that unit"
-                )
-        return None
+        unit = reduce(operator.mul, known, NO_UNIT)
+        return (
+            unit if all(map(_is_plain, numbers)) else _with_constant(expression, unit, abs(float(sympy.Mul(*numbers))))
+        )
 
     def sum_of(self, expression: sympy.Basic, parts: list[sympy.Basic]) -> Unit:
-        units = [(part, self.unit(part)) for part in parts if part != 0]
-        known = [(part, unit) for part, unit in units if unit is not None]
+        known = [(part, unit) for part in parts if part != 0 and (unit := self.unit(part)) is not None]
         for (a, first), (b, second) in pairwise(known):
             if not _fits(first, second):
                 raise DimensionError(
@@ -175,10 +145,8 @@ class _Analysis:
             return unit
         if exponent.is_Rational:
             return unit.power(Fraction(int(exponent.p), int(exponent.q)))
-        if set(unit.powers) <= {RATIO_OF_STRESS, RATIO_OF_TIME}:
+        if set(unit.powers) <= {RATIO_OF_STRESS, RATIO_OF_TIME} or _fits(unit, NO_UNIT):
             return NO_UNIT  # a ratio
-        if _fits(unit, NO_UNIT):
-            return NO_UNIT
         hard = {u for u in unit.powers if u not in (PRESSURE, SECOND, RATIO_OF_STRESS, RATIO_OF_TIME)}
         if hard or abs(unit.factor - 1.0) > FACTOR_TOLERANCE:
             raise DimensionError(
@@ -196,6 +164,22 @@ class _Analysis:
                 else "it must have none; correct unit= of its parameters, or divide by a reference"
             )
             raise DimensionError(f"{what}, {expression}, is in {_text(unit)}; {remedy}")
+
+
+def _with_constant(expression: sympy.Mul, unit: UnitPowers, number: float) -> Unit:
+    """The unit of a product with a number; an energy over the temperature needs the right constant."""
+    for constant, of, amount in ((GAS_CONSTANT, "J/mol", {AMOUNT: Fraction(-1)}), (BOLTZMANN_CONSTANT, "J", {})):
+        if dict(unit.powers) == {PRESSURE: Fraction(1), LENGTH: Fraction(3), KELVIN: Fraction(-1)} | amount:
+            joules = unit.factor / 1e3
+            if _is_multiple(number * constant / joules):
+                return NO_UNIT
+            if _is_multiple(number * constant):
+                problem = f"in {joules:g} J by a constant in J; give the energy in {of}, or multiply by {joules:g}"
+            else:
+                per_kelvin = "J/(mol K)" if amount else "J/K"
+                problem = f"in {_text(unit)} by a number that is not {constant:.5g} {per_kelvin} in that unit"
+            raise DimensionError(f"{expression} divides an energy {problem}")
+    return None
 
 
 def _fits(first: UnitPowers, second: UnitPowers) -> bool:
@@ -219,14 +203,6 @@ def _is_plain(number: sympy.Basic) -> bool:
     if number.atoms(sympy.Float):
         return any(float(number) == k / 2 for k in range(-2 * LARGEST_PLAIN_NUMBER, 2 * LARGEST_PLAIN_NUMBER + 1))
     return all(max(abs(r.p), r.q) <= LARGEST_PLAIN_NUMBER for r in number.atoms(sympy.Rational))
-
-
-def _plain_value(expression: sympy.Mul) -> float:
-    values: Iterator[float] = (float(abs(f)) for f in expression.args if f.is_number and _is_plain(f))
-    result = 1.0
-    for value in values:
-        result *= value
-    return result
 
 
 def _is_multiple(ratio: float) -> bool:

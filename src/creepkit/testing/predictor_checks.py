@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,14 +120,12 @@ def law_of_check(predictor: Any, law: CreepLaw | str | None, history: History) -
     warm = norton.times(arrhenius(T_ref=NORTON_REFERENCE))
     change = 1.0 / NORTON_REFERENCE - 1.0 / history.mean_temperature
     values_warm = {**values, "A": float(rate * np.exp(-3e5 / 8.314462618 * change)), "Q": 3e5}
-    try:
-        prediction_or_refusal(
-            lambda: predict_with(predictor, warm, warm.to_internal(warm.values(values_warm)), [history])
-        )
-    except CreepkitError:  # a closed form of Norton's law alone
-        predict_with(predictor, norton, norton.to_internal(norton.values(values)), [history])  # says why it cannot
-        return norton, values
-    return warm, values_warm
+    with suppress(CreepkitError):  # a closed form of Norton's law alone
+        theta = warm.to_internal(warm.values(values_warm))
+        prediction_or_refusal(lambda: predict_with(predictor, warm, theta, [history]))
+        return warm, values_warm
+    predict_with(predictor, norton, norton.to_internal(norton.values(values)), [history])  # says why it cannot
+    return norton, values
 
 
 def norton_at(predictor: Any, history: History) -> tuple[float, dict[str, float]]:
@@ -197,19 +196,18 @@ def check_ends(case: PredictorCase) -> str:
         assert not np.isinf(values).any(), f"{where}: a value is infinite; end the row there, NaN after it"
         beyond = found.values[c, k, times.size :]
         assert np.isnan(beyond).all(), f"{where}: values beyond its last time; pad them with NaN"
-        if status in (Status.COMPLETE, Status.OUTSIDE_DOMAIN):
-            assert not missing.any(), (
-                f"{where}: NaN at {times[np.argmax(missing)]:g} s and status complete; state how and when it ended"
-            )
-        if status is Status.RUPTURED:
-            early, late = missing & (times < end * (1 - 1e-9)), ~missing & (times > end * (1 + 1e-9))
-            assert not early.any(), (
-                f"{where}: NaN at {times[np.argmax(early)]:g} s, before its end at {end:g} s; "
-                "values until then are wanted"
-            )
-            assert not late.any(), (
-                f"{where}: values at {times[np.argmax(late)]:g} s, after its end at {end:g} s; NaN is wanted there"
-            )
+        ended = status is Status.RUPTURED
+        faults = {
+            "NaN at {} s and status complete; state how and when it ended": (
+                missing & (status in (Status.COMPLETE, Status.OUTSIDE_DOMAIN))
+            ),
+            "NaN at {} s, before its end at {}; values until then are wanted": missing
+            & (times < end * (1 - 1e-9))
+            & ended,
+            "values at {} s, after its end at {}; NaN is wanted there": ~missing & (times > end * (1 + 1e-9)) & ended,
+        }
+        for problem, at in faults.items():
+            assert not at.any(), f"{where}: {problem.format(f'{times[np.argmax(at)]:g}', f'{end:g} s')}"
     return f"{int((found.status != int(Status.COMPLETE)).sum())} of {found.status.size} rows ended early"
 
 
@@ -296,14 +294,11 @@ def nuisance_value(case: PredictorCase, kind: str) -> tuple[float, float]:
         return (2.0, STEPS["temperature"]) if kind == "temperature" else (0.02, STEPS.get(kind, 0.005))
     low, high = length.bounds
     step = 0.002 * length.default
-    for factor in (1.01, 0.99):
-        value = float(np.clip(factor * length.default, low, high))
-        try:
+    for value in (float(np.clip(factor * length.default, low, high)) for factor in (1.01, 0.99)):
+        with suppress(CreepkitError):  # two lengths may bound one another
             case.predict(histories=case.histories[:1], nuisances={kind: np.array([[value + 2 * step]])})
-        except CreepkitError:
-            continue  # two lengths may bound one another
-        if value != length.default:
-            return value, step
+            if value != length.default:
+                return value, step
     return float(length.default), step
 
 
@@ -351,11 +346,7 @@ def refusal_of(call: Callable[[], object], remedy: str) -> str:
     raise AssertionError(remedy)
 
 
-def _related(case: PredictorCase) -> Iterable[str]:
-    return (method for method in RELATED if hasattr(case.predictor, method))
-
-
-@finding("{}()", each=_related)
+@finding("{}()", each=lambda case: [method for method in RELATED if hasattr(case.predictor, method)])
 def check_related_model(case: PredictorCase, method: str) -> str:
     """A reduced-order model and a refined predictor have the same outputs and about the same values."""
     history = case.histories[-1:]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -34,40 +34,39 @@ FOREIGN_FILES: dict[str, bytes] = {
 @finding("accepts() of foreign files")
 def check_accepts(reader: Reader, _: Path | None) -> str:
     """accepts() says no or yes to whatever there is."""
-    with tempfile.TemporaryDirectory() as folder:
-        places = _foreign_paths(Path(folder))
-        for place in places:
-            error = _error(lambda place=place: accepts_path(reader, place), folder)  # type: ignore[misc]
-            assert not error, f"{error}; answer False for what is not understood"
-    return f"{len(places)} files and folders"
+    errors = [refusal(accepts_path, reader, place) for place in foreign_places()]
+    assert not any(errors), f"{next(filter(None, errors))}; answer False for what is not understood"
+    return f"{len(errors)} files and folders"
 
 
 @finding("read() of foreign files")
 def check_refusals(reader: Reader, _: Path | None) -> str:
     """read() refuses in one sentence what holds no test."""
-    with tempfile.TemporaryDirectory() as folder:
-        places = _foreign_paths(Path(folder))
-        errors = [_error(lambda place=place: histories_in(reader, place), folder) for place in places]  # type: ignore[misc]
+    errors = [refusal(histories_in, reader, place) for place in foreign_places()]
     bad = [error for error in errors if " raised " in error or "\n" in error]
     assert not bad, f"{bad[0]!r}; raise creepkit.errors.HistoryError with the file, one sentence"
-    return f"{sum(map(bool, errors))} of {len(places)} refused in one sentence, the others are tests to it"
+    return f"{sum(map(bool, errors))} of {len(errors)} refused in one sentence, the others are tests to it"
 
 
-def _error(call: Callable[[], object], folder: str) -> str:
+def refusal(call: Callable[..., object], *arguments: Any) -> str:
+    """What a call says that refuses a file, the last argument, without its folder; "" where it does not."""
     try:
-        call()
+        call(*arguments)
     except HistoryError as error:
-        return str(error).replace(f"{folder}/", "")
+        return str(error).replace(f"{Path(arguments[-1]).parent}/", "")
     return ""
 
 
-def _foreign_paths(folder: Path) -> list[Path]:
-    for name, content in FOREIGN_FILES.items():
-        (folder / name).write_bytes(content)
-    (folder / "empty folder").mkdir()
-    (folder / "folder.csv").mkdir()
-    (folder / "folder.csv" / "index.csv").write_bytes(b"")
-    return [*sorted(folder.iterdir()), folder, folder / "missing.csv"]
+def foreign_places() -> Iterator[Path]:
+    """Files and folders that are none of a laboratory's tests, one after the other; they are gone after the last."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, content in FOREIGN_FILES.items():
+            (folder / file).write_bytes(content)
+        (folder / "empty folder").mkdir()
+        (folder / "folder.csv").mkdir()
+        (folder / "folder.csv" / "index.csv").write_bytes(b"")
+        yield from (*sorted(folder.iterdir()), folder, folder / "missing.csv")
 
 
 @finding("files of write_history()")
@@ -143,12 +142,9 @@ def check_round_trip(_: Reader, __: Path, found: list[History]) -> str:
     with tempfile.TemporaryDirectory() as folder:
         for position, history in enumerate(found):
             file = Path(folder) / f"{position}.csv"
-            try:
-                write_history(history, file)
-                (back,) = HISTORY_CSV.read(file)
-            except HistoryError as error:
-                raise AssertionError(str(error).replace(f"{folder}/", "")) from None
-            difference = history_difference(history, back)
+            error = refusal(write_history, history, file) or refusal(HISTORY_CSV.read, file)
+            assert not error, error
+            difference = history_difference(history, HISTORY_CSV.read(file)[0])
             assert not difference, f"test '{history.name}': {difference}"
     return f"{len(found)} histories equal"
 

@@ -53,7 +53,7 @@ class ConformanceReport:
         return tuple(check for check in self.checks if not check.passed)
 
     def __str__(self) -> str:
-        name = getattr(self.subject, "name", type(self.subject).__name__)
+        name = getattr(self.subject, "name", getattr(self.subject, "__name__", type(self.subject).__name__))
         lines = [f"{name}: {'conforms' if self.passed else 'does NOT conform'}"]
         lines += [f"  {'ok  ' if c.passed else 'FAIL'} {c.name}: {c.detail}" for c in self.checks]
         return "\n".join(lines)

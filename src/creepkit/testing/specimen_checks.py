@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from creepkit.errors import CreepkitError
-from creepkit.language import Param, parameters, stress
+from creepkit.language import parameters, stress
 from creepkit.language.law import CreepLaw
 from creepkit.records import (
     Dimension,
@@ -108,11 +107,7 @@ def check_loads(case: PredictorCase) -> str:
     )
 
 
-def _loads(case: PredictorCase) -> Iterable[Load]:
-    return (load for load in loads_of(case.predictor) if isinstance(load, Load))
-
-
-@finding("load {}", each=_loads)
+@finding("load {}", each=lambda case: loads_of(case.predictor))
 def check_load(case: PredictorCase, load: Load) -> str:
     """Every load that is declared works."""
     plan = typical_history(case.predictor, load.name, frames=8)
@@ -125,7 +120,7 @@ def check_load(case: PredictorCase, load: Load) -> str:
     return f"{load.quantity} in {load.unit or 'no unit'}"
 
 
-@finding("steps of load {}", each=_loads)
+@finding("steps of load {}", each=lambda case: loads_of(case.predictor))
 def check_load_steps(case: PredictorCase, load: Load) -> str:
     """A load that steps up and down is followed, or refused in a sentence; before its first step nothing shows it."""
     plan = typical_history(case.predictor, load.name, frames=7)
@@ -162,23 +157,23 @@ def _refused(error: CreepkitError, remedy: str) -> str:
     return f"refused: {text}"
 
 
-def _other_laws(case: PredictorCase) -> list[CreepLaw]:
-    return [
-        _norton_like("a law with other parameters", "B", "m", 1.0),
-        _norton_like("another law with the same parameters", "A", "n", 2.0),
-    ]
+_OTHER_LAWS = {"a law with other parameters": ("B", "m", 1.0), "another law with the same parameters": ("A", "n", 2.0)}
+"""{name: (coefficient, exponent, factor)} of laws that are Norton's."""
 
 
-@finding("{}", each=_other_laws)
-def check_other_law(case: PredictorCase, law: CreepLaw) -> str:
+@finding("{}", each=lambda case: _OTHER_LAWS)
+def check_other_law(case: PredictorCase, name: str) -> str:
     """Norton's law under other names of its parameters, and half of it doubled, is predicted as Norton's, or refused.
 
     A specimen that reads values["A"] for itself fails at the first and is wrong by a factor of two at the second.
     """
+    coefficient, exponent, factor = _OTHER_LAWS[name]
     history, norton = case.histories[0], default_registry().law("norton")
     rate, values = norton_at(case.predictor, history)
-    own = {"B": rate, "m": 4.0} if "B" in law.names else {"A": 0.5 * rate, "n": 4.0}
-    predicted = []
+    A, n = parameters(f"{coefficient} {exponent}")
+    kinds = dict(zip((A, n), norton.params.values(), strict=True))
+    law = CreepLaw(name, {"creep": factor * A * stress**n}, kinds, title=name)
+    own, predicted = {coefficient: rate / factor, exponent: 4.0}, []
     for one, given in ((norton, values), (law, own)):
         theta = one.to_internal(one.values(given))
         try:
@@ -194,19 +189,7 @@ def check_other_law(case: PredictorCase, law: CreepLaw) -> str:
     return f"{gap:.1e}"
 
 
-def _norton_like(name: str, coefficient: str, exponent: str, factor: float) -> CreepLaw:
-    """Norton's law with names of its own, times a factor."""
-    A, n = parameters(f"{coefficient} {exponent}")
-    norton = default_registry().law("norton")
-    kinds: tuple[Param, ...] = tuple(norton.params.values())
-    return CreepLaw(name, {"creep": factor * A * stress**n}, dict(zip((A, n), kinds, strict=True)), title=name)
-
-
-def _lengths(case: PredictorCase) -> tuple[Any, ...]:
-    return tuple(dimensions_of(case.predictor))
-
-
-@finding("length {}", each=_lengths)
+@finding("length {}", each=lambda case: dimensions_of(case.predictor))
 def check_length(case: PredictorCase, length: Any) -> str:
     """Each length is followed when a test states it, as it is when it is a nuisance parameter."""
     assert isinstance(length, Dimension), f"{length!r} is none; write ck.dimension(50.0) for a field"
@@ -230,12 +213,10 @@ def check_length(case: PredictorCase, length: Any) -> str:
 @finding("an unknown length is refused")
 def check_unknown_length(case: PredictorCase) -> str | None:
     """A test that states a length that there is not is an error."""
+    if not dimensions_of(case.predictor):
+        return None
     foreign = case.histories[0].replace(geometry={UNKNOWN_LENGTH: 1.0})
-    return (
-        None
-        if not _lengths(case)
-        else refusal_of(
-            lambda: prediction_or_refusal(lambda: case.predict(histories=[foreign])),
-            f"a test that states '{UNKNOWN_LENGTH}' is simulated; call creepkit.records.check_geometry() in predict()",
-        )
+    return refusal_of(
+        lambda: prediction_or_refusal(lambda: case.predict(histories=[foreign])),
+        f"a test that states '{UNKNOWN_LENGTH}' is simulated; call creepkit.records.check_geometry() in predict()",
     )

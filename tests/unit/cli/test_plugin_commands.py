@@ -161,7 +161,7 @@ def test_a_file_of_the_environment_that_is_not_there_is_one_sentence(
     monkeypatch.setenv("CREEPKIT_PLUGINS", files)
     result = creepkit("list", "laws")
     assert (result.exit_code, result.stdout) == (1, "")
-    assert f"CREEPKIT_PLUGINS names the plugin file {files}, which does not exist; {advice}" in result.stderr
+    assert f"CREEPKIT_PLUGINS names the file {files}, which does not exist; {advice}" in result.stderr
 
 
 EXECUTED = "from pathlib import Path\nPath('executed').touch()\n"

@@ -15,7 +15,7 @@ from creepkit.sampling.criteria import BURST_TIME_FACTOR, SimulationOutcome, con
 from creepkit.sampling.domains import sampling_design
 
 DIMPLE, NORTON = ck.specimen("bulge").replace(threads=1), ck.law("norton")
-PAPER = {c.name: c for c in paper_criteria("bulge")}
+PAPER = {c.name: c for c in paper_criteria(ck.specimen("bulge"))}
 JUMP, END = 14400.0, 43200.0
 
 
@@ -47,7 +47,7 @@ def test_little_growth_rules_nothing_out(growths):
 
 
 def test_without_a_number_of_seconds_a_burst_rules_nothing_out():
-    full = {c.name: c for c in conditioned_criteria(NORTON, "bulge", END)}["full history"]
+    full = {c.name: c for c in conditioned_criteria(NORTON, ck.specimen("bulge"), END)}["full history"]
     assert not full.rejects_early(sketch(1.0))
 
 

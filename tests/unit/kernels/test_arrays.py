@@ -44,21 +44,6 @@ def moderate(law: CreepLaw, size: int, dtype: torch.dtype = torch.float64) -> li
 
 
 @each_target
-def test_norton_by_hand(target: Any, array: Callable[[Any], Any]) -> None:
-    kernel = lower(NORTON, target)
-    stress = array([10.0, 100.0])
-
-    found = kernel.derivatives({"A": 1e-16, "n": 4.0}, stress=stress)
-
-    np.testing.assert_allclose(kernel.rate({"A": 1e-16, "n": 4.0}, stress=stress), [1e-12, 1e-8], rtol=1e-13)
-    np.testing.assert_allclose(found.rate, [1e-12, 1e-8], rtol=1e-13)
-    np.testing.assert_allclose(found["stress"], [4e-13, 4e-10], rtol=1e-13)
-    np.testing.assert_allclose(found["A"], [1e-12, 1e-8], rtol=1e-13)  # to ln A
-    np.testing.assert_allclose(found["n"], np.log([10, 100]) * [1e-12, 1e-8], rtol=1e-13)
-    np.testing.assert_allclose(found["time"], [0.0, 0.0], atol=0)
-
-
-@each_target
 def test_candidates_and_points_broadcast(target: Any, array: Callable[[Any], Any]) -> None:
     kernel = lower(TIME_HARDENING, target)
     values = {"A": 1e-12, "n": array([[2.0], [3.0]]), "m": -0.5}
@@ -77,15 +62,6 @@ def test_numbers_alone_give_a_number(target: Any, array: Callable[[Any], Any]) -
 
     assert rate.shape == ()
     assert float(rate) == pytest.approx(9e-10, rel=1e-14)
-
-
-def test_damage_grows_at_its_own_rate() -> None:
-    law = EQUATIONS["Kachanov-Rabotnov"]
-    values = {"A": 1e-12, "n": 3.0, "B": 1e-8, "k": 2.0, "r": 4.0}
-
-    rates = lower(law, "numpy").state_rates(values, stress=50.0, principal_stress=40.0, omega=0.5)
-
-    assert float(rates["omega"]) == pytest.approx(1e-8 * 40.0**2 / 0.5**4, rel=1e-13)
 
 
 @each_target

@@ -31,20 +31,6 @@ def point(**given: float) -> Floats:
 # ---- layout --------------------------------------------------------------------------------------------------------
 
 
-def test_norton_by_hand() -> None:
-    compiled = lower(NORTON, "compiled")
-    theta = NORTON.to_internal({"A": 1e-16, "n": 4.0})[0]
-
-    rate, flags = call_entry(compiled, "rate", point(), theta)
-    update, _ = call_entry(compiled, "update", point(), theta)
-    sensitivity, _ = call_entry(compiled, "sensitivity", point(), theta)
-
-    assert flags == 0
-    np.testing.assert_allclose(rate, [[1e-8]], rtol=1e-13)
-    np.testing.assert_allclose(update, [[np.log(1e-8), 0.04, 0, 0, 0, 0, 0]], rtol=1e-13)
-    np.testing.assert_allclose(sensitivity, [[1e-8, 4e-10, 0, 0, 0, 0, 0, 1e-8, 1e-8 * np.log(100)]], rtol=1e-13)
-
-
 def test_a_rate_that_is_a_number() -> None:
     compiled = lower(NORTON.fix(n=0.0).fix(A=1e-6), "compiled")
     rate, flags = call_entry(compiled, "rate", point(), np.zeros(0))

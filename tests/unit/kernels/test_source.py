@@ -9,7 +9,6 @@ from creepkit.kernels.compilation import assembly, module_source
 from creepkit.kernels.symbolic_kernel import symbolic_kernel
 from creepkit.language import CreepLaw, parameters, stress
 from creepkit.laws.combined import COMBINED
-from creepkit.laws.norton import NORTON
 from helpers.literature_laws import EQUATIONS, POWER, RATE, A, law, n
 
 
@@ -21,14 +20,6 @@ def test_a_kernel_is_printed_in_the_words_of_its_author() -> None:
     assert "    B = exp(ln_B)" in source
     assert "    strain_hardening = exp(ln_A_2 + ln_strain*m_1 + ln_stress*n_2)" in source
     assert "        hyperbolic_sine + strain_hardening + time_hardening," in source
-
-
-def test_norton_is_one_line_on_every_target() -> None:
-    line = "power_law = exp(ln_A + ln_stress*n)"
-
-    assert line in lower(NORTON, "numpy").source
-    assert line in lower(NORTON, "torch").source
-    assert line in lower(NORTON, "compiled").source
 
 
 def test_what_needs_no_point_is_done_once_for_all_eight() -> None:

@@ -69,14 +69,6 @@ def read(document):
         return str(error)
 
 
-@given(JSON)
-@settings(max_examples=150, deadline=None)
-def test_any_json_as_a_law(data):
-    sentence = read(data)
-    assert isinstance(sentence, str)
-    assert "\n" not in sentence
-
-
 @given(TREES | JSON)
 @settings(max_examples=400, deadline=None)
 def test_any_tree_as_an_expression(tree):

@@ -53,15 +53,6 @@ def test_a_specimen_that_raises_in_simulate() -> None:
     assert "predictor 'broken': predict() raised IndexError: index 7" in said(error, "predict", "np.zeros")
 
 
-def test_a_specimen_that_raises_in_identify() -> None:
-    test = ck.simulate("norton", "uniaxial", VALUES, loading=ck.constant_stress(80.0), times=TIMES)
-
-    with pytest.raises(SolveError) as error:
-        ck.identify("norton", [test], Broken(), starts=1, nuisances=[])
-
-    assert "raised IndexError" in said(error, "predict", "np.zeros")
-
-
 def test_a_run_that_raises() -> None:
     class WithRun(Broken):
         def run(self, law, values, plan):

@@ -107,9 +107,9 @@ def test_a_design_of_any_specimen_travels() -> None:
 
 
 def test_an_output_that_falls_shows_creep_by_its_fall() -> None:
-    shown = creep_output("relaxation")
+    shown = creep_output(ck.specimen("relaxation"))
     assert (shown.falls, shown.column, str(shown.output)) == (True, 0, "stress")
-    criteria = {c.name: c for c in paper_criteria("relaxation")}
+    criteria = {c.name: c for c in paper_criteria(ck.specimen("relaxation"))}
     assert list(criteria) == ["1", "2", "3", "4"]  # a stress that has relaxed is no rejection
     marks = np.array([300.0, 280.0, 420.0, 400.0])[:, None]
     fallen = SimulationOutcome(np.arange(4.0), marks, marks, Status.COMPLETE, 4.0, {}, falls=True)

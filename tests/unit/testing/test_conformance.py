@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sympy
 import torch
-from sympy import Piecewise, exp, gamma, sinh, sqrt
+from sympy import exp, sqrt
 
 from creepkit.kernels import lowering, numpy_functions, torch_functions
 from creepkit.kernels.multiprecision import MultiprecisionLaw
@@ -22,7 +22,7 @@ from creepkit.testing.parity import (
     largest_differences,
 )
 from helpers.dyson_mclean import DYSON_MCLEAN
-from helpers.literature_laws import EQUATIONS, POWER, RATE, A, B, law, m, n, number, s_0, scale
+from helpers.literature_laws import EQUATIONS, POWER, RATE, A, law, n, number, s_0
 
 # ---- what passes ---------------------------------------------------------------------------------------------------
 
@@ -59,74 +59,14 @@ def test_a_report_prints_one_line_a_check() -> None:
     assert "  ok   off equals fix: A 0.0e+00, n 0.0e+00" in lines
 
 
-# ---- laws that are broken ------------------------------------------------------------------------------------------
-
 PLAIN = {A: RATE, n: POWER}
-BROKEN: dict[str, tuple[CreepLaw, str, str]] = {
-    "no title": (
-        CreepLaw(name="x", terms={"t": A * stress**n}, params=PLAIN, references=("somebody",)),
-        "title, references, units",
-        "missing title",
-    ),
-    "no reference": (
-        CreepLaw(name="x", title="A law", terms={"t": A * stress**n}, params=PLAIN),
-        "title, references, units",
-        "missing references",
-    ),
-    "negative by a sign": (
-        law({"creep": A * stress**n, "recovery": -B * stress**m}, {**PLAIN, B: RATE, m: POWER}),
-        "lowering",
-        "term 'recovery': -B*stress**m is negative, and a rate is not; write recovery as a factor or an internal",
-    ),
-    "negative somewhere": (
-        law(A * stress**n * (1 - m * strain), {**PLAIN, m: number(0, 1e6)}),
-        "no term is negative",
-        "say in constraints where the law holds",
-    ),
-    "falls with stress": (
-        law(A * stress**n, {A: RATE, n: number(-3, -1)}),
-        "rate never falls with stress",
-        "not at 16 of 16 points, such as stress ",
-    ),
-    "function without a kernel": (
-        law(A * stress**n * gamma(B), {**PLAIN, B: number(1, 4)}),
-        "lowering",
-        "term 'term': the function gamma in gamma(B) has no kernel; allowed are Abs, ",
-    ),
-    "gap between branches": (
-        law(A * Piecewise((stress**n, stress < 100)), PLAIN),
-        "lowering",
-        "must hold in all remaining cases: write (..., True)",
-    ),
-    "overflow": (law(A * stress**n * exp(sinh(stress)), PLAIN), "ln rate is finite", "such as stress "),
-    "digits lost as written": (
-        law(A * stress * (sqrt(1 + strain) - 1), {A: RATE}),
-        "numpy value against 50 digits",
-        ", rate at stress ",
-    ),
-    "off that is no switch": (
-        law(A * sinh(stress / B), {A: RATE, B: scale(1, 100, off=0.0)}),
-        "off equals fix",
-        "is not finite and real",
-    ),
-    "constraint that never holds": (
-        law(A * stress**n, PLAIN, constraints=(n >= 9,)),
-        "constraints",
-        "the constraints hold at 0 of the samples",
-    ),
-}
 
 
-@pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_law_is_caught_and_told_why(name: str) -> None:
-    broken, check, sentence = BROKEN[name]
-
-    report = check_law(broken, samples=16)
-
-    assert not report.passed
-    (found,) = [c for c in report.failures if c.name == check]
-    assert sentence in found.detail
-    assert "does NOT conform" in str(report)
+def test_digits_that_are_lost_as_written_are_caught() -> None:
+    lost = law(A * stress * (sqrt(1 + strain) - 1), {A: RATE})
+    (found,) = [c for c in check_law(lost, samples=16).failures if c.name == "numpy value against 50 digits"]
+    assert ", rate at stress " in found.detail
+    assert "does NOT conform" in str(check_law(lost, samples=16))
 
 
 # ---- kernels that are broken ---------------------------------------------------------------------------------------

@@ -200,13 +200,14 @@ def test_a_predictor_without_a_record_conforms_with_tests_of_its_own() -> None:
     assert report.passed, str(report)
 
 
-def test_a_class_in_the_place_of_an_object_is_refused() -> None:
-    with pytest.raises(ArgumentError, match=r"specimen of check_specimen\(\) is <class .* allowed is a Specimen"):
-        ck.check_specimen(Rod)
-    with pytest.raises(ArgumentError, match="reader of check_reader.*allowed is a Reader"):
-        ck.check_reader(Rod())
-    with pytest.raises(ArgumentError, match="exporter of check_exporter.*allowed is an Exporter"):
-        ck.check_exporter(Rod())
+def test_another_object_is_refused_with_what_it_lacks() -> None:
+    for check, given, members in (
+        (ck.check_specimen, Rod, "name and outputs and predict and title"),
+        (ck.check_reader, Rod(), "accepts and name and read and title"),
+        (ck.check_exporter, Rod(), "name and suffix and text and title"),
+    ):
+        with pytest.raises(ArgumentError, match=f"of {check.__name__}.*allowed is an object with {members}"):
+            check(given)
 
 
 # ---- readers -------------------------------------------------------------------------------------------------------
