@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mpmath
@@ -32,6 +33,7 @@ from creepkit.laws.combined import COMBINED
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.records import LawWithValues
 from creepkit.registry import default_registry
 from creepkit.testing import LawSamples, draw_samples
 from creepkit.testing.parity import KernelTable, MultiprecisionReference, largest_differences
@@ -114,6 +116,14 @@ class Case:
         found = max(differences, key=lambda difference: difference.size)
         return f"{self.law.name}: {found.size:.1e} in {truth.location_text(found)}", found.size
 
+    @property
+    def labels(self) -> list[str]:
+        """A name for the values at each point, such as law3_1: of functions that have them as constants."""
+        known: list[dict[str, float]] = []
+        for values in self.sets:
+            known += [] if values in known else [values]
+        return [f"law{[*LAWS.values()].index(self.law)}_{known.index(values)}" for values in self.sets]
+
     def logs(self, rates: np.ndarray) -> np.ndarray:
         """ln of the rates found, (samples,); the truth's where no double holds the rate, so that others are judged."""
         exact = [rows[0][0] for rows in self.truth.rows]
@@ -148,3 +158,20 @@ def case(name: str) -> Case:
             sets.append(values)
     samples = LawSamples(np.array(points), np.array(theta).reshape(len(points), -1))
     return Case(law, samples, sets, MultiprecisionReference(MultiprecisionLaw(law), samples))
+
+
+def labelled_values() -> dict[str, LawWithValues]:
+    """{label: law with values} of every set of values of every law."""
+    triples = [
+        (law, *pair) for name, law in LAWS.items() for pair in zip(case(name).labels, case(name).sets, strict=True)
+    ]
+    return {label: LawWithValues(law, values, name=label) for law, label, values in triples}
+
+
+def disagreements(evaluate: Callable[[str, Case], tuple[np.ndarray, np.ndarray]]) -> list[str]:
+    """Where programs differ from 50 digits over all laws, a line each.
+
+    evaluate(name, case) : rows (samples, 1 + S, columns) and ln rate (samples,) by the program of a law.
+    """
+    found = [case(name).worst(*evaluate(name, case(name))) for name in LAWS]
+    return [told for told, size in found if not size <= TOLERANCE]

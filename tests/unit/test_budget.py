@@ -15,7 +15,7 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 270,
-    "app": 650,
+    "app": 630,
     "cameras": 1200,
     "cli": 2300,
     "core": 100,
@@ -29,13 +29,13 @@ BUDGET = {
     "forecasts": 1490,
     "instruments": 1400,
     "integration": 1100,
-    "inverse": 11550,
+    "inverse": 12100,
     "jobs": 260,
     "kernels": 1720,
-    "language": 1550,
+    "language": 1580,
     "laws": 140,
-    "modules": 760,
-    "quality": 1400,
+    "modules": 770,
+    "quality": 1470,
     "readers": 4150,
     "records": 1960,
     "registry": 610,
@@ -44,13 +44,13 @@ BUDGET = {
     "sampling": 1110,
     "screening": 740,
     "specimens": 4050,
-    "studies": 2750,
+    "studies": 2670,
     "surrogates": 1850,
     "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 33740
+TESTS = 33500
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -145,15 +145,14 @@ def _write(histories: list[History], folder: Path) -> list[Path]:
     for history in histories:
         history_text(history)  # an error of the last one must not leave the others written
     check_folder_target(folder, HistoryError)
-    sources = [_source_file(history.source) for history in histories]
     paths = [folder / f"{name}.csv" for name in names]
-    for path, source in zip(paths, sources, strict=True):
-        with made_from(source):  # its name stands in that file, which must not choose that of another measurement
-            check_folder_target(folder, HistoryError, (path.name,))
-    make_folder(folder, HistoryError)
-    for history, path, source in zip(histories, paths, sources, strict=True):
-        with made_from(source):
-            ck.write_history(history, path)
+    for write in (False, True):
+        for history, path in zip(histories, paths, strict=True):
+            with made_from(_source_file(history.source)):  # whose names must not choose those of another measurement
+                check_folder_target(folder, HistoryError, (path.name,))
+                if write:
+                    make_folder(folder, HistoryError)
+                    ck.write_history(history, path)
     return paths
 
 

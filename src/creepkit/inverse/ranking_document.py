@@ -99,9 +99,8 @@ def _ranking_from_json(data: Any, path: str | Path) -> ModelAverage:
     fits: list[Identification] = []
     weights: list[float] = []
     for entry in laws:
-        keys = ("file", "weight", *(("sha256",) if isinstance(entry, dict) and "sha256" in entry else ()))
-        if not isinstance(entry, dict) or check_keys(entry, keys, "laws"):
-            raise FitError(f"{path}: each of its laws is a file and a weight, found {quoted(repr(entry), 60)}")
+        if not isinstance(entry, dict) or check_keys(entry, ("file", "weight", "sha256"), "laws"):
+            raise FitError(f"{path}: each of its laws is file, weight and sha256, found {quoted(repr(entry), 60)}")
         name, weight = entry["file"], entry["weight"]
         if not isinstance(name, str) or Path(name).name != name or name in ("", ".", "..", Path(path).name):
             raise FitError(f"{path}: a law's file is {quoted(repr(name), 60)}; it is a name in the same folder")
@@ -109,7 +108,7 @@ def _ranking_from_json(data: Any, path: str | Path) -> ModelAverage:
             raise FitError(f"{path}: the weight of {name} is {quoted(repr(weight), 20)}; it is a number from 0 to 1")
         if name in (known["file"] for known in laws[: len(fits)]):
             raise FitError(f"{path}: {name} is among its laws twice; keep one of them")
-        fits.append(_fit_of_law(Path(path), name, entry.get("sha256")))
+        fits.append(_fit_of_law(Path(path), name, entry["sha256"]))
         weights.append(float(weight))
     if len({fit.provenance.get("data") for fit in fits}) > 1:
         raise FitError(f"{path}: its laws were not identified alike from the same tests; {RANKING.kind.advice}")
@@ -121,12 +120,12 @@ def _ranking_from_json(data: Any, path: str | Path) -> ModelAverage:
 
 
 def _fit_of_law(path: Path, name: str, sha256: Any) -> Identification:
-    """The identification in a file beside a ranking; sha256 : of the file, None where the ranking does not state it."""
+    """The identification in a file beside a ranking; sha256 : of the file, as the ranking states it."""
     try:
         fit = load(path.parent / name)
     except FitError as error:
         raise FitError(f"{path} names {name}: {error}") from None
-    if sha256 is not None and sha256_of(path.parent / name, IDENTIFICATION.kind) != sha256:
+    if sha256_of(path.parent / name, IDENTIFICATION.kind) != sha256:
         raise FitError(
             f"{path}: {name} is not the file that this ranking was made with: it has been changed, or written by "
             f"another run; {RANKING.remedy}"

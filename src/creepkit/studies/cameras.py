@@ -260,7 +260,7 @@ class StudyCamera:
             record_to_json(asdict(said)),
             [part.name, self.operator, predictor_fingerprint(self.specimen)],
         ]
-        return Stage(self.name, "extraction", "", settings, make, ExtractedTests, _numbers_of_frames)
+        return Stage("extraction", "", settings, make, ExtractedTests, _numbers_of_frames, name=self.name)
 
     def _imposed(self, hashes: Mapping[Path, list[str]]) -> Stage:
         import creepkit as ck
@@ -288,8 +288,8 @@ class StudyCamera:
             return ImposedOnTests(tuple(found))
 
         settings = [hashes[path], record.model_dump(), part.channels, [part.lag_s, part.search_s, part.camera_start]]
-        name, needs = self.record_name, (self.name,)
-        return Stage(name, "record", "", settings, make, ImposedOnTests, _numbers_of_records, needs)
+        numbers, needs = _numbers_of_records, (self.name,)
+        return Stage("record", "", settings, make, ImposedOnTests, numbers, needs, name=self.record_name)
 
     # ---- its tests -------------------------------------------------------------------------------------------------
 

@@ -42,7 +42,7 @@ def no_numbers(result: Any) -> dict[str, Any]:
 class Stage:
     """One stage.
 
-    name : of its result. kind : what it makes. group : of the tests that it is about, "" for all.
+    kind : what it makes. group : of the tests that it is about, "" for all.
     settings : JSON-able data of all that decides the result beside what it `needs`, names of other stages.
     make : from the results of these, with something to report progress to. record : class of the result, by which a
         file is read; None where the result is made again from identifications that are kept.
@@ -50,9 +50,9 @@ class Stage:
     document : what of a result that no record can be read from is written down, as JSON-able data.
     predictor : of identifications that its file holds. file : that an export is written to, "" for other stages.
     remark : what is known beforehand that the result leaves out of account, "" where nothing is.
+    name : of its result, by default that of a stage of which each group has one.
     """
 
-    name: str
     kind: StageKind
     group: str
     settings: Any
@@ -64,6 +64,10 @@ class Stage:
     predictor: Predictor | None = field(default=None, repr=False)
     file: str = ""
     remark: str = ""
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", self.name or stage_name(self.kind, self.group))
 
 
 def stage_name(kind: StageKind, group: str = "") -> str:

@@ -115,7 +115,7 @@ def _quality_stage(study: StageInputs) -> Stage:
     def make(results: Results, tick: Tick) -> DataQuality:
         return ck.check_data_quality(framed)
 
-    return Stage("quality", "quality", "", _digests(framed), make, DataQuality)
+    return Stage("quality", "", _digests(framed), make, DataQuality)
 
 
 # ---- laws ----------------------------------------------------------------------------------------------------------
@@ -149,8 +149,7 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
         "using": study.using_fingerprint,
         "tests": _digests(tests),
     }
-    name = stage_name("identification", group.name)
-    return Stage(name, "identification", group.name, described, make, Ranking, numbers_of_ranking, predictor=using)
+    return Stage("identification", group.name, described, make, Ranking, numbers_of_ranking, predictor=using)
 
 
 def numbers_of_ranking(ranking: Ranking) -> dict[str, Any]:
@@ -193,17 +192,13 @@ def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
 
     law_fingerprint = None if law is None else law.fingerprint
     described = [part.model_dump(), record_to_json(asdict(study.settings)), study.using_fingerprint, law_fingerprint]
-    return Stage(
-        stage_name("temperature", group.name),
-        "temperature",
-        group.name,
-        [*described, _digests(tests)],
-        make,
-        numbers=lambda found: {"forms": found.temperature_law.forms, "values": found.temperature_law.values},
-        needs=(need,) if need else (),
-        document=document,
-        remark=isothermal_tests(tests, options.get("within", ISOTHERMAL_RANGE))[1],
-    )
+
+    def numbers(found: Any) -> dict[str, Any]:
+        return {"forms": found.temperature_law.forms, "values": found.temperature_law.values}
+
+    remark = isothermal_tests(tests, options.get("within", ISOTHERMAL_RANGE))[1]
+    described, needs = [*described, _digests(tests)], (need,) if need else ()
+    return Stage("temperature", group.name, described, make, None, numbers, needs, document=document, remark=remark)
 
 
 def _best_candidate(study: StageInputs, ranking: Ranking, group: TestGroup) -> tuple[CreepLaw, Identification | None]:
@@ -236,8 +231,7 @@ def _rupture_stage(study: StageInputs, group: TestGroup) -> Stage:
         return ck.rupture(tests, settings=settings, **how)
 
     described = [part.model_dump(), record_to_json(asdict(settings)), _digests(tests)]
-    name = stage_name("rupture", group.name)
-    return Stage(name, "rupture", group.name, described, make, RuptureAssessment, _numbers_of_rupture)
+    return Stage("rupture", group.name, described, make, RuptureAssessment, _numbers_of_rupture)
 
 
 def _numbers_of_rupture(assessment: RuptureAssessment) -> dict[str, Any]:
@@ -273,7 +267,7 @@ def _forecast_stage(study: StageInputs, number: int) -> Stage:
         return ck.forecast(ranking, tests, tolerances=tolerances or None, progress=tick, **how)
 
     name, described = f"forecast of {part.name}", [part.model_dump(), _digests(measured)]
-    return Stage(name, "forecast", groups[0].name, described, make, Forecast, _numbers_of_forecast, (need,))
+    return Stage("forecast", groups[0].name, described, make, Forecast, _numbers_of_forecast, (need,), name=name)
 
 
 def _numbers_of_forecast(forecast: Forecast) -> dict[str, Any]:
@@ -305,8 +299,7 @@ def _design_stage(study: StageInputs, group: TestGroup) -> Stage:
     def numbers(design: Design) -> dict[str, Any]:
         return {"plan": [test.description for test in design.plan]}
 
-    name = stage_name("design", group.name)
-    return Stage(name, "design", group.name, [part.model_dump(), seed], make, Design, numbers, (need,))
+    return Stage("design", group.name, [part.model_dump(), seed], make, Design, numbers, (need,))
 
 
 def export_name(file: StudyFile, number: int) -> str:
@@ -339,7 +332,7 @@ def _export_stage(study: StageInputs, number: int, group: TestGroup) -> Stage:
 
     name = f"export {number + 1}{f' of {group.name}' if group.name else ''}: {part.target}"
     described = [part.model_dump(), file]
-    return Stage(name, "export", group.name, described, make, ExportedFile, numbers, (need,), file=file)
+    return Stage("export", group.name, described, make, ExportedFile, numbers, (need,), file=file, name=name)
 
 
 OF_EACH_GROUP: Mapping[StageKind, Callable[[StageInputs, TestGroup], Stage]] = {

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from creepkit.app.contents import MOST_TESTS, page_contents
 from creepkit.app.documents import MOST_FRAMES, contents_document
 from creepkit.app.page import page_fragment, page_html, shared_scripts
 from creepkit.errors import ExportError, FitError
+from creepkit.exporters.javascript import script_safe_json
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from helpers.planted_bars import SPL, bars
@@ -39,8 +41,10 @@ def test_every_law_has_a_page_and_a_first_curve(name):
     for p in law["parameters"]:
         assert p["low"] <= p["value"] <= p["high"]
     assert 0.0 < law["end"] < 1e22
-    assert law["equations"][0].startswith("<math")
     assert " style=" not in "".join(law["equations"])
+    for text in (*law["equations"], *(p["symbol"] for p in law["parameters"])):
+        assert ElementTree.fromstring(text).tag.endswith("math")
+    assert json.loads(script_safe_json(shown)) == shown
 
 
 def test_an_identification_brings_its_tests_intervals_and_covariance(fit, histories):

@@ -103,9 +103,6 @@ def _json(**changes):
     ("text", "message"),
     [
         ("{", "mine.json, line 1: not JSON"),
-        ("", "mine.json, line 1: not JSON"),
-        ("[" * 100_000, "nested too deep"),
-        ('{"format": ' + "9" * 5000 + "}", "integer too long"),
         ("[]", "not a law that creepkit wrote"),
         (_json(version=1), "in version 1 of the format; this one reads version 3: export the law again"),
         (_json(ranges={"temperature": [1100, 900]}), "ranges.temperature is 1100 to 900; the lower number comes first"),
@@ -116,8 +113,6 @@ def _json(**changes):
         (_json(values={"A": 1e-16, "n": float("inf")}), "Infinity is no number of JSON"),
         (_json(notes="text"), "notes is 'text', where a list is needed"),
         (_json(law={}), "mine.json: this is not a law that creepkit wrote"),
-        ('{"format": "creepkit-valued-law", "format": 1}', "the key 'format' stands twice"),
-        ('{"format": 1e999}', "the number 1e999 is too large"),
         (_json(gas_constant=8.31), "'gas_constant' is 8.31; creepkit reads 8.314462618 alone"),
         (_json(units={"stress": "Pa", "time": "s", "temperature": "K", "energy": "J/mol"}), "'units' is .*'Pa'"),
     ],
@@ -228,26 +223,7 @@ def test_a_refused_export_leaves_the_old_file(tmp_path):
     assert path.read_text() == "old"
 
 
-def test_a_folder_that_does_not_exist_is_named(tmp_path):
-    with pytest.raises(ExportError, match="missing/norton.json: cannot be written: there is no folder"):
-        export(VALUED, "json", to=tmp_path / "missing" / "norton.json")
-
-
-def test_a_file_is_no_folder(tmp_path):
-    (tmp_path / "creep.f").write_text("mine")
-    with pytest.raises(ExportError, match="creep.f/norton.json: cannot be written: Not a directory"):
-        export(VALUED, "json", to=tmp_path / "creep.f" / "norton.json")
-    assert (tmp_path / "creep.f").read_text() == "mine"
-
-
 def test_latex_tells_references_and_keeps_each_comment_a_comment():
     text = LatexExporter().text(VALUED.replace(notes=("one\u2028\\input{two}",)))
     assert f"% Source: {NORTON.references[0]}" in text
     assert "\n% \\input{two}" in text
-
-
-def test_a_folder_is_no_file(tmp_path):
-    (tmp_path / "norton.json").mkdir()
-    with pytest.raises(ExportError, match="cannot be written: it is a folder"):
-        export(VALUED, "json", to=tmp_path / "norton.json", force=True)
-    assert [p.name for p in tmp_path.iterdir()] == ["norton.json"]
