@@ -29,6 +29,7 @@ from .forecasts.forecast import forecast as forecast
 from .hookspecs import hookimpl as hookimpl
 from .instruments.clock_alignment import align_clocks as align_clocks
 from .instruments.imposed import imposed as imposed
+from .inverse.candidates import candidates as candidates
 from .inverse.checked_identification import identify as identify
 from .inverse.checked_identification import select as select
 from .inverse.confirmation import confirm as confirm

@@ -67,9 +67,7 @@ def command(
 
 
 def print_result(result: StudyResult) -> None:
-    """How each stage ended, what was found, tests that lie apart, and where the report is."""
-    from creepkit.reports.tests_apart import apart_sentence
-
+    """How each stage ended, what was found, and where the report is."""
     tell(result.title)
     print_table("", ("stage", "state", ""), [(one.name, one.state, one.sentence) for one in result.stages])
     for exclusion in result.exclusions:
@@ -77,7 +75,7 @@ def print_result(result: StudyResult) -> None:
         frames = f", {count} frame{'s' if count > 1 else ''}" if count else ""
         tell(f"left out: {exclusion.test}{frames}: {exclusion.reason}")
     for group, ranking in result.rankings.items():
-        for sentence in filter(None, (ranking.verdict, apart_sentence(ranking.best))):
+        for sentence in (ranking.best.headline, ranking.verdict):
             tell(f"{group}: {sentence}" if group else sentence)
     if result.report is not None:
         tell(f"report: {result.report}")

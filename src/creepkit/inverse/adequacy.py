@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from creepkit.inverse.contradicting_values import ContradictingValues
+from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
@@ -24,10 +25,6 @@ UNDETECTED_SCATTER = 1.5 * SMALLEST_RATE_SCATTER
 
 LARGEST_SCATTER = 1.0
 """Of ln rate between tests, a factor of 2.7: more is no scatter of one alloy."""
-
-
-TREND_SIGNIFICANCE = 0.01
-"""p-value below which rates of tests depend on stress in another way than the law's."""
 
 
 NOTEWORTHY_EXPECTATION = 1.05
@@ -74,17 +71,17 @@ class Adequacy:
     each, times their number. correlation : of what is left, as a share of the test (of outputs that span decades: the
     ln of a factor in time); NaN where nothing is. largest : where the law misses most; None if nothing is known.
     remedies : unmodelled effects, such as "a thickness of 0.01 mm", with any of which the law would explain the tests.
-    rate_scatter : standard deviation of ln rate between tests, which was estimated from them, and rate_trend_p_value :
-        of a bend of these rates over stress, by which a law shows that it misses the dependence on stress.
+    rate_scatter : standard deviation of ln rate between tests, which was estimated from them.
+    explanations : of that scatter, the likeliest first: the law's dependence on stress or temperature, one test, two
+        groups of tests (see inverse.rate_explanations).
     implausible : nuisances that lie far from their priors, without which the law would not explain the tests.
     expected_chi_square : what `chi_square` is in the mean if the law is right: above one where noise is estimated from
         few frames. critical_chi_square : the reduced chi-square beyond which the tests contradict the law.
     smallest_p_value : of all outputs together and of each, before it is multiplied by their number.
     not_judged : the outputs, where nothing can be judged, and few_frames : the tests, each with how
         many frames it has, where these are too few to show the noise.
+    unpredicted : tests of which nothing is predicted, of which no law is judged that does not contradict the others.
     contradicting : minimum rates and rupture times that contradict one another by the law, beyond their own scatter.
-    outlying : tests whose rates lie outside of those of all others, with their factors on the law's rate;
-        `rate_scatter` is then that of the others.
     """
 
     verdict: AdequacyVerdict
@@ -96,15 +93,20 @@ class Adequacy:
     largest: LargestDeviation | None
     remedies: tuple[str, ...] = ()
     rate_scatter: float = 0.0
-    rate_trend_p_value: float = 1.0
+    explanations: tuple[Explanation, ...] = ()
     implausible: tuple[ImplausibleNuisance, ...] = ()
     expected_chi_square: float = 1.0
     not_judged: tuple[str, ...] = ()
     few_frames: tuple[tuple[str, int], ...] = ()
     critical_chi_square: float = float("nan")
     smallest_p_value: float = float("nan")
+    unpredicted: tuple[str, ...] = ()
     contradicting: ContradictingValues | None = None
-    outlying: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def scatters_too_much(self) -> bool:
+        """Whether rates of tests scatter by more than those of one alloy do."""
+        return self.rate_scatter > 0.99 * LARGEST_SCATTER
 
     @property
     def explains(self) -> bool:
@@ -114,6 +116,34 @@ class Adequacy:
     def with_contradicting(self, values: ContradictingValues | None) -> Adequacy:
         """The same, rejected where minimum rates and rupture times contradict one another by the law."""
         return self if values is None else replace(self, verdict="leaves a discrepancy", contradicting=values)
+
+    def with_explanations(self, explanations: tuple[Explanation, ...]) -> Adequacy:
+        """The same, rejected where something other than scatter explains the rates of tests."""
+        return replace(self, verdict="leaves a discrepancy", explanations=explanations) if explanations else self
+
+    def with_unpredicted(self, tests: tuple[str, ...]) -> Adequacy:
+        """The same; not judged to explain tests of which it predicts nothing."""
+        return replace(self, verdict="cannot be judged", unpredicted=tests) if tests and self.explains else self
+
+    @property
+    def lies_in_tests(self) -> bool:
+        """Whether what is left is explained by one test or by two groups of tests, and not by another law."""
+        return bool(self.explanations) and not self.explanations[0].is_of_law
+
+    @property
+    def explanation_text(self) -> str:
+        """The likeliest explanation of the rates of tests, those of other tests, and by how much it beats the next."""
+        if not self.explanations:
+            return ""
+        first, *others = self.explanations
+        same = [e for e in others if e.kind == first.kind == "one test"]
+        rivals = [e for e in others if e not in same]
+        sentence = "; ".join(e.sentence for e in (first, *same))
+        if not rivals:
+            return sentence
+        ahead = first.odds - rivals[0].odds
+        said = f"{odds_text(ahead)} less likely" if ahead > np.log(3.0) else "about as likely"
+        return f"{sentence}; {said}: {rivals[0].headline}"
 
     def judges(self, output: str) -> bool:
         """Whether the noise of an output is known well enough to judge a law by."""
@@ -179,8 +209,8 @@ class Adequacy:
         if self.contradicting is not None:
             return "contradicted: rates contradict rupture times"
         noises = self.discrepancy_in_noises
-        if self.outlying and not noises > 0:
-            return f"contradicted by test {self.outlying[0][0]}"
+        if self.explanations and (self.lies_in_tests or not noises > 0):
+            return f"contradicted: {self.explanations[0].headline}"
         left = f"leaves {noises_text(noises)} noises" if noises > 0 else "rates of tests are not followed"
         return f"contradicted: {left}"
 
@@ -192,6 +222,9 @@ class Adequacy:
 
     def __str__(self) -> str:
         """One sentence, to follow "the law": the verdict, with what is left and where."""
+        if self.unpredicted:
+            more = f" and {len(self.unpredicted) - 1} more" if len(self.unpredicted) > 1 else ""
+            return f"cannot be judged: nothing is predicted of test '{self.unpredicted[0]}'{more}"
         if self.verdict == "cannot be judged":
             return f"cannot be judged: {how_to_state_noise(self.not_judged, self.few_frames)}"
         source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
@@ -211,22 +244,18 @@ class Adequacy:
             for o in sorted(self.outputs, key=lambda o: -o.discrepancy_in_noises)
             if o.discrepancy > 0
         ]
-        parts += [
-            f"test '{name}', which creeps {factor:.3g} times as fast as it says" for name, factor in self.outlying
-        ]
-        if self.rate_scatter > LARGEST_SCATTER:
+        if self.scatters_too_much:
             parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
-        elif self.rate_trend_p_value < TREND_SIGNIFICANCE:
-            parts.append(f"rates of tests that depend on stress in another way (p = {self.rate_trend_p_value:.1g})")
         if self.contradicting is not None:
             parts.append(str(self.contradicting))
         where = f"; most in {self.largest}" if self.largest is not None else ""
-        if self.remedies:
+        if self.remedies and not self.explanations:
             where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
-        rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained"
-        if self.outlying and self.rate_scatter > 0:
-            rest += f", where rates of the other tests scatter by {100 * self.rate_scatter:.2g} %"
-        return f"{rest} ({self._chi_square_text}, {self._p_value_text}){where}"
+        judged = f"({self._chi_square_text}, {self._p_value_text})"
+        if self.explanations and not parts:
+            return f"is contradicted by the rates of the tests: {self.explanation_text} {judged}"
+        rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained {judged}{where}"
+        return f"{rest}; {self.explanation_text}" if self.explanations else rest
 
 
 def p_value_text(p: float) -> str:
@@ -239,6 +268,11 @@ def p_value_text(p: float) -> str:
 def noises_text(noises: float) -> str:
     """Multiples of a noise to two digits, without a power of ten."""
     return f"{float(f'{noises:.2g}'):g}" if np.isfinite(noises) and noises < 1e5 else f"{noises:.2g}"
+
+
+def odds_text(log_odds: float) -> str:
+    """Odds as a factor: "30 times"; log_odds : their ln."""
+    return f"{float(f'{np.exp(min(log_odds, 13.8)):.1g}'):,.0f} times" + (" or more" if log_odds > 13.8 else "")
 
 
 def rate_scatter_text(scatter: float) -> str:

@@ -9,7 +9,8 @@ has chi-square's distribution with n less the estimated unknowns degrees of free
 white; where the noise was estimated from nu frames, chi2 over its degrees of freedom has that of F. It is taken of all
 outputs together and of each, and the least probability times their number is the p-value (Bonferroni). Below 0.3 % the
 law leaves a model discrepancy: what must be added to the noise for the same chi-square. Offsets and the scatter of
-rates were estimated from the same tests; a scatter beyond a factor of 2.7, or that bends over the stress, is misfit.
+rates were estimated from the same tests; a scatter beyond a factor of 2.7, or one that something else explains (see
+inverse.rate_explanations), is misfit.
 """
 
 from __future__ import annotations
@@ -19,17 +20,14 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from scipy.stats import f
 
-from creepkit.inverse.adequacy import LARGEST_SCATTER, TREND_SIGNIFICANCE, Adequacy, OutputAdequacy
+from creepkit.inverse.adequacy import LARGEST_SCATTER, Adequacy, OutputAdequacy
+from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.judged_residuals import judged_residuals
 from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.largest_deviation import largest_deviation
-from creepkit.inverse.noise_covariance import predicted_random_effects
-from creepkit.inverse.noise_model import NoiseModel, Residuals
-from creepkit.inverse.outlying_tests import outlying_tests
+from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.unmodelled_effect import UnmodelledEffect
 from creepkit.inverse.unmodelled_effects import with_random_effects
 from creepkit.inverse.variance_components import LinearisedProblem
@@ -37,12 +35,6 @@ from creepkit.records import History, is_logarithmic
 
 SIGNIFICANCE = 0.003
 """p-value below which a law does not explain the tests: three standard deviations of a normal one."""
-
-FEWEST_TREND_TESTS = 5
-"""Tests from which on rates are tested for a bend over the stress."""
-
-JUDGED_SCATTER = 1e-4
-"""Of ln rate between tests: less is what a simulation rounds, not what a test shows."""
 
 
 def adequacy_of(
@@ -90,9 +82,7 @@ def adequacy_of(
     alone = any(o.p_value < SIGNIFICANCE for o in outputs)
     left = [p_value < SIGNIFICANCE and (o.p_value < SIGNIFICANCE or not alone) for o in outputs]
     outputs = [o if kept else replace(o, discrepancy=0.0) for o, kept in zip(outputs, left, strict=True)]
-    scatter, trend, outlying = _scatter_of_rates(problem, judged.residuals, noise_model)
-    scattered = scatter > LARGEST_SCATTER or trend < TREND_SIGNIFICANCE or bool(outlying)
-    explained = p_value >= SIGNIFICANCE and not scattered
+    explained = p_value >= SIGNIFICANCE and not noise_model.rate > 0.99 * LARGEST_SCATTER
     return Adequacy(
         "explains" if explained else "leaves a discrepancy",
         tuple(outputs),
@@ -101,12 +91,10 @@ def adequacy_of(
         p_value,
         _correlation(noise_model),
         largest_deviation(observations, known, judged.deviation, histories),
-        rate_scatter=scatter,
-        rate_trend_p_value=trend,
+        rate_scatter=noise_model.rate,
         expected_chi_square=known.expected(share_of_freedom, known.judged),
         critical_chi_square=known.critical(SIGNIFICANCE / len(p_values), share_of_freedom, known.judged),
         smallest_p_value=min(p_values),
-        outlying=outlying,
     )
 
 
@@ -117,10 +105,12 @@ def adequacy_with_remedies(
     predictor_errors: Mapping[str, float],
     histories: Sequence[History],
     effects: Sequence[UnmodelledEffect],
+    explanations: tuple[Explanation, ...],
 ) -> Adequacy:
-    """The same, with those of the unmodelled effects named with which the law would explain the tests."""
+    """The same, rejected where rates of tests are explained otherwise, with effects that would explain the tests."""
     known = KnownNoise.of_histories(problem.observations, histories)
     adequacy = adequacy_of(problem, linear, noise_model, predictor_errors, histories, known)
+    adequacy = adequacy.with_explanations(explanations)
     if not adequacy.rejects:
         return adequacy
     remedies = [
@@ -132,35 +122,6 @@ def adequacy_with_remedies(
         ).explains
     ]
     return replace(adequacy, remedies=tuple(remedies))
-
-
-def _scatter_of_rates(
-    problem: LeastSquaresProblem, residuals: Residuals, noise_model: NoiseModel
-) -> tuple[float, float, tuple[tuple[str, float], ...]]:
-    """Standard deviation of ln rate between tests, p-value of a bend of it over stress; 0 and 1 for none; and outliers.
-
-    The scatter was estimated from the same tests: a law that misses the dependence on stress makes it, and it then
-    bends over the stress. The p-value is that of the square of ln stress in a regression (F test). Of tests that lie
-    outside of all others the names and factors are given; scatter and bend are then those of the others.
-    """
-    if not noise_model.rate > 0:
-        return 0.0, 1.0, ()
-    rates = predicted_random_effects(residuals, noise_model)[1]
-    outside = outlying_tests(rates)
-    outlying = tuple((problem.histories[k].name, float(np.exp(rates[k]))) for k in np.flatnonzero(outside))
-    stresses = np.log([float(np.median(reference_stresses(h, problem.predictor))) for h in problem.histories])[~outside]
-    rates = rates[~outside]
-    scatter = float(rates.std(ddof=1)) if outlying else noise_model.rate
-    if np.std(rates) < JUDGED_SCATTER or len(rates) < FEWEST_TREND_TESTS or np.unique(stresses.round(3)).size < 3:
-        return scatter, 1.0, outlying
-    x = stresses - stresses.mean()
-    squares = [
-        float(((rates - design @ np.linalg.lstsq(design, rates, rcond=None)[0]) ** 2).sum())
-        for design in (np.stack([x**k for k in range(degree + 1)], axis=1) for degree in (1, 2))
-    ]
-    freedom = len(rates) - 3
-    ratio = (squares[0] - squares[1]) / max(squares[1] / freedom, 1e-300)
-    return scatter, float(f.sf(ratio, 1.0, freedom)), outlying
 
 
 def _correlation(noise_model: NoiseModel) -> float:

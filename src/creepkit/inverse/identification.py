@@ -17,6 +17,7 @@ from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.composite_predictor import CompositePredictor, predict
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.defect_correction import NumericalError, correct_defect
+from creepkit.inverse.explanation import LeftOut
 from creepkit.inverse.extrapolation import warn_of_extrapolation
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.noise_covariance import CovarianceFactor
@@ -60,6 +61,7 @@ class Identification(Presentable, text="reports.identification_text:identificati
     nuisances : estimates of explicit nuisances.
     adequacy : whether the law explains the tests to their noise. numerical_error : of the predictor at the optimum,
         which was corrected; None where there is no more exact one. unmodelled : effects that intervals do not include.
+    left_out : each test beside all others, of four tests or more.
     rate_scatter : what the tests say of the scatter of rates between tests, heats and laboratories, and how it enters
         the covariance: what forecasts need.
     samples : (samples, parameters) conditioned coordinates drawn from the posterior, where some value lies at its bound
@@ -94,6 +96,7 @@ class Identification(Presentable, text="reports.identification_text:identificati
     adequacy: Adequacy | None = None
     numerical_error: NumericalError | None = None
     unmodelled: tuple[UnmodelledEffect, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
     rate_scatter: RateScatter | None = None
     samples: Floats | None = None
     converged: bool = True
@@ -105,6 +108,13 @@ class Identification(Presentable, text="reports.identification_text:identificati
     sparsity: Sparsity | None = field(default=None, repr=False)
     problem: LeastSquaresProblem | None = field(default=None, repr=False)
     predictor_documents: Mapping[str, PredictorDocument] = field(default_factory=dict, repr=False)
+
+    @property
+    def headline(self) -> str:
+        """How well the law describes the tests, then whether it could be the true one, in one sentence."""
+        from creepkit.inverse.description import headline
+
+        return headline(self)
 
     @property
     def values(self) -> dict[str, float]:

@@ -16,6 +16,7 @@ from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError, V
 from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
 from creepkit.inverse.contradicting_values import ContradictingValues
 from creepkit.inverse.defect_correction import NumericalError
+from creepkit.inverse.explanation import Explanation, LeftOut
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, RateComparison, RuptureComparison, TestFit
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.largest_deviation import LargestDeviation
@@ -35,7 +36,7 @@ from creepkit.records import Nuisance
 
 IDENTIFICATION = DocumentFormat(
     "creepkit-identification",
-    6,
+    7,
     FileKind("an identification", FitError, "give a file that Identification.save wrote"),
     remedy="identify again",
 )
@@ -87,12 +88,13 @@ CODEC = RecordCodec(
                 "p_value",
                 "correlation",
                 "rate_scatter",
-                "rate_trend_p_value",
                 "critical_chi_square",
                 "smallest_p_value",
             ),
             NOT_NEGATIVE_OR_NAN,
         ),
+        Explanation: {"sd": NOT_NEGATIVE, "temperature": NOT_NEGATIVE},
+        LeftOut: {"sd": NOT_NEGATIVE},
         OutputAdequacy: {"frames": NOT_NEGATIVE, "noise": POSITIVE, "discrepancy": NOT_NEGATIVE},
         ContradictingValues: {
             "scatter": POSITIVE,

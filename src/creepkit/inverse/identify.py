@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
-from creepkit.errors import FitError
+from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.bound_penalties import check_bounds
 from creepkit.inverse.chi_square_test import adequacy_with_remedies
 from creepkit.inverse.composite_predictor import (
@@ -27,6 +27,7 @@ from creepkit.inverse.defect_correction import (
     shift_of_values,
     with_correction_at_frames,
 )
+from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
 from creepkit.inverse.identification import Identification
@@ -47,12 +48,15 @@ from creepkit.inverse.iterative_estimation import (
     linearised,
     starting_point,
 )
+from creepkit.inverse.judged_residuals import at_own_rates
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
+from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.rate_explanations import RateExplanations
 from creepkit.inverse.rupture_prediction import compare_rupture_times
 from creepkit.inverse.rupture_use import compared_tests, compares_rupture_times
 from creepkit.inverse.search.global_search import GlobalSearch
@@ -73,10 +77,14 @@ from creepkit.inverse.unmodelled_effect import unmodelled_note
 from creepkit.inverse.unmodelled_effects import unmodelled_effects
 from creepkit.inverse.working_noise import WorkingNoiseEstimator
 from creepkit.language import CreepLaw
-from creepkit.records import History, Predictor, is_length_nuisance
+from creepkit.records import History, Predictor, is_length_nuisance, is_logarithmic
 
 MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 """How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
+
+
+NEWTON_STEPS = 8
+"""Of the factor on the rate of one test."""
 
 
 REFIT_ROUNDS = 2
@@ -108,7 +116,60 @@ def identify(
     how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
     fit = identify_values(law, histories, using, through=through, **how)
     with single_threaded_blas():
-        return with_samples(fit, through_for_law(through, law)) if needs_samples(fit) else fit
+        fit = with_samples(fit, through_for_law(through, law)) if needs_samples(fit) else fit
+    return _without_one_test(fit)
+
+
+def _without_one_test(fit: Identification) -> Identification:
+    """Where one test explains the scatter of rates, what the others say without it, by a refit to them."""
+    adequacy = fit.adequacy
+    if adequacy is None or not adequacy.explanations or adequacy.explanations[0].kind != "one test":
+        return fit
+    first, *rest = adequacy.explanations
+    others = [h for h in fit.histories if h.name not in first.tests]
+    try:
+        without = identify_values(
+            fit.law,
+            others,
+            fit.least_squares_problem.predictor,
+            settings=fit.settings,
+            start=StartingEstimate.from_identification(fit),
+        )
+    except CreepkitError:
+        return fit
+    position = [h.name for h in fit.histories].index(first.tests[0])
+    again = _beside_the_others(fit, without, position, first.odds)
+    values = {e.name: (e.value, e.low, e.high) for e in without.estimates}
+    explanations = (replace(again, without=values), *rest)
+    return replace(fit, adequacy=replace(adequacy, explanations=explanations))
+
+
+def _beside_the_others(fit: Identification, without: Identification, test: int, odds: float) -> Explanation:
+    """One test, by its position, beside the law of the others, with its factor on their rate.
+
+    Of outputs that are compared by their logarithm that factor is the median of what its readings show; of others it is
+    found by Newton's method.
+    """
+    problem, x, size = fit.least_squares_problem, fit.x.copy(), 0.0
+    count, coefficients = len(without.u), list(problem.coordinates.coefficients)
+    x[:count] = without.u
+
+    def at(log_factor: float) -> RateExplanations:
+        moved = x.copy()
+        moved[coefficients] += log_factor
+        linear = linearised(problem, moved, problem.residuals(moved))
+        return RateExplanations(problem, moved, linear, without.noise_model)
+
+    others = at(0.0)
+    if all(map(is_logarithmic, problem.observations.outputs)):
+        size = float(others.rates.median_log_factors[test])
+    elif problem.every_rate_has_coefficient:
+        for _ in range(NEWTON_STEPS):
+            step = float(at(size).rates.own_log_factors[test])
+            size += step
+            if abs(step) < 1e-3:
+                break
+    return others.one_test(test, odds, size if np.isfinite(size) and size else None)
 
 
 @kept_where_asked
@@ -279,9 +340,14 @@ def _result(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]
     )
     implausible = implausible_nuisances(problem, random_effects, nuisance_estimates)
+    failed = np.isin(prediction.status[0], FAILED) | tests_without_prediction(prediction, histories)[0]
+    unpredicted = tuple(h.name for h, is_failed in zip(histories, failed, strict=True) if is_failed)
+    rates = RateExplanations(problem, x, linear, noise_model)
+    judged = at_own_rates(problem, x, linear, noise_model)
     adequacy = adequacy_with_remedies(
-        problem, linear, noise_model, working_estimator.predictor_errors, histories, unmodelled
-    ).with_contradicting(contradicting_values(histories, single_values))
+        problem, judged, noise_model, working_estimator.predictor_errors, histories, unmodelled, rates.found
+    ).with_unpredicted(unpredicted)
+    adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
     estimates = parameter_estimates(law, coordinates, u, law_covariance, interval_quantile(freedom))
     return Identification(
         law=law,
@@ -307,6 +373,7 @@ def _result(
         adequacy=replace(adequacy, implausible=implausible),
         numerical_error=numerical_error,
         unmodelled=unmodelled,
+        left_out=rates.left_out,
         rate_scatter=scatter,
         notes=(
             *suspect_frames_note(histories),

@@ -18,7 +18,7 @@ from creepkit.inverse.composite_predictor import prediction_errors_of
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.known_noise import KnownNoise
-from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -84,10 +84,31 @@ def judged_residuals(
     )
 
 
+NOTEWORTHY_FACTOR = 0.03
+"""Of ln rate of a test, from which on its curve is simulated with that factor: what is linear in it no longer holds."""
+
+
+def at_own_rates(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
+) -> LinearisedProblem:
+    """The problem made linear at x (unknowns,) and where the rate of each test is its own, by which a law is judged."""
+    log_factors = predicted_random_effects(linear.residuals, noise_model)[1]
+    if np.abs(log_factors).max() < NOTEWORTHY_FACTOR or not problem.every_rate_has_coefficient:
+        return linear
+    there = problem.residuals_at_rates(x, log_factors)
+    values = there.values - log_factors[:, None] * there.log_rate_sensitivity
+    finite = np.isfinite(values).all() and there.jacobian is not None and np.isfinite(there.jacobian).all()
+    residuals = replace(
+        there, values=values, present=linear.residuals.present, test_weights=linear.residuals.test_weights
+    )
+    return replace(linear, residuals=residuals) if finite else linear
+
+
 def judged_residuals_of(fit: Identification) -> JudgedResiduals | None:
     """The same of an identification with its histories, as its adequacy was judged; None where no noise is known."""
     problem = fit.least_squares_problem
     linear = fit.linearised or linearised(problem, fit.x, problem.residuals(fit.x))
+    linear = at_own_rates(problem, fit.x, linear, fit.noise_model)
     error = fit.numerical_error
     errors = prediction_errors_of(problem.predictor) if error is None else error.remaining
     known = KnownNoise.of_histories(problem.observations, fit.histories)

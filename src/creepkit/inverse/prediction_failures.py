@@ -12,6 +12,9 @@ from creepkit.errors import FitError
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.records import History, Prediction, Status
 
+FAILED = (Status.NOT_CONVERGED, Status.OUTSIDE_CLASS)
+"""How tests end that are not predicted, or in part alone."""
+
 
 def tests_without_prediction(prediction: Prediction, histories: Sequence[History]) -> Bools:
     """(candidates, tests): which tests have frames after the start, none of which has a predicted number.

@@ -35,6 +35,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters, check_nuisance_law
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history
+from creepkit.inverse.prediction_concatenation import concatenated_tests
 from creepkit.inverse.prediction_failures import PredictionFailures
 from creepkit.inverse.reference_conditions import ReferencePoint, median_log_inverse_duration, median_log_strain_rate
 from creepkit.inverse.residuals import (
@@ -55,7 +56,7 @@ from creepkit.inverse.search.local_refinement import (
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
-from creepkit.records import History, Prediction, Predictor
+from creepkit.records import History, NuisanceValues, Prediction, Predictor
 
 CACHED_EVALUATIONS = 4
 """Points whose residuals are cached: a search ends at one that it has evaluated, and the next begins there."""
@@ -256,18 +257,45 @@ class LeastSquaresProblem:
         prediction = self._prediction(u, jacobian=False)
         self.evaluations.failures.check(prediction, self.histories, self.law.name)
 
+    def residuals_at_rates(self, x: Floats, log_factors: Floats) -> Residuals:
+        """Residuals of one x (unknowns,) where each test has a factor on its rates; log_factors : (tests,) their ln.
+
+        Where some rate has no coefficient of its own, none has such a factor.
+        """
+        u, e = x[: self.parameter_count], x[self.parameter_count :]
+        if not self.every_rate_has_coefficient:
+            return self.residuals(x)
+        nuisances, groups = self.nuisance_parameters.predictor_values(e), []
+        for k, history in enumerate(self.histories):
+            moved = u.copy()
+            moved[list(self.coordinates.coefficients)] += log_factors[k]
+            own = {key: values[:, [k]] for key, values in nuisances.items()}
+            groups.append(([k], self._with_sensitivities(moved, own, [history])))
+        return self._residuals_of(u, concatenated_tests(groups, self.histories))
+
+    @property
+    def every_rate_has_coefficient(self) -> bool:
+        """Whether each term and internal variable has a coordinate that is ln of its rate."""
+        return len(self.coordinates.coefficients) == len(self.law.terms) + len(self.law.states)
+
     def _evaluated(self, x: Floats) -> Residuals:
         u, e = x[: self.parameter_count], x[self.parameter_count :]
-        theta, nuisances = self.coordinates.theta(u), self.nuisance_parameters.predictor_values(e)
-        tests = (self.predictor, self.law, theta[None], self.histories)
+        nuisances = self.nuisance_parameters.predictor_values(e)
+        prediction = self._with_sensitivities(u, nuisances, self.histories)
+        self.evaluations.failures.record(prediction, self.histories)
+        return self._residuals_of(u, prediction)
+
+    def _with_sensitivities(self, u: Floats, nuisances: NuisanceValues, histories: Sequence[History]) -> Prediction:
+        theta = self.coordinates.theta(u)
+        tests = (self.predictor, self.law, theta[None], histories)
         if self.observations.followed_to_rupture.any():
             prediction = predict_to_rupture(*tests, sensitivities=True)
         else:
-            prediction = predict_with_sensitivities(self.predictor, self.law, theta, self.histories, nuisances)
-        prediction = with_minimum_rates(prediction, *tests, nuisances, sensitivities=True)
-        self.evaluations.failures.record(prediction, self.histories)
-        coefficients = self.coordinates.coefficients
-        every_rate_has_one = len(coefficients) == len(self.law.terms) + len(self.law.states)
+            prediction = predict_with_sensitivities(self.predictor, self.law, theta, histories, nuisances)
+        return with_minimum_rates(prediction, *tests, nuisances, sensitivities=True)
+
+    def _residuals_of(self, u: Floats, prediction: Prediction) -> Residuals:
+        coefficients, every_rate_has_one = self.coordinates.coefficients, self.every_rate_has_coefficient
         residuals = residuals_of_prediction(
             self.observations,
             prediction,

@@ -9,6 +9,7 @@ from typing import Any
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.language import algebra
 from creepkit.language.law_record import LawRecord
+from creepkit.language.primary_creep import with_primary
 from creepkit.language.printing import law_latex, law_text
 from creepkit.language.temperature_factors import times
 
@@ -58,6 +59,14 @@ class CreepLaw(LawRecord):
         shared : whether internal variables share Q.
         """
         return times(self, factor, terms, states, shared=shared)
+
+    def with_primary(self) -> CreepLaw:
+        """The law with primary creep: every rate times 1 + b exp(-strain / e_p), which falls to the rate it had.
+
+        For laws of stress and temperature alone; b is the initial over the steady rate, less one, and e_p the strain
+        over which it fades.
+        """
+        return with_primary(self)
 
     def with_temperature(self, /, **forms: Any) -> CreepLaw:
         """The law with parameters made functions of temperature, such as n=linear(T_ref=1073)."""

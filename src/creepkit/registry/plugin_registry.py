@@ -132,10 +132,12 @@ class Registry:
         return self._all(contributions.TEMPERATURE_FORM)
 
     def law(self, name: str) -> CreepLaw:
-        """The law of a name, or the sum of several as in "norton+strain-hardening"; LawError where there is none."""
+        """The law of a name, a sum as "norton+strain-hardening", or "hyperbolic-sine*primary"; LawError without one."""
         if "+" in name and name not in self.laws():
             first, *others = (self.law(part.strip()) for part in name.split("+"))
             return sum(others, start=first)
+        if name.endswith("*primary"):
+            return self.law(name.removesuffix("*primary")).with_primary()
         law: CreepLaw = self._one(contributions.LAW, name)
         return law
 

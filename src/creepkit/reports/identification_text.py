@@ -18,7 +18,6 @@ from creepkit.records.units import celsius_text
 from creepkit.reports.interval_basis import interval_basis
 from creepkit.reports.judged_readings import LAW_RATE_MEANING, LAW_RATE_MISFIT, OWN_RATE_CHI_SQUARE, judged_readings
 from creepkit.reports.stress_exponents import reference_sentences
-from creepkit.reports.tests_apart import apart_sentence
 
 if TYPE_CHECKING:
     from creepkit.inverse.goodness_of_fit import RuptureComparison
@@ -34,7 +33,7 @@ def identification_text(fit: Identification) -> str:
     """The law, its values with 95 % intervals, the scatter between tests, and what is not determined."""
     lines = [
         f"{fit.law.title or fit.law.name}",
-        *(["  this law does not fit the tests (see below): what follows are values of this law alone"] * rejected(fit)),
+        f"  {fit.headline}",
         *(f"  {label}: {expression_text(term)}" for label, term in fit.law.terms.items()),
         *(f"  {equation}" for equation in state_equations(fit.law)),
         "",
@@ -60,10 +59,23 @@ def rejected(fit: Identification) -> bool:
 
 
 def _adequacy(fit: Identification) -> list[str]:
-    """Whether the law explains the tests, and which tests lie apart from it, each on a line of its own."""
+    """Whether the law explains the tests, and what it would say without each of them."""
     lines = [] if fit.adequacy is None else ["", f"  the law {fit.adequacy}"]
-    apart = apart_sentence(fit)
-    return [*lines, f"  {apart}"] if apart else lines
+    return [*lines, *left_out_lines(fit)]
+
+
+def left_out_lines(fit: Identification) -> list[str]:
+    """Between which the stress exponent lies where one test is left out; none of fewer tests than four."""
+    if not fit.left_out:
+        return []
+    low, high = min(fit.left_out, key=lambda one: one.exponent), max(fit.left_out, key=lambda one: one.exponent)
+    far = max(fit.left_out, key=lambda one: abs(one.log_factor) / one.sd)
+    factor, sd = math.exp(far.log_factor), far.sd
+    return [
+        f"  leaving one test out: stress exponent {low.exponent:.3g} (without '{low.test}') to {high.exponent:.3g} "
+        f"(without '{high.test}'); farthest from the others: '{far.test}', {factor:.3g} times their rate "
+        f"[{factor * math.exp(-1.96 * sd):.3g}, {factor * math.exp(1.96 * sd):.3g}]"
+    ]
 
 
 def _values(fit: Identification) -> list[str]:
@@ -292,7 +304,6 @@ def identification_comments(fit: Identification, verdict: str = "") -> list[str]
         if name != logarithmic
     ]
     adequacy_text = [] if fit.adequacy is None else [f"the law {fit.adequacy}"]
-    adequacy_text += [text] if (text := apart_sentence(fit)) else []
     lines += ["; ".join([*errors_text, rate_scatter]), *adequacy_text, *fit.notes]
     return [line.replace("°C", "C") for line in lines]  # sources in Fortran hold ASCII alone
 

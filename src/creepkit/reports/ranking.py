@@ -25,7 +25,7 @@ CHI_SQUARE_NOTE = (
 
 
 def ranking_text(ranking: Ranking) -> str:
-    """The verdict, then a line for each law."""
+    """How well the best law describes the tests, the verdict, then a line for each law."""
     width = max(len(r.fit.law.name) for r in ranking.laws)
     header = (
         f"{'law':{width}}   weight  {_CRITERION_NAMES[ranking.criterion]} - best  chi-square  by the noise of the tests"
@@ -36,7 +36,9 @@ def ranking_text(ranking: Ranking) -> str:
     ]
     failed = [f"{name}: {reason}" for name, reason in ranking.failed.items()]
     equivalent = [] if ranking.decisive else [f"- {pair}" for pair in equivalents_among_remaining(ranking)]
-    return "\n".join([ranking.verdict, *equivalent, "", header, *rows, *failed, "", CHI_SQUARE_NOTE])
+    return "\n".join(
+        [ranking.best.headline, ranking.verdict, *equivalent, "", header, *rows, *failed, "", CHI_SQUARE_NOTE]
+    )
 
 
 def explanation(fit: Identification) -> str:
@@ -69,7 +71,7 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
     print_table(f"{test_count} tests", columns, rows)
     equivalent = [] if ranking.decisive else [f"- {pair}" for pair in equivalents_among_remaining(ranking)]
     failed = [f"- left out: {name}: {reason}" for name, reason in ranking.failed.items()]
-    tell("\n".join([ranking.verdict, *equivalent, *failed]) + f"\n\n{ranking.best}\n")
+    tell("\n".join([ranking.best.headline, ranking.verdict, *equivalent, *failed]) + f"\n\n{ranking.best}\n")
     for path in written:
         tell_written(path)
 
@@ -111,6 +113,7 @@ def _single_value_misfit(fit: Identification) -> tuple[str, str]:
 def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]:
     """The same as JSON-able data."""
     return {
+        "headline": ranking.best.headline,
         "verdict": ranking.verdict,
         "decisive": ranking.decisive,
         "adequacy": ranking.adequacy,

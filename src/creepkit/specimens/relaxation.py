@@ -81,10 +81,15 @@ class Relaxation(Bar):
         return reason
 
     def reference_stress(self, history: History) -> Floats:
-        """The least and the largest stress at which a law acts in a test, (2,) MPa: measured, and elastic."""
-        levels = np.unique(point_test(history).driving.values)
-        outputs = np.abs(history.outputs["stress"][history.used]) if "stress" in history.outputs else levels[levels > 0]
-        return np.array([float(np.min(outputs[outputs > 0], initial=levels.max())), float(levels.max())])
+        """The largest stress of a test and the least from there on, which no ramp passed, (2,) MPa, the least first.
+
+        As measured; of a plan that of elasticity alone.
+        """
+        driving = point_test(history).driving.values
+        measured = np.abs(history.outputs["stress"][history.used]) if "stress" in history.outputs else driving
+        stresses = measured[int(measured.argmax()) :] if measured.any() else driving
+        stresses = stresses[stresses > 0]
+        return np.array([float(stresses.min()), float(stresses.max())])
 
     def growth_per_strain(self, history: History) -> float:
         """MPa by which the stress falls for each unit of creep strain while the total strain is held: the modulus."""

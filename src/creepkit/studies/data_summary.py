@@ -8,9 +8,9 @@ from itertools import pairwise
 
 from creepkit.inverse.duration import duration_known
 from creepkit.inverse.held_levels import held_temperatures
+from creepkit.quality.curve_shapes import shows_tertiary_creep
 from creepkit.records import History, load_unit
 from creepkit.records.units import celsius_text
-from creepkit.studies.tertiary_creep import shows_tertiary_creep
 
 FEWEST_RUPTURES = 5
 """For methods of rupture times."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os.path
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -13,7 +13,8 @@ from textwrap import wrap
 from typing import Any
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.inverse.duration import followed_duration, needs_durations, rests_on_durations
+from creepkit.inverse.candidates import candidates
+from creepkit.inverse.duration import followed_duration
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
@@ -22,20 +23,8 @@ from creepkit.studies.camera_proposal import found_cameras
 from creepkit.studies.data_summary import FEWEST_RUPTURES, DataSummary
 from creepkit.studies.study_file import parse_study
 
-SECONDARY_LAWS = ["norton", "strain-hardening", "time-hardening"]
-SEVERAL_STRESSES_LAW = "hyperbolic-sine"
-TERTIARY_LAWS = ["norton", "mpc-omega", "kachanov-rabotnov"]
-DAMAGE_LAWS = ["norton", "kachanov-rabotnov"]
-"""Candidates, those of them that are installed; of damage where rupture times stand beside minimum rates, for damage
-gives rates and times exponents of stress and temperature of their own."""
-
-
-TERTIARY_SHARE = 0.3
-"""Of the tests with curves, from which on laws with tertiary creep are the candidates."""
-
-
-STRESS_RATIO = 1.5
-"""Largest over smallest load, from which laws with another dependence on stress can be told apart."""
+PLANNED_LAWS = ["norton", "strain-hardening", "time-hardening"]
+"""Of tests that cameras are still to be read of."""
 
 
 FEWEST_TEMPERATURES = 3
@@ -86,7 +75,7 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
             **(_identification(summary) if summary.framed else {}),
         }  # fmt: skip
     elif cameras.cameras:
-        known["laws"] = _installed(SECONDARY_LAWS)
+        known["laws"] = PLANNED_LAWS
     else:
         raise failure or StudyError(f"{folder}: none of its files holds a test")
     text = rendered(known)
@@ -133,7 +122,7 @@ def _identification(summary: DataSummary) -> dict[str, Any]:
     import creepkit as ck
     from creepkit.surrogates.loading import reduced_order_models
 
-    laws, one = candidate_laws(summary), summary.framed[0]
+    laws, one = [law.name for law in candidates(summary.framed)], summary.framed[0]
     damage = {name for name in laws if "alpha" in ck.law(name).names}
     specimens = {history.specimen for history in summary.tests}
     lengths = dimensions_of(ck.available("specimens").get(summary.tests[0].specimen))
@@ -148,7 +137,7 @@ def _identification(summary: DataSummary) -> dict[str, Any]:
     return {
         "laws": laws,
         "damage": damage,
-        "damage_of_tension": damage <= {*TERTIARY_LAWS},
+        "damage_of_tension": damage <= {"kachanov-rabotnov", "sinh-damage"},
         "reduced": [name for name, one in reduced_order_models().items() if {getattr(one, "name", name)} == specimens],
         "lengths": [length for length in lengths if length.tolerance > 0][:1],
         "longer": longer,
@@ -207,26 +196,3 @@ def _folders_with_tests(folder: Path, reader: str | None) -> list[Path]:
         if not any(part.startswith(".") or part.endswith(".results") for part in one.relative_to(folder).parts)
     ]
     return [one for one in shown[:MOST_FOLDERS] if holds_tests(one)][:MOST_FOLDERS_NAMED]
-
-
-def _installed(names: Sequence[str]) -> list[str]:
-    import creepkit as ck
-
-    installed = ck.available("laws")
-    return [name for name in names if name in installed]
-
-
-def candidate_laws(summary: DataSummary) -> list[str]:
-    """Names of laws that suit the tests, of those that are installed."""
-    import creepkit as ck
-
-    names = TERTIARY_LAWS if summary.tertiary > TERTIARY_SHARE * len(summary.framed) else SECONDARY_LAWS
-    if summary.rupture_table and _installed(DAMAGE_LAWS) == DAMAGE_LAWS:
-        names = DAMAGE_LAWS
-    judged = summary.durations_known
-    chosen = [name for name in _installed(names) if judged or not needs_durations(ck.law(name))]
-    testable = [name for name in chosen if not rests_on_durations(ck.law(name), summary.tests)]
-    judged, chosen = judged and testable == chosen, testable
-    if len(summary.loads) > 2 and summary.loads[-1] > STRESS_RATIO * summary.loads[0] and names is SECONDARY_LAWS:
-        chosen += _installed([SEVERAL_STRESSES_LAW])
-    return chosen if len(chosen) > 1 or not judged else _installed(SECONDARY_LAWS)

@@ -170,6 +170,9 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
     best, count, adequacy = ranking.best.law.name, len(ranking.laws), ranking.adequacy
     weight = f"weight {ranking.laws[0].weight:.2f} of the laws tried"
     if adequacy is not None and adequacy.rejects:
+        if adequacy.lies_in_tests:
+            first = adequacy.explanations[0].headline
+            return f"of {count} laws tried {best} is best ({weight}), but {first}: {adequacy.explanation_text}"
         others = "" if len(names) == 1 else f", not told apart from {' and '.join(names[1:])}"
         remedied = [r.fit for r in ranking.laws if r.fit.adequacy is not None and r.fit.adequacy.remedies]
         if remedied and not adequacy.remedies:

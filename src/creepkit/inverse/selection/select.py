@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from creepkit.errors import CreepkitError, FitError
+from creepkit.inverse.candidates import candidates
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.duration import duration_known, needs_durations, rests_on_durations
@@ -119,16 +120,19 @@ def select(
 
 
 def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLaw]:
-    """What is tried where no candidate explains the tests: sums of the best one with the others, then other laws.
+    """What is tried where no candidate explains the tests: laws that suit them, sums of the best one, then others.
 
-    Nothing where a candidate would explain them with an effect that is not modelled: that is the simpler explanation.
+    Nothing where a candidate would explain them with an effect that is not modelled, or but for one test or for two
+    groups of tests: that is the simpler explanation.
     """
     adequacies = [ranked.fit.adequacy for ranked in ranking.laws]
-    if any(a is None or a.verdict != "leaves a discrepancy" or a.remedies for a in adequacies):
+    if any(a is None or a.verdict != "leaves a discrepancy" or a.remedies or a.lies_in_tests for a in adequacies):
         return []
     laws = [ranked.fit.law for ranked in ranking.laws]
     tried = {law.fingerprint for law in laws}
-    richer = _distinct_laws([*(laws[0] + other for other in laws[1:]), *_registered_laws(laws, histories)])
+    suited = [_with_temperature_of(laws, law, histories) for law in (candidates(histories) if histories else [])]
+    sums = [laws[0] + other for other in laws[1:]]
+    richer = _distinct_laws([*suited, *sums, *_registered_laws(laws, histories)])
     judged = all(map(duration_known, histories))
     return [
         law
@@ -151,9 +155,13 @@ def _registered_laws(tried: Sequence[CreepLaw], histories: Sequence[History]) ->
 
     known = {memory(law) for law in tried}
     laws = [one.value for one in default_registry().laws().values() if not one.value.uses(temperature)]
-    if any(law.uses(temperature) for law in tried):
-        laws = [with_arrhenius(law, histories) for law in laws]
+    laws = [_with_temperature_of(tried, law, histories) for law in laws]
     return sorted(laws, key=lambda law: (memory(law) in known, len(law.params), law.name))
+
+
+def _with_temperature_of(tried: Sequence[CreepLaw], law: CreepLaw, histories: Sequence[History]) -> CreepLaw:
+    """The law with an Arrhenius factor where those that were tried have one."""
+    return with_arrhenius(law, histories) if any(one.uses(temperature) for one in tried) else law
 
 
 def _identify_all(

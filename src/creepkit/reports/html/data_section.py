@@ -14,7 +14,6 @@ from creepkit.reports.html.elements import Block, PageSection, Paragraph, Table,
 from creepkit.reports.html.findings import findings_of
 from creepkit.reports.html.minimum_rates import minimum_rate_table
 from creepkit.reports.html.test_details import NOT_STATED, table_of_details
-from creepkit.reports.tests_apart import apart_sentence
 
 if TYPE_CHECKING:
     from creepkit.quality.flags import DataQuality
@@ -37,8 +36,9 @@ def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) 
     blocks += [Paragraph(sentence(f"Source of the data: {text}")) for text in contents.data_citations]
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)
-    apart = [f"{one.name}: {text}" if one.name else text for one in found if (text := apart_sentence(one.fit))]
-    blocks += [Paragraph(sentence(text), "warning") for text in apart]
+    in_tests = [(one.name, one.fit.adequacy) for one in found if one.fit.adequacy is not None]
+    texts = [(name, adequacy.explanation_text) for name, adequacy in in_tests if adequacy.lies_in_tests]
+    blocks += [Paragraph(sentence(f"{name}: {text}" if name else text), "warning") for name, text in texts]
     left_out = _exclusion_blocks(contents) if histories or contents.exclusions else []
     return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)])
 

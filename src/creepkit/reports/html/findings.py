@@ -29,7 +29,6 @@ from creepkit.reports.identification_text import rejected
 from creepkit.reports.interval_basis import interval_basis
 from creepkit.reports.ranking import equivalents_among_remaining
 from creepkit.reports.stress_exponents import reference_sentences
-from creepkit.reports.tests_apart import apart_sentence
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -116,7 +115,7 @@ def with_histories(group: ReportGroup) -> ReportGroup:
 def verdict_blocks(found: GroupFindings) -> list[Block]:
     """The verdict, the law as a formula, its values with intervals, adequacy, and what is not determined."""
     fit = found.fit
-    blocks: list[Block] = [Paragraph(sentence(found.verdict), "lead")]
+    blocks: list[Block] = [Paragraph(sentence(fit.headline), "lead"), Paragraph(sentence(found.verdict))]
     if found.equivalents:
         blocks.append(Items([sentence(text) for text in found.equivalents]))
     which = "The best law" if found.ranking else "The law"
@@ -125,9 +124,6 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
     misfit = rejected(fit)
     if fit.adequacy is not None and (found.ranking is not None or misfit) and str(fit.adequacy) not in found.verdict:
         blocks.append(Paragraph(sentence(f"the law {fit.adequacy}")))
-    apart = apart_sentence(fit)
-    if apart:
-        blocks.append(Paragraph(sentence(apart), "warning"))
     blocks.append(_values(fit))
     blocks += [] if misfit else [_point(fit)]
     blocks += single_value_blocks(fit)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from creepkit.inverse.adequacy import LARGEST_SCATTER, TREND_SIGNIFICANCE
+from creepkit.inverse.adequacy import LARGEST_SCATTER
 from creepkit.inverse.chi_square_test import SIGNIFICANCE
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
@@ -82,6 +82,7 @@ def adequacy_sentences(found: Sequence[GroupFindings], references: References) -
         "A law is not contradicted by the tests where its chi-square, against noise that was stated or estimated "
         f"without the law, has a probability of at least {100 * SIGNIFICANCE:g} %"
         f"{several if any(len(one.outputs) > 1 for one in judged) else ''}, the rates of tests scatter by less than a "
-        f"factor of {scatter}, and they do not bend over stress (p at least {TREND_SIGNIFICANCE:g}). Degrees of "
-        f"freedom are the readings less the unknowns that they determine.{freedom}{estimated}"
+        f"factor of {scatter}, and nothing else explains that scatter six times better: a stress exponent that "
+        "changes with stress, an activation energy that changes with temperature, one test, or two groups of tests. "
+        f"Degrees of freedom are the readings less the unknowns that they determine.{freedom}{estimated}"
     ]

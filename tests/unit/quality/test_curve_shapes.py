@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.quality.curve_shapes import shows_primary_creep, shows_tertiary_creep
 from creepkit.records import StressSteps
-from creepkit.studies.tertiary_creep import shows_tertiary_creep
 from tests.helpers.paths import SHARED, needs_shared_data
 
 CONCAVE = {
@@ -84,3 +84,17 @@ def test_measured_tests_to_rupture_show_tertiary_creep(folder):
     tests = [h for h in ck.read_histories([SHARED / "uniaxial" / folder]) if h.rupture_time is not None and h.outputs]
     assert tests
     assert all(shows_tertiary_creep(history) for history in tests)
+
+
+def test_primary_creep_is_seen_where_the_rate_falls_and_not_in_noise():
+    rng = np.random.default_rng(1)
+    primary = ("cube root", "primary and secondary", "primary and tertiary")
+    curves = {**CONCAVE, **TERTIARY}
+    for name, curve in curves.items():
+        found = [
+            shows_primary_creep(planted(curve, frames, 0.01, correlation, rng))
+            for frames in (25, 50, 200)
+            for correlation in (0.0, 0.5)
+            for _ in range(5)
+        ]
+        assert np.mean(found) >= 0.9 if name in primary else np.mean(found) <= 0.1, name

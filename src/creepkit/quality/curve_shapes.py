@@ -1,4 +1,4 @@
-"""Whether a test shows tertiary creep: whether its rate rises after its minimum by more than noise makes it seem to.
+"""Whether a test shows tertiary or primary creep: whether its rate rises, or falls, by more than noise can do.
 
 Under one load creep strain without tertiary creep is concave in time: its rate falls or is constant. Of the parabola
 fitted by least squares to a part of a concave curve the curvature is then negative or zero, whatever that curve is
@@ -6,11 +6,13 @@ fitted by least squares to a part of a concave curve the curvature is then negat
 therefore has Student's distribution at most. Noise is what a polynomial of the fourth degree leaves, correlated from
 mean to mean of neighbouring frames as an AR(1) process, whose correlation is corrected for the fit. Noise that is
 correlated over a large part of the test cannot be told from creep, and a rate that rises and falls within a quarter of
-a test is missed where that polynomial does not follow it: tests/unit/studies/test_tertiary_creep.py says what was
-measured.
+a test is missed where that polynomial does not follow it: tests/unit/quality/test_curve_shapes.py says what was
+measured. A rate that falls is one that rises where time runs backwards.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.stats import t as student
@@ -31,6 +33,10 @@ PARTS = ((0.0, 1.0), (0.25, 1.0), (0.5, 1.0), (0.7, 1.0), (0.0, 0.6), (0.2, 0.8)
 """Parts of a curve in which its rate is judged, over its duration: a rate that rises may fall again later."""
 
 
+PARTS_FROM_THE_END = ((0.0, 1.0), (0.5, 1.0), (0.7, 1.0))
+"""Parts in which a rate may fall, over the duration from the end: primary creep comes first."""
+
+
 FEWEST_FRAMES = 12
 """Of a part that is judged."""
 
@@ -48,8 +54,24 @@ def shows_tertiary_creep(history: History) -> bool:
     times, values = history.times[frames], history.outputs[growing_output(history)][frames]
     if np.ptp(times) <= 0 or values[-1] < values[0]:
         return False
+    return _rises_in_a_part(times, values, PARTS)
+
+
+def shows_primary_creep(history: History) -> bool:
+    """Whether the rate of the output that grows falls under the first load by LEAST_RISE and by more than noise."""
+    segments = load_segments(history)
+    if not segments or not segments[0].is_first:
+        return False
+    frames = segments[0].frames
+    times, values = history.times[frames], history.outputs[growing_output(history)][frames]
+    if np.ptp(times) <= 0 or values[-1] < values[0]:
+        return False
+    return _rises_in_a_part(times[-1] - times[::-1], values[-1] - values[::-1], PARTS_FROM_THE_END)
+
+
+def _rises_in_a_part(times: Floats, values: Floats, parts_of_time: Sequence[tuple[float, float]]) -> bool:
     places = (times - times[0]) / np.ptp(times)
-    masks = [(places >= start) & (places <= end) for start, end in PARTS]
+    masks = [(places >= start) & (places <= end) for start, end in parts_of_time]
     parts = [(places[mask], values[mask]) for mask in masks if mask.sum() >= FEWEST_FRAMES]
     return any(_rises(x, y, SIGNIFICANCE / len(parts)) for x, y in parts)
 

@@ -1,0 +1,139 @@
+"""One explanation of what the rates of tests leave of a law, its size, and sentences; a test beside all others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from creepkit.records.units import celsius_text
+
+Kind = Literal["stress exponent", "activation energy", "one test", "two groups"]
+
+
+LARGEST_KELVIN, LARGEST_LOAD = 40.0, 1.3
+"""By which a temperature and a load are mistaken; beyond it is another error."""
+
+
+ROUND_FACTORS = (10.0, 100.0, 1000.0, 3600.0, 60.0, 6.895, 9.81, 25.4)
+"""Between units that are taken for one another: percent and per mille, percent and one, GPa and MPa, h and s, min and
+s, ksi and MPa, kgf and N, inches and mm."""
+
+
+ROUND_TOLERANCE = 0.2
+"""Of ln: rates scatter."""
+
+
+MOST_NAMED = 6
+"""Tests in a sentence."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One explanation of what the rates of tests leave of a law.
+
+    kind : what changes. tests : names of the tests that it concerns; of two groups those of the smaller.
+    size, sd : of ln of the factor on their rates, or what the stress exponent, or the activation energy in J/mol,
+        changes by over the tests, and its standard deviation. odds : ln of the odds against the law as it is.
+    ends : the exponent at the lowest and the highest stress, or the energy in J/mol at the lowest and the highest
+        temperature; at : these stresses, MPa, or temperatures, K.
+    errors : of one test, errors of what is stated of it, any one of which would make it: {"load", "strain", "time":
+        true value over that stated, "temperature": true less stated, K}.
+    condition, temperature : of the one test, in words and in K. label : by which groups differ, such as "heat B".
+    without : {parameter: (value, low, high)}, 95 % intervals in the law's units of the tests without the one.
+    """
+
+    kind: Kind
+    tests: tuple[str, ...]
+    size: float
+    sd: float
+    odds: float
+    ends: tuple[float, float] = (0.0, 0.0)
+    at: tuple[float, float] = (0.0, 0.0)
+    errors: Mapping[str, float] = field(default_factory=dict)
+    condition: str = ""
+    temperature: float = 0.0
+    label: str = ""
+    without: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+
+    @property
+    def is_of_law(self) -> bool:
+        """Whether it is the law that misses what the tests show."""
+        return self.kind in ("stress exponent", "activation energy")
+
+    @property
+    def headline(self) -> str:
+        """In a few words."""
+        if self.kind == "one test":
+            return f"test '{self.tests[0]}' does not agree with the others"
+        if self.kind == "two groups":
+            return "the tests are of two groups"
+        return f"the {self.kind} {self._change}"
+
+    @property
+    def sentence(self) -> str:
+        """What it is, for people, without a full stop."""
+        if self.is_of_law:
+            return f"{self.headline} over the tests, and by this law it does not"
+        speed = f"{np.exp(self.size):.3g} times as fast"
+        if self.kind == "two groups":
+            named = ", ".join(self.tests[:MOST_NAMED])
+            more = f" and {len(self.tests) - MOST_NAMED} more" if len(self.tests) > MOST_NAMED else ""
+            whose = f"tests of {self.label}" if self.label else "tests"
+            return f"{whose} ({named}{more}) creep {speed} as the others at equal conditions: are they of one material?"
+        errors = self._errors_text
+        cause = f"; it would agree with them {errors}" if errors else ""
+        return (
+            f"test '{self.tests[0]}' ({self.condition}) creeps {speed} as the others say{cause}{self._values_without}"
+        )
+
+    @property
+    def _change(self) -> str:
+        low, high = self.ends
+        verb = "rises" if high > low else "falls"
+        if self.kind == "stress exponent":
+            return f"{verb} from {low:.2g} at {self.at[0]:.4g} MPa to {high:.2g} at {self.at[1]:.4g} MPa"
+        first, last = (celsius_text(T, T) for T in self.at)
+        return f"{verb} from {low / 1e3:.3g} kJ/mol at {first} to {high / 1e3:.3g} kJ/mol at {last}"
+
+    @property
+    def _errors_text(self) -> str:
+        """With which errors of what is stated the test would agree, the likelier first."""
+        kelvin, load = self.errors.get("temperature", np.inf), self.errors.get("load", np.inf)
+        texts = []
+        if abs(kelvin) <= LARGEST_KELVIN:
+            actual = celsius_text(self.temperature + kelvin, self.temperature + kelvin)
+            texts.append(f"at {actual}, {abs(kelvin):.2g} K {'less' if kelvin < 0 else 'more'} than stated")
+        if 1.0 / LARGEST_LOAD <= load <= LARGEST_LOAD:
+            texts.append(f"at a load {abs(100 * (load - 1)):.2g} % {'lower' if load < 1 else 'higher'}")
+        if texts:
+            return " or ".join(texts)
+        for quantity in ("strain", "load", "time"):
+            ratio = self.errors.get(quantity, 0.0)
+            factor = max(ratio, 1.0 / ratio) if ratio > 0 else 1.0
+            near = [f"{known:g}" for known in ROUND_FACTORS if abs(np.log(factor / known)) < ROUND_TOLERANCE]
+            said = f" (nearly {' or '.join(near)}: a unit?)" if near else ""
+            if factor > 1.0:
+                texts.append(f"if its {quantity} were {factor:.3g} times {'smaller' if ratio < 1 else 'larger'}{said}")
+        return ", or ".join(sorted(texts, key=lambda text: "unit" not in text))
+
+    @property
+    def _values_without(self) -> str:
+        texts = [f"{name} = {v:.4g} [{low:.4g}, {high:.4g}]" for name, (v, low, high) in self.without.items()]
+        return f"; without it {', '.join(texts)}" if texts else ""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """One test beside all others: what they say of it, and what they would say without it.
+
+    log_factor, sd : ln of its rate over what the others say, and its standard deviation, from both.
+    exponent : the stress exponent amid the tests, without it.
+    """
+
+    test: str
+    log_factor: float
+    sd: float
+    exponent: float

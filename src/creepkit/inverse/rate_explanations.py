@@ -1,0 +1,392 @@
+"""Explanations: why the rates of tests scatter about a law, tried against one another before any cause is named.
+
+Rates that the law does not follow may be the law's fault, whose stress exponent or activation energy changes over the
+tests, or that of one test, or the tests may be of two materials or rigs. Each of these is a perturbation of the problem
+made linear at its optimum: ln of the rate of test k is moved by sum_j w_kj c_j, with weights w that the explanation
+states and coefficients c with a Gaussian prior. With s the scatter of rates between tests, r the residuals, J their
+derivatives to the unknowns and d those to ln rate, the evidence
+
+    p(r | w) = mean over s of  int N(r + J dx + (w c) d; 0, C0 + s^2 d d') p(dx) p(c) dx dc
+
+is a mean over a logarithmic grid of s, for the few tests of a campaign do not show their scatter. C0, the noise and
+offsets of each test, is whitened once; what is left are small matrices of each test, so that all explanations of twelve
+tests cost a few hundredths of a second and no simulation.
+
+Occam's factor is in the evidence: a wide prior that the tests do not need costs. What an explanation was chosen from is
+counted too: one of n tests by ln n, a split into two groups by the ln of how many splits there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.special import logsumexp
+
+from creepkit.arrays import Bools, Floats
+from creepkit.inverse.common_errors import USUAL_ACTIVATION_ENERGY
+from creepkit.inverse.explanation import Explanation, Kind, LeftOut
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.uncertainty.quantities import local_exponent, log_rate
+from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
+from creepkit.language import temperature
+from creepkit.language.symbols import GAS_CONSTANT
+
+SCATTERS = np.geomspace(1e-3, LARGEST_RATE_SCATTER, 25)
+"""Of ln rate between tests, over which evidence is averaged."""
+
+
+FACTOR_SD = 1.5
+"""Prior standard deviation of ln of a factor on the rate of one test or of a group."""
+
+
+EXPONENT_CHANGE, ENERGY_CHANGE = 5.0, 200e3
+"""Prior standard deviations of what the stress exponent and the activation energy, J/mol, change by over the tests."""
+
+
+DECISIVE_ODDS = float(np.log(6.0))
+"""ln of the odds against the law as it is, from which on an explanation is stated: false in one campaign of fifty."""
+
+
+ENERGY_ODDS = float(np.log(0.3))
+"""ln of the odds of a changing activation energy before the tests were seen: stress exponents change more often."""
+
+
+STEP = 0.01
+"""Of ln of strain and time, for derivatives of the rate."""
+
+
+SMALLEST_FACTOR = 0.1
+"""Of ln rate: a smaller deviation of a test is no finding, however exact the tests are."""
+
+
+SMALLEST_CHANGE = {"stress exponent": 0.5, "activation energy": 30e3}
+"""Over the tests: less is no finding."""
+
+
+FEWEST_TESTS = 4
+
+
+MOST_TESTS = 3
+"""That may be named one after the other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """ln of the evidence; mean and sd of the coefficients (columns,); step of all unknowns, (unknowns,)."""
+
+    log: float
+    mean: Floats
+    sd: Floats
+    step: Floats
+
+
+class RatePerturbations:
+    """The problem made linear, reduced to one small matrix a test, for perturbations of the rates of tests.
+
+    own_log_factors, median_log_factors : (tests,) of ln of the factor on the rate that each test alone shows beside the
+    law as it is, by least squares, and the median of those of its readings.
+    """
+
+    def __init__(self, linear: LinearisedProblem, noise_model: NoiseModel, *, scatter_known: bool) -> None:
+        """scatter_known : whether the scatter of rates is what the noise model says and no grid is averaged."""
+        residuals = linear.residuals
+        assert residuals.jacobian is not None
+        columns = np.concatenate(
+            [residuals.values[..., None], residuals.jacobian, residuals.log_rate_sensitivity[..., None]], axis=-1
+        )
+        factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
+        whitened = np.where(residuals.present[..., None], factor.whiten(columns), 0.0)
+        gram = np.einsum("tem,ten->tmn", whitened, whitened)
+        scatters = np.array([noise_model.rate]) if scatter_known else SCATTERS
+        own = scatters[:, None] ** 2 / (1.0 + scatters[:, None] ** 2 * gram[None, :, -1, -1])
+        row = gram[:, :, -1]
+        self.gram = gram[None] - own[..., None, None] * (row[:, :, None] * row[:, None, :])[None]
+        self.own_log_factors = -gram[:, -1, 0] / np.maximum(gram[:, -1, -1], 1e-300)
+        sensitive = residuals.present & (residuals.log_rate_sensitivity > 0.5)
+        ratios = np.where(sensitive, -residuals.values, np.nan) / np.where(
+            sensitive, residuals.log_rate_sensitivity, 1.0
+        )
+        self.median_log_factors = np.array(
+            [np.median(r[np.isfinite(r)]) if np.isfinite(r).any() else np.nan for r in ratios]
+        )
+        self.log_determinant = np.log1p(scatters[:, None] ** 2 * gram[None, :, -1, -1]).sum(axis=1)
+        self.precision, self.prior_residual = linear.precision, linear.prior_residual
+
+    def evidence(self, weights: Floats, prior_sd: Floats) -> Evidence:
+        """Of ln rates moved by weights (tests, columns) times coefficients of these prior deviations (columns,)."""
+        unknowns, count = self.precision.size, prior_sd.size
+        total = self.gram.sum(axis=1)
+        rows = np.einsum("tq,stm->sqm", weights, self.gram[..., -1])
+        normal = np.zeros((len(total), unknowns + count, unknowns + count))
+        normal[:, :unknowns, :unknowns] = total[:, 1:-1, 1:-1] + np.diag(self.precision)
+        normal[:, unknowns:, :unknowns] = rows[:, :, 1:-1]
+        normal[:, :unknowns, unknowns:] = np.swapaxes(rows[:, :, 1:-1], 1, 2)
+        normal[:, unknowns:, unknowns:] = np.einsum("tq,tp,st->sqp", weights, weights, self.gram[..., -1, -1])
+        normal[:, unknowns:, unknowns:] += np.diag(1.0 / prior_sd**2)
+        side = np.concatenate([total[:, 1:-1, 0] + self.precision * self.prior_residual, rows[:, :, 0]], axis=1)
+        scale = np.sqrt(np.diagonal(normal, axis1=1, axis2=2))
+        inverse = np.linalg.inv(normal / scale[:, :, None] / scale[:, None, :]) / scale[:, :, None] / scale[:, None, :]
+        step = -np.einsum("spq,sq->sp", inverse, side)
+        chi_square = total[:, 0, 0] + (self.precision * self.prior_residual**2).sum() + (side * step).sum(axis=1)
+        determinant = np.linalg.slogdet(normal / scale[:, :, None] / scale[:, None, :])[1] + 2 * np.log(scale).sum(
+            axis=1
+        )
+        logs = -0.5 * (self.log_determinant + determinant + 2 * np.log(prior_sd).sum() + chi_square)
+        share = np.exp(logs - logsumexp(logs))
+        mean = share @ step
+        variance = share @ (np.diagonal(inverse, axis1=1, axis2=2) + (step - mean) ** 2)
+        return Evidence(
+            float(logsumexp(logs) - np.log(len(logs))), mean[unknowns:], np.sqrt(variance[unknowns:]), mean[:unknowns]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Of each test the stress, MPa, and temperature, K, and ln stress and -1/(R T), mol/J, less their means."""
+
+    stresses: Floats
+    temperatures: Floats
+
+    @classmethod
+    def of_problem(cls, problem: LeastSquaresProblem) -> Conditions:
+        """Medians over each test."""
+        stresses = [float(np.median(reference_stresses(h, problem.predictor))) for h in problem.histories]
+        return cls(np.maximum(stresses, 1e-6), np.array([h.mean_temperature for h in problem.histories]))
+
+    @cached_property
+    def log_stress(self) -> Floats:
+        """(tests,) less its mean."""
+        x = np.log(self.stresses)
+        return np.asarray(x - x.mean())
+
+    @cached_property
+    def activation(self) -> Floats:
+        """(tests,) mol/J, less its mean."""
+        z = -1.0 / (GAS_CONSTANT * self.temperatures)
+        return np.asarray(z - z.mean())
+
+
+class RateExplanations:
+    """The search for explanations of a problem at its optimum x (unknowns,), where it is made linear."""
+
+    def __init__(self, problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise: NoiseModel) -> None:
+        self.problem, self.x = problem, x
+        fixed = ("", "rate") in components_fixed_by_priors(problem.settings.nuisances, list(noise.outputs))
+        self.rates = RatePerturbations(linear, noise, scatter_known=fixed or not noise.rate > 0)
+        self.conditions = Conditions.of_problem(problem)
+        self.possible = len(problem.histories) >= FEWEST_TESTS and bool(linear.residuals.log_rate_sensitivity.any())
+
+    @cached_property
+    def found(self) -> tuple[Explanation, ...]:
+        """What explains the rates better than scatter, the likeliest first; none that is not six times likelier."""
+        if not self.possible:
+            return ()
+        found = [*self._of_law(), *self._of_tests(), *self._of_groups()]
+        return tuple(sorted((e for e in found if e.odds > DECISIVE_ODDS), key=lambda e: -e.odds))
+
+    @cached_property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """Each test beside all others; none of fewer tests than FEWEST_TESTS."""
+        if not self.possible:
+            return ()
+        out, reference = [], self.problem.coordinates.reference
+        for history, evidence in zip(self.problem.histories, self._alone, strict=True):
+            exponent = float(local_exponent(self.problem.coordinates, reference.stress)(self._moved(evidence)))
+            out.append(LeftOut(history.name, float(evidence.mean[0]), float(evidence.sd[0]), exponent))
+        return tuple(out)
+
+    def one_test(self, test: int, odds: float, size: float | None = None) -> Explanation:
+        """That of one test by its position, as it is here; size : of ln of its factor, where that is known better."""
+        evidence = self._alone[test]
+        return self._one_test(test, evidence if size is None else replace(evidence, mean=np.array([size])), odds)
+
+    def _evidence(self, columns: Sequence[Floats], prior_sd: Sequence[float]) -> Evidence:
+        weights = np.stack(columns, axis=1) if columns else np.zeros((len(self.problem.histories), 0))
+        return self.rates.evidence(weights, np.array(prior_sd, float))
+
+    @cached_property
+    def _as_it_is(self) -> float:
+        return self._evidence([], []).log
+
+    @cached_property
+    def _alone(self) -> list[Evidence]:
+        """Of each test with a rate of its own."""
+        return [self._evidence([self._only(k)], [FACTOR_SD]) for k in range(len(self.problem.histories))]
+
+    def _only(self, test: int) -> Floats:
+        return np.asarray(np.arange(len(self.problem.histories)) == test, float)
+
+    # ---- the law -----------------------------------------------------------------------------------------------------
+
+    def _of_law(self) -> Iterable[Explanation]:
+        """A stress exponent that changes with stress, an activation energy that changes with temperature."""
+        s, z = self.conditions.log_stress, self.conditions.activation
+        if np.unique(s.round(2)).size >= 3:
+            yield from self._change("stress exponent", s, EXPONENT_CHANGE)
+        if self.problem.law.uses(temperature) and np.unique((z / max(np.ptp(z), 1e-300)).round(2)).size >= 3:
+            yield from self._change("activation energy", z, ENERGY_CHANGE)
+
+    def _change(self, kind: Kind, over: Floats, prior_sd: float) -> Iterable[Explanation]:
+        """The slope of ln rate over ln stress, or over -1/(R T), changes in proportion to it or to its exponential.
+
+        The exponential of ln stress is the stress: the exponent of a law whose power law breaks down grows with it.
+        """
+        scaled = over / np.ptp(over)
+        tried = []
+        for slope, primitive in ((scaled, 0.5 * scaled * over), (np.exp(over), np.exp(over) - over)):
+            span = float(np.ptp(slope))
+            tried.append((self._evidence([primitive], [prior_sd / span]), slope - slope.mean(), span))
+            if kind != "stress exponent":
+                break
+        evidence, slope, span = max(tried, key=lambda one: one[0].log)
+        change = float(evidence.mean[0]) * span
+        if abs(change) < SMALLEST_CHANGE[kind]:
+            return
+        u, coordinates, middle = self._moved(evidence), self.problem.coordinates, self.problem.coordinates.reference
+        if kind == "stress exponent":
+            mean, values = float(local_exponent(coordinates, middle.stress)(u)), self.conditions.stresses
+        else:
+            mean, values = self._energy(u, middle.stress, middle.temperature), self.conditions.temperatures
+        first, last = int(over.argmin()), int(over.argmax())
+        ends = tuple(mean + float(evidence.mean[0] * slope[k]) for k in (first, last))
+        before = ENERGY_ODDS if kind == "activation energy" else 0.0
+        odds = evidence.log - self._as_it_is - float(np.log(len(tried))) + before
+        at = float(values[first]), float(values[last])
+        yield Explanation(kind, (), change, float(evidence.sd[0]) * span, odds, (ends[0], ends[1]), at)
+
+    # ---- single tests ------------------------------------------------------------------------------------------------
+
+    def _of_tests(self) -> Iterable[Explanation]:
+        """One test whose rate is its own; then another beside it, while that is likelier by as much again."""
+        count, base, kept = len(self.problem.histories), self._as_it_is, list[int]()
+        for _ in range(min(MOST_TESTS, (count - 1) // 3)):
+            tried = [
+                (self._evidence([self._only(j) for j in (*kept, k)], [FACTOR_SD] * (len(kept) + 1)), k)
+                for k in range(count)
+                if k not in kept
+            ]
+            evidence, test = max(tried, key=lambda one: one[0].log)
+            odds = evidence.log - base - float(np.log(len(tried)))
+            if odds < DECISIVE_ODDS or abs(evidence.mean[-1]) < SMALLEST_FACTOR:
+                return
+            kept.append(test)
+            base = evidence.log
+            yield self._one_test(test, evidence, odds)
+
+    def _one_test(self, test: int, evidence: Evidence, odds: float) -> Explanation:
+        history, u = self.problem.histories[test], self._moved(evidence)
+        size, T = float(evidence.mean[-1]), history.mean_temperature
+        errors = {
+            name: float(np.exp(np.clip(size / exponent, -50.0, 50.0)))
+            for name, exponent in self._rate_exponents(u, float(self.conditions.stresses[test]), T).items()
+        }
+        energy = USUAL_ACTIVATION_ENERGY
+        if self.problem.law.uses(temperature):
+            energy = self._energy(u, float(self.conditions.stresses[test]), T)
+        inverse = 1.0 / T - GAS_CONSTANT * size / energy if energy > 0 else 0.0
+        if inverse > 0:
+            errors["temperature"] = 1.0 / inverse - T
+        return Explanation(
+            "one test",
+            (history.name,),
+            size,
+            float(evidence.sd[-1]),
+            odds,
+            errors=errors,
+            condition=history.condition,
+            temperature=T,
+        )
+
+    def _rate_exponents(self, u: Floats, stress: float, T: float) -> dict[str, float]:
+        """{quantity: exponent of its true over its stated value in the factor on the rate that it seems to make}.
+
+        A rate k g(s) e^m t^r makes e^(1 - m) grow as k t^(1 + r): a strain stated c times too large seems to need
+        k = c^(1 - m), a time c times too short k = c^(1 + r), a load that was c times as large k = c^n.
+        """
+        coordinates, middle = self.problem.coordinates, self.problem.coordinates.reference
+        about = np.exp([-STEP, STEP])
+        in_strain = log_rate(coordinates, stress, T, middle.strain * about)(u)
+        in_time = log_rate(coordinates, stress, T, None, middle.time * about)(u)
+        strain, time = (float(pair[1] - pair[0]) / (2 * STEP) for pair in (in_strain, in_time))
+        exponents = {
+            "strain": strain - 1.0,
+            "load": float(local_exponent(coordinates, stress, T)(u)),
+            "time": 1.0 + time,
+        }
+        return {name: value for name, value in exponents.items() if np.isfinite(value) and abs(value) > 0.05}
+
+    # ---- groups ------------------------------------------------------------------------------------------------------
+
+    def _of_groups(self) -> Iterable[Explanation]:
+        """Two groups of tests, of two materials or rigs: rates that differ by a factor, or in exponent and energy."""
+        count = len(self.problem.histories)
+        stated = self._stated_groups()
+        tried = [(self._of_split(group), group, label, float(np.log(len(stated)))) for label, group in stated.items()]
+        order = np.argsort([evidence.mean[0] for evidence in self._alone])
+        starts = [np.isin(np.arange(count), order[:size]) for size in range(2, count - 1)]
+        if starts:
+            evidence, group = self._exchanged(max(starts, key=lambda one: self._of_split(one).log))
+            tried.append((evidence, group, "", (count - 1) * float(np.log(2.0))))
+        if not tried:
+            return
+        _, group, label, choice = max(tried, key=lambda one: one[0].log - one[3])
+        smaller = group if label or group.sum() <= count / 2 else ~group
+        evidence = self._of_split(smaller)
+        odds = evidence.log - self._as_it_is - choice
+        if abs(evidence.mean[0]) > SMALLEST_FACTOR:
+            names = tuple(self.problem.histories[k].name for k in np.flatnonzero(smaller))
+            yield Explanation("two groups", names, float(evidence.mean[0]), float(evidence.sd[0]), odds, label=label)
+
+    def _stated_groups(self) -> dict[str, Bools]:
+        """{what they have in common: which tests}, of groups that the tests themselves state: alloy, heat, rig."""
+        histories, groups = self.problem.histories, dict[str, Bools]()
+        for key in dict.fromkeys(["alloy", *(key for h in histories for key in h.labels)]):
+            entries = [h.alloy if key == "alloy" else h.labels.get(key, "") for h in histories]
+            for entry in dict.fromkeys(entries):
+                group = np.array([one == entry for one in entries])
+                known = any((group == other).all() or (group != other).all() for other in groups.values())
+                if entry and 2 <= group.sum() <= len(histories) - 2 and not known:
+                    groups[f"{key} {entry}"] = group
+        return groups
+
+    def _of_split(self, group: Bools) -> Evidence:
+        """The likelier of a factor between two groups alone, and of one with exponents and energies of their own."""
+        s, z, inside = self.conditions.log_stress, self.conditions.activation, group.astype(float)
+        simple = self._evidence([inside], [FACTOR_SD])
+        columns, deviations = [inside], [FACTOR_SD]
+        if np.ptp(s[group]) > 0.05 and np.ptp(s[~group]) > 0.05:
+            columns, deviations = [*columns, inside * (s - s[group].mean())], [*deviations, EXPONENT_CHANGE]
+        if self.problem.law.uses(temperature) and np.ptp(z[group]) > 0 and np.ptp(z[~group]) > 0:
+            columns, deviations = [*columns, inside * (z - z[group].mean())], [*deviations, ENERGY_CHANGE]
+        return max(simple, self._evidence(columns, deviations), key=lambda one: one.log)
+
+    def _exchanged(self, group: Bools) -> tuple[Evidence, Bools]:
+        """The group with tests moved one by one to the other side while that is likelier."""
+        best = self._of_split(group)
+        for _ in range(2 * len(group)):
+            tried = []
+            for k in range(len(group)):
+                moved = group.copy()
+                moved[k] = ~moved[k]
+                if 2 <= moved.sum() <= len(group) - 2:
+                    tried.append((self._of_split(moved), moved))
+            if not tried or max(one.log for one, _ in tried) <= best.log:
+                break
+            best, group = max(tried, key=lambda one: one[0].log)
+        return best, group
+
+    # ---- values ------------------------------------------------------------------------------------------------------
+
+    def _moved(self, evidence: Evidence) -> Floats:
+        """(parameters,) coordinates of the law, moved to where they are with the explanation."""
+        return (self.x + evidence.step)[: self.problem.parameter_count]
+
+    def _energy(self, u: Floats, stress: float, T: float) -> float:
+        up, down = (float(log_rate(self.problem.coordinates, stress, T + step)(u)) for step in (1.0, -1.0))
+        return 0.5 * (up - down) * GAS_CONSTANT * T**2
