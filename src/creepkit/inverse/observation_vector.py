@@ -313,6 +313,11 @@ class ObservationVector:
         """(tests, observations) which are the only value of their output: rupture times and minimum rates."""
         return self._mask_of(*SINGLE_VALUES)
 
+    @property
+    def followed_frames(self) -> Bools:
+        """(tests, observations) which are frames of tests that are compared up to rupture."""
+        return np.asarray(self.followed_to_rupture[:, None] & self.present & ~self.single_value_mask)
+
     def _mask_of(self, *outputs: str) -> Bools:
         return np.asarray(self.present & (self.per_observation([float(n in outputs) for n in self.outputs]) > 0))
 
