@@ -206,7 +206,7 @@ def test_fits(
     offsets, log_factors = random_effects
     observations = problem.observations
     ratios = _log_ratios(problem, residuals, np.take_along_axis(offsets, observations.output_index, axis=1))
-    logarithmic = observations.per_observation([float(is_logarithmic(name)) for name in observations.outputs]) > 0
+    logarithmic = observations.logarithmic_mask
     test_fits = []
     for k, history in enumerate(histories):
         test_ratios = ratios[k][np.isfinite(ratios[k])]
