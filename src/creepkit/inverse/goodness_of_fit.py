@@ -158,7 +158,7 @@ class TestFit:
 
     frames : how many values count (strains above twice the floor of their transform, all frames of other outputs).
     log_strain_rms, log_strain_bias : root mean square and mean of ln((predicted + offset) / measured) over its fitted
-        strains, else NaN. For a test followed to rupture, of its orthogonal residual (see inverse.orthogonal_residual).
+        strains, else NaN. For a test followed to rupture, of its orthogonal residual (see inverse.residuals).
     rate_factor : estimated factor of this test's creep rate on the law's (heat-to-heat scatter).
     weight : of the test in the fit; below one where test_loss="student" found it far from the others.
     rupture : its end, where that is known and predicted. minimum_rate : of a test without frames, where it is stated.
@@ -206,7 +206,7 @@ def test_fits(
     offsets, log_factors = random_effects
     observations = problem.observations
     ratios = _log_ratios(problem, residuals, np.take_along_axis(offsets, observations.output_index, axis=1))
-    logarithmic = observations.per_observation([float(is_logarithmic(name)) for name in observations.outputs]) > 0
+    logarithmic = observations.logarithmic_mask
     test_fits = []
     for k, history in enumerate(histories):
         test_ratios = ratios[k][np.isfinite(ratios[k])]

@@ -112,9 +112,7 @@ class Identification(Presentable, text="reports.identification_text:identificati
     @property
     def headline(self) -> str:
         """How well the law describes the tests, then whether it could be the true one, in one sentence."""
-        from creepkit.inverse.description import headline
-
-        return headline(self)
+        return cast(str, present("inverse.description:headline", self))
 
     @property
     def values(self) -> dict[str, float]:

@@ -23,6 +23,7 @@ from creepkit.inverse.bound_penalties import BoundPenalties, constraint_points
 from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.composite_predictor import (
     CompositePredictor,
+    concatenated_tests,
     predict,
     predict_to_rupture,
     predict_with_sensitivities,
@@ -35,7 +36,6 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters, check_nuisance_law
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history
-from creepkit.inverse.prediction_concatenation import concatenated_tests
 from creepkit.inverse.prediction_failures import PredictionFailures
 from creepkit.inverse.reference_conditions import ReferencePoint, median_log_inverse_duration, median_log_strain_rate
 from creepkit.inverse.residuals import (

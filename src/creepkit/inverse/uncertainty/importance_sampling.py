@@ -20,7 +20,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.composite_predictor import reduced_order_model_of, search_predictor_of
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.uncertainty.laplace_approximation import AT_BOUND
+from creepkit.inverse.uncertainty.laplace_approximation import lies_at_bound
 from creepkit.inverse.uncertainty.posterior import Posterior
 from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals, quadratic_terms
 from creepkit.records import Predictor
@@ -55,9 +55,8 @@ def needs_samples(fit: Identification) -> bool:
         param = fit.law.table[one.name]
         low, high = (param.to_internal(bound) for bound in param.bounds)
         value, start, end = (param.to_internal(v) for v in (one.value, one.low, one.high))
-        at_bound = min(value - low, high - value) <= AT_BOUND * (high - low)
         half = max(value - start, end - value)  # of the interval as it was: a bound cuts one side at most, or both
-        if at_bound or 2.0 * half >= SAMPLED_WIDTH * (high - low):
+        if lies_at_bound(param, one) or 2.0 * half >= SAMPLED_WIDTH * (high - low):
             return True
     return False
 
