@@ -17,8 +17,8 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
+from creepkit.inverse.compared_tests import compares_minimum_rate, duration_known, followed_duration, needs_durations
 from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for
-from creepkit.inverse.duration import compares_minimum_rate, duration_known, followed_duration, needs_durations
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE

@@ -14,8 +14,8 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
+from creepkit.inverse.compared_tests import compares_minimum_rate, followed_duration
 from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
-from creepkit.inverse.duration import compares_minimum_rate, followed_duration
 from creepkit.inverse.frame_noise import frame_noise, noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_series import SharedNoise
 from creepkit.inverse.output_transforms import (

@@ -21,6 +21,7 @@ from scipy.stats import f
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
+from creepkit.inverse.compared_tests import compares_minimum_rate
 from creepkit.inverse.composite_predictor import (
     predict_to_rupture,
     predict_with_sensitivities,
@@ -28,7 +29,6 @@ from creepkit.inverse.composite_predictor import (
     predicts_rupture,
 )
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.duration import compares_minimum_rate
 from creepkit.inverse.minimum_rates import measured_minimum_rate, with_minimum_rates
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
