@@ -80,7 +80,7 @@ class Adequacy:
     smallest_p_value : of all outputs together and of each, before it is multiplied by their number.
     not_judged : the outputs, where nothing can be judged, and few_frames : the tests, each with how
         many frames it has, where these are too few to show the noise.
-    unpredicted : tests of which nothing is predicted, of which no law is judged that does not contradict the others.
+    unpredicted : tests of which nothing, or not every reading, is predicted: a law is never judged to explain them.
     contradicting : minimum rates and rupture times that contradict one another by the law, beyond their own scatter.
     """
 
@@ -122,8 +122,9 @@ class Adequacy:
         return replace(self, verdict="leaves a discrepancy", explanations=explanations) if explanations else self
 
     def with_unpredicted(self, tests: tuple[str, ...]) -> Adequacy:
-        """The same; not judged to explain tests of which it predicts nothing."""
-        return replace(self, verdict="cannot be judged", unpredicted=tests) if tests and self.explains else self
+        """The same; not judged to explain tests that it does not predict."""
+        verdict = "cannot be judged" if tests and self.explains else self.verdict
+        return replace(self, verdict=verdict, unpredicted=tests)
 
     @property
     def lies_in_tests(self) -> bool:
@@ -222,9 +223,9 @@ class Adequacy:
 
     def __str__(self) -> str:
         """One sentence, to follow "the law": the verdict, with what is left and where."""
-        if self.unpredicted:
+        if self.unpredicted and self.verdict == "cannot be judged":
             more = f" and {len(self.unpredicted) - 1} more" if len(self.unpredicted) > 1 else ""
-            return f"cannot be judged: nothing is predicted of test '{self.unpredicted[0]}'{more}"
+            return f"cannot be judged: it does not predict every reading of test '{self.unpredicted[0]}'{more}"
         if self.verdict == "cannot be judged":
             return f"cannot be judged: {how_to_state_noise(self.not_judged, self.few_frames)}"
         source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
